@@ -2,7 +2,7 @@
 
 Messages and their fields are those of ArduPilot's LogStructure.h files, from Copter 3.2 on: which there are, their
 units and their time stamps differ from version to version. Frames are PX4's already: NED, and FRD with a specific
-force of -9.81 m/s^2 on z at rest. Whole numbers in CTUN are cm/s and thousandths of the throttle, decimal ones are not.
+force of -9.81 m/s^2 on z at rest.
 """
 
 import contextlib
@@ -35,10 +35,16 @@ _NAMES = [
     *("MSG", "PARM", "IMU", "ATT", "CTUN", "VIBE", "GPS", "MODE", "EV", "ERR", "RCIN", "PSCN", "PSCE", "PSCD"),
     *(f"{estimator}{number}" for estimator in ("XKF", "NKF", "EKF") for number in (1, 4)),
 ]
-_SCALES = {"ThrOut": 1e-3, "ThO": 1e-3, "DCRt": 1e-2}
+# CTUN's climb rates are in cm/s where they are whole numbers.
+_CLIMB_RATES = ("DCRt", "CRt")
 # What a missing message costs, in the words of docs/how-to/recorded-flights.md.
 _COSTS = {
-    ("XKF1", "NKF1", "EKF1"): "height and velocity are not known: no v_c, and landings are told by the land detector",
+    (
+        "XKF1",
+        "NKF1",
+        "EKF1",
+        "CTUN",
+    ): "height and velocity are not known: no v_c, and landings are told by the land detector",
     ("ATT", "XKF1", "NKF1", "EKF1"): "the direction of a hit in the world is not known",
     ("CTUN",): "thrust is not known: hits along body z are judged by the force's own change alone",
     ("EV",): "neither arming nor landing is known: the whole log is taken for a flight",
@@ -98,8 +104,15 @@ _TROUBLES = [
     *("terrain failsafe", "EKF primary", "thrust loss", "sensor failsafe", "leak", "pilot input"),
     *("vibration failsafe", "internal error", "dead reckoning failsafe"),
 ]
-# AHRS_EKF_TYPE to the first letters of that estimator's messages. EKF is the one of 2014.
-_ESTIMATORS = {2: "NKF", 3: "XKF"}
+# Two estimates of one climb rate that both work are nearer than this for more than half of the time: each is good to
+# 0.1 to 0.2 m/s by its barometer.
+_SAME_CLIMB_M_S = 0.3
+# GPS.Status
+_FIX_3D = 3
+# On the mean sphere, 6371 km.
+_METRES_PER_DEGREE = math.radians(6_371_000.0)
+# AHRS_EKF_TYPE to that estimator's message; EKF1 is of the one before them.
+_ESTIMATORS = {2: "NKF1", 3: "XKF1"}
 # MAV_STATE
 _STANDBY, _ACTIVE = 3, 4
 # The estimator's own word, SS (nav_filter_status): horizontal and vertical velocity are good.
@@ -138,8 +151,7 @@ def read_dataflash(path: Path) -> Log:
     imu = topics["IMU"]
     if not imu:
         raise LogError(f"{path}: no IMU in it; ArduPilot logs it by default (LOG_BITMASK).")
-    estimator = _estimator(topics, parameters)
-    estimate = _of_primary(topics[f"{estimator}1"], topics[f"{estimator}4"])
+    estimator, estimate = _estimate(topics, parameters)
     heard = [
         *_imu_samples(imu),
         *_local_position(estimate),
@@ -213,7 +225,7 @@ def _number(name: str, field: str, value: object) -> float:
         return int(value) if value.isdigit() else _MODE_NUMBERS.get(value.upper().replace("_", ""), math.nan)
     if not isinstance(value, int | float):
         return math.nan
-    return value * _SCALES.get(field, 1.0) if isinstance(value, int) else value
+    return value / 100 if field in _CLIMB_RATES and isinstance(value, int) else value
 
 
 def _topic(fields: Sequence[str], values: Sequence[float], started_us: float) -> Topic:
@@ -232,11 +244,29 @@ def _vehicle(path: Path, texts: Sequence[str], parameters: _Parameters) -> str:
     return f"{told[0]}, {multicopter(path, kind).vehicle_type}"
 
 
-def _estimator(topics: _Topics, parameters: _Parameters) -> str:
-    """The one that flies, by the first letters of its messages."""
+def _estimate(topics: _Topics, parameters: _Parameters) -> tuple[str, Topic]:
+    """Position and velocity by which the vehicle flies, and where they are from."""
     flies = _ESTIMATORS.get(int(parameters.get("AHRS_EKF_TYPE", 0)))
-    order = [name for name in (flies, "XKF", "NKF", "EKF") if name is not None]
-    return next((name for name in order if topics[f"{name}1"]), order[0])
+    for name in (flies, "XKF1", "NKF1"):
+        if name is not None and topics[name]:
+            return name, _of_primary(topics[name], topics[_status_of(name)])
+    if topics["EKF1"] and _is_flown_by(topics["EKF1"], topics["CTUN"]):
+        return "EKF1", topics["EKF1"]
+    return "CTUN", _inertial_navigation(topics["CTUN"], topics["GPS"])
+
+
+def _status_of(name: str) -> str:
+    """XKF4 of XKF1; CTUN has none beside it."""
+    return name.replace("1", "4")
+
+
+def _is_flown_by(estimate: Topic, throttle: Topic) -> bool:
+    """Until 3.2 the EKF ran without being used: not started, it gave zeros, and gone astray, hundreds of m/s."""
+    down, up = estimate.column("VD"), throttle.column("CRt")
+    if down is None or up is None:
+        return down is not None
+    apart_m_s = np.abs(down + throttle.held(up, estimate.time_us)[0])
+    return bool(down.any()) and float(np.median(apart_m_s)) < _SAME_CLIMB_M_S
 
 
 def _of_primary(topic: Topic, status: Topic) -> Topic:
@@ -245,6 +275,25 @@ def _of_primary(topic: Topic, status: Topic) -> Topic:
     if core is None:
         return topic
     return topic.only(core == (0.0 if primary is None else status.held(primary, topic.time_us)[0]))
+
+
+def _inertial_navigation(throttle: Topic, gps: Topic) -> Topic:
+    """Before there was an EKF: height and climb rate as flown by, the rest by GPS; at rest until it has a fix."""
+    up, fixes = throttle.vector("Alt", "CRt"), gps.vector("Lat", "Lng", "Spd", "GCrs", "Status")
+    if up is None:
+        return Topic({"timestamp": np.empty(0)})
+    flat = np.zeros((len(throttle), 4))
+    if fixes is not None and (fixes[:, 4] >= _FIX_3D).any():
+        fixed = gps.only(fixes[:, 4] >= _FIX_3D)
+        latitude_deg, longitude_deg, speed, course_deg, _ = fixes[fixes[:, 4] >= _FIX_3D].T
+        north, east = latitude_deg - latitude_deg[0], longitude_deg - longitude_deg[0]
+        course_rad, shrinking = np.radians(course_deg), math.cos(math.radians(latitude_deg[0]))
+        place = _METRES_PER_DEGREE * north, _METRES_PER_DEGREE * shrinking * east
+        known = np.column_stack([*place, speed * np.cos(course_rad), speed * np.sin(course_rad)])
+        held, is_known = fixed.held(known, throttle.time_us)
+        flat[is_known] = held[is_known]
+    fields = dict(zip(("PN", "PE", "VN", "VE", "PD", "VD"), (*flat.T, *-up.T), strict=True))
+    return Topic({"timestamp": throttle.time_us, **fields})
 
 
 def _losses(topics: _Topics, estimator: str, estimate: Topic, window_us: float | None) -> Iterator[str]:
@@ -259,15 +308,14 @@ def _losses(topics: _Topics, estimator: str, estimate: Topic, window_us: float |
         )
     if not estimate:
         return
-    yield f"resets of {estimator}1 are not counted in these logs: one of them can look like a hit"
-    yield from slow_velocity(f"{estimator}1", estimate.rate_hz())
-    flags = topics[f"{estimator}4"].column("SS")
+    yield from slow_velocity(estimator, estimate.rate_hz())
+    flags, fixes = topics[_status_of(estimator)].column("SS"), topics["GPS"].column("Status")
     if flags is not None:
         for what, bit in _GOOD.items():
             if share := 100 * float(np.mean(flags.astype(np.int64) & bit == 0)):
                 yield f"the {what} is invalid by the estimator's own word for {share:.0f} % of the log: so is v_c"
-    elif not topics["GPS"]:
-        yield "no GPS: the horizontal velocity is a guess, and so is v_c"
+    elif fixes is None or (fixes < _FIX_3D).any():
+        yield "no GPS fix, at least for a time: nothing tells the horizontal velocity, and v_c lacks it"
 
 
 def _imu_samples(imu: Topic) -> Iterator[LoggedSample]:
@@ -303,7 +351,7 @@ def _quaternions(angles_deg: Floats | None) -> Floats | None:
 
 def _attitude_targets(throttle: Topic, attitude: Topic) -> Iterator[LoggedSample]:
     """With the throttle as it was last told: the attitude is logged oftener."""
-    thrust, asked = throttle.column("ThO", "ThrOut"), _quaternions(attitude.vector("DesRoll", "DesPitch", "DesYaw"))
+    thrust, asked = _thrust(throttle), _quaternions(attitude.vector("DesRoll", "DesPitch", "DesYaw"))
     if thrust is None:
         return
     if asked is None:
@@ -314,6 +362,12 @@ def _attitude_targets(throttle: Topic, attitude: Topic) -> Iterator[LoggedSample
     held[~is_known] = math.nan
     for _, time_us, (fraction, w, x, y, z) in attitude.rows(np.column_stack([held, asked])):
         yield LoggedSample(time_us, messages.AttitudeTarget(time_us, fraction, (w, x, y, z)))
+
+
+def _thrust(throttle: Topic) -> Floats | None:
+    """In thousandths until 3.4."""
+    thousandths = throttle.column("ThrOut")
+    return throttle.column("ThO") if thousandths is None else thousandths / 1000.0
 
 
 def _vibration(topic: Topic) -> Iterator[LoggedSample]:
@@ -335,8 +389,8 @@ def _heartbeats(events: Topic, modes: Topic) -> Iterator[LoggedSample]:
     armed, mode = not arming or arming[0][1] == _DISARMED, 0
     numbers = modes.column("ModeNum", "Mode")
     flown = modes.rows(None if numbers is None else numbers[:, None])
-    news: list[tuple[int, int | None, int]] = [(time_us, event, 0) for time_us, event in arming]
-    news += [(time_us, None, int(number)) for _, time_us, (number,) in flown]
+    news: list[tuple[int, int | None, int]] = [(time_us, None, int(number)) for _, time_us, (number,) in flown]
+    news += [(time_us, event, 0) for time_us, event in arming]
     for time_us, event, number in sorted(news, key=lambda item: item[0]):
         if event is None:
             mode = _MODES.get(number, ("", 0))[1]
@@ -373,10 +427,12 @@ def _sticks(topic: Topic, parameters: _Parameters) -> Iterator[LoggedSample]:
         pulses = topic.column(f"C{channel}")
         if pulses is None:
             return
-        low, middle, high = (parameters.get(f"RC{channel}_{end}", value) for end, value in _ENDS)
+        # While they had the older name, RC1 to RC4 were of roll, pitch, throttle and yaw, whatever their channels.
+        number = channel if "RC1_REVERSED" in parameters else usual
+        low, middle, high = (parameters.get(f"RC{number}_{end}", value) for end, value in _ENDS)
         if stick == "THROTTLE" or not low < middle < high:
             middle = (low + high) / 2.0
-        is_reversed = parameters.get(f"RC{channel}_REV", 1.0) < 0 or parameters.get(f"RC{channel}_REVERSED", 0.0) > 0
+        is_reversed = parameters.get(f"RC{number}_REV", 1.0) < 0 or parameters.get(f"RC{number}_REVERSED", 0.0) > 0
         sign = -1.0 if is_reversed != (stick == "PITCH") else 1.0
         columns.append(sign * np.interp(pulses, (low, middle, high), (-1.0, 0.0, 1.0)))
     for _, time_us, (pitch, roll, throttle, yaw) in topic.rows(np.column_stack(columns)):
