@@ -41,7 +41,6 @@ class GuardContext(FlightContext):
     # When, and to where; None for a lean alone.
     sent_ned_m: deque[tuple[int, Vector3 | None]] = field(default_factory=lambda: deque(maxlen=64))
 
-
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""
         FlightContext.note_touchdown(self)

@@ -14,8 +14,10 @@ from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, O
 from companion.motion.config import KEPT_US
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
 from companion.reflex.detector import Detector, DetectorState, Phase, Situation
+from companion.reflex.force_signs import FusedState
 from companion.reflex.fused import FusedDetector
 from companion.reflex.impact import ImpactEstimate, ImpactEstimator
+from companion.reflex.promise import Promise, promise_of
 from companion.reflex.stream_health import SampleGate, StreamHealth
 from companion.strict_model import StrictModel
 
@@ -74,6 +76,8 @@ class CollisionMonitor:
     imu_fault: str | None = None  # what was wrong with the newest IMU message
     is_introduced: bool = False  # threshold and losses have been reported
     invalidity_reported: bool = False
+    promise: Promise | None = None  # while it was last armed
+    promised_us: int = 0
     heard: set[MessageId] = field(default_factory=set)
 
     @property
@@ -88,7 +92,11 @@ class CollisionMonitor:
 
     def describe(self) -> str:
         """For the live line."""
-        return self.state.describe() if self.no_data_reason is None else f"blind ({self.no_data_reason})"
+        if self.no_data_reason is not None:
+            return f"blind ({self.no_data_reason})"
+        if self.promise is not None and self.state.phase is Phase.ARMED:
+            return f"{self.state.phase.value} at {self.promise.text()}"
+        return self.state.describe()
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +156,16 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             if final is not None:
                 finished.append(final)
     monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
+    _promise(monitor, now_us)
     return MonitorResult(impacts, finished, _notices(monitor, is_on, now_us))
+
+
+def _promise(monitor: CollisionMonitor, now_us: int) -> None:
+    """Once a second, of an armed detector whose noise is known."""
+    state = monitor.state
+    if isinstance(state, FusedState) and state.phase is Phase.ARMED and now_us - monitor.promised_us >= 1e6:
+        fixes, imu_hz = monitor.estimator.strapdown.fixes, len(monitor.stream_health.arrivals_us)
+        monitor.promise, monitor.promised_us = promise_of(state, monitor.config.fused, fixes, imu_hz), now_us
 
 
 def _vibration(monitor: CollisionMonitor) -> str | None:
@@ -183,7 +200,8 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
     if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
         monitor.is_introduced = True
         threshold_m_s2 = monitor.state.threshold_m_s2
-        text = f"detector '{monitor.detector.name}' armed: a hit is {threshold_m_s2:.1f} m/s^2 or more"
+        means = f"{threshold_m_s2:.1f} m/s^2" if monitor.promise is None else monitor.promise.text()
+        text = f"detector '{monitor.detector.name}' armed: from {means}"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
         losses = monitor.detector.losses.items()
         notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]

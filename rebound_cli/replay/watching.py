@@ -122,6 +122,7 @@ class Findings:
     happenings: list[Happening] = field(default_factory=list)
     flown_us: int = 0  # armed and in the air
     watched_us: int = 0  # of that, with a detector that was on and saw
+    promised: float = 0.0  # false alarms in that time, by the detector's own statistic
     _open: dict[str, tuple[int, str]] = field(default_factory=dict)
     _noted_us: int | None = None
 
@@ -159,7 +160,9 @@ class Findings:
         self._noted_us = at_us
         if situation.armed and situation.landed_state is not messages.LandedState.ON_GROUND:
             self.flown_us += elapsed_us
-            self.watched_us += elapsed_us if off is None and monitor.no_data_reason is None else 0
+            if off is None and monitor.no_data_reason is None:
+                self.watched_us += elapsed_us
+                self.promised += elapsed_us / 3.6e9 * (monitor.promise.false_alarms_per_h if monitor.promise else 0.0)
 
     def _note_span(self, name: str, reason: str | None, at_us: int) -> None:
         """A span lasts as long as there is a reason and goes by its first: a blind detector's changes its figures."""
@@ -192,7 +195,7 @@ def watch_log(
     circumstances, findings = Circumstances(config, modes), Findings()
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
-    monitor = start_monitor(config, start_us)
+    monitor = start_monitor(_sampled_as(log, config), start_us)
     if listen is not None:
         listen(monitor)
 
@@ -219,6 +222,14 @@ def watch_log(
         last_us = at_us
     findings.close(last_us)
     return findings
+
+
+def _sampled_as(log: Log, config: CompanionConfig) -> CompanionConfig:
+    """With the time that a sample of this log's source looks back over."""
+    if log.low_pass_hz is None or log.window_us is None:
+        return config
+    estimate = config.estimate.model_copy(update={"imu_averaging_interval_s": log.window_us * 1e-6})
+    return config.model_copy(update={"estimate": estimate})
 
 
 def thinned(heard: tuple[LoggedSample, ...], rate_hz: float) -> Iterator[LoggedSample]:

@@ -77,6 +77,9 @@ def test_height_counts_from_the_place_of_arming():
     assert situation_after(beat(True), position(0, 0.2), position(1, 2.2)).height_m == pytest.approx(2.2)
 
 
+DOWN = Demand(0, (0.0, 0.0, 0.0), None, 2.0)
+
+
 def test_one_old_setpoint_does_not_make_a_crash_a_landing():
     # Given a log that begins with the setpoint of a flight 44 s before, and a vehicle that strikes something 0.5 m up
     log = flight(push_m_s2=60.0)
