@@ -1,6 +1,6 @@
 """ArduPilot's DataFlash logs (.bin, .log) as the samples that PX4's link would have carried; pymavlink reads the file.
 
-Messages and their fields are those of ArduPilot's LogStructure.h files, from Copter 3.2 on: which there are, their
+Messages and their fields are those of ArduPilot's LogStructure.h files, from Copter 3.1 on: which there are, their
 units and their time stamps differ from version to version. Frames are PX4's already: NED, and FRD with a specific
 force of -9.81 m/s^2 on z at rest.
 """
@@ -149,8 +149,8 @@ def read_dataflash(path: Path) -> Log:
         raise LogError(f"{path}: not a readable ArduPilot log: {error or type(error).__name__}.") from error
     vehicle = _vehicle(path, texts, parameters)
     imu = topics["IMU"]
-    if not imu:
-        raise LogError(f"{path}: no IMU in it; ArduPilot logs it by default (LOG_BITMASK).")
+    if not imu.rate_hz():
+        raise LogError(f"{path}: no IMU samples with times in it; Copter logs them by default since 3.1 (LOG_BITMASK).")
     estimator, estimate = _estimate(topics, parameters)
     heard = [
         *_imu_samples(imu),

@@ -254,7 +254,7 @@ def test_the_vehicle_is_named(tmp_path):
         ([COPTER, ("PARM", 0, "FRAME_CLASS", 6.0, 0.0), *IMU], "helicopter"),
         ([COPTER, ("MSG", 0, "Frame: HELI"), *IMU], "helicopter"),
         (IMU, "does not say what vehicle"),
-        ([COPTER], "no IMU in it"),
+        ([COPTER], "no IMU samples"),
         ([COPTER, IMU[0]], "no IMU samples"),
     ],
 )
@@ -262,6 +262,13 @@ def test_a_log_that_cannot_be_used_is_refused_in_a_sentence(tmp_path, rows, word
     with pytest.raises(LogError, match=words) as refused:
         read(tmp_path, rows)
     assert "\n" not in str(refused.value)
+
+
+def test_samples_without_times_are_refused(tmp_path):
+    # Given Copter 3.0, whose samples have no stamps
+    formats = OLD | {"IMU": ("ffffff", "GyrX,GyrY,GyrZ,AccX,AccY,AccZ")}
+    with pytest.raises(LogError, match="no IMU samples with times"):
+        read(tmp_path, [OLD_COPTER, *[("IMU", 0, 0, 0, 0, 0, -9.81)] * 5], formats)
 
 
 @pytest.mark.parametrize("name", ["flight.bin", "flight.log"])
