@@ -163,13 +163,14 @@ def read_dataflash(path: Path) -> Log:
         *_sticks(topics["RCIN"], parameters),
         *_demand(topics["PSCD"] or topics["CTUN"]),
     ]
+    low_pass_hz = parameters.get("INS_ACCEL_FILTER", parameters.get("INS_MPU6K_FILTER", 0.0))
     log = Log(
         path=path,
         vehicle=vehicle,
         started_at_us=int(imu.time_us[0]),
         heard=in_order(heard, float(np.median(imu.time_us))),
         losses=(),
-        low_pass_hz=parameters.get("INS_ACCEL_FILTER", parameters.get("INS_MPU6K_FILTER", 0.0)) or _LOW_PASS_HZ,
+        low_pass_hz=low_pass_hz if low_pass_hz >= 1.0 else _LOW_PASS_HZ,
         marks=tuple(_marks(topics["ERR"])),
     )
     return replace(log, losses=tuple(_losses(topics, estimator, estimate, log.window_us)))
@@ -201,7 +202,8 @@ def _content(path: Path) -> tuple[_Topics, Sequence[str], _Parameters]:
             if name == "MSG":
                 texts.append(str(row.get("Message", "")))
             elif name == "PARM":
-                parameters[str(row.get("Name"))] = float(row.get("Value", math.nan))
+                if math.isfinite(value := row.get("Value", math.nan)):
+                    parameters[str(row.get("Name"))] = float(value)
             elif row.get("I", 0) == 0:  # the first instance of each sensor
                 fields, values = columns.setdefault(name, (("timestamp", *row), array("d")))
                 if fields[1:] == tuple(row):

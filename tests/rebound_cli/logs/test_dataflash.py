@@ -71,8 +71,9 @@ def test_a_sample_holds_what_its_low_pass_filter_has_not_forgotten(tmp_path):
     assert log.averaging_us is None
 
 
-def test_what_no_parameter_tells_is_the_default_filter(tmp_path):
-    rows = [OLD_COPTER, ("PARM", "INS_MPU6K_FILTER", 0.0), *OLD_IMU]
+@pytest.mark.parametrize("told", [0.0, -5.0, math.nan])
+def test_what_no_parameter_tells_is_the_default_filter(tmp_path, told):
+    rows = [OLD_COPTER, *[("PARM", name, told) for name in ("INS_MPU6K_FILTER", "FRAME_CLASS", "RCMAP_YAW")], *OLD_IMU]
     assert read(tmp_path, rows, OLD).low_pass_hz == 20.0
 
 
