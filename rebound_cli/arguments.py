@@ -361,14 +361,8 @@ def add_replay(commands: Commands) -> None:
 def add_tune(commands: Commands) -> None:
     text = "Noise floor, margins, the smallest hit that would be seen, settings; see docs/how-to/recorded-flights.md."
     tune = _command(commands, "tune", "tune.command:run_tune", "settings for a vehicle from its healthy flights", text)
-    _option(
-        tune,
-        "logs",
-        "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders",
-        "LOG",
-        type=Path,
-        nargs="+",
-    )
+    text = "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders"
+    _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
     _option(tune, "--airframe", "whose arms hit the wall (default: both foldable and rigid)", "NAME|FILE")
     _option(tune, "--companion", "settings to begin with (default: the defaults)", "FILE")

@@ -1,6 +1,6 @@
 """ArduPilot's DataFlash logs (.bin, .log) as the samples that PX4's link would have carried; pymavlink reads the file.
 
-Messages and their fields are those of ArduPilot's LogStructure.h files, from Copter 3.2 on: which there are, their
+Messages and their fields are those of ArduPilot's LogStructure.h files, from Copter 3.1 on: which there are, their
 units and their time stamps differ from version to version. Frames are PX4's already: NED, and FRD with a specific
 force of -9.81 m/s^2 on z at rest.
 """
@@ -151,8 +151,8 @@ def read_dataflash(path: Path) -> Log:
         raise LogError(f"{path}: not a readable ArduPilot log: {error or type(error).__name__}.") from error
     vehicle = _vehicle(path, texts, parameters)
     imu = topics["IMU"]
-    if not imu:
-        raise LogError(f"{path}: no IMU in it; ArduPilot logs it by default (LOG_BITMASK).")
+    if not imu.rate_hz():
+        raise LogError(f"{path}: no IMU samples with times in it; Copter logs them by default since 3.1 (LOG_BITMASK).")
     estimator, estimate = _estimate(topics, parameters)
     estimate = _while_good(estimate, topics["ERR"])
     heard = [
@@ -166,13 +166,14 @@ def read_dataflash(path: Path) -> Log:
         *(_sticks(topics["RCIN"], parameters) if topics["RCIN"] else _throttle_stick(topics["CTUN"])),
         *_demand(topics["PSCD"] or topics["CTUN"]),
     ]
+    low_pass_hz = parameters.get("INS_ACCEL_FILTER", parameters.get("INS_MPU6K_FILTER", 0.0))
     log = Log(
         path=path,
         vehicle=vehicle,
         started_at_us=int(imu.time_us[0]),
         heard=in_order(heard, float(np.median(imu.time_us))),
         losses=(),
-        low_pass_hz=parameters.get("INS_ACCEL_FILTER", parameters.get("INS_MPU6K_FILTER", 0.0)) or _LOW_PASS_HZ,
+        low_pass_hz=low_pass_hz if low_pass_hz >= 1.0 else _LOW_PASS_HZ,
         marks=tuple(_marks(topics["ERR"])),
     )
     return replace(log, losses=tuple(_losses(topics, estimator, estimate, log.window_us)))
@@ -204,7 +205,8 @@ def _content(path: Path) -> tuple[_Topics, Sequence[str], _Parameters]:
             if name == "MSG":
                 texts.append(str(row.get("Message", "")))
             elif name == "PARM":
-                parameters[str(row.get("Name"))] = float(row.get("Value", math.nan))
+                if math.isfinite(value := row.get("Value", math.nan)):
+                    parameters[str(row.get("Name"))] = float(value)
             elif row.get("I", 0) == 0:  # the first instance of each sensor
                 fields, values = columns.setdefault(name, (("timestamp", *row), array("d")))
                 if fields[1:] == tuple(row):

@@ -13,7 +13,8 @@ class Topic:
     """One instance of a topic. Fields that this version has not are None."""
 
     def __init__(self, data: Mapping[str, npt.NDArray[Any]]) -> None:
-        stamps = data["timestamp"].astype(np.int64)
+        with np.errstate(invalid="ignore"):  # damage can make a stamp of any size
+            stamps = data["timestamp"].astype(np.int64)
         order = np.argsort(stamps, kind="stable")
         self.time_us: npt.NDArray[np.int64] = stamps[order]
         self._fields = {name: values[order] for name, values in data.items()}
