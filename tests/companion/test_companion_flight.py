@@ -366,7 +366,7 @@ def test_the_detector_says_armed_in_flight():
     f = flight()
     f.run_to("mission")
     f.run_for(0.5)
-    assert f.companion.status().detector == "armed at 1.8 m/s^2"
+    assert f.companion.status().detector.startswith("armed at 1.8 m/s^2 or 0.2")
     assert f.event("detector").data["threshold_m_s2"] == 1.75
 
 
