@@ -1,1 +1,0 @@
-"""What the hits through the whole wire show: build/hits.md."""
