@@ -194,7 +194,7 @@ class SimulatedVehicle:
                 for other in links:
                     if other is not link:
                         other.forward(foreign)
-        if self._autopilot.ground.wants_reboot and self._reboot_at_us is None:
+        if self._autopilot.wants_reboot and self._reboot_at_us is None:
             self._reboot_at_us = self.time_boot_us + REBOOT_AFTER_US
 
     def _is_rebooting(self, reboot_at_us: int) -> bool:

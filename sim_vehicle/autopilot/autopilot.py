@@ -7,7 +7,6 @@ from sim_vehicle.autopilot.commander.commander import Commander, SystemStatus
 from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, ManualFlight
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
-from sim_vehicle.autopilot.ground_commands import Ground
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import (
     AttitudeTarget,
@@ -71,7 +70,8 @@ class Autopilot:
         self.commander = Commander(parameters, self.navigator, self.detector)
         self.modes, self.arming = self.commander.modes, self.commander.arming
         self.signal, self.battery = self.commander.signal, self.commander.battery
-        self.ground = Ground(parameters, self.origin, self.commander, self.navigator)
+        self.wants_reboot = False
+        """To be done by whoever switches the software on and off, once the answer is out."""
         self._offboard = OffboardControl(self.signal, self.origin)
         self.applied: Setpoint | None = None
         self.texts: list[StatusText] = []
@@ -127,7 +127,7 @@ class Autopilot:
         self._takeoff.state = TakeoffState.FLIGHT
         home = self.home_ned_m, self.home_yaw_rad
         self._look()
-        self.arm()
+        self.commander.arm()
         self.navigator.set_home(*home)
         self.commander.texts.clear()
         self.navigator.hold_at(goal)
@@ -163,23 +163,6 @@ class Autopilot:
         if result is Result.ACCEPTED and says_so is not None:
             self.say(Severity.INFO, says_so)
         return result
-
-    def refuse_mode(self, why: str) -> Result:
-        """Turn down a mode that does not exist."""
-        self.say(Severity.CRITICAL, why)
-        return Result.TEMPORARILY_REJECTED
-
-    def complain(self, why: str) -> None:
-        """Say what is wrong with a command."""
-        self.say(Severity.CRITICAL, why)
-
-    def arm(self) -> Result:
-        """Arm as a command asks."""
-        return self.commander.arm()
-
-    def disarm(self, forced: bool) -> Result:
-        """Disarm as a command asks."""
-        return self.commander.disarm(forced)
 
     def say(self, severity: Severity, text: str) -> None:
         """Tell the ground stations."""

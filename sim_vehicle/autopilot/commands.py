@@ -7,12 +7,15 @@ MavlinkReceiver::handle_message_command_both and Commander::handle_command of PX
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from sim_vehicle.autopilot import flight_commands, ground_commands
-from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result
+from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result, Severity
 from sim_vehicle.autopilot.mode_numbers import AUTO_MAIN_MODE, CUSTOM_FLAG, mode_from_request
 from sim_vehicle.autopilot.modes import Mode
+
+if TYPE_CHECKING:
+    from sim_vehicle.autopilot.autopilot import Autopilot
 
 NAV_RETURN_TO_LAUNCH = 20
 NAV_LAND = 21
@@ -52,25 +55,6 @@ class StreamControl(Protocol):
 
     def send_now(self, message_id: int, index: int = 0) -> bool:
         """Send one message at once; False for an unknown one and for one that has nothing new."""
-
-
-class CommandedFlight(Protocol):
-    """What commands may do to the flight."""
-
-    def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
-        """Change the mode; ``says_so`` is the text for a change that was accepted."""
-
-    def refuse_mode(self, why: str) -> Result:
-        """Turn down a mode that this vehicle does not know."""
-
-    def complain(self, why: str) -> None:
-        """Say what is wrong with a command."""
-
-    def arm(self) -> Result:
-        """Arm."""
-
-    def disarm(self, forced: bool) -> Result:
-        """Disarm."""
 
 
 def is_for_us(command: Command, us: Identity) -> bool:
@@ -113,7 +97,7 @@ def answer(command: Command, result: Result) -> CommandAck:
     return CommandAck(command.command, result, command.source_system, command.source_component)
 
 
-def execute(command: Command, flight: CommandedFlight) -> Result | None:
+def execute(command: Command, flight: "Autopilot") -> Result | None:
     """The commander's part: does it and returns its answer; None leaves the command unanswered."""
     handler = _HANDLERS.get(command.command)
     return Result.UNSUPPORTED if handler is None else handler(command, flight)
@@ -141,32 +125,33 @@ def _sent(was_sent: bool) -> Result:
     return Result.ACCEPTED if was_sent else Result.DENIED
 
 
-def _set_mode(command: Command, flight: CommandedFlight) -> Result:
+def _set_mode(command: Command, flight: "Autopilot") -> Result:
     base, main, sub = _byte(command.param1), _byte(command.param2), _byte(command.param3)
     mode = mode_from_request(base, main, sub)
     if mode is not None:
         return flight.request_mode(mode)
     kind = "base" if not base & CUSTOM_FLAG else "auto" if main == AUTO_MAIN_MODE else "main"
-    return flight.refuse_mode(f"Unsupported {kind} mode")
+    flight.say(Severity.CRITICAL, f"Unsupported {kind} mode")
+    return Result.TEMPORARILY_REJECTED
 
 
-def _arm_disarm(command: Command, flight: CommandedFlight) -> Result | None:
+def _arm_disarm(command: Command, flight: "Autopilot") -> Result | None:
     action, forced = _whole(command.param1), _whole(command.param2) == FORCE
     if action not in (0, 1):
-        flight.complain(f"Unsupported ARM_DISARM param: {command.param1:.3f}")
+        flight.say(Severity.CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:.3f}")
         return None
-    return flight.arm() if action == 1 else flight.disarm(forced)
+    return flight.commander.arm() if action == 1 else flight.commander.disarm(forced)
 
 
-def _land(command: Command, flight: CommandedFlight) -> Result:
+def _land(command: Command, flight: "Autopilot") -> Result:
     return flight.request_mode(Mode.LAND, says_so="Landing at current position")
 
 
-def _return(command: Command, flight: CommandedFlight) -> Result:
+def _return(command: Command, flight: "Autopilot") -> Result:
     return flight.request_mode(Mode.RETURN, says_so="Returning to launch")
 
 
-_HANDLERS: dict[int, Callable[[Command, Any], Result | None]] = {
+_HANDLERS: dict[int, Callable[[Command, "Autopilot"], Result | None]] = {
     **flight_commands.HANDLERS,
     DO_SET_MODE: _set_mode,
     COMPONENT_ARM_DISARM: _arm_disarm,
