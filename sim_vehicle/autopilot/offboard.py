@@ -118,8 +118,6 @@ def local_target(target: GlobalTarget, origin: Origin, home_ned_m: Vector3) -> P
     if position == FREE and target.velocity_m_s == FREE and target.acceleration_m_s2 == FREE:
         return None
     return PositionTarget(
-        target_system=0,
-        target_component=0,
         frame=FRAME_LOCAL_NED,
         position_m=position,
         velocity_m_s=target.velocity_m_s,

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
+from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText
 from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.mavlink import framing
@@ -213,16 +213,6 @@ def message_interval(message_id: int, interval_us: int) -> Message:
 
 def command_ack(ack: CommandAck) -> Message:
     return dialect.MAVLink_command_ack_message(ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
-
-
-def ping_answer(request: PingRequest) -> Message:
-    return dialect.MAVLink_ping_message(
-        request.time_us, request.number, request.source_system, request.source_component
-    )
-
-
-def timesync_reply(request: TimeSyncRequest, heard_at_us: int) -> Message:
-    return dialect.MAVLink_timesync_message(heard_at_us * 1000, request.peer_time_ns)
 
 
 def status_texts(text: StatusText, number: int) -> Iterator[Message]:

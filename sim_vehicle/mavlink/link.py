@@ -3,7 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, PeerHeartbeat, PingRequest, SigningSetup, StatusText
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
@@ -15,11 +17,10 @@ from sim_vehicle.mavlink.services.mission_service import MissionService
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
 from sim_vehicle.mavlink.services.service import BusyService, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
-from sim_vehicle.mavlink.services.timesync_service import TimeSyncService
-from sim_vehicle.mavlink.signing import is_optional
+from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, is_optional
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
-from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
+from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.parameters.store import Parameters
 
 # Of a serial line's buffer, for the streams between the packets of a long answer.
@@ -31,7 +32,6 @@ _BEGINS_WITH_MAVLINK_1 = 1
 # What every link offers, a line a protocol, in the order in which they are brought up to date in an interval.
 SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
     CommandService,
-    TimeSyncService,
     SetpointService,
     ParameterService,
     MissionService,
@@ -68,23 +68,24 @@ class Link:
         self.now_us = board.telemetry.sample.time_boot_us
         self._board = board
         self._signing = board.signing.of_link()
-        self._decoder = Decoder(board.identity, self._signing)
         self._encoder = Encoder(board.identity)
         self._signed_with: bytes | None = None
         self._buffer = Buffer(line, self.now_us)
         self._outbox = Outbox(self._encoder, self._buffer)
         self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, line)
-        self._choose_protocol()
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
         self._busy = tuple(service for service in self._services if isinstance(service, BusyService))
-        self._handlers: dict[type, Handler] = {
-            PeerHeartbeat: self._hear_heartbeat,
-            PingRequest: self._answer_ping,
-            SigningSetup: self._set_up_signing,
+        self.handlers: dict[int, Handler] = {
+            HEARTBEAT_ID: self._hear_heartbeat,
+            4: self._answer_ping,
+            111: self._answer_timesync,
+            SETUP_SIGNING_ID: self._set_up_signing,
         }
         for service in self._services:
-            self._handlers.update(service.handlers)
+            self.handlers.update(service.handlers)
+        self._decoder = Decoder(board.identity, self.handlers, self._signing)
+        self._choose_protocol()
         if options.line.baud is not None:
             # Over a serial port PX4 introduces itself unasked.
             self.streams.send_now(encode.AUTOPILOT_VERSION_ID)
@@ -142,10 +143,8 @@ class Link:
         decoder, parameters = self._decoder, self._board.parameters
         decoder.foreign = [] if collects_foreign and self.options.forwards else None
         decoder.signing_is_optional = is_optional(parameters["MAV_SIGN_CFG"], self.options.is_usb)
-        for message in decoder.push(data):
-            handler = self._handlers.get(type(message))
-            if handler is not None:
-                handler(message)
+        for packet in decoder.push(data):
+            self.handlers[packet.get_msgId()](packet)
         self._choose_protocol()
         return decoder.foreign or []
 
@@ -189,13 +188,25 @@ class Link:
         stamp = signing.next_stamp(self._board.telemetry.epoch_at_boot_us + self.now_us)
         self._encoder.sign(key, self._number, stamp)
 
-    def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
-        self._texts.heard(heartbeat, self.now_us)
-        if heartbeat.type == GROUND_STATION_TYPE:
+    # --- what concerns the link alone --------------------------------------------------------------------
+
+    def _hear_heartbeat(self, packet: dialect.MAVLink_heartbeat_message) -> None:
+        if packet.type == dialect.MAV_TYPE_GCS:
+            self._texts.heard_us = self.now_us
             self._board.autopilot.ground_station_heard()
 
-    def _answer_ping(self, request: PingRequest) -> None:
-        self.send(encode.ping_answer(request))
+    def _answer_ping(self, packet: dialect.MAVLink_ping_message) -> None:
+        """One to everybody is sent back."""
+        if (packet.target_system, packet.target_component) == (EVERY_ID, EVERY_ID):
+            asker = (packet.get_srcSystem(), packet.get_srcComponent())
+            self.send(dialect.MAVLink_ping_message(packet.time_usec, packet.seq, *asker))
 
-    def _set_up_signing(self, setup: SigningSetup) -> None:
-        self._signing.hear_setup(setup.key, setup.time_stamp, self.options.is_usb)
+    def _answer_timesync(self, packet: dialect.MAVLink_timesync_message) -> None:
+        """The vehicle's clock, for a request; an answer, to the vehicle's own, has a time in tc1."""
+        if packet.tc1 == 0:
+            # Bytes arrive anywhere in the interval since the last sample: on average in its middle.
+            heard_at_us = self.now_us + self._board.interval_us // 2
+            self.send(dialect.MAVLink_timesync_message(heard_at_us * 1000, packet.ts1))
+
+    def _set_up_signing(self, packet: dialect.MAVLink_setup_signing_message) -> None:
+        self._signing.hear_setup(bytes(packet.secret_key), packet.initial_timestamp, self.options.is_usb)

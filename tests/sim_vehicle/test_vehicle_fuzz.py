@@ -24,7 +24,7 @@ def state(client: Client) -> tuple:
         parameters.sets,
         autopilot.home_ned_m,
         client.vehicle._signing.key,
-        autopilot.ground.wants_reboot,
+        autopilot.wants_reboot,
     )
 
 
@@ -96,7 +96,7 @@ def test_damaged_packets_change_nothing():
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.binary(max_size=400), max_size=8))
 def test_any_bytes_are_read_without_an_error_and_hold_nothing_up(pieces):
-    decoder = Decoder(Identity())
+    decoder = Decoder(Identity(), range(1000))
     for piece in pieces:
         decoder.push(piece)
     # What is left of noise cannot hide more than one longest packet

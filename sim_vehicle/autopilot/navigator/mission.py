@@ -20,8 +20,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
 )
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters

@@ -29,8 +29,8 @@ class Service(Protocol):
     """One protocol on one link, each message answered at once. What all links share is the autopilot's."""
 
     @property
-    def handlers(self) -> Mapping[type, Handler]:
-        """What to do with a message, by the class of its value; called in the order of arrival."""
+    def handlers(self) -> Mapping[int, Handler]:
+        """What to do with a packet, by its message's id; called in the order of arrival."""
 
 
 @runtime_checkable

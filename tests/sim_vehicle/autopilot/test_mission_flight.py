@@ -9,7 +9,7 @@ from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.flight_commands import DO_CHANGE_SPEED, MISSION_START
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType, StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
