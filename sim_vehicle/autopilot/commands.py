@@ -7,15 +7,13 @@ MavlinkReceiver::handle_message_command_both and Commander::handle_command of PX
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from sim_vehicle.autopilot import flight_commands, ground_commands
+from sim_vehicle.autopilot.flight_commands import CommandedVehicle
 from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result, Severity
 from sim_vehicle.autopilot.mode_numbers import AUTO_MAIN_MODE, CUSTOM_FLAG, mode_from_request
 from sim_vehicle.autopilot.modes import Mode
-
-if TYPE_CHECKING:
-    from sim_vehicle.autopilot.autopilot import Autopilot
 
 NAV_RETURN_TO_LAUNCH = 20
 NAV_LAND = 21
@@ -97,7 +95,7 @@ def answer(command: Command, result: Result) -> CommandAck:
     return CommandAck(command.command, result, command.source_system, command.source_component)
 
 
-def execute(command: Command, flight: "Autopilot") -> Result | None:
+def execute(command: Command, flight: CommandedVehicle) -> Result | None:
     """The commander's part: does it and returns its answer; None leaves the command unanswered."""
     handler = _HANDLERS.get(command.command)
     return Result.UNSUPPORTED if handler is None else handler(command, flight)
@@ -125,7 +123,7 @@ def _sent(was_sent: bool) -> Result:
     return Result.ACCEPTED if was_sent else Result.DENIED
 
 
-def _set_mode(command: Command, flight: "Autopilot") -> Result:
+def _set_mode(command: Command, flight: CommandedVehicle) -> Result:
     base, main, sub = _byte(command.param1), _byte(command.param2), _byte(command.param3)
     mode = mode_from_request(base, main, sub)
     if mode is not None:
@@ -135,7 +133,7 @@ def _set_mode(command: Command, flight: "Autopilot") -> Result:
     return Result.TEMPORARILY_REJECTED
 
 
-def _arm_disarm(command: Command, flight: "Autopilot") -> Result | None:
+def _arm_disarm(command: Command, flight: CommandedVehicle) -> Result | None:
     action, forced = _whole(command.param1), _whole(command.param2) == FORCE
     if action not in (0, 1):
         flight.say(Severity.CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:.3f}")
@@ -143,15 +141,15 @@ def _arm_disarm(command: Command, flight: "Autopilot") -> Result | None:
     return flight.commander.arm() if action == 1 else flight.commander.disarm(forced)
 
 
-def _land(command: Command, flight: "Autopilot") -> Result:
+def _land(command: Command, flight: CommandedVehicle) -> Result:
     return flight.request_mode(Mode.LAND, says_so="Landing at current position")
 
 
-def _return(command: Command, flight: "Autopilot") -> Result:
+def _return(command: Command, flight: CommandedVehicle) -> Result:
     return flight.request_mode(Mode.RETURN, says_so="Returning to launch")
 
 
-_HANDLERS: dict[int, Callable[[Command, "Autopilot"], Result | None]] = {
+_HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     **flight_commands.HANDLERS,
     DO_SET_MODE: _set_mode,
     COMPONENT_ARM_DISARM: _arm_disarm,

@@ -6,13 +6,10 @@ with those of a running SITL.
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from sim_vehicle.autopilot.flight_commands import CommandedVehicle
 from sim_vehicle.autopilot.messages import Command, Result
-from sim_vehicle.hil.messages import Place
-
-if TYPE_CHECKING:
-    from sim_vehicle.autopilot.autopilot import Autopilot
+from sim_vehicle.geography import Place
 
 DO_SET_HOME = 179
 DO_SET_ACTUATOR = 187
@@ -37,7 +34,7 @@ _WELL, _OFF = 0, 1
 _RESETS = (2, 3, 4)
 
 
-def _set_home(command: Command, flight: "Autopilot") -> Result:
+def _set_home(command: Command, flight: CommandedVehicle) -> Result:
     """To where the vehicle is, or to a place; a heading that is not a number is north."""
     if not flight.parameters["COM_HOME_EN"]:
         return Result.DENIED
@@ -52,30 +49,30 @@ def _set_home(command: Command, flight: "Autopilot") -> Result:
     return Result.ACCEPTED
 
 
-def _storage(command: Command, flight: "Autopilot") -> Result | None:
+def _storage(command: Command, flight: CommandedVehicle) -> Result | None:
     """Nothing is to be done to keep parameters, for they are always kept; or back to the defaults."""
     action = _whole(command.param1)
     if action not in range(5):
         return None
-    if flight.arming.armed:
+    if flight.commander.arming.armed:
         return Result.TEMPORARILY_REJECTED
     if action in _RESETS:
         flight.parameters.reset()
     return Result.ACCEPTED
 
 
-def _reboot(command: Command, flight: "Autopilot") -> Result:
+def _reboot(command: Command, flight: CommandedVehicle) -> Result:
     action = _whole(command.param1)
     if action == 0:
         return Result.ACCEPTED
     # No board that this vehicle stands for can switch itself off or wait in its bootloader.
-    if action != 1 or flight.arming.armed:
+    if action != 1 or flight.commander.arming.armed:
         return Result.DENIED
     flight.wants_reboot = True
     return Result.ACCEPTED
 
 
-def _inject_failure(command: Command, flight: "Autopilot") -> Result:
+def _inject_failure(command: Command, flight: CommandedVehicle) -> Result:
     """No fix any more, or the charge gone; or well again."""
     unit, kind = _whole(command.param1), _whole(command.param2)
     if unit not in (_GPS, _BATTERY) or kind not in (_WELL, _OFF):
@@ -85,19 +82,19 @@ def _inject_failure(command: Command, flight: "Autopilot") -> Result:
     if unit == _GPS:
         flight.commander.positioning.gps_is_off = kind == _OFF
     else:
-        flight.battery.is_forced_empty = kind == _OFF
+        flight.commander.battery.is_forced_empty = kind == _OFF
     return Result.ACCEPTED
 
 
-def _accept(command: Command, flight: "Autopilot") -> Result:
+def _accept(command: Command, flight: CommandedVehicle) -> Result:
     return Result.ACCEPTED
 
 
-def _leave_unanswered(command: Command, flight: "Autopilot") -> None:
+def _leave_unanswered(command: Command, flight: CommandedVehicle) -> None:
     return None
 
 
-HANDLERS: dict[int, Callable[[Command, "Autopilot"], Result | None]] = {
+HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     DO_SET_HOME: _set_home,
     DO_SET_ACTUATOR: _accept,
     PREFLIGHT_STORAGE: _storage,

@@ -8,8 +8,7 @@ import math
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, GlobalTarget, PositionTarget, Severity, StatusText
 from sim_vehicle.estimator.estimate import yaw_of
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import (
     FREE,

@@ -4,8 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.setpoint import Vector3
 
 FRAME_GLOBAL, FRAME_MISSION, FRAME_GLOBAL_RELATIVE = 0, 2, 3

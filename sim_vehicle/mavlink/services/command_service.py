@@ -20,10 +20,7 @@ class CommandService:
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
         self._board = board
-
-    @property
-    def handlers(self) -> Mapping[int, Handler]:
-        return {
+        self.handlers: Mapping[int, Handler] = {
             11: self._set_mode,
             75: lambda packet: self._take(command_from_int(packet)),
             76: lambda packet: self._take(command_from_long(packet)),

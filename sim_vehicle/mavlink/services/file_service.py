@@ -32,10 +32,7 @@ class FileService:
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
-
-    @property
-    def handlers(self) -> Mapping[int, Handler]:
-        return {110: self._answer}
+        self.handlers: Mapping[int, Handler] = {110: self._answer}
 
     def _answer(self, packet: dialect.MAVLink_file_transfer_protocol_message) -> None:
         asked = bytes(packet.payload)

@@ -28,11 +28,7 @@ class MissionService:
         self._autopilot = board.autopilot
         self._transfer = MissionTransfer(board.autopilot.missions)
         self._report = ProgressReport(board.autopilot.missions)
-
-    @property
-    def handlers(self) -> Mapping[int, Handler]:
-        """All that the protocol has."""
-        return dict.fromkeys(MESSAGES, self._receive)
+        self.handlers: Mapping[int, Handler] = dict.fromkeys(MESSAGES, self._receive)
 
     def update(self, now_us: int) -> None:
         """Repeats, time-outs, and what the mission has come to."""

@@ -44,10 +44,7 @@ class ParameterService:
         """Index of what is sent next of a list; -1 for the hash, None while no list is sent."""
         self._told = board.parameters.sets
         self._announce_at_us: int | None = None
-
-    @property
-    def handlers(self) -> Mapping[int, Handler]:
-        return {20: self._read, 21: self._list, 23: self._set}
+        self.handlers: Mapping[int, Handler] = {20: self._read, 21: self._list, 23: self._set}
 
     def update(self, now_us: int) -> None:
         """Go on with the list; tell of what has changed."""

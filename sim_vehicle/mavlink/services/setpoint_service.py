@@ -98,25 +98,14 @@ class SetpointService:
     """Hands them to the autopilot, whatever the mode; PX4 answers none of them."""
 
     def __init__(self, link: Channel, board: Board) -> None:
-        self._autopilot = board.autopilot
-        self._source = board.autopilot.commander.sticks.new_link_source()
-
-    @property
-    def handlers(self) -> Mapping[int, Handler]:
-        """Every kind of it."""
-        return {
-            69: self._take_sticks,
-            70: lambda packet: self._autopilot.receive(radio_channels(packet)),
-            82: lambda packet: self._autopilot.receive(attitude_target(packet)),
-            84: lambda packet: self._autopilot.receive(position_target(packet)),
-            86: lambda packet: self._autopilot.receive(global_target(packet)),
-            144: self._follow,
+        receive = board.autopilot.receive
+        source = board.autopilot.commander.sticks.new_link_source()
+        self.handlers: Mapping[int, Handler] = {
+            69: lambda packet: receive(stick_input(packet, source)),
+            70: lambda packet: receive(radio_channels(packet)),
+            82: lambda packet: receive(attitude_target(packet)),
+            84: lambda packet: receive(position_target(packet)),
+            86: lambda packet: receive(global_target(packet)),
+            # One without a height is none.
+            144: lambda packet: receive(follow_target(packet)) if isfinite(packet.alt) else None,
         }
-
-    def _take_sticks(self, packet: dialect.MAVLink_manual_control_message) -> None:
-        self._autopilot.receive(stick_input(packet, self._source))
-
-    def _follow(self, packet: dialect.MAVLink_follow_target_message) -> None:
-        """One without a height is none."""
-        if isfinite(packet.alt):
-            self._autopilot.receive(follow_target(packet))

@@ -6,7 +6,7 @@ Source: PX4's mavlink/streams/OPTICAL_FLOW_RAD.hpp, DISTANCE_SENSOR.hpp and HIL_
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.telemetry import Telemetry

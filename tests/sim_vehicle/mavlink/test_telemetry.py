@@ -9,13 +9,10 @@ from pymavlink.dialects.v20 import development as dialect
 from pymavlink.generator.mavcrc import x25crc
 
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.earth import StandardAir
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
-from sim_vehicle.slow_sensors import air_at
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_MODE, TAKEOFF, Client
@@ -240,14 +237,6 @@ def test_radio_channels_show_once_somebody_sends_them():
     channels = client.last("RC_CHANNELS")
     assert (channels.chancount, channels.chan3_raw, channels.chan5_raw) == (4, 1200, 0xFFFF)
     assert len(client.all("RC_CHANNELS")) == pytest.approx(20, abs=2)
-
-
-@pytest.mark.parametrize("height_m", [-100.0, 0.0, 350.0, 1_500.0])
-def test_the_barometers_formula_is_the_standard_atmosphere(height_m):
-    expected, found = StandardAir().at(height_m), air_at(488.0 + height_m)
-    assert found.pressure_hpa == pytest.approx(expected.pressure_hpa, rel=2e-4)
-    assert found.altitude_m == pytest.approx(488.0 + height_m, abs=0.01)
-    assert found.temperature_c == pytest.approx(expected.temperature_c, abs=0.05)
 
 
 def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
