@@ -15,7 +15,6 @@ from sim_vehicle.autopilot.messages import (
     FlightInput,
     GlobalTarget,
     PositionTarget,
-    RadioChannels,
     Result,
     Severity,
     StatusText,
@@ -99,8 +98,6 @@ class Autopilot:
             self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
         elif isinstance(message, StickInput):
             self.commander.sticks.heard(message, self._now_us)
-        elif isinstance(message, RadioChannels):
-            self.commander.sticks.heard_radio(message, self._now_us)
         else:
             self.navigator.follow(message)
 
@@ -281,11 +278,6 @@ class Autopilot:
     def home_yaw_rad(self) -> float:
         """Heading at home."""
         return self.navigator.view.home_yaw_rad
-
-    @property
-    def radio_channels(self) -> RadioChannels | None:
-        """What a radio last said, if there ever was one."""
-        return self.commander.sticks.channels
 
     @property
     def home_set_us(self) -> int:

@@ -128,14 +128,7 @@ class StickInput:
     throttle: float
     yaw: float
     source: int
-    """1: a radio; 2 and more: the first link and those after it."""
-
-
-@dataclass(frozen=True, slots=True)
-class RadioChannels:
-    """RC_CHANNELS_OVERRIDE: pulses in microseconds, 18 of them; 0 and 65535 say nothing."""
-
-    pulses_us: tuple[int, ...]
+    """1 and more: the first link and those after it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,4 +141,4 @@ class FollowTarget:
     velocity_ned_m_s: Vector3
 
 
-FlightInput: TypeAlias = PositionTarget | GlobalTarget | AttitudeTarget | StickInput | RadioChannels | FollowTarget
+FlightInput: TypeAlias = PositionTarget | GlobalTarget | AttitudeTarget | StickInput | FollowTarget

@@ -19,7 +19,6 @@ class Reason(StrEnum):
     """Who armed or disarmed, in PX4's words."""
 
     COMMAND = "external command"
-    GESTURE = "stick gesture"
     MISSION = "mission start"
     FAILSAFE = "failsafe"
     LANDING = "landing"

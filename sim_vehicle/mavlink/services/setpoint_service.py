@@ -10,7 +10,6 @@ from sim_vehicle.autopilot.messages import (
     FollowTarget,
     GlobalTarget,
     PositionTarget,
-    RadioChannels,
     StickInput,
 )
 from sim_vehicle.mavlink.services.board import Board
@@ -73,10 +72,6 @@ def _stick(value: int) -> float:
     return value / _FULL_STICK if abs(value) <= _FULL_STICK else 0.0
 
 
-def radio_channels(packet: dialect.MAVLink_rc_channels_override_message) -> RadioChannels:
-    return RadioChannels(tuple(getattr(packet, f"chan{number}_raw") for number in range(1, 19)))
-
-
 def follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget:
     v_north, v_east, v_down = (value if isfinite(value) else 0.0 for value in packet.vel)
     return FollowTarget(packet.lat * 1e-7, packet.lon * 1e-7, packet.alt, (v_north, v_east, v_down))
@@ -102,7 +97,6 @@ class SetpointService:
         source = board.autopilot.commander.sticks.new_link_source()
         self.handlers: Mapping[int, Handler] = {
             69: lambda packet: receive(stick_input(packet, source)),
-            70: lambda packet: receive(radio_channels(packet)),
             82: lambda packet: receive(attitude_target(packet)),
             84: lambda packet: receive(position_target(packet)),
             86: lambda packet: receive(global_target(packet)),

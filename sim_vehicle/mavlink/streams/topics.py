@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-from sim_vehicle.autopilot.messages import RadioChannels, StickInput
+from sim_vehicle.autopilot.messages import StickInput
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Air, HilGps
@@ -29,13 +29,12 @@ class Topic(IntEnum):
     ORIGIN = 10
     """New once: it does not move."""
     MAGNETIC_FIELD = 11
-    RADIO = 12
-    STICKS = 13
-    ORBIT = 14
+    STICKS = 12
+    ORBIT = 13
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.RADIO, Topic.STICKS, Topic.ORBIT)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.STICKS, Topic.ORBIT)
 
 
 class Topics:
@@ -49,7 +48,6 @@ class Topics:
         self._fix: HilGps | None = None
         self._battery = 0
         self._air: Air | None = None
-        self._channels: RadioChannels | None = None
         self._sticks: StickInput | None = None
         self._field = state.magnetic_field_frd_gauss
         self._status: tuple[int, bool, int] | None = None
@@ -67,14 +65,10 @@ class Topics:
             return
         # All else is slow enough to be looked at this often only.
         versions[2] += 1
-        channels = commander.sticks.channels
-        if channels is not self._channels:
-            self._channels = channels
-            versions[12] += 1
         sticks = commander.sticks.sticks
         if sticks is not self._sticks and sticks is not None:
             self._sticks = sticks
-            versions[13] += 1
+            versions[12] += 1
         if state.air is not self._air:
             self._air = state.air
             versions[8] += 1
@@ -96,7 +90,7 @@ class Topics:
         now_us = state.sample.time_boot_us
         status = (commander.modes.flown, commander.arming.armed, commander.system_status)
         if status[0] is Mode.ORBIT:
-            versions[14] += 1
+            versions[13] += 1
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us
             versions[3] += 1

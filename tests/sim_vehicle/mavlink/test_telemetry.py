@@ -226,19 +226,6 @@ def test_the_world_lies_where_the_parameters_say():
     assert last["ALTITUDE"].altitude_monotonic == pytest.approx(20.0, abs=3.0)
 
 
-def test_radio_channels_show_once_somebody_sends_them():
-    client = Client()
-    client.run(1.0)
-    assert client.all("RC_CHANNELS") == []
-    pulses = (1500, 1500, 1200, 1500, *[0] * 14)
-    for _ in range(20):
-        client.send(dialect.MAVLink_rc_channels_override_message(1, 1, *pulses))
-        client.run(0.05)
-    channels = client.last("RC_CHANNELS")
-    assert (channels.chancount, channels.chan3_raw, channels.chan5_raw) == (4, 1200, 0xFFFF)
-    assert len(client.all("RC_CHANNELS")) == pytest.approx(20, abs=2)
-
-
 def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
     client = Client(system=255, component=190)
     client.command(TAKEOFF)
