@@ -68,8 +68,8 @@ def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
 def mode_from_request(base: int, main: int, sub: int) -> Mode | None:
     """The mode that DO_SET_MODE's three parameters name; None for one this vehicle does not know.
 
-    As Commander.cpp: AUTO without a sub mode is MISSION, POSCTL takes every sub mode for
-    itself, and without the custom flag the base mode's own bits decide.
+    As Commander.cpp: AUTO without a sub mode is MISSION, POSCTL takes every sub mode for itself, and without the
+    custom flag the base mode's own bits decide.
     """
     if base & CUSTOM_FLAG:
         if main == _POSITION_MAIN_MODE:

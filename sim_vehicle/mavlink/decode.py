@@ -44,7 +44,6 @@ class Decoder:
         self._rest = b""
         self.sources: set[tuple[int, int]] = set()
         """System and component of everybody who was heard here."""
-        self.heard_mavlink_2 = False
         self.foreign: list[ForeignPacket] | None = None
         """Where set: packets that are not for this vehicle alone, for other links to pass on."""
 
@@ -91,7 +90,6 @@ class Decoder:
 
     def _hear(self, packet: dialect.MAVLink_message, raw: bytes) -> None:
         self.sources.add((packet.get_srcSystem(), packet.get_srcComponent()))
-        self.heard_mavlink_2 |= raw[0] == _MARKER_V2
         if self.foreign is None:
             return
         target = _target(packet) if _is_addressed(packet) else (EVERY_ID, EVERY_ID)

@@ -106,9 +106,8 @@ class Outbox:
     def send(self, message: Message) -> None:
         """Make a packet of the message."""
         packet = self._encoder.packet(message)
-        if packet is None or (self._loses and not self._buffer.take(len(packet))):
-            return
-        self._packets.append(packet)
+        if not self._loses or self._buffer.take(len(packet)):
+            self._packets.append(packet)
 
     def forward(self, packet: bytes) -> None:
         """Send somebody else's packet as it is."""

@@ -25,8 +25,6 @@ from sim_vehicle.parameters.store import Parameters
 
 # Of a serial line's buffer, for the streams between the packets of a long answer.
 _RESERVED_BYTES = 1_000
-# MAV_PROTO_VER: MAVLink 1 until somebody speaks MAVLink 2.
-_BEGINS_WITH_MAVLINK_1 = 1
 
 
 # What every link offers, a line a protocol, in the order in which they are brought up to date in an interval.
@@ -85,7 +83,6 @@ class Link:
         for service in self._services:
             self.handlers.update(service.handlers)
         self._decoder = Decoder(board.identity, self.handlers, self._signing)
-        self._choose_protocol()
         if options.line.baud is not None:
             # Over a serial port PX4 introduces itself unasked.
             self.streams.send_now(encode.AUTOPILOT_VERSION_ID)
@@ -145,7 +142,6 @@ class Link:
         decoder.signing_is_optional = is_optional(parameters["MAV_SIGN_CFG"], self.options.is_usb)
         for packet in decoder.push(data):
             self.handlers[packet.get_msgId()](packet)
-        self._choose_protocol()
         return decoder.foreign or []
 
     def forward(self, packets: Iterable[ForeignPacket]) -> None:
@@ -177,10 +173,6 @@ class Link:
         if system == EVERY_ID:
             return bool(sources)
         return any(source[0] == system and component in (EVERY_ID, source[1]) for source in sources)
-
-    def _choose_protocol(self) -> None:
-        begins_with_1 = self._board.parameters["MAV_PROTO_VER"] <= _BEGINS_WITH_MAVLINK_1
-        self._encoder.speaks_mavlink_1 = begins_with_1 and not self._decoder.heard_mavlink_2
 
     def _sign(self) -> None:
         signing = self._signing

@@ -14,7 +14,9 @@ from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 
 # Stored by the link, yet no item that the navigator could fly.
-_NOT_FLOWN = frozenset({kinds.CONDITION_DELAY, kinds.CONDITION_DISTANCE, kinds.FENCE_RETURN_POINT})
+_NOT_FLOWN = frozenset(
+    {kinds.CONDITION_DELAY, kinds.CONDITION_DISTANCE, kinds.CONDITION_GATE, kinds.FENCE_RETURN_POINT}
+)
 # What may stand before a takeoff: it has no place. Of payload, all but a winch, a gripper and an actuator.
 _PLACELESS = frozenset(
     {

@@ -197,20 +197,6 @@ def versions(end: End) -> Counter[int]:
     return Counter(packet[0] for packet in end.packets)
 
 
-def test_mavlink_1_until_somebody_speaks_mavlink_2():
-    vehicle = Vehicle(ONBOARD)
-    (end,) = vehicle.ends
-    vehicle.vehicle.parameters.set("MAV_PROTO_VER", 1)
-    end.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), v1=True)
-    vehicle.run(2.0)
-    assert set(versions(end)) == {0xFE}
-    assert end.all("HEARTBEAT") and not end.all("ODOMETRY")
-    end.packets.clear()
-    end.heartbeat()
-    vehicle.run(2.0)
-    assert set(versions(end)) == {0xFD}
-
-
 def signed(end: End, time_stamp: int = 10**15, key: bytes = KEY) -> None:
     end.mav.signing.secret_key, end.mav.signing.sign_outgoing = key, True
     end.mav.signing.timestamp, end.mav.signing.link_id = time_stamp, 1

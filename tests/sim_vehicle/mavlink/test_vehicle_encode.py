@@ -274,18 +274,12 @@ FLAT = [found[0] for kind in dialect.mavlink_map.values() if (found := framing.f
 def test_frequent_messages_are_framed_as_pymavlink_frames_them(layout, kept):
     theirs = example(layout, kept)
     for sequence in (0, 255):
-        for speaks_mavlink_1 in (False, True):
-            link, encoder = dialect.MAVLink(None, 1, 1), Encoder(Identity())
-            link.seq = encoder._link.seq = sequence
-            encoder.speaks_mavlink_1 = speaks_mavlink_1
-            ours = encoder.packet((layout, layout.pack(*in_wire_order(theirs))))
-            if speaks_mavlink_1 and layout.number > 255:
-                assert ours is None
-                continue
-            assert ours == theirs.pack(link, force_mavlink1=speaks_mavlink_1)
-            assert encoder._link.seq == (sequence + 1) % 256
-            heard = dialect.MAVLink(None).decode(bytearray(ours))
-            assert heard.to_dict() == theirs.to_dict()
+        link, encoder = dialect.MAVLink(None, 1, 1), Encoder(Identity())
+        link.seq = encoder._link.seq = sequence
+        ours = encoder.packet((layout, layout.pack(*in_wire_order(theirs))))
+        assert ours == theirs.pack(link)
+        assert encoder._link.seq == (sequence + 1) % 256
+        assert dialect.MAVLink(None).decode(bytearray(ours)).to_dict() == theirs.to_dict()
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.name)
