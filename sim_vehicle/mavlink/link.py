@@ -9,7 +9,7 @@ from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
-from sim_vehicle.mavlink.line import FAST_LINE, Buffer, Line, Outbox
+from sim_vehicle.mavlink.line import FAST_LINE, Line, Outbox
 from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.command_service import CommandService
 from sim_vehicle.mavlink.services.file_service import FileService
@@ -68,8 +68,7 @@ class Link:
         self._signing = board.signing.of_link()
         self._encoder = Encoder(board.identity)
         self._signed_with: bytes | None = None
-        self._buffer = Buffer(line, self.now_us)
-        self._outbox = Outbox(self._encoder, self._buffer)
+        self._outbox = Outbox(self._encoder, line, self.now_us)
         self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, line)
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
@@ -155,8 +154,7 @@ class Link:
     def update(self, now_us: int, texts: Sequence[StatusText]) -> None:
         """Send what is due at the end of the interval."""
         self.now_us = now_us
-        if self.options.line.baud is not None:
-            self._buffer.advance(now_us)
+        self._outbox.advance(now_us)
         if self._signing.key is not self._signed_with or self._signed_with is not None:
             self._sign()
         for text in texts:

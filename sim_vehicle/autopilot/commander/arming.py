@@ -109,7 +109,4 @@ def preflight_problems(
         found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
     if navigator.fence.breached:
         found.append(StatusText(Severity.CRITICAL, navigator.fence.breach_text))
-    if parameters["COM_ARM_MIS_REQ"] and not navigator.progress.valid:
-        # An event without a text in PX4 too.
-        found.append(StatusText(Severity.INFO, ""))
     return found

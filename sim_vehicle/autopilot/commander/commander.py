@@ -94,7 +94,7 @@ class Commander:
             return Result.TEMPORARILY_REJECTED
         result = self.arming.arm(self._now_us, self.checks_pass)
         if result is not Result.ACCEPTED:
-            self.texts += [problem for problem in self._problems if problem.text]
+            self.texts += self._problems
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
         elif not was_armed:
             self._say(Severity.INFO, f"Armed by {reason}")

@@ -25,8 +25,6 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 
-# Behind MIS_COMMAND_TOUT PX4 goes on past a winch, a gripper or a gimbal that does not answer.
-_WITH_TIMEOUT = (211, 1000, 42600)
 # A mission of jumps alone ends where it has jumped more often than it has items.
 _MOST_JUMPS_PER_ITEM = 1
 
@@ -165,8 +163,6 @@ class MissionFlight:
                 return False
             if command == kinds.DELAY:
                 return view.now_us - self._entered_us >= 1e6 * max(item.params[0], 0.0)
-            if command in _WITH_TIMEOUT:
-                return view.now_us - self._entered_us > 1e6 * self._parameters["MIS_COMMAND_TOUT"]
             if command not in kinds.WITH_POSITION:
                 return True
         return self._arrival.is_reached(self.target, self._acceptance(item, view), view, self._parameters)

@@ -258,25 +258,6 @@ def test_missions_that_cannot_be_flown_are_stored_but_not_started(items, text):
     assert "Mission start denied! No valid mission" in flight.texts()
 
 
-@pytest.mark.parametrize(
-    ("wanted", "items", "valid"),
-    [
-        (0, [NORTH], True),
-        (1, [NORTH], False),
-        (1, [TAKEOFF], True),
-        (2, [TAKEOFF], False),
-        (3, [TAKEOFF, NORTH], False),
-        (3, [TAKEOFF, LAND_AT_HOME], True),
-        (4, [NORTH], True),
-        (4, [TAKEOFF, NORTH], False),
-    ],
-)
-def test_takeoff_and_landing_can_be_demanded(wanted, items, valid):
-    flight = Flight(None, MIS_TKO_LAND_REQ=wanted)
-    upload(flight, *items)
-    assert flight.autopilot.missions.progress.valid is valid
-
-
 def test_a_first_place_far_away_is_only_a_warning():
     flight = Flight(None, MIS_DIST_1WP=100.0)
     upload(flight, item(kinds.WAYPOINT, 150.5))

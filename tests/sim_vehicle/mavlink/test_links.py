@@ -73,7 +73,7 @@ def imu_hz(baud: int, asked_hz: float | None) -> tuple[float, float]:
     if asked_hz is not None:
         end.command(SET_INTERVAL, IMU, 1e6 / asked_hz)
     vehicle.run(10.0)
-    assert end.link._buffer.lost == 0
+    assert end.link._outbox.lost == 0
     return len(end.all("HIGHRES_IMU")) / 10, sum(map(len, end.packets)) / 10
 
 
@@ -109,7 +109,7 @@ def test_a_long_list_over_a_slow_line_loses_nothing():
     vehicle.run(6.0)
     values = end.all("PARAM_VALUE")
     assert len(values) == values[0].param_count + 1
-    assert end.link._buffer.lost == 0
+    assert end.link._outbox.lost == 0
 
 
 def test_a_serial_line_begins_with_the_version():
