@@ -241,10 +241,3 @@ def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
     client.forget()
     client.run(1.0)
     assert client.all("ORBIT_EXECUTION_STATUS") == []
-
-
-def requested(client: Client, *params: float) -> None:
-    client.forget()
-    client.command(REQUEST_MESSAGE, *params)
-    client.run(0.02)
-    assert client.results(REQUEST_MESSAGE) == [0]
