@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import EVERY_ID, Identity
+from sim_vehicle.faults.wire import packet_size
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.signing import Signing
 
 _MARKER = re.compile(rb"[\xfd\xfe]")
 _MARKER_V2 = 0xFD
-# Header and checksum around the payload, for MAVLink 2 and 1, and what a signature adds.
-_AROUND_V2, _AROUND_V1, _SIGNATURE = 12, 8, 13
 _SIGNED_FLAG = 0x01
 
 # Its target is a system, too, under another name.
@@ -61,8 +60,9 @@ class Decoder:
         position = 0
         while (found := _MARKER.search(buffer, position)) is not None:
             start = found.start()
-            end = _end_of_packet(buffer, start)
-            if end is None or end > len(buffer):
+            size = packet_size(buffer, start)
+            end = start + (size or 0)
+            if size is None or end > len(buffer):
                 kept = min(kept, start)
                 position = start + 1
                 continue
@@ -100,17 +100,6 @@ class Decoder:
         if packet.get_msgId() in _READ_BY_ALL or not _is_addressed(packet):
             return True
         return self._us.is_addressed(*_target(packet))
-
-
-def _end_of_packet(buffer: bytes, start: int) -> int | None:
-    """Where the packet that may begin at ``start`` ends; None while its header is not complete."""
-    if len(buffer) < start + 3:
-        return None
-    length = buffer[start + 1]
-    if buffer[start] != _MARKER_V2:
-        return start + length + _AROUND_V1
-    signature = _SIGNATURE if buffer[start + 2] & _SIGNED_FLAG else 0
-    return start + length + _AROUND_V2 + signature
 
 
 def _is_addressed(packet: dialect.MAVLink_message) -> bool:
