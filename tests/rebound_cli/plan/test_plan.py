@@ -15,7 +15,7 @@ from companion.mission.model import Mission
 from rebound_cli.main import main
 from rebound_cli.plan.reading import mission_of_plan
 from rebound_cli.plan.writing import plan_of_mission
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Place
 from tests.rebound_cli.command import run_here as rebound
 
 HOME = Place(47.3977, 8.5456, 488.0)
