@@ -4,20 +4,13 @@ import math
 from itertools import pairwise
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from sim_vehicle.world import Box, Motion, Pole, Vector3, Wall
+from sim_vehicle.written import Finite, NotNegative, Part
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Point = tuple[Finite, Finite, Finite]
 Length = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
-
-
-class Part(BaseModel):
-    """What a person writes: no unknown keys, no changes."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Waypoint(Part):

@@ -12,7 +12,7 @@ from companion.guard import states as guard_states
 from rebound_cli import exit_codes
 from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth
-from tests.rebound_cli.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
+from tests.rebound_cli.results.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
 
 
 @pytest.mark.parametrize("name", PAGES)

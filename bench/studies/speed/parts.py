@@ -22,7 +22,7 @@ class Part:
 
 KERNEL, PLANT, VEHICLE, COMPANION, LOG = "plant: kernel", "plant: the rest", "vehicle: autopilot", "companion", "log"
 PARTS = (
-    Part(KERNEL, "sim_vehicle.plant.plant:advance_boxed", PLANT),
+    Part(KERNEL, "sim_vehicle.plant.plant:advance_interval", PLANT),
     Part(PLANT, "sim_vehicle.plant.plant:Plant._advance", VEHICLE),
     Part(VEHICLE, "sim_vehicle.vehicle:SimulatedVehicle.advance"),
     Part("vehicle: MAVLink in", "sim_vehicle.mavlink.link:Link.receive", VEHICLE),

@@ -9,8 +9,7 @@ import math
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, turned_towards
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import FollowTarget
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 

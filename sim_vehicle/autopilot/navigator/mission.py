@@ -20,14 +20,11 @@ from sim_vehicle.autopilot.flight_tasks.target import (
 )
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 
-# Behind MIS_COMMAND_TOUT PX4 goes on past a winch, a gripper or a gimbal that does not answer.
-_WITH_TIMEOUT = (211, 1000, 42600)
 # A mission of jumps alone ends where it has jumped more often than it has items.
 _MOST_JUMPS_PER_ITEM = 1
 
@@ -166,10 +163,6 @@ class MissionFlight:
                 return False
             if command == kinds.DELAY:
                 return view.now_us - self._entered_us >= 1e6 * max(item.params[0], 0.0)
-            if command in _WITH_TIMEOUT:
-                return view.now_us - self._entered_us > 1e6 * self._parameters["MIS_COMMAND_TOUT"]
-            if command == kinds.CONDITION_GATE:
-                return self._is_through(item, view)
             if command not in kinds.WITH_POSITION:
                 return True
         return self._arrival.is_reached(self.target, self._acceptance(item, view), view, self._parameters)
@@ -186,12 +179,6 @@ class MissionFlight:
         return Acceptance(
             horizontal_m, vertical_m, inside_s=max(item.params[0], 0.0) if stays else 0.0, yaw_rad=self.target.yaw_rad
         )
-
-    def _is_through(self, item: StoredItem, view: View) -> bool:
-        """Past the plane through the gate that faces the next place."""
-        north, east, _ = self._place(item, view)
-        to_north, to_east = self.target.position_ned_m[0] - north, self.target.position_ned_m[1] - east
-        return to_north * (view.position_ned_m[0] - north) + to_east * (view.position_ned_m[1] - east) >= 0.0
 
     def _advance(self) -> bool:
         """The next item's number, jumps taken; False behind the last."""
@@ -240,9 +227,6 @@ class MissionFlight:
             self._fly_to(item, view)
             return
         self._work = Work.ITEM
-        if item.command == kinds.CONDITION_GATE:
-            self._fly_through(view)
-            return
         if self.target.kind in (Kind.TAKEOFF, Kind.IDLE, Kind.LAND) and not view.landed:
             self.target = NavigatorTarget(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
         elif view.landed:
@@ -290,13 +274,6 @@ class MissionFlight:
             self.target = NavigatorTarget(Kind.POSITION, (place[0], place[1], height[2]))
         else:
             self.target = NavigatorTarget(Kind.LAND, place)
-
-    def _fly_through(self, view: View) -> None:
-        """A gate: the place to fly to is that of the next item that has one."""
-        for item in self._store.mission.items[self._store.current + 1 :]:
-            if item.command in kinds.WITH_POSITION:
-                self.target = NavigatorTarget(Kind.POSITION, self._place(item, view), item.yaw_rad)
-                return
 
     def _look_at_roi(self, view: View) -> None:
         """A region of interest turns the vehicle while it is farther than the radius at which places are reached."""

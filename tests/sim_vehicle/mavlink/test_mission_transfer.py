@@ -7,20 +7,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim_vehicle.autopilot.mission_protocol import mission_items as commands
-from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionPeer, MissionResult, MissionType, WireItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore
-from sim_vehicle.autopilot.mission_protocol.mission_transfer import RETRY_US, TIMEOUT_US, TransferState
-from tests.sim_vehicle.autopilot.mission_client import CLIENT, STEP_US, Exchange, wire_item
+from sim_vehicle.mavlink.services import mission_wire as wire
+from sim_vehicle.mavlink.services.mission_transfer import RETRY_US, TIMEOUT_US, TransferState
+from sim_vehicle.mavlink.services.mission_wire import MissionResult
+from tests.sim_vehicle.mavlink import mission_client as client
+from tests.sim_vehicle.mavlink.mission_client import CLIENT, STEP_US, STRANGER, Exchange, of_type, sent, wire_item
 
-STRANGER = MissionPeer(246, 190)
 MISSION = MissionType.MISSION
 SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(3, commands.LAND)]
 
 
 def receiving(count: int = 3) -> Exchange:
     exchange = Exchange()
-    exchange.ask(wire.Count(CLIENT, count, MISSION))
+    exchange.ask(client.count(count, MISSION))
     assert exchange.transfer.state is TransferState.RECEIVING
     return exchange
 
@@ -28,7 +29,7 @@ def receiving(count: int = 3) -> Exchange:
 def sending() -> Exchange:
     exchange = Exchange()
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
-    exchange.ask(wire.RequestList(CLIENT, MISSION))
+    exchange.ask(client.request_list(MISSION))
     assert exchange.transfer.state is TransferState.SENDING
     return exchange
 
@@ -41,9 +42,9 @@ def test_an_uploaded_list_comes_back_as_it_went():
     exchange = Exchange()
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
     back = exchange.download()
-    assert [(item.number, item.item.command) for item in back] == [(0, 22), (1, 16), (2, 16), (3, 21)]
-    assert [round(1e7 * item.item.latitude_deg) for item in back] == [wire_item(n).x for n in range(4)]
-    assert [item.is_current for item in back] == [True, False, False, False]
+    assert [(item.seq, item.command) for item in back] == [(0, 22), (1, 16), (2, 16), (3, 21)]
+    assert [item.x for item in back] == [wire_item(n).x for n in range(4)]
+    assert [item.current for item in back] == [1, 0, 0, 0]
 
 
 @settings(max_examples=25, deadline=None)
@@ -77,7 +78,7 @@ def test_downloads_survive_loss(seed, loss, count):
     store = MissionStore()
     assert Exchange(store).upload([wire_item(number) for number in range(count)]) == MissionResult.ACCEPTED
     exchange = Exchange(store, seed=seed, loss=loss)
-    assert [item.number for item in exchange.download()] == list(range(count))
+    assert [item.seq for item in exchange.download()] == list(range(count))
 
 
 @settings(max_examples=200, deadline=None)
@@ -92,12 +93,12 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
         message = data.draw(
             st.sampled_from(
                 [
-                    wire.RequestList(peer, kind),
-                    wire.RequestItem(peer, number, kind, True),
-                    wire.Count(peer, number + 1, kind),
-                    wire.SentItem(peer, wire_item(number), kind),
-                    wire.Ack(peer, number, kind),
-                    wire.SetCurrent(peer, number),
+                    client.request_list(kind, peer),
+                    client.request_item(number, kind, peer),
+                    client.count(number + 1, kind, peer),
+                    sent(wire_item(number, kind=kind), peer),
+                    client.ack(number, kind, peer),
+                    client.set_current(number, peer),
                 ]
             )
         )
@@ -124,7 +125,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
         (wire_item(0, commands.FENCE_CIRCLE_INCLUSION), MissionResult.ERROR),
     ],
 )
-def test_items_that_px4_refuses(item: WireItem, result: MissionResult):
+def test_items_that_px4_refuses(item, result):
     exchange = Exchange()
     assert exchange.upload([item]) == result
     assert exchange.store.mission.items == () and exchange.transfer.state is TransferState.IDLE
@@ -157,17 +158,17 @@ def test_a_heading_that_is_not_given_stays_so():
 @pytest.mark.parametrize("kind", list(MOST_ITEMS))
 def test_more_items_than_there_is_room_for(kind):
     exchange = Exchange()
-    ack = exchange.ask(wire.Count(CLIENT, MOST_ITEMS[kind] + 1, kind))[0]
-    assert (ack.result, ack.type) == (MissionResult.NO_SPACE, kind)
+    ack = exchange.ask(client.count(MOST_ITEMS[kind] + 1, kind))[0]
+    assert (ack.type, ack.mission_type) == (MissionResult.NO_SPACE, kind)
 
 
 def test_a_count_of_nothing_clears_and_so_does_clear_all():
-    for message in (wire.Count(CLIENT, 0, MISSION), wire.ClearAll(CLIENT, MISSION), wire.ClearAll(CLIENT, 255)):
+    for message in (client.count(0, MISSION), client.clear_all(MISSION), client.clear_all(255)):
         exchange = Exchange()
         exchange.upload(SQUARE)
         changes = exchange.store.mission_changes
-        acks = [answer for answer in exchange.ask(message) if isinstance(answer, wire.SendAck)]
-        assert [ack.result for ack in acks] == [MissionResult.ACCEPTED]
+        acks = of_type(exchange.ask(message), "MISSION_ACK")
+        assert [ack.type for ack in acks] == [MissionResult.ACCEPTED]
         assert exchange.store.mission.items == () and exchange.store.mission_changes > changes
 
 
@@ -193,7 +194,7 @@ def test_a_lost_request_is_repeated_after_a_quarter_of_a_second():
     exchange = receiving()
     times = []
     while len(times) < 2:
-        times += [exchange.now_us for answer in exchange.step() if isinstance(answer, wire.SendRequest)]
+        times += [exchange.now_us for _ in of_type(exchange.step(), "MISSION_REQUEST_INT")]
     assert times[1] - times[0] == pytest.approx(RETRY_US, abs=2 * STEP_US)
 
 
@@ -201,7 +202,7 @@ def test_a_lost_request_is_repeated_after_a_quarter_of_a_second():
 def test_silence_ends_a_transfer_after_five_seconds(begin):
     exchange = begin()
     if begin is sending:
-        exchange.ask(wire.RequestItem(CLIENT, 0, MISSION, True))
+        exchange.ask(client.request_item(0, MISSION))
     start_us = exchange.now_us
     while exchange.transfer.state is not TransferState.IDLE:
         exchange.step()
@@ -213,27 +214,27 @@ def test_silence_ends_a_transfer_after_five_seconds(begin):
 def test_the_last_acknowledgement_is_given_again():
     exchange = Exchange()
     exchange.upload(SQUARE)
-    acks = exchange.ask(wire.SentItem(CLIENT, SQUARE[3], MISSION))
-    assert MissionResult.ACCEPTED in [ack.result for ack in acks if isinstance(ack, wire.SendAck)]
-    exchange.ask(wire.SentItem(CLIENT, SQUARE[1], MISSION))
+    acks = exchange.ask(sent(SQUARE[3]))
+    assert MissionResult.ACCEPTED in [ack.type for ack in of_type(acks, "MISSION_ACK")]
+    exchange.ask(sent(SQUARE[1]))
     assert said(exchange) == "IGN MISSION_ITEM: No transfer"
 
 
 def test_a_peer_that_wants_the_old_kind_of_item_gets_it():
     # Given an upload to which the client answers that it does not know MISSION_REQUEST_INT
     exchange = receiving(1)
-    asked = exchange.ask(wire.Ack(CLIENT, MissionResult.UNSUPPORTED, MISSION))
-    assert [answer.is_int for answer in asked if isinstance(answer, wire.SendRequest)] == [False]
+    asked = exchange.ask(client.ack(MissionResult.UNSUPPORTED, MISSION))
+    assert [answer.get_type() for answer in asked] == ["MISSION_REQUEST"]
     old = wire_item(0, frame=commands.FRAME_GLOBAL_RELATIVE, x=47.397742, y=8.545594, is_int=False)
-    exchange.ask(wire.SentItem(CLIENT, old, MISSION))
+    exchange.ask(sent(old))
     assert exchange.store.mission.items[0].latitude_deg == pytest.approx(47.397742)
 
 
 def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
     exchange = Exchange()
     exchange.upload(SQUARE)
-    exchange.ask(wire.Count(CLIENT, 2, MISSION))
-    exchange.ask(wire.Ack(CLIENT, MissionResult.CANCELLED, MISSION))
+    exchange.ask(client.count(2, MISSION))
+    exchange.ask(client.ack(MissionResult.CANCELLED, MISSION))
     assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
     assert len(exchange.store.mission.items) == 4
 
@@ -241,20 +242,20 @@ def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
 @pytest.mark.parametrize(
     ("begin", "message", "text"),
     [
-        (receiving, wire.RequestList(CLIENT, MISSION), "Mission download request ignored, already active"),
-        (receiving, wire.RequestItem(CLIENT, 0, MISSION, True), "WPM: REJ. CMD: Busy"),
-        (receiving, wire.RequestItem(STRANGER, 0, MISSION, True), "WPM: REJ. CMD: partner id mismatch"),
-        (receiving, wire.SentItem(STRANGER, SQUARE[0], MISSION), "REJ. MIS ITEM: partner id mismatch"),
-        (receiving, wire.ClearAll(CLIENT, MISSION), "WPM: IGN CLEAR CMD: Busy"),
-        (receiving, wire.SetCurrent(CLIENT, 0), "WPM: IGN WP CURR CMD: Busy"),
-        (receiving, wire.Ack(STRANGER, 0, MISSION), "REJ. WP CMD: partner id mismatch"),
-        (sending, wire.Count(CLIENT, 2, MISSION), "WPM: IGN MISSION_COUNT: Busy"),
-        (sending, wire.SentItem(CLIENT, SQUARE[0], MISSION), "IGN MISSION_ITEM: Busy"),
-        (sending, wire.RequestList(STRANGER, MISSION), "Mission download request ignored, already active"),
-        (sending, wire.RequestItem(CLIENT, 3, MISSION, True), "WPM: REJ. CMD: Req. WP was unexpected"),
-        (sending, wire.ClearAll(CLIENT, MISSION), "WPM: IGN CLEAR CMD: Busy"),
-        (sending, wire.SetCurrent(CLIENT, 0), "WPM: IGN WP CURR CMD: Busy"),
-        (Exchange, wire.SetCurrent(CLIENT, 9), "WPM: WP CURR CMD: Not in list"),
+        (receiving, client.request_list(MISSION), "Mission download request ignored, already active"),
+        (receiving, client.request_item(0, MISSION), "WPM: REJ. CMD: Busy"),
+        (receiving, client.request_item(0, MISSION, STRANGER), "WPM: REJ. CMD: partner id mismatch"),
+        (receiving, sent(wire_item(0), STRANGER), "REJ. MIS ITEM: partner id mismatch"),
+        (receiving, client.clear_all(MISSION), "WPM: IGN CLEAR CMD: Busy"),
+        (receiving, client.set_current(0), "WPM: IGN WP CURR CMD: Busy"),
+        (receiving, client.ack(0, MISSION, STRANGER), "REJ. WP CMD: partner id mismatch"),
+        (sending, client.count(2, MISSION), "WPM: IGN MISSION_COUNT: Busy"),
+        (sending, sent(SQUARE[0]), "IGN MISSION_ITEM: Busy"),
+        (sending, client.request_list(MISSION, STRANGER), "Mission download request ignored, already active"),
+        (sending, client.request_item(3, MISSION), "WPM: REJ. CMD: Req. WP was unexpected"),
+        (sending, client.clear_all(MISSION), "WPM: IGN CLEAR CMD: Busy"),
+        (sending, client.set_current(0), "WPM: IGN WP CURR CMD: Busy"),
+        (Exchange, client.set_current(9), "WPM: WP CURR CMD: Not in list"),
     ],
 )
 def test_what_is_turned_down_and_in_which_words(begin, message, text):
@@ -266,8 +267,8 @@ def test_what_is_turned_down_and_in_which_words(begin, message, text):
 def test_only_one_link_receives_at_a_time():
     first = receiving()
     second = Exchange(first.store)
-    ack = second.ask(wire.Count(STRANGER, 2, MISSION))[0]
-    assert ack.result == MissionResult.ERROR
+    ack = second.ask(client.count(2, MISSION, STRANGER))[0]
+    assert ack.type == MissionResult.ERROR
     # And the other link still gets its list
     assert first.upload([wire_item(0), wire_item(1), wire_item(2)]) == MissionResult.ACCEPTED
 
@@ -281,4 +282,4 @@ def test_the_checksum_is_px4s():
         crc ^= byte
         for _ in range(8):
             crc = crc >> 1 ^ 0xEDB88320 * (crc & 1)
-    assert item.checksum(0) == crc
+    assert wire.checksum(item, 0) == crc

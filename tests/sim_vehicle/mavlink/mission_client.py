@@ -3,33 +3,69 @@
 import random
 from dataclasses import dataclass, field
 
-from sim_vehicle.autopilot.mission_protocol import mission_items as commands
-from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionPeer, MissionResult, MissionType, WireItem
-from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
-from sim_vehicle.autopilot.mission_protocol.mission_transfer import MissionTransfer
+from pymavlink.dialects.v20 import development as dialect
 
-CLIENT = MissionPeer(245, 190)
+from sim_vehicle.autopilot.mission_protocol import mission_items as commands
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.mavlink.services.mission_transfer import MissionTransfer
+from sim_vehicle.mavlink.services.mission_wire import MissionResult
+
+CLIENT, STRANGER = (245, 190), (246, 190)
 STEP_US = 4_000
 # MAVSDK asks again after half a second.
 CLIENT_RETRY_US = 500_000
 
 
-def wire_item(number: int, command: int = commands.WAYPOINT, **fields: object) -> WireItem:
+def wire_item(number, command=commands.WAYPOINT, is_int=True, kind=MissionType.MISSION, **fields):
     """A waypoint north of home, 10 m up, in MISSION_ITEM_INT."""
-    values: dict[str, object] = {
-        "number": number,
+    build = dialect.MAVLink_mission_item_int_message if is_int else dialect.MAVLink_mission_item_message
+    params = fields.pop("params", (0.0, 0.0, 0.0, 0.0))
+    values = {
         "frame": commands.FRAME_GLOBAL_RELATIVE_INT,
-        "command": command,
-        "current": number == 0,
+        "current": int(number == 0),
         "autocontinue": 1,
-        "params": (0.0, 0.0, 0.0, 0.0),
         "x": 473_977_420 + 100 * number,
         "y": 85_455_940,
         "z": 10.0,
-        "is_int": True,
+        **fields,
     }
-    return WireItem(**{**values, **fields})  # type: ignore[arg-type]
+    frame, current, autocontinue, *place = values.values()
+    return sent(build(1, 1, number, frame, command, current, autocontinue, *params, *place, kind))
+
+
+def sent(message, peer=CLIENT):
+    """The message as it comes from that peer."""
+    message._header.srcSystem, message._header.srcComponent = peer
+    return message
+
+
+def request_list(kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_request_list_message(1, 1, kind), peer)
+
+
+def request_item(number, kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_request_int_message(1, 1, number, kind), peer)
+
+
+def count(items, kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_count_message(1, 1, items, kind), peer)
+
+
+def ack(result, kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_ack_message(1, 1, result, kind), peer)
+
+
+def clear_all(kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_clear_all_message(1, 1, kind), peer)
+
+
+def set_current(number, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_set_current_message(1, 1, number), peer)
+
+
+def of_type(answers, *types):
+    return [answer for answer in answers if answer.get_type() in types]
 
 
 @dataclass
@@ -50,7 +86,7 @@ class Wire:
                 self.count += 1
                 self.waiting.append((now_us + self.random.randrange(self.latest_us + 1), self.count, message))
 
-    def take(self, now_us: int) -> list[object]:
+    def take(self, now_us: int) -> list:
         due = sorted(entry[:2] for entry in self.waiting if entry[0] <= now_us)
         messages = [next(entry[2] for entry in self.waiting if entry[:2] == key) for key in due]
         self.waiting = [entry for entry in self.waiting if entry[0] > now_us]
@@ -74,58 +110,58 @@ class Exchange:
         self.back = Wire(source, self.loss, self.repeat, self.latest_us)
         self.now_us = 1_000_000
 
-    def step(self) -> list[object]:
+    def step(self) -> list:
         self.now_us += STEP_US
         for message in self.there.take(self.now_us):
-            for answer in self.transfer.receive(message, self.now_us):  # type: ignore[arg-type]
+            for answer in self.transfer.receive(message, self.now_us):
                 self.back.put(answer, self.now_us)
         for answer in self.transfer.update(self.now_us):
             self.back.put(answer, self.now_us)
         return self.back.take(self.now_us)
 
-    def ask(self, message: object) -> list[object]:
+    def ask(self, message: object) -> list:
         """One message and what comes back at once."""
         self.there.put(message, self.now_us)
         return self.step()
 
-    def upload(self, items: list[WireItem], kind: MissionType = MissionType.MISSION, within_s: float = 60.0) -> int:
+    def upload(self, items, kind=MissionType.MISSION, within_s: float = 60.0) -> int:
         """The result that the client gets in the end."""
-        said: object = wire.Count(CLIENT, len(items), kind)
+        said = count(len(items), kind)
         self.there.put(said, self.now_us)
         said_us = end_us = self.now_us
         end_us += round(1e6 * within_s)
         while self.now_us < end_us:
             for answer in self.step():
-                if isinstance(answer, wire.SendAck) and answer.peer == CLIENT:
-                    return answer.result
-                if isinstance(answer, wire.SendRequest) and answer.number < len(items):
-                    said, said_us = wire.SentItem(CLIENT, items[answer.number], kind), self.now_us
+                if answer.get_type() == "MISSION_ACK" and answer.target_system == CLIENT[0]:
+                    return answer.type
+                if answer.get_type().startswith("MISSION_REQUEST") and answer.seq < len(items):
+                    said, said_us = items[answer.seq], self.now_us
+                    said.mission_type = kind
                     self.there.put(said, self.now_us)
             if self.now_us - said_us > CLIENT_RETRY_US:
                 said_us = self.now_us
                 self.there.put(said, self.now_us)
         raise AssertionError("no acknowledgement came")
 
-    def download(self, kind: MissionType = MissionType.MISSION, within_s: float = 60.0) -> list[wire.SendItem]:
+    def download(self, kind=MissionType.MISSION, within_s: float = 60.0):
         """The items that the client has in the end, in their order."""
-        said: object = wire.RequestList(CLIENT, kind)
+        said = request_list(kind)
         self.there.put(said, self.now_us)
-        said_us, count, items = self.now_us, None, {}
+        said_us, total, items = self.now_us, None, {}
         end_us = self.now_us + round(1e6 * within_s)
         while self.now_us < end_us:
             for answer in self.step():
-                if isinstance(answer, wire.SendAck):
-                    raise AssertionError(f"refused: {answer}")
-                if isinstance(answer, wire.SendCount):
-                    count = answer.count if count is None else count
-                elif isinstance(answer, wire.SendItem) and answer.number == len(items):
-                    items[answer.number] = answer
+                assert answer.get_type() != "MISSION_ACK", f"refused: {answer}"
+                if answer.get_type() == "MISSION_COUNT":
+                    total = answer.count if total is None else total
+                elif answer.get_type() == "MISSION_ITEM_INT" and answer.seq == len(items):
+                    items[answer.seq] = answer
                 else:
                     continue
-                if len(items) == count:
-                    self.there.put(wire.Ack(CLIENT, MissionResult.ACCEPTED, kind), self.now_us)
-                    return [items[number] for number in range(count)]
-                said, said_us = wire.RequestItem(CLIENT, len(items), kind, True), self.now_us
+                if len(items) == total:
+                    self.there.put(ack(MissionResult.ACCEPTED, kind), self.now_us)
+                    return [items[number] for number in range(total)]
+                said, said_us = request_item(len(items), kind), self.now_us
                 self.there.put(said, self.now_us)
             if self.now_us - said_us > CLIENT_RETRY_US:
                 said_us = self.now_us
