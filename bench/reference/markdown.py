@@ -21,3 +21,8 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def code(text: object) -> str:
     return f"`{text}`" if str(text) else ""
+
+
+def first_sentence(text: str) -> str:
+    """What a key or a function is; what follows says why."""
+    return re.split(r"(?<=\.)\s+(?=[A-Z`0-9])", text, maxsplit=1)[0]
