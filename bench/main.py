@@ -53,7 +53,7 @@ def _add_docs(commands: Commands) -> None:
 
 
 def _add_stamps(commands: Commands) -> None:
-    text = "Lists figures and tables of the manual that are older than the code they speak of, or bear no stamp."
-    stamps = commands.add_parser("stamps", help="look for figures and tables that are out of date", description=text)
+    text = "Lists pictures and figures of the manual that are older than the code they speak of, or bear no stamp."
+    stamps = commands.add_parser("stamps", help="look for pictures and figures that are out of date", description=text)
     stamps.add_argument("--release", action="store_true", help="exit 1 where there is one")
     stamps.set_defaults(run=runs("bench.stamps:run_stamps"))
