@@ -7,8 +7,8 @@ from pathlib import Path
 
 from rebound_cli.arguments import count, number
 
-# Studies are dated: what they write are notes, and no part of the manual.
-NOTES = Path("bench/notes")
+# Tables and pictures of one machine on one day: not committed.
+BUILD = Path("build")
 DRAWN_NAME, DRAWN_TITLE = "drawn.md", "Vehicles nobody tuned for"
 hours = number(float, math.ulp(0.0), 10_000, "a time: give hours, such as 0.5")
 
@@ -27,7 +27,7 @@ def add_workers(parser: ArgumentParser) -> None:
 
 def add_documents_folder(parser: ArgumentParser, written: str) -> None:
     parser.add_argument(
-        "--out", type=Path, default=NOTES, metavar="DIR", help=f"folder of {written} (default: {NOTES})"
+        "--out", type=Path, default=BUILD, metavar="DIR", help=f"folder of {written} (default: {BUILD})"
     )
 
 

@@ -26,12 +26,13 @@ def with_part(text: str, name: str, content: str) -> str:
 
 
 def checked_text(path: Path, name: str, title: str | None = None) -> str:
-    """The text of a document that has a place for the part; a new one under ``title`` where there is no file.
+    """The text of a document that has a place for the part; a new one, by default under the part's name, where there
+    is no file.
 
-    Commands ask before they fly for hours. Raises MarkedPartError, also for a missing file without a ``title``.
+    Commands ask before they fly for hours. Raises MarkedPartError.
     """
-    if title is not None and not path.exists():
-        return f"# {title}\n\n<!-- generated: {name} -->\n{_END}\n"
+    if not path.exists():
+        return f"# {title or name}\n\n<!-- generated: {name} -->\n{_END}\n"
     try:
         text = path.read_text(encoding="utf-8")
         with_part(text, name, "")
@@ -46,4 +47,6 @@ def checked_text(path: Path, name: str, title: str | None = None) -> str:
 
 def write_part(path: Path, name: str, content: str, title: str | None = None) -> None:
     """Make the part anew in the file. Raises MarkedPartError as `checked_text` does, OSError."""
-    path.write_text(with_part(checked_text(path, name, title), name, content), encoding="utf-8")
+    text = with_part(checked_text(path, name, title), name, content)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")

@@ -22,9 +22,9 @@ def add_ablation(commands: Commands) -> None:
     ablation.add_argument(
         "--out",
         type=Path,
-        default=Path("bench/notes/ablation.md"),
+        default=Path("build/ablation.md"),
         metavar="FILE",
-        help="default: bench/notes/ablation.md",
+        help="default: build/ablation.md",
     )
     ablation.add_argument(
         "--hits",

@@ -11,7 +11,7 @@ def add_campaign(commands: Commands) -> None:
     campaign = commands.add_parser(
         "campaign",
         help="fly random missions in random rooms and write what became of them",
-        description="Random missions with both airframes, hits with both laws; see bench/notes/campaign.md.",
+        description="Random missions with both airframes, hits with both laws; see bench/notes/results.md.",
     )
     campaign.add_argument("--missions", type=count, default=1000, metavar="N", help="random missions (default 1000)")
     campaign.add_argument(
@@ -32,7 +32,7 @@ def add_campaign(commands: Commands) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="folder of campaign.md, or of drawn.md, and images (default: bench/notes); with --only the run folder "
+        help="folder of campaign.md, or of drawn.md, and images (default: build); with --only the run folder "
         "(default: runs/<time>-random-SEED)",
     )
     campaign.set_defaults(run=runs("bench.campaign_report.command:run_campaign_command"))

@@ -4,7 +4,7 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
-from bench.arguments import DRAWN_NAME, DRAWN_TITLE, NOTES
+from bench.arguments import BUILD, DRAWN_NAME, DRAWN_TITLE
 from bench.campaign.plan import Campaign
 from bench.campaign.record import record_path
 from bench.campaign.run import RECORDS_FOLDER, Results, Workers, failures_text, run_campaign
@@ -39,7 +39,7 @@ def run_campaign_command(options: Namespace) -> int:
     if options.airframe is not None:
         raise ConfigurationError("--airframe belongs to --only: a campaign flies every mission with both.")
     started_s = time.monotonic()
-    workers, out = Workers(options.jobs, options.scheduler), options.out or NOTES
+    workers, out = Workers(options.jobs, options.scheduler), options.out or BUILD
     if options.vehicles == "drawn":
         return _run_drawn(options, workers, out)
     _check(out)

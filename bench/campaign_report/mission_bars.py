@@ -15,7 +15,7 @@ CLEAN_WANTED = 0.99
 OVERSHOOT_MOST_M = 0.05
 LOST_MOST_M, LOST_UP_TO_M_S = 0.10, 2.5
 RISEN_MOST_M = 0.05
-# A vehicle that leant by more hangs on the obstacle by its own thrust (bench/notes/recovery.md).
+# A vehicle that leant by more hangs on the obstacle by its own thrust (bench/notes/decisions.md).
 PINNED_DEG = 60.0
 LOSING_M, LEFT_MOST = 0.05, 0.5
 CLEAR_LEAST_M = 0.3

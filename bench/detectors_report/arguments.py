@@ -22,7 +22,7 @@ def add_detectors(commands: Commands) -> None:
     detectors = commands.add_parser(
         "detectors",
         help="try every collision detector on hits and healthy flights",
-        description="Simulated and recorded hits and flights through every detector; see bench/notes/detection.md.",
+        description="Simulated and recorded hits and flights through every detector; see bench/notes/results.md.",
     )
     detectors.add_argument("--hits", type=count, default=400, metavar="N", help="simulated hits (default 400)")
     detectors.add_argument(

@@ -1,4 +1,4 @@
-"""`bench detectors`: works the campaigns out, writes the tables of bench/notes/detection.md and the pictures."""
+"""`bench detectors`: works the campaigns out, writes the tables of build/detection.md and the pictures."""
 
 import time
 from argparse import Namespace

@@ -17,6 +17,6 @@ def add_faults(commands: Commands) -> None:
     faults.add_argument("--only", metavar="NAME", help="print the flights of this fault and write nothing")
     add_jobs(faults)
     faults.add_argument("--hits", type=count, default=1000, metavar="N", help="hits under load (default 1000)")
-    page = Path("docs/reference/faults.md")
+    page = Path("build/faults.md")
     faults.add_argument("--out", type=Path, default=page, metavar="FILE", help="default: %(default)s")
     faults.set_defaults(run=runs("bench.faults.command:run_faults"))

@@ -45,7 +45,7 @@ SPEEDS_M_S = (0.5, 5.0)
 # Asked for: every sample there is, and PX4's default onboard stream.
 IMU_HZ = (250, 50)
 # Until the obstacle is touched. The detector knows what a vehicle shakes after 1 s (`detection.floor`); meeting the
-# vehicle takes 0.05 s. Twice as long changes nothing (bench/notes/hits.md).
+# vehicle takes 0.05 s. Twice as long changes nothing (bench/notes/decisions.md).
 FREE_FLIGHT_S = (1.2, 1.4)
 # Of the streams' rates, in place of 2 s: ten of the slowest stream that must arrive.
 WINDOW_S = 0.5

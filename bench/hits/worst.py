@@ -41,7 +41,7 @@ LEAST, MOST, HALVINGS = 1 / 8, 64.0, 8
 NOTICED_M_S = 0.5
 # Of nothing touched, or too slowly; greater than any figure that a search makes least.
 NO_HIT = 2.0 * MOST
-# A fall: ten times what a hit may lose that counts as recovered (bench/notes/recovery.md).
+# A fall: ten times what a hit may lose that counts as recovered (bench/notes/decisions.md).
 FALL_M = 1.0
 # From one class of recoveries to the next: more than a speed and a time to rest together.
 BETTER = 15.0

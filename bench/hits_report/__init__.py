@@ -1,1 +1,1 @@
-"""What the hits through the whole wire show: bench/notes/hits.md."""
+"""What the hits through the whole wire show: build/hits.md."""

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bench.arguments import NOTES, add_vehicles, add_workers
+from bench.arguments import BUILD, add_vehicles, add_workers
 from rebound_cli.arguments import Commands, count, runs
 
 
@@ -43,5 +43,5 @@ def add_hits(commands: Commands) -> None:
     hits.add_argument(
         "--corpus", type=Path, metavar="FOLDER", help="with --worst: keep their flights there, for `corpus judge`"
     )
-    hits.add_argument("--out", type=Path, default=NOTES / "hits.md", metavar="FILE", help="default: %(default)s")
+    hits.add_argument("--out", type=Path, default=BUILD / "hits.md", metavar="FILE", help="default: %(default)s")
     hits.set_defaults(run=runs("bench.hits_report.command:run_hits"))

@@ -1,4 +1,4 @@
-"""`bench hits`: flies hits alone and writes bench/notes/hits.md."""
+"""`bench hits`: flies hits alone and writes build/hits.md."""
 
 from argparse import Namespace
 from collections.abc import Iterator

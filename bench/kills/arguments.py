@@ -15,7 +15,7 @@ def add_kills(commands: Commands) -> None:
     kills.add_argument("--kills", type=count, default=1000, metavar="N", help="so many kills (default 1000)")
     kills.add_argument("--first-seed", type=count, default=1, metavar="SEED", help="of the first flight (default 1)")
     kills.add_argument(
-        "--out", type=Path, default=Path("bench/notes/kills.md"), metavar="FILE", help="default: bench/notes/kills.md"
+        "--out", type=Path, default=Path("build/kills.md"), metavar="FILE", help="default: build/kills.md"
     )
     add_workers(kills)
     kills.set_defaults(run=runs("bench.kills.command:run_kills"))

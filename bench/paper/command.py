@@ -1,4 +1,4 @@
-"""`python -m bench paper`: flies every study and writes pictures, table and results of bench/notes/paper.md."""
+"""`python -m bench paper`: flies every study and writes pictures, table and results of build/paper.md."""
 
 from argparse import Namespace
 from collections.abc import Sequence

@@ -13,7 +13,7 @@ def add_results(commands: Commands) -> None:
         description="Lockstep wall hits at four speeds with both airframes, as a table in Markdown.",
     )
     results.add_argument(
-        "--out", type=Path, default=Path("bench/notes/results.md"), metavar="FILE", help="default: %(default)s"
+        "--out", type=Path, default=Path("build/results.md"), metavar="FILE", help="default: %(default)s"
     )
     results.add_argument("--seeds", type=count, default=20, help="flights for each speed and airframe (default 20)")
     add_jobs(results)

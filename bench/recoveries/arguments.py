@@ -13,7 +13,7 @@ def add_recoveries(commands: Commands) -> None:
         description="Lockstep wall hits at 1 to 5 m/s, square and slanted, both airframes, laws paper and adaptive.",
     )
     recoveries.add_argument(
-        "--out", type=Path, default=Path("bench/notes/recovery.md"), metavar="FILE", help="default: %(default)s"
+        "--out", type=Path, default=Path("build/recovery.md"), metavar="FILE", help="default: %(default)s"
     )
     recoveries.add_argument("--seeds", type=count, default=10, help="flights for each hit and law (default 10)")
     add_jobs(recoveries)

@@ -1,4 +1,4 @@
-"""`bench campaign recoveries`: hits with laws `paper` and `adaptive`, as a table in bench/notes/recovery.md."""
+"""`bench campaign recoveries`: hits with laws `paper` and `adaptive`, as a table in build/recovery.md."""
 
 import statistics
 from argparse import Namespace

@@ -18,6 +18,6 @@ def add_soak(commands: Commands) -> None:
     soak.add_argument(
         "--python", metavar="PATH", help="of the environment that the guard has, such as a drone's (default: this one)"
     )
-    note = Path("bench/notes/soak.md")
+    note = Path("build/soak.md")
     soak.add_argument("--out", type=Path, default=note, metavar="FILE", help="default: %(default)s")
     soak.set_defaults(run=runs("bench.soak.command:run_soak"))

@@ -15,9 +15,9 @@ def add_speed(commands: Commands) -> None:
     speed.add_argument(
         "--out",
         type=Path,
-        default=Path("docs/explanation/performance.md"),
+        default=Path("build/performance.md"),
         metavar="FILE",
-        help="default: docs/explanation/performance.md",
+        help="default: build/performance.md",
     )
     speed.add_argument(
         "--calls", action="store_true", help="count function calls alone, and make what the count is held to anew"

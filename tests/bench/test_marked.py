@@ -16,10 +16,10 @@ def test_only_what_stands_between_the_marks_is_made_anew(tmp_path):
 
 
 def test_a_document_that_is_not_there_begins_with_its_title_and_the_marks(tmp_path):
-    write_part(tmp_path / "bumps.md", "bumps", "new\n", "Bumps")
-    assert (tmp_path / "bumps.md").read_text() == "# Bumps\n\n<!-- generated: bumps -->\nnew\n<!-- end -->\n"
-    with pytest.raises(MarkedPartError, match="No such file"):
-        checked_text(tmp_path / "other.md", "bumps")
+    for title, head in (("Bumps", "Bumps"), (None, "bumps")):
+        path = tmp_path / head / "document.md"
+        write_part(path, "bumps", "new\n", title)
+        assert path.read_text() == f"# {head}\n\n<!-- generated: bumps -->\nnew\n<!-- end -->\n"
 
 
 @pytest.mark.parametrize("text", ["# Bumps\n", DOCUMENT.replace("end", "stop"), DOCUMENT + DOCUMENT])

@@ -269,7 +269,7 @@ def test_every_equation_has_its_function_and_its_test():
 
 
 def test_every_picture_of_the_document_is_made_and_the_other_way_round(sample):
-    named = {Path(name).name for row in table_of("Figures") for name in re.findall(r"\((images/paper/\S+)\)", row[2])}
+    named = {Path(name).name for row in table_of("Figures") for name in re.findall(r"`(\S+\.png)`", row[2])}
     made = set(arm.conclude([]).pictures) | set(sample_scenario.conclude([sample]).pictures)
     for study in (flight_tests, causes, directions, imu_rate, simulation_experiment, claims):
         made |= set(study.conclude(results_like(sample, study.flights(1))).pictures)

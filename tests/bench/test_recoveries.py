@@ -10,7 +10,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_wall():
-    """This cell; bench/notes/campaign.md has the median of all."""
+    """This cell; bench/notes/results.md has the median of all."""
     paper, adaptive = (work_out(RecoveryCase(law, "foldable", 0, 2.0, 1)) for law in ("paper", "adaptive"))
     assert (paper["outcome"], adaptive["outcome"]) == ("completed", "completed")
     assert adaptive["settled_s"] < 0.8 * paper["settled_s"]

@@ -46,7 +46,7 @@ def test_one_command_flies_into_the_wall_recovers_and_lands(wall_flight):
     (hit,) = summary["collisions"]
     assert hit["impact_speed_m_s"] == pytest.approx(2.0, abs=0.15)
     assert hit["truth"]["normal_ned"] == [-1.0, 0.0, 0.0]
-    # A hit that clips leaves few samples of the normal: 25 degrees at most in 95 of 100 (bench/notes/detection.md).
+    # A hit that clips leaves few samples of the normal: 25 degrees at most in 95 of 100 (bench/notes/results.md).
     assert hit["normal_ned"][0] < -0.85
     assert 0.0 < hit["truth"]["detection_latency_ms"] < 9.0
     assert hit["settled_after_s"] is not None
