@@ -42,6 +42,14 @@ class GuardContext(FlightContext):
     sent_ned_m: deque[tuple[int, Vector3 | None]] = field(default_factory=lambda: deque(maxlen=64))
 
 
+    def note_touchdown(self) -> None:
+        """The ground is here: heights count from it."""
+        FlightContext.note_touchdown(self)
+        latest, origin = self.vehicle.history.latest(), self.origin_ned_m
+        if latest is not None and origin is not None:
+            self.origin_ned_m = (origin[0], origin[1], latest.position_ned_m[2])
+
+
 class GuardStateHandler(Protocol):
     """A state's behaviour; one object is made each time the state is entered."""
 

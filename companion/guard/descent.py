@@ -20,7 +20,7 @@ class Descent:
     """Changed only by `update`. Receive times are on the companion's clock."""
 
     velocity_down_m_s: float | None = None
-    setpoint_us: int = 0
+    setpoint_us: int | None = None
     throttle: float | None = None
 
     def update(self, samples: Sequence[Sample], now_us: int) -> None:
@@ -31,11 +31,14 @@ class Descent:
                 self.throttle = sample.deflections[THROTTLE]
 
     def is_meant(self, vehicle: Vehicle, now_us: int) -> bool:
-        """A pilot who flies by attitude or rates has the thrust in hand: what lets the vehicle down is meant."""
+        """A pilot who flies by attitude or rates has the thrust in hand: what lets the vehicle down is meant.
+
+        So it is where the sticks ask for velocities, and nothing has ever told which.
+        """
         mode = vehicle.custom_mode or 0
         if vehicle.landed is LandedState.LANDING or mode in (AUTO_LAND, AUTO_PRECLAND) or by_hand_alone(mode):
             return True
-        if by_sticks(mode) and self.throttle is not None and self.throttle < -STICK_DEADZONE:
+        if by_sticks(mode) and (self.setpoint_us is None if self.throttle is None else self.throttle < -STICK_DEADZONE):
             return True
-        is_current = now_us - self.setpoint_us < OLD_NEWS_US
+        is_current = self.setpoint_us is not None and now_us - self.setpoint_us < OLD_NEWS_US
         return is_current and self.velocity_down_m_s is not None and self.velocity_down_m_s >= DESCENT_M_S

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from companion.messages import Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S
 from companion.motion.rotation import tilt_rad
+from companion.motion.strapdown import ZERO
 from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
 from companion.reflex.detector import ImpactKind, Situation
 
@@ -40,6 +41,12 @@ class Touch:
         return self.near_ground or self.upward > STEEP
 
     @property
+    def comes_down(self) -> bool:
+        """Whether the ground is what the vehicle moves towards, rather than something beside it."""
+        north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s or ZERO
+        return down_m_s > math.hypot(north_m_s, east_m_s)
+
+    @property
     def is_upright(self) -> bool:
         return math.cos(tilt_rad(self.attitude_wxyz)) > STEEP
 
@@ -51,7 +58,8 @@ class Touch:
     def has_landed(self) -> bool:
         """A vehicle on its way down meets the ground; one that is as low as its feet stands on it or scrapes along."""
         height_m = self.situation.height_m
-        return self.situation.descent_commanded or (height_m is not None and height_m < SCRAPING_M)
+        is_as_low_as_feet = height_m is not None and height_m < SCRAPING_M
+        return is_as_low_as_feet or (self.situation.descent_commanded and (self.on_ground or self.comes_down))
 
     @property
     def is_struck(self) -> bool:
@@ -76,8 +84,8 @@ TABLE = (
     ),
     Row(
         ImpactKind.LANDING,
-        "near the ground or pushed from below, and sent down, flown down by hand, or as low as the feet",
-        lambda touch: touch.on_ground and touch.has_landed,
+        "sent down or flown down by hand, and near the ground, pushed from below or coming down; or as low as the feet",
+        lambda touch: touch.has_landed,
     ),
     Row(
         ImpactKind.STRUCK,

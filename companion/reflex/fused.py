@@ -126,6 +126,9 @@ class FusedDetector:
                 is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
                 if is_another and size > 2.0 * s.peak_specific_force_m_s2:
                     return self._fire(s, situation, impact)
+                # A touch that tips the vehicle over becomes a crash.
+                if s.kind is not ImpactKind.CRASH and self._classified(s, situation, impact).kind is ImpactKind.CRASH:
+                    return self._fire(s, situation, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
         first = s.observed = s.observed or impact
@@ -150,7 +153,7 @@ class FusedDetector:
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
         s.peak_specific_force_m_s2 = impact.size_m_s2
-        s.observed, s.is_hand = None, impact.kind is ImpactKind.CONTACT
+        s.observed, s.kind = None, impact.kind
         return impact
 
     # --- velocity ---------------------------------------------------------------------------------------------

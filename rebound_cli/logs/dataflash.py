@@ -12,6 +12,7 @@ import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,7 @@ _TROUBLES = [
 # Two estimates of one climb rate that both work are nearer than this for more than half of the time: each is good to
 # 0.1 to 0.2 m/s by its barometer.
 _SAME_CLIMB_M_S = 0.3
+_EKF_CHECK = _TROUBLES.index("EKF check")
 # GPS.Status
 _FIX_3D = 3
 # On the mean sphere, 6371 km.
@@ -152,6 +154,7 @@ def read_dataflash(path: Path) -> Log:
     if not imu:
         raise LogError(f"{path}: no IMU in it; ArduPilot logs it by default (LOG_BITMASK).")
     estimator, estimate = _estimate(topics, parameters)
+    estimate = _while_good(estimate, topics["ERR"])
     heard = [
         *_imu_samples(imu),
         *_local_position(estimate),
@@ -160,7 +163,7 @@ def read_dataflash(path: Path) -> Log:
         *_vibration(topics["VIBE"]),
         *_heartbeats(topics["EV"], topics["MODE"]),
         *_landed_states(topics["EV"], int(imu.time_us[0])),
-        *_sticks(topics["RCIN"], parameters),
+        *(_sticks(topics["RCIN"], parameters) if topics["RCIN"] else _throttle_stick(topics["CTUN"])),
         *_demand(topics["PSCD"] or topics["CTUN"]),
     ]
     log = Log(
@@ -255,6 +258,16 @@ def _estimate(topics: _Topics, parameters: _Parameters) -> tuple[str, Topic]:
     return "CTUN", _inertial_navigation(topics["CTUN"], topics["GPS"])
 
 
+def _while_good(estimate: Topic, errors: Topic) -> Topic:
+    """Without the times in which the vehicle's own check of its EKF failed: it does not fly by it then."""
+    column = errors.vector("Subsys", "ECode")
+    checks = [] if column is None else [(t, code) for _, t, (part, code) in errors.rows(column) if part == _EKF_CHECK]
+    good = np.ones(len(estimate), dtype=bool)
+    for (time_us, code), (until_us, _) in pairwise([*checks, (np.inf, 0.0)]):
+        good &= not code or (estimate.time_us < time_us) | (estimate.time_us >= until_us)
+    return estimate.only(good)
+
+
 def _status_of(name: str) -> str:
     """XKF4 of XKF1; CTUN has none beside it."""
     return name.replace("1", "4")
@@ -278,22 +291,27 @@ def _of_primary(topic: Topic, status: Topic) -> Topic:
 
 
 def _inertial_navigation(throttle: Topic, gps: Topic) -> Topic:
-    """Before there was an EKF: height and climb rate as flown by, the rest by GPS; at rest until it has a fix."""
+    """Before there was an EKF: height and climb rate as flown by, the rest by GPS; at rest where it never has a fix.
+
+    At the times of the fixes, from the first one on: a velocity of 5 Hz held until the next would jump.
+    """
     up, fixes = throttle.vector("Alt", "CRt"), gps.vector("Lat", "Lng", "Spd", "GCrs", "Status")
     if up is None:
         return Topic({"timestamp": np.empty(0)})
-    flat = np.zeros((len(throttle), 4))
+    time_us, flat = throttle.time_us, np.zeros((len(throttle), 4))
     if fixes is not None and (fixes[:, 4] >= _FIX_3D).any():
-        fixed = gps.only(fixes[:, 4] >= _FIX_3D)
+        fixed_us = gps.only(fixes[:, 4] >= _FIX_3D).time_us
+        waiting_us = time_us[time_us < fixed_us[0]]
+        time_us = np.concatenate([waiting_us, fixed_us])
         latitude_deg, longitude_deg, speed, course_deg, _ = fixes[fixes[:, 4] >= _FIX_3D].T
         north, east = latitude_deg - latitude_deg[0], longitude_deg - longitude_deg[0]
         course_rad, shrinking = np.radians(course_deg), math.cos(math.radians(latitude_deg[0]))
         place = _METRES_PER_DEGREE * north, _METRES_PER_DEGREE * shrinking * east
-        known = np.column_stack([*place, speed * np.cos(course_rad), speed * np.sin(course_rad)])
-        held, is_known = fixed.held(known, throttle.time_us)
-        flat[is_known] = held[is_known]
+        fixed = np.column_stack([*place, speed * np.cos(course_rad), speed * np.sin(course_rad)])
+        flat = np.concatenate([np.zeros((len(waiting_us), 4)), fixed])
+        up, _ = throttle.held(up, time_us)
     fields = dict(zip(("PN", "PE", "VN", "VE", "PD", "VD"), (*flat.T, *-up.T), strict=True))
-    return Topic({"timestamp": throttle.time_us, **fields})
+    return Topic({"timestamp": time_us, **fields})
 
 
 def _losses(topics: _Topics, estimator: str, estimate: Topic, window_us: float | None) -> Iterator[str]:
@@ -437,6 +455,14 @@ def _sticks(topic: Topic, parameters: _Parameters) -> Iterator[LoggedSample]:
         columns.append(sign * np.interp(pulses, (low, middle, high), (-1.0, 0.0, 1.0)))
     for _, time_us, (pitch, roll, throttle, yaw) in topic.rows(np.column_stack(columns)):
         yield LoggedSample(time_us, messages.Sticks((pitch, roll, throttle, yaw)))
+
+
+def _throttle_stick(topic: Topic) -> Iterator[LoggedSample]:
+    """As the pilot's throttle was understood, until 3.4 in thousandths; nothing is known of the other sticks."""
+    thousandths = topic.column("ThrIn")
+    shares = topic.column("ThI") if thousandths is None else thousandths / 1000.0
+    for _, time_us, (share,) in topic.rows(None if shares is None else shares[:, None]):
+        yield LoggedSample(time_us, messages.Sticks((0.0, 0.0, max(-1.0, min(1.0, 2.0 * share - 1.0)), 0.0)))
 
 
 def _demand(topic: Topic) -> Iterator[LoggedSample]:

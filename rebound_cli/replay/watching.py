@@ -56,6 +56,11 @@ class Circumstances:
         guard.events, guard.outbox = [], []
         return happened
 
+    def note(self, impacts: Sequence[ImpactEstimate]) -> None:
+        """What the detector has reported."""
+        if any(estimate.impact.kind is ImpactKind.LANDING for estimate in impacts):
+            self._guard.note_touchdown()
+
     @property
     def situation(self) -> Situation:
         """Now."""
@@ -192,9 +197,12 @@ def watch_log(
         listen(monitor)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
-        for notice in advance(monitor, samples, circumstances.situation, now_us).notices:
+        situation = circumstances.situation
+        result = advance(monitor, samples, situation, now_us)
+        for notice in result.notices:
             findings.tell(now_us, notice.text)
-        findings.note(monitor, circumstances.situation, now_us)
+        findings.note(monitor, situation, now_us)
+        circumstances.note(result.impacts)
 
     for at_us, group in groupby(heard, key=lambda item: max(item.at_us, start_us)):
         last_poll_us = min(at_us, last_us + _MOST_POLLS * POLL_INTERVAL_US)

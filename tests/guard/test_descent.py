@@ -43,6 +43,11 @@ def test_a_setpoint_that_sinks_means_it_while_it_is_renewed(mode):
 
 
 @pytest.mark.parametrize("mode", [ALTCTL, POSCTL])
+def test_a_pilot_of_whom_nothing_was_ever_heard_may_mean_it(mode):
+    assert is_meant(mode) and not is_meant(AUTO_LOITER)
+
+
+@pytest.mark.parametrize("mode", [ALTCTL, POSCTL])
 def test_a_throttle_below_its_middle_means_it_where_sticks_ask_for_velocities(mode):
     assert is_meant(mode, throttle(-1.5 * STICK_DEADZONE)) and not is_meant(mode, throttle(-0.9 * STICK_DEADZONE))
     assert not is_meant(AUTO_LOITER, throttle(-1.0))
