@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.head_on import head_on
+from bench.fly.cruise import head_on
 from rebound_cli.documents import load_document, validated
 from rebound_cli.identification.capture import find_hit, read_table
 from rebound_cli.identification.fit import (

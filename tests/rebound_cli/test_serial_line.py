@@ -7,7 +7,7 @@ import time
 import pytest
 from pymavlink import mavutil
 
-from bench.soak.cable import Cable
+from bench.studies.cable import Cable
 from companion.mavlink.delivery import Delivery
 from companion.shell.tlog import read_tlog
 from sim_vehicle.testing import start_vehicle
