@@ -87,7 +87,7 @@ class WallSpec(ObstacleSpec):
             raise ValueError("normal_ned has no direction; give the way the face looks, e.g. [-1, 0, 0]")
         return self
 
-    def wall(self, number: int) -> Wall:
+    def built(self, number: int) -> Wall:
         """The same as a value, with its normal made unit and a name if it had none."""
         return Wall(
             name=self.name or f"wall {number}",
@@ -118,7 +118,7 @@ class PoleSpec(ObstacleSpec):
             raise ValueError("axis_ned has no direction; [0, 0, -1] stands upright")
         return self
 
-    def pole(self, number: int) -> Pole:
+    def built(self, number: int) -> Pole:
         """The same as a value, with its axis made unit and a name if it had none."""
         return Pole(
             name=self.name or f"pole {number}",
@@ -140,7 +140,7 @@ class BoxSpec(ObstacleSpec):
     yaw_deg: Finite = 0.0
     """By which it is turned, clockwise."""
 
-    def box(self, number: int) -> Box:
+    def built(self, number: int) -> Box:
         """The same as a value, with a name if it had none."""
         cosine, sine = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
         return Box(

@@ -113,13 +113,7 @@ def _orbit(command: Command, flight: CommandedVehicle) -> Result:
     place, altitude_m = _place(command, flight), _given(command.param7)
     north, east = (None, None) if place is None else place[:2]
     down_m = None if altitude_m is None else flight.origin.place.altitude_m - altitude_m
-    behaviour = _given(command.param3)
-    done = flight.navigator.change_orbit(
-        _given(command.param1),
-        _given(command.param2),
-        None if behaviour is None else round(behaviour),
-        (north, east, down_m),
-    )
+    done = flight.navigator.change_orbit(_given(command.param1), _given(command.param2), (north, east, down_m))
     if not done:
         flight.say(Severity.CRITICAL, "Orbit radius limit exceeded")
     return result
@@ -145,7 +139,7 @@ def _terminate(command: Command, flight: CommandedVehicle) -> Result:
 
 
 def _look_at(command: Command, flight: CommandedVehicle) -> Result:
-    """PX4 takes every region of interest; outside a mission this vehicle, like one without a gimbal, ignores it."""
+    """PX4 takes every region of interest; this vehicle, like one without a gimbal, ignores it."""
     return Result.ACCEPTED
 
 

@@ -189,13 +189,7 @@ class Bench:
         self._timeline.note(f"removed {names}")
 
     def _built(self, spec: ObstacleSpec, number: int) -> Obstacle:
-        obstacle: Obstacle
-        if isinstance(spec, WallSpec):
-            obstacle = spec.wall(number)
-        elif isinstance(spec, PoleSpec):
-            obstacle = spec.pole(number)
-        else:
-            obstacle = spec.box(number)
+        obstacle = spec.built(number)
         if obstacle.motion is None:
             return obstacle
         return replace(obstacle, motion=obstacle.motion.later(self.time_s))

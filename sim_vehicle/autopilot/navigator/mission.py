@@ -57,7 +57,6 @@ class MissionFlight:
         self._climb_down_m: float | None = None
         self._jumps_left: dict[int, int] = {}
         self._entered_us = 0
-        self._roi: StoredItem | None = None
         self._was_disarmed = False
         self._was_flown = False
         self.runs = False
@@ -102,7 +101,7 @@ class MissionFlight:
         self._was_disarmed = True
 
     def _announce(self, view: View) -> None:
-        self._work, self._roi = Work.ITEM, None
+        self._work = Work.ITEM
         progress = self._store.progress
         progress.reached, progress.finished = -1, False
         if self._store.mission.items and progress.valid:
@@ -141,7 +140,6 @@ class MissionFlight:
             self._given = []
         if not self.runs:
             return
-        self._look_at_roi(view)
         item = self._store.mission.items[self._store.current]
         if not self._is_over(item, view):
             return
@@ -231,10 +229,6 @@ class MissionFlight:
             self.target = NavigatorTarget(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
         elif view.landed:
             self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
-        if item.command in (kinds.DO_SET_ROI, kinds.DO_SET_ROI_LOCATION, kinds.DO_SET_ROI_NONE):
-            is_place = item.frame != kinds.FRAME_MISSION and item.params[0] != kinds.ROI_NONE
-            is_place = is_place or item.command == kinds.DO_SET_ROI_LOCATION
-            self._roi = item if is_place and item.command != kinds.DO_SET_ROI_NONE else None
         self._given.append(MissionCommand(item.command, item.params))
 
     def _begin_with_jump(self, view: View) -> None:
@@ -274,16 +268,6 @@ class MissionFlight:
             self.target = NavigatorTarget(Kind.POSITION, (place[0], place[1], height[2]))
         else:
             self.target = NavigatorTarget(Kind.LAND, place)
-
-    def _look_at_roi(self, view: View) -> None:
-        """A region of interest turns the vehicle while it is farther than the radius at which places are reached."""
-        if self._roi is None or self.target.kind not in (Kind.POSITION, Kind.HOLD):
-            return
-        north, east, _ = self._place(self._roi, view)
-        to_north, to_east = north - view.position_ned_m[0], east - view.position_ned_m[1]
-        if math.hypot(to_north, to_east) > self._parameters["NAV_ACC_RAD"]:
-            yaw_rad = math.atan2(to_east, to_north)
-            self.target = NavigatorTarget(self.target.kind, self.target.position_ned_m, yaw_rad, self.target.speed_m_s)
 
     def _place(self, item: StoredItem, view: View) -> Vector3:
         return place_of(item, self._origin, view.home_ned_m)

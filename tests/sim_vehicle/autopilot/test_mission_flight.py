@@ -181,15 +181,6 @@ def test_an_item_without_autocontinue_is_stayed_at():
     assert math.dist(north_east(flight), (10.0, 0.0)) < 0.1
 
 
-def test_a_region_of_interest_is_looked_at():
-    looks = StoredItem(6, kinds.DO_SET_ROI_LOCATION, 1, item(kinds.WAYPOINT, 0.0, 40.0).params)
-    flight = begun(TAKEOFF, looks, item(kinds.WAYPOINT, 30.0))
-    reached(flight, 1)
-    flight.fly(3.0)
-    bearing = math.atan2(40.0 - north_east(flight)[1], -north_east(flight)[0])
-    assert yaw_of(flight.state.attitude_wxyz) == pytest.approx(bearing, abs=0.15)
-
-
 def test_pause_holds_and_resume_goes_on_with_the_same_item():
     flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
     reached(flight, 1)
