@@ -2,12 +2,14 @@
 
 import io
 import shutil
+import subprocess
 import sys
 
 import pytest
 
+from rebound_cli.figure import showing
 from rebound_cli.live.console import Console
-from rebound_cli.report import offering
+from tests.rebound_cli.command import ROOT
 from tests.test_base_install import alone
 
 
@@ -19,28 +21,28 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def begun(monkeypatch):
     commands = []
-    monkeypatch.setattr(offering.subprocess, "Popen", lambda command, **_: commands.append(command))
+    monkeypatch.setattr(showing.subprocess, "Popen", lambda command, **_: commands.append(command))
     return commands
 
 
 def said(stream, folder, packets=b"some"):
     (folder / "flight.tlog").write_bytes(packets)
     console = Console(stream)
-    offering.offer_report(folder, console)
+    showing.offer_page(folder, console)
     console.still()
     return stream.getvalue()
 
 
 def test_a_person_at_a_terminal_gets_it_from_a_process_beside(begun, tmp_path):
     assert "report.html follows." in said(Terminal(), tmp_path)
-    assert begun == [[sys.executable, "-m", "rebound_cli.report.writer", str(tmp_path)]]
+    assert begun == [[sys.executable, "-m", "rebound_cli.figure.showing", str(tmp_path)]]
 
 
 @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
 def test_a_drone_is_left_alone(begun, stream, tmp_path, monkeypatch):
     # Given the base install, which lacks what draws; or nobody at a terminal
     if stream is Terminal:
-        monkeypatch.setattr(offering, "find_spec", lambda _: None)
+        monkeypatch.setattr(showing, "find_spec", lambda _: None)
     assert f"rebound report {tmp_path}" in said(stream(), tmp_path).replace("\n", "")
     assert begun == []
 
@@ -57,13 +59,11 @@ def test_the_base_install_is_enough_to_write_one(wall_folder, tmp_path):
     assert out.stat().st_size > 1_000_000
 
 
-def test_a_process_beside_writes_it_whole(wall_folder, tmp_path):
+def test_a_process_beside_makes_picture_and_page_whole(wall_folder, tmp_path):
     folder = shutil.copytree(wall_folder, tmp_path / "wall")
-    (folder / "report.html").unlink()
-    done = alone(
-        f"import runpy\nsys.argv = ['writer', {str(folder)!r}]\nrunpy.run_module('rebound_cli.report.writer', "
-        "run_name='__main__')",
-        tmp_path,
-    )
-    assert done.returncode == 0, done.stderr
+    for name in ("flight.png", "report.html"):
+        (folder / name).unlink()
+    done = subprocess.run([sys.executable, "-m", "rebound_cli.figure.showing", str(folder)], cwd=ROOT, check=False)
+    assert done.returncode == 0
+    assert (folder / "flight.png").read_bytes().endswith(b"IEND\xaeB`\x82")
     assert (folder / "report.html").read_text().rstrip().endswith("</html>")
