@@ -11,13 +11,7 @@ import pytest
 from bench.head_on import head_on
 from rebound_cli.documents import load_document, validated
 from rebound_cli.identification.capture import find_hit, read_table
-from rebound_cli.identification.fit import (
-    fit_friction,
-    fit_restitution,
-    fit_restitution_with_loss,
-    fit_spring,
-    leave_one_out,
-)
+from rebound_cli.identification.fit import fit_friction, fit_restitution, fit_spring
 from rebound_cli.identification.hit import IdentificationError
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.plant.plant import Plant
@@ -79,7 +73,7 @@ def test_the_springs_of_the_foldable_vehicle_are_found_again(tmp_path):
     assert spring.stiffness_per_s2.value == pytest.approx(500, rel=0.05)
     assert spring.damping_per_s.value == pytest.approx(30, rel=0.05)
     assert abs(spring.stiffness_per_s2.value - 500) < 3 * spring.stiffness_per_s2.sigma
-    assert fit_restitution(hits).restitution.value == pytest.approx(0.22, abs=0.015)
+    assert fit_restitution(hits).value == pytest.approx(0.22, abs=0.015)
 
 
 def test_the_sigma_of_a_single_hits_damping_is_how_far_it_scatters(tmp_path):
@@ -113,8 +107,8 @@ def test_a_rigid_vehicle_has_a_restitution_and_no_spring(tmp_path):
     # A contact of 1 ms lies between two samples: any stiff spring would fit.
     assert fit_spring([hit]) is None
     truth = head_on(airframe, 1.2).hit
-    assert fit_restitution([hit]).restitution.value == pytest.approx(truth.rebound_speed_m_s / 1.2, abs=0.02)
-    assert fit_restitution([hit]).restitution.value == pytest.approx(0.9, abs=0.02)
+    assert fit_restitution([hit]).value == pytest.approx(truth.rebound_speed_m_s / 1.2, abs=0.02)
+    assert fit_restitution([hit]).value == pytest.approx(0.9, abs=0.02)
 
 
 def test_friction_along_the_wall(tmp_path):
@@ -216,19 +210,11 @@ FOLDER = os.environ.get("REBOUND_DATA")
 
 
 @pytest.mark.skipif(FOLDER is None, reason="REBOUND_DATA does not name a folder with wall_hits/*.csv")
-def test_real_wall_hits_are_predicted_by_the_others():
+def test_real_wall_hits_show_a_spring_and_friction():
     # Given four hits of a 1.23 kg quadrotor, motion capture at 120 Hz
     files = sorted((Path(FOLDER) / "wall_hits").glob("*.csv"))
     hits = [find_hit(read_table(file)) for file in files]
     assert [hit.guards for hit in hits] == [2, 1, 2, 1]  # aligned, not aligned, aligned, not aligned
     assert all(0.4 < hit.ratio < 0.75 for hit in hits)
-    # When each is predicted from the other three
-    errors = {name: np.abs(column) for name, column in leave_one_out(hits).items()}
-    # Then the error is below the 0.1 m/s of the best published model, on the mean and at the worst
-    assert errors["restitution and loss"].mean() < 0.05
-    assert errors["restitution and loss"].max() < 0.1
-    assert errors["restitution"].mean() < 0.1
-    # And a spring is seen in them, and friction
     assert 10_000 < fit_spring(hits).stiffness_per_s2.value < 25_000
     assert fit_friction(hits).value == pytest.approx(0.2, abs=0.1)
-    assert fit_restitution_with_loss(hits).loss_m_s.value > 0
