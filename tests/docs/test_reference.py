@@ -9,7 +9,7 @@ from bench.reference.command import FOLDER, PAGES, page_text
 from rebound_cli import exit_codes
 from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth
-from tests.rebound_cli.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
+from tests.rebound_cli.results.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
 
 
 @pytest.mark.parametrize("name", PAGES)

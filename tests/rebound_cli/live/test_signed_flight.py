@@ -24,7 +24,7 @@ from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of
-from tests.rebound_cli.test_control_path import EPOCH_US, World
+from tests.rebound_cli.live.test_control_path import EPOCH_US, World
 
 KEY = hashlib.sha256(b"test").digest()
 DISARM = mav.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0)

@@ -4,7 +4,6 @@ import io
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -14,8 +13,8 @@ from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.simulation.compiling import compiling_shown
 from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
 from rebound_cli.timing import LinkRate
+from tests.rebound_cli.command import ROOT
 
-ROOT = Path(__file__).parents[2]
 EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))
 FLYING = Status("mission", "OFFBOARD", True, (1.0, 2.0, -1.5), 2.0, "armed at 1.8 m/s^2", 4_000)
 RED = "\x1b[1;31m"

@@ -6,8 +6,8 @@ import tarfile
 
 import pytest
 
-from rebound_cli import doctor
 from rebound_cli.main import main
+from rebound_cli.service import doctor
 from tests.rebound_cli.flights.flying import pretend
 
 KEY = "0123456789abcdef" * 4

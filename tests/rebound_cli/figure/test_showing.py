@@ -51,16 +51,16 @@ def test_of_a_flight_in_which_nothing_was_heard_there_is_none(begun, tmp_path):
     assert said(Terminal(), tmp_path, b"") == "" and begun == []
 
 
-def test_the_base_install_is_enough_to_write_one(wall_folder, tmp_path):
+def test_the_base_install_is_enough_to_write_one(wall_flight, tmp_path):
     out = tmp_path / "page.html"
-    words = ["report", str(wall_folder), "--out", str(out)]
+    words = ["report", str(wall_flight[0]), "--out", str(out)]
     done = alone(f"from rebound_cli.main import main\nsys.exit(main({words!r}))", tmp_path)
     assert done.returncode == 0, done.stderr
     assert out.stat().st_size > 1_000_000
 
 
-def test_a_process_beside_makes_picture_and_page_whole(wall_folder, tmp_path):
-    folder = shutil.copytree(wall_folder, tmp_path / "wall")
+def test_a_process_beside_makes_picture_and_page_whole(wall_flight, tmp_path):
+    folder = shutil.copytree(wall_flight[0], tmp_path / "wall")
     for name in ("flight.png", "report.html"):
         (folder / name).unlink()
     done = subprocess.run([sys.executable, "-m", "rebound_cli.figure.showing", str(folder)], cwd=ROOT, check=False)
