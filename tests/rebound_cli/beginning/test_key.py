@@ -54,7 +54,3 @@ def test_a_key_that_others_may_read_is_refused_before_anything_is_opened_or_writ
     result = run_here(*COMMANDS[command], "--connect", "udpin://127.0.0.1:0", "--signing-key", key)
     assert_one_clear_sentence(result, "mode 644", f"chmod 600 {key}")
     assert "abab" not in result.stderr and list(tmp_path.iterdir()) == [key]
-
-
-def test_a_simulated_flight_takes_no_key(tmp_path: Path):
-    assert_one_clear_sentence(run_here("fly", SQUARE, "--lockstep", "--signing-key", tmp_path / "key"), "--connect")

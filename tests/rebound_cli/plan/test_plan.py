@@ -12,7 +12,6 @@ import yaml
 
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
-from rebound_cli.main import main
 from rebound_cli.plan.reading import mission_of_plan
 from rebound_cli.plan.writing import plan_of_mission
 from sim_vehicle.hil.messages import Place
@@ -259,9 +258,3 @@ def test_a_plan_with_any_part_of_another_kind_is_read_or_refused(wrong):
             functools.reduce(operator.getitem, way, damaged)[last] = wrong
             with contextlib.suppress(ConfigurationError):
                 mission_of_plan(damaged, "t")
-
-
-def test_a_place_that_is_no_number_is_refused(capsys):
-    with pytest.raises(SystemExit):
-        main(["plan", "export", "missions/hover.yaml", "--home", "nan,8"])
-    assert "'nan,8' is not LAT,LON" in capsys.readouterr().err

@@ -7,7 +7,7 @@ import yaml
 
 from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.main import main
-from tests.rebound_cli.command import QUICK, WALL, assert_comes_again, events_of, run_here
+from tests.rebound_cli.command import QUICK, WALL, assert_comes_again, events_of
 
 pytestmark = [pytest.mark.flight, pytest.mark.usefixtures("without_pictures")]
 
@@ -77,11 +77,6 @@ def test_what_is_wrong_in_the_file_is_named_with_its_line(tmp_path, capsys, text
     assert fly("--obstacles", stored, "--out", tmp_path / "run") == 78
     error = capsys.readouterr().err
     assert "hall.yaml" in error and all(word in error for word in words)
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path):
-    result = run_here("check", WALL, "--set", f"obstacles.file={tmp_path}/none.json", "--no-picture")
-    assert result.returncode == 1 and "none.json: no such file" in result.stderr
 
 
 def test_check_shows_the_way_round_what_is_known(tmp_path, capsys):

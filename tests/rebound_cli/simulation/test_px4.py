@@ -45,14 +45,6 @@ def test_the_airframe_is_printed_whole_in_every_format(format_name):
         assert parameter.name in result.stdout
 
 
-def test_an_airframe_that_does_not_exist_is_one_sentence():
-    assert_one_clear_sentence(run("airframe", "px4", "--airframe", "none"), "foldable", "rigid")
-
-
-def test_sim_stands_alone_before_the_missions_name():
-    assert_one_clear_sentence(run("fly", "--sim", "no-such-mission.yaml"), "no-such-mission.yaml")
-
-
 def test_the_body_alone_serves_a_px4_and_writes_the_truth(tmp_path):
     port, path = free_port(), tmp_path / "truth.npz"
     options = ("--port", port, "--mission", WALL, "--speed", "0", "--truth", path)
@@ -98,12 +90,3 @@ def test_a_simulators_port_that_is_taken_is_one_sentence(tmp_path):
     sentence = result.stderr.strip().splitlines()[-1]
     assert sentence.startswith("rebound: ")
     assert f"TCP port {SIMULATOR_PORT} is in use" in sentence
-
-
-@pytest.mark.parametrize(
-    "arguments", [("--speed", "-1"), ("--speed", "fast"), ("--sensor-rate", "333"), ("--autopilot", "apm")]
-)
-def test_options_that_make_no_sense_are_refused(arguments):
-    result = run("sim", *arguments)
-    assert result.returncode == 2
-    assert arguments[0] in result.stderr

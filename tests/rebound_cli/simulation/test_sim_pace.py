@@ -68,9 +68,3 @@ def test_px4s_variable_sets_speed_and_time_outs(monkeypatch):
         while (message := parser.decode(bytearray(client.recv(2048)))).get_type() != "PARAM_VALUE":
             pass
     assert (message.param_id, message.param_value) == ("COM_OF_LOSS_T", 3.0)
-
-
-def test_a_senseless_speed_is_one_sentence():
-    process = start("sim", "--speed", "-2")
-    _, stderr = process.communicate(timeout=TIMEOUT_S)
-    assert process.returncode == 2 and "'-2' is not a speed: give a number from 0 to 1000" in stderr
