@@ -8,7 +8,15 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from rebound_cli.main import main
-from tests.rebound_cli.command import SQUARE, WALL, assert_one_clear_sentence, processes_naming, run, run_here
+from tests.rebound_cli.command import (
+    SQUARE,
+    WALL,
+    assert_one_clear_sentence,
+    free_port,
+    processes_naming,
+    run,
+    run_here,
+)
 
 MULTICOPTER, PLANE = dialect.MAV_TYPE_QUADROTOR, dialect.MAV_TYPE_FIXED_WING
 PX4, ARDUPILOT = dialect.MAV_AUTOPILOT_PX4, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
@@ -118,9 +126,7 @@ def test_nothing_waits_to_arm_a_vehicle_that_nobody_has_looked_at_and_none_for_a
 
 
 def fly_without_reply(folder, *extra):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     options = ("--set", "companion.link.heartbeat_wait_s=1.0", "--out", folder, "--yes", "--json", *extra)
     return port, lambda: run_here("fly", SQUARE, "--connect", f"udpin://127.0.0.1:{port}", *options)
 

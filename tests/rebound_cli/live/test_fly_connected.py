@@ -3,14 +3,13 @@
 import itertools
 import json
 import signal
-import socket
 import subprocess
 import time
 
 import pytest
 
 from companion.shell.tlog import read_tlog
-from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, vehicle_on_air, wait_for_event
 
 pytestmark = pytest.mark.realtime
 
@@ -21,14 +20,8 @@ HEARTBEAT, SET_POSITION_TARGET, COMMAND_LONG = 0, 84, 76
 @pytest.fixture
 def address():
     """A vehicle on the air and the address at which it expects its companion."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    vehicle = start("sim", "--port", "0", "--remote", f"127.0.0.1:{port}")
-    vehicle.stdout.readline()
-    yield f"udpin://127.0.0.1:{port}"
-    vehicle.terminate()
-    vehicle.communicate(timeout=10)
+    with vehicle_on_air() as port:
+        yield f"udpin://127.0.0.1:{port}"
 
 
 def fly(address, folder, *options, stdin=subprocess.DEVNULL):

@@ -1,30 +1,22 @@
 """A flight with --signing-key against a vehicle that signs as PX4 1.17 does, with and without somebody who forges."""
 
 import hashlib
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from companion.companion import Companion
 from companion.mavlink.signing import Signing as CompanionsSigning
 from companion.mavlink.signing import stamp_at
 from companion.shell.signing_files import StampFile, write_new
 from companion.shell.tlog import read_tlog
-from rebound_cli.background import Background
-from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
-from rebound_cli.live.console import Console
-from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.live.realtime import ConfirmAtOnce, Loop, fly_realtime
 from rebound_cli.live.signed_connection import SignedConnection
 from rebound_cli.results import run_folder
-from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of
-from tests.rebound_cli.live.test_control_path import EPOCH_US, World
+from tests.rebound_cli.command import assert_comes_again, events_of
+from tests.rebound_cli.live.flying import EPOCH_US, World, fly
 
 KEY = hashlib.sha256(b"test").digest()
 DISARM = mav.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0)
@@ -68,23 +60,19 @@ class SignedWorld(World):
         return b"".join(map(bytes, forged)) + replayed + genuine
 
 
-def fly(folder: Path, forges: bool) -> Any:
-    document = load_mission_document(SQUARE, [word for word in HOP if word != "--set"])
-    scene = world_from(document)
-    mission = mission_from(document, scene)
-    world: Any = SignedWorld(scene, forges)
+def flown(folder: Path, forges: bool) -> Any:
+    """The world after a flight with the key."""
     folder.mkdir()
-    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))
-    for name in (run_folder.VERSIONS_NAME, run_folder.SUMMARY_NAME):
-        run_folder.write_json(folder / name, {})
-    stamps = StampFile(folder / "key")
-    connection = SignedConnection(world, CompanionsSigning(KEY, stamps.first(world.now_us())), stamps, world)
-    recorder, console = FlightRecorder(folder, Background("log")), Console(sys.stderr, Background("console"))
-    companion = Companion(mission)
-    fly_realtime(companion, Loop(companion, connection, world, recorder, console, Interrupts()), ConfirmAtOnce())
-    recorder.close()
-    world.refused = connection.signing.refused
-    connection.close()
+    stamps, opened = StampFile(folder / "key"), []
+
+    def signed(world):
+        opened.append(SignedConnection(world, CompanionsSigning(KEY, stamps.first(world.now_us())), stamps, world))
+        return opened[0]
+
+    _, world, _, _, problem = fly(folder, world_of=lambda scene: SignedWorld(scene, forges), over=signed)
+    assert problem is None
+    world.refused = opened[0].signing.refused
+    opened[0].close()
     return world
 
 
@@ -109,12 +97,12 @@ def decisions(folder: Path) -> list[str]:
 def forged_at(tmp_path_factory) -> tuple[Path, Any]:
     """The flight whose every packet comes with forged ones, in both directions: its folder, and the world after it."""
     folder = tmp_path_factory.mktemp("signed") / "loud"
-    return folder, fly(folder, forges=True)
+    return folder, flown(folder, forges=True)
 
 
 def test_forged_and_replayed_packets_on_the_link_change_nothing_of_a_signed_flight(forged_at, tmp_path: Path):
     # Given the flight that nobody disturbs
-    quiet = fly(tmp_path / "quiet", forges=False)
+    quiet = flown(tmp_path / "quiet", forges=False)
     assert decisions(tmp_path / "quiet")[-1] == "done: landed and disarmed, no hit"
     # When every packet comes with forged ones, in both directions
     folder, loud = forged_at

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, run, start
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, run, vehicle_on_air
 
 pytestmark = pytest.mark.realtime
 
@@ -22,17 +22,8 @@ def signed(tmp_path: Path):
     """The key, a port for the companion, and a vehicle that has the key."""
     key = tmp_path / "key"
     assert run("key", "new", key).returncode == 0
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    vehicle = start(
-        "sim", "--port", "0", "--remote", f"127.0.0.1:{port}", "--signing", "px4-1.17", "--signing-key", key
-    )
-    assert vehicle.stdout is not None
-    vehicle.stdout.readline()
-    yield key, port
-    vehicle.terminate()
-    vehicle.communicate(timeout=10)
+    with vehicle_on_air("--signing", "px4-1.17", "--signing-key", key) as port:
+        yield key, port
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from rebound_cli.report.moments import moments_of
 from rebound_cli.report.page import page
 from rebound_cli.report.shown_flight import followed_flight, recorded_flight, replayed_flight
 from tests.rebound_cli.command import WALL
-from tests.rebound_cli.live.test_control_path import fly
+from tests.rebound_cli.live.flying import fly
 from tests.rebound_cli.replay.flying import HIT_US, flight
 
 
