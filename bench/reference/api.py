@@ -3,14 +3,14 @@
 import dataclasses
 import enum
 import inspect
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from types import ModuleType
 
 from pydantic import BaseModel
 
 import companion.mavsdk
 import sim_vehicle.testing
-from bench.reference.markdown import code, first_sentence, table
+from bench.reference.markdown import code, first_sentence, once, table
 from companion.guard.config import GuardConfig
 from companion.report import CollisionReport, Event
 
@@ -41,20 +41,12 @@ def api_page() -> str:
         _MODULE.format(
             name=module.__name__,
             doc=inspect.getdoc(module),
-            names=table(HEADS, _once(row for name in module.__all__ for row in _rows(name, getattr(module, name)))),
+            names=table(HEADS, once(row for name in module.__all__ for row in _rows(name, getattr(module, name)))),
         )
         for module in MODULES
     ]
     values = [*_rows("companion.report.Event", Event), *_rows("CollisionReport", CollisionReport)]
     return _PAGE.format(modules="".join(modules), values=table(HEADS, values))
-
-
-def _once(rows: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """Each meaning once: both kinds of vehicle have some methods."""
-    said: set[str] = set()
-    for name, meaning in rows:
-        yield name, "the same" if meaning and meaning in said else meaning
-        said.add(meaning)
 
 
 def _rows(name: str, value: object) -> Iterator[tuple[str, str]]:

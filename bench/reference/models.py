@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 from pydantic import BaseModel
 
-from bench.reference.markdown import code, first_sentence, table
+from bench.reference.markdown import code, first_sentence, once, table
 from companion.guard.config import GuardConfig
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
@@ -101,7 +101,7 @@ def airframe_page() -> str:
         one, other = (code(json.dumps(_value(data, key))) for data in (first, second))
         if not isinstance(_value(first, key), dict):
             rows.append((code(key), one if one == other else f"{one}, rigid {other}", meaning))
-    return _AIRFRAME.format(keys=table(("key", "foldable", "meaning"), rows))
+    return _AIRFRAME.format(keys=table(("key", "foldable", "meaning"), once(rows)))
 
 
 class Keys:
