@@ -17,7 +17,7 @@ from sim_vehicle.airframe import load_built_in
 
 
 def sent_and_arrived(fault, seed=4):
-    case = draw_case("link", 0)
+    case = draw_case("link", 0, ())
     recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     sent = Wire(recording).heard(streams_asked_hz(246), seed)
     return recording, hit, sent, over_link(sent, recording, fault, seed)
@@ -61,7 +61,7 @@ def test_a_link_that_only_delays_shows_the_hit_by_so_much_later():
 @pytest.mark.parametrize("seed", range(10))
 def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
     # Given an obstacle of any kind that comes at a hovering vehicle
-    case = draw_case("struck", seed, is_struck=True)
+    case = draw_case("struck", seed, (), is_struck=True)
     _, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     # Then it is the obstacle that moves, at the speed asked for, and it meets the vehicle head-on or at a slant
     assert 0.5 <= case.speed_m_s <= 3.0

@@ -42,6 +42,7 @@ from bench.studies.worst import (
     keep,
     margin,
     recovery,
+    search,
     worst_table,
 )
 from companion.companion import StepResult
@@ -267,7 +268,7 @@ def test_a_bare_worst_is_the_margin_and_its_page_names_all_that_makes_a_hit_agai
     for words, part in ((["--worst"], "margin"), (["--worst", "recovery"], "recovery"), (["--verdicts"], "verdicts")):
         assert parse(["hits", *words]).part == part
     hit = {"closing_m_s": 1.234, "latency_ms": 4.0, "tilt_deg": 91.0, "lost_m": 3.0, "again": 1, "rest_s": None}
-    campaign = Campaign("worst", {}, [SearchCase("rigid", 50, 7, 60, "recovery")], recovery)
+    campaign = Campaign("worst", {}, [SearchCase("rigid", 50, 7, 60, "recovery")], search)
     text = worst_table(campaign, Results({0: {**hit, "flown": 60, **MIDDLE}}, {}))
     rows = {line.split("|")[1].strip(): line.split("|")[2].strip() for line in text.splitlines()}
     assert rows["closing_m_s"] == "1.234" and rows["approach"] == "wall" and {*MIDDLE} <= {*rows}
