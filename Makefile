@@ -119,7 +119,7 @@ pictures: $(READY)
 site: $(READY)
 	$(BIN)/mkdocs build --strict
 
-# Figures and tables of the manual that are older than the code they speak of: a list, and no release.
+# Pictures and figures of the manual that are older than the code they speak of: a list, and no release.
 stamps: $(READY)
 	$(BIN)/python -m bench stamps
 

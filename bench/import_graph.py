@@ -1,4 +1,4 @@
-"""Which of the project's modules imports which, wherever in its file; and the picture of it, a box a package."""
+"""Which of the project's modules imports which, wherever in its file."""
 
 import ast
 import functools
@@ -35,17 +35,6 @@ def module_imports(root: Path) -> dict[str, set[str]]:
     """Every module of the project below ``root``, and those of them that it imports."""
     paths = {_module(path.relative_to(root)): path for name in PACKAGES for path in (root / name).rglob("*.py")}
     return {module: {name for name in imported_names(path) if name in paths} for module, path in paths.items()}
-
-
-def package_diagram(root: Path) -> str:
-    """Packages and the arrows between them as Mermaid draws them: an arrow leads down to what is imported."""
-    arrows = {
-        (module.partition(".")[0], name.partition(".")[0])
-        for module, names in module_imports(root).items()
-        for name in names
-    }
-    between = sorted((above, below) for above, below in arrows if above != below)
-    return "flowchart TD\n" + "".join(f"    {above} --> {below}\n" for above, below in between)
 
 
 def _module(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Stamps: every figure and table that was measured says by which command, and on which version of which files.
+"""Stamps: every picture and figure of the manual says by which command it was made, on which version of which files.
 
 A stamp is a sentence such as
 
@@ -6,7 +6,7 @@ A stamp is a sentence such as
 
 Its digits are a digest of the code and the data in the files and folders that it names. Comments and docstrings do not
 count, and neither does the release. A stamp with another digest than the files have now is out of date. In the manual
-each section with a picture, or with a table of a study (`<!-- generated: NAME -->`), has one.
+each section with a picture has one. What a study writes into `build/` begins with one, too.
 """
 
 import ast
@@ -20,7 +20,6 @@ from pathlib import Path
 from rebound_cli import __version__
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "docs")
 _STAMP = re.compile(
     r"Measured\s+by\s+`(?P<command>[^`]+)`\s+on\s+version\s+(?P<version>[\w.+-]+)\s+of\s+"
     r"(?P<paths>`[^`]+`(?:,\s+`[^`]+`)*)"
@@ -29,7 +28,7 @@ FLOWN = ("companion", "sim_vehicle")
 # Files that a result depends on beside the code.
 _DATA = (".yaml", ".csv", ".js", ".css", ".html")
 _DIGITS = 16
-_FIGURE = re.compile(r"!\[[^]]*\]\(|<!-- generated: ")
+_PICTURE = re.compile(r"!\[[^]]*\]\(")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +89,8 @@ def complaints(name: str, text: str) -> Iterator[str]:
         if stamp.is_old:
             yield f"{name}: measured on {stamp.version}, which is older than the code: run `{stamp.command}`"
     for section in re.split(r"^#+ ", text, flags=re.MULTILINE):
-        if _FIGURE.search(section) and not stamps_in(section):
-            yield f"{name}: the section {section.partition(chr(10))[0]!r} has a figure or table without a stamp"
+        if _PICTURE.search(section) and not stamps_in(section):
+            yield f"{name}: the section {section.partition(chr(10))[0]!r} has a picture without a stamp"
 
 
 def stamped_anew(text: str, command: str) -> str:
@@ -104,18 +103,12 @@ def stamped_anew(text: str, command: str) -> str:
     return _STAMP.sub(anew, text)
 
 
-def pages() -> Iterator[Path]:
-    for place in PAGES:
-        path = ROOT / place
-        yield from sorted(path.rglob("*.md")) if path.is_dir() else [path]
-
-
 def run_stamps(options: Namespace) -> int:
     """0, or with --release 1 where a stamp is old or missing."""
     found = [
         complaint
-        for path in pages()
+        for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
         for complaint in complaints(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
     ]
-    print("\n".join(found) or "Every figure and table of the manual is as new as its code.")
+    print("\n".join(found) or "Every picture and figure of the manual is as new as its code.")
     return 1 if found and options.release else 0

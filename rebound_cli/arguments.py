@@ -190,7 +190,7 @@ def add_guard(commands: Commands) -> None:
 
 def add_init(commands: Commands) -> None:
     text = "A copy, to be changed, of one of the missions that ship with the program; see docs/how-to/missions.md."
-    init = _command(commands, "init", "init:run_init", "write a mission to begin with", text)
+    init = _command(commands, "init", "beginning.init:run_init", "write a mission to begin with", text)
     _option(init, "file", "the file to write, such as my-mission.yaml", "FILE")
     _option(init, "--from", "which one (default: wall)", "MISSION", dest="model", default="wall")
 
@@ -292,7 +292,7 @@ def add_watch(commands: Commands) -> None:
 def add_doctor(commands: Commands) -> None:
     text = "Configuration without keys, versions, machine, journal, last flights; see docs/how-to/flights.md."
     summary = "one archive for whoever is asked for help"
-    doctor = _command(commands, "doctor", "doctor:run_doctor", summary, text)
+    doctor = _command(commands, "doctor", "service.doctor:run_doctor", summary, text)
     _option(doctor, "--out", "the archive (default: %(default)s)", "FILE", default=Path("rebound-doctor.tar.gz"))
     _option(doctor, "--config", "settings beside those of /etc/rebound", "FILE", action="append", default=[])
     _option(doctor, "--preflight", "what `rebound preflight --json` printed", "FILE")
@@ -384,7 +384,7 @@ def add_identify(commands: Commands) -> None:
 
 def add_airframe(commands: Commands) -> None:
     text = "PX4's parameters for one of our airframes, on standard output."
-    airframe = _command(commands, "airframe", "airframe:run_airframe", "print an airframe for PX4", text)
+    airframe = _command(commands, "airframe", "beginning.airframe:run_airframe", "print an airframe for PX4", text)
     _option(airframe, "target", "for whom", choices=("px4",))
     _option(airframe, "--airframe", "default: foldable", "NAME|FILE", default="foldable")
     text = "what PX4 flies by: motion capture, as indoors (default), an RTK GPS, or optical flow and a range finder"
@@ -395,7 +395,7 @@ def add_airframe(commands: Commands) -> None:
 
 def add_key(commands: Commands) -> None:
     text = "The key that a vehicle and those who may command it share; see docs/how-to/security.md."
-    key = _command(commands, "key", "key:run_key", "make a key for MAVLink's message signing", text)
+    key = _command(commands, "key", "beginning.key:run_key", "make a key for MAVLink's message signing", text)
     text = "new: make a key; px4: write it as the file that PX4 has on its SD card"
     _option(key, "what", text, choices=("new", "px4"))
     _option(key, "file", "the key's file", "FILE")

@@ -1,6 +1,6 @@
 """What a drone does without, and the extra that brings it."""
 
-EXTRAS = dict.fromkeys(("numba", "pygeomag", "ambiance", "matplotlib"), "sim")
+EXTRAS = dict.fromkeys(("numba", "pygeomag", "matplotlib"), "sim")
 EXTRAS |= {"pyulog": "logs", "mcap": "logs", "mavsdk": "mavsdk", "distributed": "bench"}
 
 

@@ -15,6 +15,7 @@ from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
 from rebound_cli import inputs
 from rebound_cli.background import Background
+from rebound_cli.figure.showing import offer_page, show_flight, show_later
 from rebound_cli.flights.kept import make_room_for_next, room_for
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
@@ -23,7 +24,6 @@ from rebound_cli.live.signed_connection import open_signed, refused_packets
 from rebound_cli.live.status import StatusServer, served
 from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import Followed
-from rebound_cli.report.offering import offer_report
 from rebound_cli.results import run_folder
 from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import FlightRecorder
@@ -204,9 +204,9 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
         if world is not None:
-            _draw(flight, flown, world)
+            _draw(flight)
         else:
-            offer_report(flight.folder, console)
+            offer_page(flight.folder, console)
         console.print(f"\nEverything is in {flight.folder}/")
     finally:
         if json_on_stdout:
@@ -216,18 +216,11 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     return 0 if summary["outcome"] == "completed" else 1
 
 
-def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
+def _draw(flight: Flight) -> None:
     """Picture and page of the flight, beside and later where the person wants the prompt back."""
-    from rebound_cli.figure.later import draw_later
-    from rebound_cli.report.writer import write_report
-
-    drawn = (flight.folder, flight.mission, world.scene, flown.report, flown.truth)
     try:
         if flight.interrupts.reason is None:
-            from rebound_cli.figure.flight import draw_flight
-
-            draw_flight(*drawn)
-            write_report(flight.folder, followed=flight.followed)
+            show_flight(flight.folder, flight.followed)
             return
     except KeyboardInterrupt:
         pass
@@ -235,5 +228,5 @@ def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
         # Of a flight in which nothing was heard there is nothing to show.
         flight.console.print(f"\nNo {run_folder.REPORT_NAME}: {error}")
         return
-    draw_later(*drawn)
+    show_later(flight.folder)
     flight.console.print(f"\n{run_folder.FIGURE_NAME} and {run_folder.REPORT_NAME} follow.")

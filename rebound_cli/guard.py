@@ -13,13 +13,13 @@ from companion.shell.connection import Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.documents import Document, apply_overrides, load_document, validated
+from rebound_cli.figure.showing import offer_page
 from rebound_cli.flights.kept import make_room_for_next, room_for
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop, watched
 from rebound_cli.live.signed_connection import open_signed, refused_packets
 from rebound_cli.live.status import served
-from rebound_cli.report.offering import offer_report
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 
@@ -83,7 +83,7 @@ def _recorded(
     left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
     console.print(f"{summary['outcome']}; {len(hits)} hits{left_alone}; log in {folder}")
     if guard.outcome:
-        offer_report(folder, console)
+        offer_page(folder, console)
     return guard.outcome
 
 

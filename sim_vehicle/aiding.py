@@ -2,18 +2,14 @@
 
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+from sim_vehicle.written import NotNegative, Part, Positive
+
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Aid(_Part):
+class Aid(Part):
     """What every aiding sensor has."""
 
     fitted: bool
@@ -79,7 +75,7 @@ class MotionCapture(Aid):
     """Standard deviation of one heading."""
 
 
-class Sensors(_Part):
+class Sensors(Part):
     """What is fitted beside the inertial sensor."""
 
     optical_flow: OpticalFlow
@@ -100,7 +96,7 @@ class Sensors(_Part):
         return max((aid.delay_s for aid in aids if aid.fitted), default=0.0)
 
 
-class Estimator(_Part):
+class Estimator(Part):
     """Tuning of the filter that the sensors' own figures do not give."""
 
     gyroscope_bias_walk_rad_s2: NotNegative

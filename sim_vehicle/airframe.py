@@ -6,25 +6,20 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from sim_vehicle.aiding import Estimator, Sensors
 from sim_vehicle.errors import AirframeError
+from sim_vehicle.written import NotNegative, Part, Positive
 
 # Arms, each with a motor and a guard, and all of one length. `physics/layout.py` has their directions.
 ARMS = 4
 BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Geometry(_Part):
+class Geometry(Part):
     """Lengths in metres, in the body's horizontal plane unless said otherwise."""
 
     hub_radius_m: Positive
@@ -53,7 +48,7 @@ class Geometry(_Part):
         return self.motor_radius_m + self.guard_radius_m
 
 
-class Bounce(_Part):
+class Bounce(Part):
     """A linear spring and damper stated by what it does when a mass lands on it."""
 
     contact_time_s: Positive
@@ -62,7 +57,7 @@ class Bounce(_Part):
     """Speed after over speed before; for a linear spring and damper the same at every speed."""
 
 
-class Arms(_Part):
+class Arms(Part):
     """The folding arms of eq. 2; `fold_max_m` = 0 makes the vehicle rigid."""
 
     damping_per_s: NotNegative
@@ -79,7 +74,7 @@ class Arms(_Part):
     """The stop at l_max (for a rigid vehicle: the frame itself), for half of the vehicle's mass."""
 
 
-class Motors(_Part):
+class Motors(Part):
     max_thrust_n: Positive
     """Of one motor with its propeller."""
     idle_fraction: NotNegative
@@ -90,7 +85,7 @@ class Motors(_Part):
     """Reaction torque about the rotor's axis per newton of thrust."""
 
 
-class Surface(_Part):
+class Surface(Part):
     guard_friction: NotNegative
     """Coulomb coefficient between a guard and a wall."""
     ground_friction: NotNegative
@@ -99,7 +94,7 @@ class Surface(_Part):
     """One foot on the ground, for a quarter of the vehicle's mass."""
 
 
-class Imu(_Part):
+class Imu(Part):
     raw_interval_us: Annotated[int, Field(gt=0)]
     """Between two raw samples."""
     integration_interval_us: Annotated[int, Field(gt=0)]
@@ -122,7 +117,7 @@ class Imu(_Part):
         return self
 
 
-class Clipping(_Part):
+class Clipping(Part):
     """How an estimate finds back after a hit of which an accelerometer's clipping hid a part (bench/notes/px4.md).
 
     The hidden part is missing in the velocity at once. `late_s` later the error of the place that grows from it begins
@@ -139,7 +134,7 @@ class Clipping(_Part):
     """How fast the tilt goes back. 0: nothing is taken for a tilt."""
 
 
-class Estimate(_Part):
+class Estimate(Part):
     """Where the vehicle's own state estimate comes from.
 
     `markov`: the truth, late, with errors that are first-order Gauss-Markov processes per axis, which the figures
@@ -166,7 +161,7 @@ class Estimate(_Part):
     """None: the estimate knows all of a hit, whatever the accelerometer saw of it."""
 
 
-class Control(_Part):
+class Control(Part):
     """Gains of eqs. 4-6. Attitude gains are stated as the closed loop's frequency and damping."""
 
     position_p_per_s: Positive
@@ -197,7 +192,7 @@ class Control(_Part):
     """PX4's MPC_Z_VEL_MAX_DN."""
 
 
-class Airframe(_Part):
+class Airframe(Part):
     """One vehicle. Frames: body forward-right-down; arms in PX4's quad-x motor order."""
 
     name: str

@@ -8,9 +8,23 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from sim_vehicle.hil.earth import EARTH_RADIUS_M, HOME
-from sim_vehicle.hil.messages import Place
 from sim_vehicle.world import Vector3
+
+# The sphere of PX4's projection between geographic and local coordinates (lib/geo).
+EARTH_RADIUS_M = 6_371_000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A point on the Earth; the altitude is above mean sea level."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+# Where PX4's own simulators put their home by default, so that its users know the place.
+HOME = Place(latitude_deg=47.397742, longitude_deg=8.545594, altitude_m=488.0)
 
 
 @dataclass(frozen=True)

@@ -4,20 +4,13 @@ import math
 from itertools import pairwise
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from sim_vehicle.world import Box, Motion, Pole, Vector3, Wall
+from sim_vehicle.written import Finite, NotNegative, Part
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Point = tuple[Finite, Finite, Finite]
 Length = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
-
-
-class Part(BaseModel):
-    """What a person writes: no unknown keys, no changes."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Waypoint(Part):
@@ -94,7 +87,7 @@ class WallSpec(ObstacleSpec):
             raise ValueError("normal_ned has no direction; give the way the face looks, e.g. [-1, 0, 0]")
         return self
 
-    def wall(self, number: int) -> Wall:
+    def built(self, number: int) -> Wall:
         """The same as a value, with its normal made unit and a name if it had none."""
         return Wall(
             name=self.name or f"wall {number}",
@@ -125,7 +118,7 @@ class PoleSpec(ObstacleSpec):
             raise ValueError("axis_ned has no direction; [0, 0, -1] stands upright")
         return self
 
-    def pole(self, number: int) -> Pole:
+    def built(self, number: int) -> Pole:
         """The same as a value, with its axis made unit and a name if it had none."""
         return Pole(
             name=self.name or f"pole {number}",
@@ -147,7 +140,7 @@ class BoxSpec(ObstacleSpec):
     yaw_deg: Finite = 0.0
     """By which it is turned, clockwise."""
 
-    def box(self, number: int) -> Box:
+    def built(self, number: int) -> Box:
         """The same as a value, with a name if it had none."""
         cosine, sine = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
         return Box(

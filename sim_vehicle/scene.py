@@ -7,8 +7,9 @@ from pydantic import Field, model_validator
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.errors import SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
-from sim_vehicle.obstacles import BoxSpec, Finite, Part, Point, PoleSpec, WallSpec
+from sim_vehicle.obstacles import BoxSpec, Point, PoleSpec, WallSpec
 from sim_vehicle.world import Obstacle, Vector3, Wall, World, build_world
+from sim_vehicle.written import Finite, Part
 
 
 class Start(Part):
@@ -54,14 +55,17 @@ class Scene(Part):
 
     def walls_built(self) -> tuple[Wall, ...]:
         """The walls as values, in the file's order."""
-        return tuple(spec.wall(number) for number, spec in enumerate(self.walls, start=1))
+        return tuple(spec.built(number) for number, spec in enumerate(self.walls, start=1))
 
     def obstacles(self) -> tuple[tuple[str, Obstacle], ...]:
         """Everything that the vehicle can run into but the ground, each with its place in the file."""
-        walls = ((f"sim.walls.{index}", wall) for index, wall in enumerate(self.walls_built()))
-        poles = ((f"sim.poles.{index}", spec.pole(index + 1)) for index, spec in enumerate(self.poles))
-        boxes = ((f"sim.boxes.{index}", spec.box(index + 1)) for index, spec in enumerate(self.boxes))
-        return (*walls, *poles, *boxes)
+        specs: list[tuple[str, tuple[WallSpec | PoleSpec | BoxSpec, ...]]]
+        specs = [("walls", self.walls), ("poles", self.poles), ("boxes", self.boxes)]
+        return tuple(
+            (f"sim.{kind}.{index}", spec.built(index + 1))
+            for kind, all_of in specs
+            for index, spec in enumerate(all_of)
+        )
 
     def world(self) -> World:
         """Ground and obstacles as contact faces."""

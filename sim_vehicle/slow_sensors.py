@@ -6,7 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.hil.messages import Air, HilGps, Place
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.earth import air_at
+from sim_vehicle.hil.messages import Air, HilGps
 from sim_vehicle.hil.sensors import BAROMETER_NOISE_PA, Gps, Magnetometer
 from sim_vehicle.world import Vector3
 
@@ -16,27 +18,15 @@ MAGNETOMETER_PERIOD_US = 64_000
 BAROMETER_PERIOD_US = 48_000
 GPS_PERIOD_US = 124_000
 
-_SEA_LEVEL_PA, _SEA_LEVEL_K, _LAPSE_K_M = 101_325.0, 288.15, 0.0065
-# Gravity over the lapse rate and the gas constant of air.
-_EXPONENT = 9.80665 / (287.0528 * _LAPSE_K_M)
-
-
-def air_at(altitude_m: float, noise_pa: float = 0.0) -> Air:
-    """The ICAO standard atmosphere of the lowest eleven kilometres, by its formula (PX4's lib/atmosphere)."""
-    share = 1 - _LAPSE_K_M * altitude_m / _SEA_LEVEL_K
-    pressure_pa = _SEA_LEVEL_PA * share**_EXPONENT + noise_pa
-    shown_m = _SEA_LEVEL_K / _LAPSE_K_M * (1 - (pressure_pa / _SEA_LEVEL_PA) ** (1 / _EXPONENT))
-    return Air(pressure_pa / 100, shown_m, _SEA_LEVEL_K * share - 273.15)
-
 
 class SlowSensors:
     """Newest samples; each is a new object when it is renewed."""
 
-    def __init__(self, airframe: Airframe, seed: int, origin: Place) -> None:
+    def __init__(self, airframe: Airframe, seed: int, origin: Origin) -> None:
         """``origin``: where local NED (0, 0, 0) lies."""
         rng = random.Random(seed)
-        self._magnetometer, self._gps, self._rng = Magnetometer(rng, origin), Gps(airframe, rng, origin), rng
-        self._altitude_m = origin.altitude_m
+        self._magnetometer, self._gps, self._rng = Magnetometer(rng, origin.place), Gps(airframe, rng, origin), rng
+        self._altitude_m = origin.place.altitude_m
         self._due_us = [0, 0, 0]
         self.due_us = 0
         """When any of them has its next sample."""

@@ -7,23 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.layout import (
-    HIT_ENERGY_AFTER_J,
-    HIT_ENERGY_BEFORE_J,
-    HIT_EXIT_VELOCITY,
-    HIT_FACE,
-    HIT_FOLD_M,
-    HIT_FRAME_OFFSET,
-    HIT_IMPULSE,
-    HIT_LAST_US,
-    HIT_NORMAL,
-    HIT_PEAK_N,
-    HIT_POINT,
-    HIT_POSITION,
-    HIT_START_US,
-    HIT_SURFACE_VELOCITY,
-    HIT_VELOCITY,
-)
+from sim_vehicle.physics import layout
 from sim_vehicle.world import Vector3, World
 
 Floats = npt.NDArray[np.float64]
@@ -118,22 +102,22 @@ class TruthRecorder:
         """Add a finished row of `PlantState.finished_hits`."""
         self._add(
             Hit(
-                obstacle=world.names[int(row[HIT_FACE])],
-                contact_at_boot_us=float(row[HIT_START_US]),
-                ended_at_boot_us=float(row[HIT_LAST_US]),
-                contact_position_ned_m=_vector(row[HIT_POSITION]),
-                impact_velocity_ned_m_s=_vector(row[HIT_VELOCITY]),
-                normal_ned=_vector(row[HIT_NORMAL]),
-                max_fold_m=float(row[HIT_FOLD_M]),
-                peak_force_n=float(row[HIT_PEAK_N]),
-                rebound_velocity_ned_m_s=_vector(row[HIT_EXIT_VELOCITY]),
-                impulse_ned_n_s=_vector(row[HIT_IMPULSE]),
-                energy_before_j=float(row[HIT_ENERGY_BEFORE_J]),
-                energy_after_j=float(row[HIT_ENERGY_AFTER_J]),
-                kind=world.kinds[int(row[HIT_FACE])],
-                contact_point_ned_m=_vector(row[HIT_POINT]),
-                surface_velocity_ned_m_s=_vector(row[HIT_SURFACE_VELOCITY]),
-                frame_offset_ned_m=_vector(row[HIT_FRAME_OFFSET]),
+                obstacle=world.names[int(row[layout.HIT_FACE])],
+                contact_at_boot_us=float(row[layout.HIT_START_US]),
+                ended_at_boot_us=float(row[layout.HIT_LAST_US]),
+                contact_position_ned_m=_vector(row[layout.HIT_POSITION]),
+                impact_velocity_ned_m_s=_vector(row[layout.HIT_VELOCITY]),
+                normal_ned=_vector(row[layout.HIT_NORMAL]),
+                max_fold_m=float(row[layout.HIT_FOLD_M]),
+                peak_force_n=float(row[layout.HIT_PEAK_N]),
+                rebound_velocity_ned_m_s=_vector(row[layout.HIT_EXIT_VELOCITY]),
+                impulse_ned_n_s=_vector(row[layout.HIT_IMPULSE]),
+                energy_before_j=float(row[layout.HIT_ENERGY_BEFORE_J]),
+                energy_after_j=float(row[layout.HIT_ENERGY_AFTER_J]),
+                kind=world.kinds[int(row[layout.HIT_FACE])],
+                contact_point_ned_m=_vector(row[layout.HIT_POINT]),
+                surface_velocity_ned_m_s=_vector(row[layout.HIT_SURFACE_VELOCITY]),
+                frame_offset_ned_m=_vector(row[layout.HIT_FRAME_OFFSET]),
             )
         )
 

@@ -93,7 +93,7 @@ class SimulatedVehicle:
             epoch_at_boot_us=self._epoch_at_boot_us + booted_at_us,
             system=identity.system,
         )
-        self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin.place)
+        self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = int(self._plant.state.time_us)
         """Since the vehicle was first switched on; its own clock begins anew with every reboot."""
@@ -194,7 +194,7 @@ class SimulatedVehicle:
                 for other in links:
                     if other is not link:
                         other.forward(foreign)
-        if self._autopilot.ground.wants_reboot and self._reboot_at_us is None:
+        if self._autopilot.wants_reboot and self._reboot_at_us is None:
             self._reboot_at_us = self.time_boot_us + REBOOT_AFTER_US
 
     def _is_rebooting(self, reboot_at_us: int) -> bool:

@@ -10,7 +10,7 @@ ROOT = Path(__file__).parent.parent
 # rich is for a terminal: there is none here.
 LEFT_OUT = (
     *("numba", "filterpy", "scipy", "matplotlib", "distributed", "dask"),
-    *("mavsdk", "pyulog", "mcap", "pygeomag", "ambiance", "pytest", "rich"),
+    *("mavsdk", "pyulog", "mcap", "pygeomag", "pytest", "rich"),
 )
 WITHOUT = f"import sys\nsys.modules.update(dict.fromkeys({LEFT_OUT!r}))\n"
 # What Python tells its auditors of a process that is started.

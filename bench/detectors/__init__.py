@@ -1,1 +1,1 @@
-"""The bench of the collision detectors: simulated hits and flights, recorded flights, and what each detector saw."""
+"""Detectors of other authors, and a simpler one of our own, beside which the drone's is measured."""

@@ -1,1 +1,1 @@
-"""Faults and attacks: what is done to a flight, what is expected of it, and what became of many."""
+"""Faults and attacks, one file a kind: what is done to a flight, and what is expected of it."""

@@ -1,12 +1,13 @@
 """The ways in which most faults act: by the simulated vehicle, on packets that pass, or with packets of their own."""
 
 import math
+import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from bench.faults.air import Air, Injector, When
-from bench.faults.packets import changed
+from bench.fly.air import Air, Injector, When
+from bench.fly.packets import changed
 from companion.mavlink.packet import message_id_of
 from sim_vehicle.bench.faults import FaultRequest
 
@@ -83,3 +84,16 @@ def adding(**fields: float) -> Callable[[Any, Air], None]:
             setattr(message, name, getattr(message, name) + value)
 
     return change
+
+
+Inject = Callable[[random.Random], Injector]
+
+
+def flying(request: FaultRequest, for_s: float = math.inf) -> Inject:
+    """What the simulated vehicle can do by itself, from a random instant of the cruise on."""
+    return lambda chance: Simulated(request, When.flying(chance, for_s))
+
+
+def rewriting(numbers: Sequence[int], change: Callable[[Any, Air], None], for_s: float = math.inf) -> Inject:
+    """The same for messages of these numbers."""
+    return lambda chance: Rewritten(When.flying(chance, for_s), numbers, change)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from bench.pictures.animation import write_animation
 from bench.pictures.screens import browser_path, write_screens
-from bench.places import make_folder
 from bench.stamps import ROOT, stamped_anew
 from rebound_cli.main import main as rebound
 from rebound_cli.report.shown_flight import recorded_flight
@@ -24,7 +23,7 @@ def run_pictures(options: Namespace) -> int:
     """0 when all are written. Raises ReboundError."""
     browser_path()
     images = options.out / FOLDER
-    make_folder(images)
+    images.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "wall"
         rebound(["fly", str(MISSION), "--lockstep", "--json", "--out", str(folder)])

@@ -1,9 +1,8 @@
-"""The page of the Python API, from signatures and docstrings."""
+"""The page of the Python API, from signatures and docstrings: a row a name, and one a member."""
 
 import dataclasses
 import enum
 import inspect
-import re
 from collections.abc import Iterator
 from types import ModuleType
 
@@ -11,78 +10,87 @@ from pydantic import BaseModel
 
 import companion.mavsdk
 import sim_vehicle.testing
-from bench.reference.markdown import code, table
-from bench.reference.models import world_links
+from bench.reference.markdown import code, first_sentence, once, table
 from companion.guard.config import GuardConfig
 from companion.report import CollisionReport, Event
 
 MODULES: tuple[ModuleType, ...] = (companion.mavsdk, sim_vehicle.testing)
 
 
+_MODULE = """## {name}
+
+{doc}
+
+{names}
+"""
+_PAGE = """# Python API
+
+What other programs import. Everything else may change between versions. `help(NAME)` says more.
+
+{modules}## Values
+
+What `CollisionGuard.events` and `CollisionGuard.collisions` hold. [summary.json](summary.md) has most of a collision's
+fields with their meaning.
+
+{values}"""
+HEADS = ("name", "what it is or does")
+
+
 def api_page() -> str:
-    text = "# Python API\n\nWhat other programs import. Everything else may change between versions.\n\n"
-    for module in MODULES:
-        text += f"## {module.__name__}\n\n{inspect.getdoc(module)}\n\n"
-        for name in module.__all__:
-            text += _entry(name, getattr(module, name))
-    text += "## Values\n\nWhat `CollisionGuard.events` and `CollisionGuard.collisions` hold.\n\n"
-    return text + _entry("Event", Event, "companion.report.") + _entry("CollisionReport", CollisionReport)
+    modules = [
+        _MODULE.format(
+            name=module.__name__,
+            doc=inspect.getdoc(module),
+            names=table(HEADS, once(row for name in module.__all__ for row in _rows(name, getattr(module, name)))),
+        )
+        for module in MODULES
+    ]
+    values = [*_rows("companion.report.Event", Event), *_rows("CollisionReport", CollisionReport)]
+    return _PAGE.format(modules="".join(modules), values=table(HEADS, values))
 
 
-def _entry(name: str, value: object, prefix: str = "") -> str:
-    doc = inspect.getdoc(value) or ""
-    head = f"### {prefix}{name}\n\n"
+def _rows(name: str, value: object) -> Iterator[tuple[str, str]]:
+    doc = first_sentence(inspect.getdoc(value) or "")
     if inspect.ismodule(value):
-        functions = [(one, f) for one, f in vars(value).items() if _is_own(value, one, f)]
-        return head + f"{doc}\n\n" + table(("function", "does"), [_function(*each) for each in functions]) + "\n"
-    if isinstance(value, type) and issubclass(value, Exception):
-        return head + f"{doc}\n\n"
-    if isinstance(value, type) and issubclass(value, enum.Enum):
-        return head + f"{doc}\n\n" + "".join(f"- `{one.name}`: {one.value}\n" for one in value) + "\n"
-    if not isinstance(value, type):
-        return head + f"```text\n{name}{_signature(value)}\n```\n\n{doc}\n\n"
-    if issubclass(value, BaseModel):
-        page = "guard.md" if value is GuardConfig else world_links()[value.__name__]
-        return head + f"{doc}\n\nIts fields are [these keys]({page}).\n\n"
-    if doc.startswith(f"{value.__name__}("):
-        doc = ""  # a dataclass's own
-    text = head + (f"{doc}\n\n" if doc else "")
-    if dataclasses.is_dataclass(value):
-        fields = [(code(field.name), _type(field.type)) for field in dataclasses.fields(value)]
-        text += table(("field", "type"), fields) + "\n"
+        yield code(name), doc
+        for one, function in vars(value).items():
+            if inspect.isfunction(function) and function.__module__ == value.__name__ and _is_own(one):
+                yield _function(f"{name}.{one}", function)
+    elif not isinstance(value, type):
+        yield _function(name, value)
+    elif issubclass(value, BaseModel):
+        yield code(name), f"{doc} [Its keys]({'guard' if value is GuardConfig else 'world'}.md)."
+    elif issubclass(value, enum.Enum):
+        yield code(name), f"{doc} " + ", ".join(code(one.name) for one in value) + "."
+    elif dataclasses.is_dataclass(value):
+        yield code(name), f"{doc} Fields: " + ", ".join(code(field.name) for field in dataclasses.fields(value)) + "."
+        yield from _members(name, value)
+    elif issubclass(value, Exception):
+        yield code(name), doc
     else:
-        text += f"```text\n{name}{_signature(value)}\n```\n\n"
-    return text + table(("member", "does"), list(_members(value))) + "\n"
+        yield _function(name, value)
+        yield from _members(name, value)
 
 
-def _is_own(module: ModuleType, name: str, value: object) -> bool:
-    return inspect.isfunction(value) and value.__module__ == module.__name__ and name.islower() and name != "opposite"
+def _is_own(name: str) -> bool:
+    return name.islower() and not name.startswith("_") and name != "opposite"
 
 
-def _members(value: type) -> Iterator[tuple[str, str]]:
+def _members(of: str, value: type) -> Iterator[tuple[str, str]]:
     for name, member in vars(value).items():
-        if name.startswith("_"):
-            continue
-        if isinstance(member, property):
-            yield code(name), inspect.getdoc(member) or ""
-        elif inspect.isfunction(member):
-            yield _function(name, member)
+        if isinstance(member, property) and not name.startswith("_"):
+            yield code(f"{of}.{name}"), first_sentence(inspect.getdoc(member) or "")
+        elif inspect.isfunction(member) and not name.startswith("_"):
+            yield _function(f"{of}.{name}", member)
 
 
 def _function(name: str, function: object) -> tuple[str, str]:
-    return code(f"{name}{_signature(function)}"), inspect.getdoc(function) or ""
+    return code(f"{name}{_signature(function)}"), first_sentence(inspect.getdoc(function) or "")
 
 
 def _signature(value: object) -> str:
+    """Without annotations."""
     signature = inspect.signature(value)  # type: ignore[arg-type]
-    own = [one.replace(annotation=_annotation(one)) for one in signature.parameters.values() if one.name != "self"]
-    return str(signature.replace(parameters=own, return_annotation=inspect.Signature.empty)).replace("'", "")
-
-
-def _annotation(parameter: inspect.Parameter) -> object:
-    return parameter.annotation if isinstance(parameter.annotation, str) else inspect.Parameter.empty
-
-
-def _type(annotation: object) -> str:
-    text = annotation.__name__ if isinstance(annotation, type) else str(annotation)
-    return re.sub(r"\b(?:[a-z_]+\.)+(?=\w)", "", text)
+    empty = inspect.Parameter.empty
+    own = [one.replace(annotation=empty) for one in signature.parameters.values() if one.name != "self"]
+    return str(signature.replace(parameters=own, return_annotation=inspect.Signature.empty))

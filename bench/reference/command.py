@@ -4,29 +4,26 @@ from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from bench.reference import api, commands, events, models, states, summary, tables
+from bench.reference import api, commands, events, messages, models, states, summary
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "reference"
 
 # Of each page the function that makes it.
 PAGES: Mapping[str, Callable[[], str]] = {
-    "commands.md": commands.program_page,
-    "studies.md": commands.studies_page,
+    "commands.md": commands.commands_page,
     "mission.md": models.mission_page,
     "companion.md": models.companion_page,
     "guard.md": models.guard_page,
     "world.md": models.world_page,
     "airframe.md": models.airframe_page,
-    "missions.md": tables.missions_page,
     "events.md": events.events_page,
     "summary.md": summary.summary_page,
     "states.md": states.states_page,
-    "messages.md": tables.messages_page,
-    "parameters.md": tables.parameters_page,
+    "messages.md": messages.messages_page,
     "python-api.md": api.api_page,
 }
-MADE_BY = "\n<!-- Written by `python -m bench docs`; do not edit. -->\n"
+MADE_BY = "\n<!-- Written by `make docs`. -->\n"
 
 
 def page_text(name: str) -> str:

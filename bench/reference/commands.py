@@ -1,6 +1,7 @@
-"""The pages of commands, from the argument parsers of `rebound` and of `python -m bench`."""
+"""The page of commands, from the argument parsers of `rebound` and of `python -m bench`: a line each."""
 
 import argparse
+import re
 from collections.abc import Iterator
 
 import bench.main
@@ -17,52 +18,38 @@ _EXITS = (
 )
 
 
-def program_page() -> str:
-    text = "# Commands\n\nEvery command of `rebound`. `rebound COMMAND --help` prints the same.\n\n"
-    text += "".join(_command(parser) for parser in _commands(rebound_cli.main.build_parser()))
-    text += (
-        "## Exit codes\n\n`fly` and `guard` tell a wrong configuration from other failures. Other commands end with "
+_TEXT = """# Commands
+
+`rebound COMMAND --help` has the options of each.
+
+{commands}
+## Studies
+
+They need a checkout. `python -m bench STUDY --help` has the options of each.
+
+{studies}
+## Exit codes
+
+`fly` and `guard` tell a wrong configuration from other failures. Other commands end with {error} there.
+
+{exits}"""
+
+
+def commands_page() -> str:
+    return _TEXT.format(
+        commands=table(("command", "does", "more"), _commands(rebound_cli.main.build_parser())),
+        studies=table(("study", "does", "more"), _commands(bench.main.build_parser())),
+        error=exit_codes.ERROR,
+        exits=table(("code", "meaning", "a guard as a service"), _EXITS),
     )
-    text += f"{exit_codes.ERROR} there.\n\n"
-    return text + table(("code", "meaning", "a guard as a service"), _EXITS)
 
 
-def studies_page() -> str:
-    text = "# Studies\n\nEvery study of `python -m bench`. Studies need a checkout.\n\n"
-    return text + "".join(_command(parser) for parser in _commands(bench.main.build_parser()))
-
-
-def _commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    """Those that run something, each with all words of its name."""
-    children = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+def _commands(parser: argparse.ArgumentParser, does: str = "") -> Iterator[tuple[str, str, str]]:
+    """Those that run something, each with all words of its name and the page that its description names."""
     if parser.get_default("run") is not None:
-        yield parser
-    for action in children:
-        for child in action.choices.values():
-            yield from _commands(child)
-
-
-def _command(parser: argparse.ArgumentParser) -> str:
-    actions = [a for a in parser._actions if not isinstance(a, argparse._HelpAction | argparse._SubParsersAction)]
-    rows = [(_name(a), _help(parser, a), _default(a)) for a in actions]
-    return f"## {parser.prog}\n\n{parser.description}\n\n" + table(("argument", "meaning", "default"), rows) + "\n"
-
-
-def _name(action: argparse.Action) -> str:
-    value = action.metavar or (action.dest.upper() if action.option_strings else action.dest)
-    if action.choices is not None and action.metavar is None:
-        value = "{" + ",".join(map(str, action.choices)) + "}"
-    if not action.option_strings:
-        return code(value)
-    flag = ", ".join(action.option_strings)
-    return code(flag if action.nargs == 0 else f"{flag} {value}")
-
-
-def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
-    return (action.help or "") % {**vars(action), "prog": parser.prog}
-
-
-def _default(action: argparse.Action) -> str:
-    if action.default in (None, False, [], argparse.SUPPRESS) or action.dest == "speed" or action.dest == "jobs":
-        return ""
-    return code(action.default)
+        page = re.search(r"docs/([\w/-]+)\.md", parser.description or "")
+        yield code(parser.prog), does, f"[{page[1].rpartition('/')[2]}](../{page[1]}.md)" if page else ""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for said in action._choices_actions:
+                yield from _commands(action.choices[said.dest], said.help or "")

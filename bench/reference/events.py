@@ -18,6 +18,7 @@ MEANINGS = {
     "confirmed": "The guard's OFFBOARD is confirmed by the vehicle.",
     "connected": "A PX4 multicopter was heard.",
     "contact": "A landing or a hand. It is no collision and is not answered.",
+    "crash": "The ground was met tilted, or faster than a landing may be.",
     "crossed": "Another program's setpoints reached the vehicle while the guard held it.",
     "damage": "A motor works harder than before the hit: its propeller, or it, may be hurt.",
     "detection": "A collision, on the first message that shows it.",

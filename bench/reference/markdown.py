@@ -1,7 +1,7 @@
 """Markdown that several generated pages have in common."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 
 def cell(text: object) -> str:
@@ -21,3 +21,16 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def code(text: object) -> str:
     return f"`{text}`" if str(text) else ""
+
+
+def first_sentence(text: str) -> str:
+    """What a key or a function is; what follows says why."""
+    return re.split(r"(?<=\.)\s+(?=[A-Z`0-9])", text, maxsplit=1)[0]
+
+
+def once(rows: Iterable[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+    """Each meaning, the last cell, once: sensors have some keys in common, and vehicles some methods."""
+    said: set[str] = set()
+    for *cells, meaning in rows:
+        yield (*cells, "the same" if meaning and meaning in said else meaning)
+        said.add(meaning)

@@ -1,260 +1,192 @@
-"""The pages of what a person writes, from the models that read it."""
+"""The pages of what a person writes, from the JSON schemas of the models that read it: a row a key."""
 
-import ast
-import functools
-import inspect
 import json
-import tokenize
-from collections.abc import Iterator, Mapping, Sequence
-from io import StringIO
-from textwrap import dedent
-from types import UnionType
-from typing import Any, get_args
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 import yaml
 from pydantic import BaseModel
 
-from bench.reference.markdown import code, table
-from companion.fence import Fence
+from bench.reference.markdown import code, first_sentence, once, table
 from companion.guard.config import GuardConfig
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from companion.mission.policy import SetpointLimits
-from companion.reflex.config import RecoveryConfig
-from rebound_cli.check.schema import key_docstrings
-from sim_vehicle.airframe import BUILT_IN_FOLDER, Airframe, load_built_in
-from sim_vehicle.faults.spec import Fault
+from rebound_cli.check.schema import DescribedSchema
+from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.scene import Scene
 
-Model = type[BaseModel]
+MISSIONS = Path(__file__).parents[2] / "missions"
+COMPANION = {"CompanionConfig": "[keys of their own](companion.md)"}
+OF_A_MISSION = dict.fromkeys(("Fence", "SetpointLimits", "RecoveryConfig"), "[as in a mission](mission.md)")
+Schema = Mapping[str, Any]
+HEADS = ("key", "value", "default", "meaning")
+_KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "object": "map"}
+
+
+_MISSION = """# Mission keys
+
+[Write a mission](../how-to/missions.md) shows how they are used. A key below another stands in its map.
+Positions are metres north, east and down of the arming position.
+
+{keys}
+## Missions that ship
+
+`rebound fly NAME --lockstep` flies one. Those without an obstacle fly on a real PX4 with only the address changed.
+
+{missions}"""
+_COMPANION = """# Companion keys
+
+The `companion:` part of a mission, of a guard's file and of `--companion FILE`. Every key is optional.
+`companion/mission/config.py` and `companion/reflex/config.py` have the reason of each number.
+
+{keys}"""
+_GUARD = """# Guard keys
+
+The file of `rebound guard --config`. Every key is optional. `companion/guard/config.py` has the reason of each number.
+
+{keys}"""
+_WORLD = """# World keys
+
+The `sim:` part of a mission file: what the simulated vehicle flies in. A flight with `--connect` ignores it.
+Positions are metres in the world, whose origin is the vehicle's default start.
+
+{keys}
+## Faults
+
+Each entry of `faults` has a `kind` and a time, in seconds of the vehicle's boot clock: `at_s`, from then on or the
+moment of what happens once, or `between_s`, `[from, until]`.
+
+{faults}"""
+_AIRFRAME = """# Airframe keys
+
+A file states what differs from a built-in airframe: `based_on: foldable` or `rigid`. SI units; body axes forward,
+right, down. `sim_vehicle/airframes/foldable.yaml` has the source of each number.
+
+{keys}"""
 
 
 def mission_page() -> str:
-    head = "# Mission keys\n\nEvery key of a mission file. [Write a mission](../how-to/missions.md) shows how they are "
-    head += "used.\nPositions are metres north, east and down of the arming position.\n\n"
-    return head + _sections(Mission, {CompanionConfig: "[companion](companion.md)"})
+    """With the missions that ship."""
+    shipped = [(code(path.stem), yaml.safe_load(path.read_text("utf-8"))) for path in sorted(MISSIONS.glob("*.yaml"))]
+    missions = table(("name", "what it flies"), [(name, data["description"]) for name, data in shipped])
+    return _MISSION.format(keys=table(HEADS, Keys(Mission, COMPANION).rows()), missions=missions)
 
 
 def companion_page() -> str:
-    head = "# Companion keys\n\nThe `companion:` part of a mission, of a guard's file and of `--companion FILE`. Every "
-    head += "key is optional.\n\n"
-    return head + _sections(CompanionConfig)
+    return _COMPANION.format(keys=_short_table(Keys(CompanionConfig)))
 
 
 def guard_page() -> str:
-    head = "# Guard keys\n\nThe file of `rebound guard --config`. Every key is optional. `fence`, `limits`, `recovery` "
-    head += "and\n`companion` mean what they do in a [mission](mission.md).\n\n"
-    shared: dict[Model, str] = {CompanionConfig: "[companion](companion.md)"}
-    shared |= {Fence: "[fence](mission.md#fence)", SetpointLimits: "[limits](mission.md#limits)"}
-    shared |= {RecoveryConfig: "[recovery](mission.md#recovery)"}
-    return head + _sections(GuardConfig, shared)
+    return _GUARD.format(keys=_short_table(Keys(GuardConfig, COMPANION | OF_A_MISSION)))
+
+
+def _short_table(keys: "Keys") -> str:
+    return table(HEADS, ((*row[:-1], first_sentence(row[-1])) for row in keys.rows()))
 
 
 def world_page() -> str:
-    head = "# World keys\n\nThe `sim:` part of a mission file: what the simulated vehicle flies in. A flight with "
-    head += (
-        "`--connect` ignores it.\nPositions are metres in the world, whose origin is the vehicle's default start.\n\n"
-    )
-    text = head + _sections(Scene, dict.fromkeys(_faults(), "[faults](#faults)"))
-    text += "## Faults\n\nEach entry of `faults` has a `kind` and a time: `at_s` or `between_s`, in seconds of the "
-    text += "vehicle's boot clock.\n\n"
-    return text + "".join(_section(model, "### " + _kind(model), {}) for model in _faults())
+    whole = Keys(Scene)
+    faults = whole.choices(whole.schema["properties"]["faults"])
+    world = Keys(Scene, dict.fromkeys(faults, "[kinds below](#faults)"))
+    kinds = table(HEADS, (row for name in faults for row in world.fault_rows(name)))
+    return _WORLD.format(keys=table(HEADS, world.rows()), faults=kinds)
 
 
 def airframe_page() -> str:
-    """With both built-in airframes' values, and what the file of the first says about each."""
-    text = (
-        "# Airframe keys\n\nA file states what differs from a built-in airframe: `based_on: foldable` or `rigid`. SI "
-    )
-    text += "units; body axes\nforward, right, down. The last column is the comment in "
-    text += "`sim_vehicle/airframes/foldable.yaml`.\n\n"
+    """With both built-in airframes' values instead of bounds."""
     first, second = (load_built_in(name).model_dump() for name in ("foldable", "rigid"))
-    said = _yaml_comments((BUILT_IN_FOLDER / "foldable.yaml").read_text(encoding="utf-8"))
-    places: list[tuple[Model, str]] = [(Airframe, ""), *_placed(Airframe, "")]
-    for model, at in places:
-        rows = []
-        for name, meaning in _notes(model).items():
-            path = f"{at}{name}"
-            if isinstance(_value(first, path), dict):
-                continue
-            values = [code(json.dumps(_value(data, path))) for data in (first, second)]
-            rows.append((code(path), *values, meaning, said.get(path, "")))
-        text += f"## {at.rstrip('.') or 'The vehicle'}\n\n{_doc(model)}\n\n"
-        text += table(("key", "foldable", "rigid", "meaning", "source"), rows) + "\n"
-    return text
-
-
-def world_links() -> Mapping[str, str]:
-    """Of each model of a world by its name the address of its section."""
-    return {model.__name__: f"world.md#{_anchor(path)}" for model, path in _paths(Scene, _faults()).items()}
-
-
-def _sections(top: Model, elsewhere: Mapping[Model, str] | None = None) -> str:
-    """The keys of a file, then those of each key that is a map, under its path. `elsewhere`: links to other pages."""
-    paths = _paths(top, tuple(elsewhere or {}))
-    links = {model.__name__: link for model, link in (elsewhere or {}).items()}
-    links |= {model.__name__: f"[{path}](#{_anchor(path)})" for model, path in paths.items()}
-    text = _section(top, "## All keys", links)
-    return text + "".join(_section(model, f"## {path}", links) for model, path in paths.items())
-
-
-def _anchor(path: str) -> str:
-    """As GitHub and MkDocs make it of a heading."""
-    return path.replace(".", "")
-
-
-def _section(model: Model, heading: str, links: Mapping[str, str]) -> str:
-    """A heading, the model's docstring and a row a key."""
-    schema = model.model_json_schema(by_alias=True)
-    if "$ref" in schema:  # a model that leads to itself
-        schema = schema["$defs"][model.__name__]
-    notes = _notes(model)
     rows = []
-    for field_name, field in model.model_fields.items():
-        key = field.alias or field_name
-        if key == "kind":
-            continue
-        kind = _type(schema["properties"][key], links)
-        default = "" if field.is_required() else _default(field.get_default(call_default_factory=True))
-        inner = next(_models(field.annotation), None)
-        meaning = notes.get(field_name) or (_doc(inner).partition("\n")[0] if inner else "")
-        rows.append((code(key), kind, default, meaning))
-    return (
-        f"{heading}\n\n{_doc(model)}\n\n" + table(("key", "value", "default", "meaning"), rows) + ("\n" if rows else "")
-    )
+    for key, meaning in Keys(Airframe).meanings():
+        one, other = (code(json.dumps(_value(data, key))) for data in (first, second))
+        if not isinstance(_value(first, key), dict):
+            rows.append((code(key), one if one == other else f"{one}, rigid {other}", meaning))
+    return _AIRFRAME.format(keys=table(("key", "foldable", "meaning"), once(rows)))
 
 
-def _default(value: object) -> str:
-    if value is None:
-        return "none"
-    if isinstance(value, BaseModel):
+class Keys:
+    """The keys of a file, each with its path. `elsewhere`: of models that other tables have, what stands instead."""
+
+    def __init__(self, model: type[BaseModel], elsewhere: Mapping[str, str] | None = None) -> None:
+        self.schema = model.model_json_schema(by_alias=True, schema_generator=DescribedSchema)
+        if "$ref" in self.schema:  # a model that leads to itself
+            self.schema = {**self.schema["$defs"][model.__name__], "$defs": self.schema["$defs"]}
+        self._elsewhere = dict(elsewhere or {})
+
+    def rows(self) -> Iterator[tuple[str, ...]]:
+        shown = dict(self._elsewhere)
+        for key, prop, required in self._walked(self.schema, "", shown):
+            yield code(key), self._type(prop, shown), "required" if required else _default(prop), self._meaning(prop)
+
+    def meanings(self) -> Iterator[tuple[str, str]]:
+        return ((key, self._meaning(prop)) for key, prop, _ in self._walked(self.schema, "", {}))
+
+    def fault_rows(self, name: str) -> Iterator[tuple[str, ...]]:
+        """Of one kind of fault: without its times, which all have."""
+        part = self.schema["$defs"][name]
+        kind = part["properties"]["kind"]["const"]
+        yield code(kind), "", "", part["description"].partition("\n")[0]
+        for key, prop, required in self._walked(part, f"{kind}.", {}):
+            if key.rpartition(".")[2] not in ("kind", "at_s", "between_s"):
+                yield code(key), self._type(prop, {}), "required" if required else _default(prop), self._meaning(prop)
+
+    def choices(self, prop: Schema) -> list[str]:
+        """The names of the models that a value may be, of a list its entries."""
+        parts = [prop, *prop.get("anyOf", ()), *prop.get("oneOf", ())]
+        inner = [part["items"] for part in parts if isinstance(part.get("items"), dict)]
+        own = [part["$ref"].rpartition("/")[2] for part in parts if "$ref" in part]
+        return own + [name for part in inner for name in self.choices(part)]
+
+    def _walked(self, part: Schema, at: str, shown: dict[str, str]) -> Iterator[tuple[str, Schema, bool]]:
+        """Depth first. A model's keys stand below the first key that leads to it."""
+        for name, prop in part["properties"].items():
+            yield f"{at}{name}", prop, name in part.get("required", ())
+            for model in self.choices(prop):
+                if model not in shown:
+                    shown[model] = f"as `{at}{name}`"
+                    yield from self._walked(self.schema["$defs"][model], f"{at}{name}.", shown)
+
+    def _type(self, prop: Schema, shown: Mapping[str, str]) -> str:
+        """In words."""
+        for word in ("anyOf", "oneOf", "allOf"):
+            if word in prop:
+                parts = [self._type(part, shown) for part in prop[word] if part.get("type") != "null"]
+                return " or ".join(dict.fromkeys(parts))
+        if "$ref" in prop:
+            return shown.get(prop["$ref"].rpartition("/")[2], "map")
+        if "enum" in prop:
+            return " or ".join(code(value) for value in prop["enum"])
+        if "const" in prop:
+            return code(json.dumps(prop["const"]))
+        if prop.get("type") == "array":
+            inner = self._type(prop.get("items") or (prop.get("prefixItems") or [{}])[0], shown)
+            count = prop.get("maxItems") if prop.get("maxItems") == prop.get("minItems") else None
+            return f"{count} {inner.replace('number', 'numbers', 1)}" if count else f"list of {inner}"
+        return f"{_KINDS.get(str(prop.get('type')), 'map')}{_bounds(prop)}"
+
+    def _meaning(self, prop: Schema) -> str:
+        """The key's docstring, or the first line of its model's."""
+        models = self.choices(prop)
+        own = self.schema["$defs"][models[0]].get("description", "") if len(models) == 1 else ""
+        return str(prop.get("description") or own.partition("\n")[0])
+
+
+def _bounds(prop: Schema) -> str:
+    """As an interval; coordinates, whose bounds are those of any number that is no mistake, without."""
+    least, most = prop.get("minimum", prop.get("exclusiveMinimum")), prop.get("maximum", prop.get("exclusiveMaximum"))
+    if (least is None and most is None) or (least, most) == (-100_000, 100_000):
         return ""
-    return code(json.dumps(value)) if value != () else "none"
+    if most is None:
+        return f" {'≥' if 'minimum' in prop else '>'} {least:g}"
+    return f" in {'[' if 'minimum' in prop else '('}{least:g}, {most:g}{']' if 'maximum' in prop else ')'}"
 
 
-def _type(prop: Mapping[str, Any], links: Mapping[str, str]) -> str:
-    """In words, from JSON schema; a model's name leads to its section."""
-    for word in ("anyOf", "oneOf", "allOf"):
-        if word in prop:
-            parts = [_type(part, links) for part in prop[word] if part.get("type") != "null"]
-            return " or ".join(dict.fromkeys(parts))
-    if "$ref" in prop:
-        return links[prop["$ref"].rpartition("/")[2]]
-    if "enum" in prop:
-        return " or ".join(code(value) for value in prop["enum"])
-    if "const" in prop:
-        return code(prop["const"])
-    if prop.get("type") == "array":
-        inner = prop.get("items") or (prop.get("prefixItems") or [{}])[0]
-        count = prop.get("maxItems") if prop.get("maxItems") == prop.get("minItems") else None
-        return f"list of {count or ''} {_type(inner, links)}".replace("  ", " ")
-    words = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
-    text = words.get(str(prop.get("type")), "map")
-    least = ("minimum", "from") if "minimum" in prop else ("exclusiveMinimum", "above")
-    bounds = (least, ("exclusiveMaximum", "below"), ("maximum", "to"))
-    return " ".join([text, *(f"{word} {prop[name]:g}" for name, word in bounds if name in prop)])
-
-
-def _doc(model: Model) -> str:
-    text = inspect.getdoc(model) or ""
-    return "" if text == inspect.getdoc(BaseModel) else text
-
-
-def _paths(top: Model, stop: Sequence[Model] = (), at: str = "") -> dict[Model, str]:
-    """Every model that the keys of this one lead to, with the shortest path of keys."""
-    own: dict[Model, str] = {}
-    for name, field in top.model_fields.items():
-        for inner in _models(field.annotation):
-            if inner not in stop and inner is not top:
-                own.setdefault(inner, f"{at}{field.alias or name}")
-    found: dict[Model, str] = {}
-    for inner, path in own.items():
-        found[inner] = path
-        found |= _paths(inner, (*stop, *own, *found, top), f"{path}.")
-    return found
-
-
-def _models(annotation: Any) -> Iterator[Model]:
-    if isinstance(annotation, type) and not isinstance(annotation, UnionType) and not get_args(annotation):
-        if issubclass(annotation, BaseModel):
-            yield annotation
-    else:
-        for part in get_args(annotation):
-            yield from _models(part)
-
-
-def _placed(model: Model, at: str) -> Iterator[tuple[Model, str]]:
-    """The same with the path of keys that leads to each."""
-    for name, field in model.model_fields.items():
-        for inner in _models(field.annotation):
-            yield inner, f"{at}{name}."
-            yield from _placed(inner, f"{at}{name}.")
-
-
-@functools.cache
-def _faults() -> tuple[Model, ...]:
-    return tuple(_models(Fault))
-
-
-def _kind(model: Model) -> str:
-    (kind,) = get_args(model.model_fields["kind"].annotation)
-    return str(kind)
-
-
-@functools.cache
-def _notes(model: Model) -> Mapping[str, str]:
-    """Of each field its docstring, or the comment before it; a base class's, too."""
-    found: dict[str, str] = {}
-    for base in reversed(model.__mro__):
-        if base is not BaseModel and isinstance(base, type) and issubclass(base, BaseModel):
-            found |= _own_notes(base)
-    return {name: found.get(name, "") for name in model.model_fields}
-
-
-def _own_notes(model: Model) -> dict[str, str]:
-    source = dedent(inspect.getsource(model))
-    comments = {
-        token.start[0]: token.string.lstrip("# ")
-        for token in tokenize.generate_tokens(StringIO(source).readline)
-        if token.type == tokenize.COMMENT
-    }
-    (body,) = (node.body for node in ast.parse(source).body if isinstance(node, ast.ClassDef))
-    found = {}
-    for node in body:
-        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-            first = node.lineno
-            while first - 1 in comments:
-                first -= 1
-            found[node.target.id] = " ".join(comments[line] for line in range(first, node.lineno))
-    return found | {name: " ".join(text.split()) for name, text in key_docstrings(model).items()}
+def _default(prop: Schema) -> str:
+    value = prop.get("default")
+    return "" if value is None or isinstance(value, dict) or value == [] else code(json.dumps(value))
 
 
 def _value(data: Any, path: str) -> Any:
     for part in path.split("."):
         data = data[part] if isinstance(data, dict) and part in data else None
     return data
-
-
-def _yaml_comments(text: str) -> dict[str, str]:
-    """Of each key of a YAML file of nested maps the comment beside it, or the lines of comment before it."""
-    found: dict[str, str] = {}
-    keys: list[tuple[int, str]] = []
-    before: list[str] = []
-    for line in text.splitlines():
-        stripped, indent = line.strip(), len(line) - len(line.lstrip())
-        if stripped.startswith("#"):
-            before.append(stripped.lstrip("# "))
-            continue
-        name, colon, rest = stripped.partition(":")
-        if not colon:
-            before = []
-            continue
-        keys = [*((depth, key) for depth, key in keys if depth < indent), (indent, name)]
-        path = ".".join(key for _, key in keys)
-        beside = rest.partition("#")[2].strip()
-        found[path] = " ".join([*before, beside]).strip()
-        inner = yaml.safe_load(rest.partition("#")[0]) if rest.strip().startswith("{") else None
-        if isinstance(inner, dict):
-            found |= {f"{path}.{key}": found[path] for key in inner}
-        before = []
-    return found

@@ -94,7 +94,7 @@ class OperatorConfig(StrictModel):
     status_texts: bool = True
     """Hits, recoveries, limits and the outcome, as STATUSTEXT."""
     values_hz: Annotated[NotNegative, Field(le=50.0)] = 2.0
-    """Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio. 0: none."""
+    """Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio; 0: none."""
     computer_status: bool = True
     """CPU, temperature, memory and disk of this computer once a second, as ONBOARD_COMPUTER_STATUS. Real vehicles."""
 
@@ -103,10 +103,10 @@ class DiskConfig(StrictModel):
     """How much of the disk recorded flights of real vehicles may take; the oldest go first, those with a hit last."""
 
     max_use_mb: NotNegative | None = None
-    """Megabytes (10^6 bytes) of all flights together. Unset: a tenth of the file system, at most 4 GiB, as journald's
+    """Megabytes (10^6 bytes) of all flights together; unset: a tenth of the file system, at most 4 GiB, as journald's
     SystemMaxUse."""
     keep_free_mb: NotNegative | None = None
-    """Megabytes that are left free. Unset: 300 MiB, or a tenth of a smaller file system, as PX4's logger leaves."""
+    """Megabytes that are left free; unset: 300 MiB, or a tenth of a smaller file system, as PX4's logger leaves."""
 
 
 class CompanionConfig(CollisionMonitorConfig):

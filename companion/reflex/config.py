@@ -88,7 +88,7 @@ SHORT = 2
 
 # --- the normal
 # Standard deviations of the directions from the normal, rad, on drawn walls, slanted and leaning walls and poles
-# (bench/notes/ablation.md): friction turns a force by 17 degrees. Walls are met at up to 60 degrees, and
+# (bench/notes/decisions.md): friction turns a force by 17 degrees. Walls are met at up to 60 degrees, and
 # less often head-on than a quarter, as in the draws.
 IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
 # Standard deviation of a change of velocity, m/s: that of both velocities, and what a controller adds in 0.1 s.

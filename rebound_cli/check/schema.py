@@ -18,7 +18,7 @@ from sim_vehicle.scene import Scene
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
-class _Described(GenerateJsonSchema):
+class DescribedSchema(GenerateJsonSchema):
     """Each key with its docstring."""
 
     def model_schema(self, schema: ModelSchema) -> JsonSchemaValue:
@@ -52,8 +52,8 @@ def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
 
 def mission_schema() -> dict[str, Any]:
     """For editors; what only a look at several values together shows is left to `rebound check MISSION`."""
-    schema = Mission.model_json_schema(by_alias=True, schema_generator=_Described)
-    scene = Scene.model_json_schema(ref_template="#/$defs/{model}", schema_generator=_Described)
+    schema = Mission.model_json_schema(by_alias=True, schema_generator=DescribedSchema)
+    scene = Scene.model_json_schema(ref_template="#/$defs/{model}", schema_generator=DescribedSchema)
     definitions = schema["$defs"]
     for name, definition in scene.pop("$defs", {}).items():
         assert definitions.setdefault(name, definition) == definition, f"two parts of the schema are called {name}"

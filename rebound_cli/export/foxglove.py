@@ -20,7 +20,8 @@ from rebound_cli import __version__
 from rebound_cli.export.ulog import boot_us, positions_us, true_rows
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.report import finding_data
-from rebound_cli.report.content import finite, surfaces
+from rebound_cli.report.content import finite
+from rebound_cli.report.scene import surfaces
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.run_folder import HIT_KINDS
 from sim_vehicle.mavlink.telemetry import quaternion_from_matrix

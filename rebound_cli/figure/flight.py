@@ -9,13 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from companion.mission.model import Mission
-from companion.report import CollisionReport, FlightReport
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches
-from rebound_cli.results.flight_log import FlightLog, read_flight_log
-from rebound_cli.results.run_folder import FIGURE_NAME, TLOG_NAME
-from rebound_cli.results.truth_match import FlightTruth, match_contacts
-from sim_vehicle.scene import Scene
+from rebound_cli.report.shown_flight import ShownFlight
+from rebound_cli.results.truth_match import FlightTruth
 
 Floats = npt.NDArray[np.float64]
 
@@ -39,29 +35,30 @@ _UPRIGHT = 0.7
 _START, _DETECTION = "time since the start [s]", "time from the detection [ms]"
 
 
-def draw_flight(
-    folder: Path, mission: Mission, scene: Scene | None, report: FlightReport, truth: FlightTruth | None
-) -> None:
-    """Write the picture of the flight in `folder` from its telemetry log and, if there is one, the truth."""
-    log = read_flight_log(folder / TLOG_NAME)
-    picture = _Picture(log, mission, scene, report, truth)
-    count = len(report.collisions)
+def draw_flight(flight: ShownFlight, path: Path) -> None:
+    """Write the picture of a flight that is over, with the truth where there is one."""
+    assert flight.summary is not None, "a flight that is over has one"
+    # What the companion summed up, and what its detector found: a hit has both.
+    picture, count = _Picture(flight), min(len(flight.summary["collisions"]), len(flight.hits))
     figure = Figure(figsize=(18 if count else 13, 9.5), layout="constrained")  # without pyplot: no global state
     if count:
         picture.draw_hit(figure.subplots(2, 3))
     else:
         picture.draw_free_flight(figure.subplots(2, 2))
     hits = {0: "no hit", 1: "one hit"}.get(count, f"{count} hits, the first of them in detail")
-    detail = f" ({report.reason})" if report.outcome != "completed" else ""
-    figure.suptitle(f"Mission '{mission.name}': {report.outcome}{detail}, {hits}", fontsize=13)
-    figure.savefig(folder / FIGURE_NAME, dpi=100)
+    outcome, reason = flight.summary["outcome"], flight.summary["reason"]
+    detail = f" ({reason})" if outcome != "completed" else ""
+    figure.suptitle(f"Mission '{flight.name}': {outcome}{detail}, {hits}", fontsize=13)
+    figure.savefig(path, dpi=100)
 
 
 @dataclass(frozen=True, slots=True)
 class _Hit:
     """The first one, in seconds since the flight began and along the line into the obstacle."""
 
-    collision: CollisionReport
+    place_ned_m: Floats
+    target_ned_m: Floats
+    velocity_ned_m_s: Floats
     into_obstacle: Floats
     detected_s: float
     recovered_s: float | None
@@ -84,18 +81,12 @@ class _Hit:
 class _Picture:
     """Times are seconds since the flight began, places from the take-off point."""
 
-    def __init__(
-        self, log: FlightLog, mission: Mission, scene: Scene | None, report: FlightReport, truth: FlightTruth | None
-    ) -> None:
-        self._log, self._mission, self._scene, self._report, self._truth = log, mission, scene, report, truth
-        self._origin = np.array(report.origin_ned_m or (0.0, 0.0, 0.0))
+    def __init__(self, flight: ShownFlight) -> None:
+        self._flight, self._log, self._truth = flight, flight.log, flight.truth
+        self._origin = np.array(flight.origin_ned_m)
         self._imu_s, self._position_s, self._setpoint_s = (
-            self._since_start_s(at_us) for at_us in (log.imu_at_us, log.position_at_us, log.setpoint_at_us)
+            flight.seconds(at_us) for at_us in (self._log.imu_at_us, self._log.position_at_us, self._log.setpoint_at_us)
         )
-
-    def _since_start_s(self, at_us: Any) -> Any:
-        """Of a time of the log's clock, or of many."""
-        return (at_us - self._report.started_at_us) / 1e6
 
     def draw_hit(self, axes: Any) -> None:
         hit = self._first_hit()
@@ -121,24 +112,29 @@ class _Picture:
 
     def _first_hit(self) -> _Hit:
         """By the companion; obstacle, surface and touch by the truth, where there is one."""
-        collision = self._report.collisions[0]
-        detected_s, settled_s = (
-            self._since_start_s(collision.detected_at_us),
-            self._mission.companion.settled.duration_s,
-        )
-        normal, contact_s, surface_m, touch_m, obstacle = np.array(collision.normal_ned), None, None, None, "obstacle"
-        contact = None
-        if self._truth is not None:
-            contact = match_contacts(self._report.collisions, self._truth.hits, settled_s).hit_of_collision[0]
+        flight, first = self._flight, self._flight.hits[0]
+        assert flight.summary is not None, "a flight that is over has one"
+        told, contact = flight.summary["collisions"][0], flight.contact_at(first.first.impact.sample_time_boot_us)
+        detected_s, after_s = flight.seconds(first.at_us), told["settled_after_s"]
+        into_obstacle, contact_s, surface_m, touch_m = -np.array(told["normal_ned"]), None, None, None
         if self._truth is not None and contact is not None:
-            normal, obstacle = np.array(contact.normal_ned), contact.obstacle
-            contact_s = self._since_start_s(self._truth.at_us(contact.contact_at_boot_us))
-            touch_m = float((np.array(contact.contact_position_ned_m) - self._origin) @ -normal)
+            into_obstacle = -np.array(contact.normal_ned)
+            contact_s = flight.seconds(self._truth.at_us(contact.contact_at_boot_us))
+            touch_m = float((np.array(contact.contact_position_ned_m) - self._origin) @ into_obstacle)
             if contact.contact_point_ned_m is not None:
-                surface_m = float((np.array(contact.contact_point_ned_m) - self._origin) @ -normal)
-        after_s = collision.settled_after_s
-        recovered_s = None if after_s is None else detected_s + after_s + settled_s
-        return _Hit(collision, -normal, detected_s, recovered_s, contact_s, obstacle, surface_m, touch_m)
+                surface_m = float((np.array(contact.contact_point_ned_m) - self._origin) @ into_obstacle)
+        return _Hit(
+            place_ned_m=np.array(first.first.position_ned_m),
+            target_ned_m=np.array(told["recovery_setpoint_ned_m"]),
+            velocity_ned_m_s=np.array(told["impact_velocity_ned_m_s"]),
+            into_obstacle=into_obstacle,
+            detected_s=detected_s,
+            recovered_s=None if after_s is None else detected_s + after_s + flight.config.settled.duration_s,
+            contact_s=contact_s,
+            obstacle="obstacle" if contact is None else contact.obstacle,
+            surface_m=surface_m,
+            touch_m=touch_m,
+        )
 
     def _draw_position(self, axis: Any, hit: _Hit) -> None:
         def place(positions_ned_m: Any) -> Any:
@@ -148,7 +144,7 @@ class _Picture:
         axis.plot(self._position_s, place_m, label="vehicle's centre", **MEASURED)
         setpoints_m = place(self._log.setpoint_ned_m)
         axis.plot(self._setpoint_s, setpoints_m, label="setpoint sent", drawstyle="steps-post", **ASKED)
-        position_m, target_m = place(hit.collision.position_ned_m), place(hit.collision.recovery_setpoint_ned_m)
+        position_m, target_m = place(hit.place_ned_m), place(hit.target_ned_m)
         top_m = max(position_m, hit.surface_m or position_m) + 0.5
         if hit.surface_m is not None:
             axis.axhline(
@@ -163,11 +159,11 @@ class _Picture:
 
     def _draw_velocity(self, axis: Any, hit: _Hit) -> None:
         if self._truth is not None:
-            true_s = self._since_start_s(self._truth.at_us(self._truth.series["time_boot_us"]))
+            true_s = self._flight.seconds(self._truth.at_us(self._truth.series["time_boot_us"]))
             true_m_s = hit.along(self._truth.series["velocity_ned_m_s"])
             axis.plot(true_s, true_m_s, label="simulator's truth", color="0.55", linewidth=1.0)
         axis.plot(self._position_s, hit.along(self._log.velocity_ned_m_s), label="measured", **MEASURED)
-        before_m_s = float(hit.along(np.array(hit.collision.impact_velocity_ned_m_s)))
+        before_m_s = float(hit.along(hit.velocity_ned_m_s))
         label = f"before the hit, by the companion: {before_m_s:.2f} m/s"
         axis.plot([hit.detected_s], [before_m_s], "o", color=DETECTED, label=label)
         axis.axhline(0.0, color="0.7", linewidth=0.8)
@@ -191,7 +187,7 @@ class _Picture:
         _finish(axis, title, _DETECTION, "specific force [m/s²]")
 
     def _draw_fold(self, axis: Any, hit: _Hit, truth: FlightTruth) -> None:
-        since_s = self._since_start_s(truth.at_us(truth.series["time_boot_us"])) - hit.detected_s
+        since_s = self._flight.seconds(truth.at_us(truth.series["time_boot_us"])) - hit.detected_s
         near = np.abs(since_s) <= _ZOOM_S
         fold_mm = 1e3 * truth.series["arm_fold_m"][near]
         for arm, (name, style) in enumerate(_ARMS.items()):
@@ -208,11 +204,11 @@ class _Picture:
         shown = np.concatenate([asked[:, :2], flown[:, :2]])
         # A setpoint that asks for an acceleration or an attitude alone has no place.
         shown = shown[np.isfinite(shown).all(axis=1)]
-        if self._scene is not None:
-            draw_obstacles(axis, self._scene, self._origin, "obstacles", 0.6)
-        draw_patches(axis, self._report.obstacles)
-        for number, collision in enumerate(self._report.collisions):
-            north, east, _ = np.array(collision.position_ned_m) - self._origin
+        if self._flight.scene is not None:
+            draw_obstacles(axis, self._flight.scene, self._origin, "obstacles", 0.6)
+        draw_patches(axis, self._flight.patches)
+        for number, hit in enumerate(self._flight.hits):
+            north, east, _ = np.array(hit.first.position_ned_m) - self._origin
             axis.plot([east], [north], "o", color=DETECTED, label="hit detected" if number == 0 else None)
         if len(shown):
             # A wall may be far longer than the flight: the flight is what is looked at.
@@ -228,8 +224,8 @@ class _Picture:
         )
         axis.plot(self._setpoint_s, asked_m, label="setpoint sent", drawstyle="steps-post", **ASKED)
         axis.plot(self._position_s, measured_m, label="measured", **MEASURED)
-        for collision in self._report.collisions:
-            axis.axvline(self._since_start_s(collision.detected_at_us), color=DETECTED, linewidth=1.0)
+        for hit in self._flight.hits:
+            axis.axvline(self._flight.seconds(hit.at_us), color=DETECTED, linewidth=1.0)
         _finish(axis, "Height above the take-off point", _START, "height [m]")
 
     def _draw_speed(self, axis: Any) -> None:
@@ -245,7 +241,7 @@ class _Picture:
         _finish(axis, title, _START, "specific force [m/s²]")
 
     def _draw_threshold(self, axis: Any) -> None:
-        threshold_m_s2 = self._mission.companion.fused.side_threshold_m_s2
+        threshold_m_s2 = self._flight.config.fused.side_threshold_m_s2
         label = f"least threshold, {threshold_m_s2:g} m/s²"
         axis.axhline(threshold_m_s2, color=DETECTED, linewidth=1.0, linestyle=":", label=label)
 
@@ -258,7 +254,7 @@ class _Picture:
             left, right = axis.get_xlim()
             for fault in truth.faults:
                 began_s, ended_s = (
-                    right if at_us is None else self._since_start_s(truth.at_us(at_us))
+                    right if at_us is None else self._flight.seconds(truth.at_us(at_us))
                     for at_us in (fault.began_at_boot_us, fault.ended_at_boot_us)
                 )
                 axis.axvspan(began_s, max(ended_s, began_s + 0.02), color=FAULT, alpha=0.12)

@@ -5,12 +5,10 @@ import math
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from statistics import mean
 
 from rebound_cli.documents import load_document, parse_document, validated, write_text
-from rebound_cli.identification import fit
 from rebound_cli.identification.capture import find_hit, read_table
-from rebound_cli.identification.fit import Identified, Number, Spring, identify, leave_one_out
+from rebound_cli.identification.fit import Identified, Number, Spring, identify
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
 from rebound_cli.results import run_folder
@@ -58,14 +56,14 @@ def _mass_kg(options: Namespace) -> float | None:
 
 
 def report_text(found: Identified, mass_kg: float | None) -> str:
-    """Markdown: the hits, the force sensor, the numbers, the leave-one-out table."""
+    """Markdown: the hits, the force sensor, the numbers."""
     rows = [
         f"{hit.name} | {hit.at_s:.2f} s | {hit.guards} | {hit.speed_in_m_s:.3f} m/s | {hit.speed_out_m_s:.3f} ± "
         f"{hit.speed_sigma_m_s:.3f} m/s | {hit.ratio:.2f} | {hit.along_in_m_s:.2f}, {hit.along_out_m_s:.2f} m/s"
         for hit in found.hits
     ]
     table = _table("hit | at | guards | in | out | ratio | along the wall, in and out", rows)
-    return "\n".join([*table, *_forces(found.hits, mass_kg), *_numbers(found), "", *_left_out(found.hits)]) + "\n"
+    return "\n".join([*table, *_forces(found.hits, mass_kg), *_numbers(found)]) + "\n"
 
 
 def _table(head: str, rows: Sequence[str]) -> list[str]:
@@ -84,10 +82,7 @@ def _forces(hits: Sequence[Hit], mass_kg: float | None) -> list[str]:
 
 
 def _numbers(found: Identified) -> list[str]:
-    lines = [f"- restitution {_text(found.restitution.restitution, 3)}"]
-    if found.with_loss is not None and found.with_loss.loss_m_s is not None:
-        loss = _text(found.with_loss.loss_m_s, 3)
-        lines.append(f"- restitution and loss: {_text(found.with_loss.restitution, 3)} of the speed, less {loss} m/s")
+    lines = [f"- restitution {_text(found.restitution, 3)}"]
     if found.spring is None:
         lines.append("- spring: not shown; every contact is over within the time between a few samples")
     else:
@@ -102,23 +97,6 @@ def _numbers(found: Identified) -> list[str]:
     if found.friction is not None:
         lines.append(f"- friction along the wall at least {_text(found.friction, 2)}")
     return lines
-
-
-def _left_out(hits: Sequence[Hit]) -> list[str]:
-    if len(hits) < fit.FEWEST_FOR_LEAVE_ONE_OUT:
-        count = "1 hit is" if len(hits) == 1 else f"{len(hits)} hits are"
-        return [f"{count} too few to leave one out: nothing checks these numbers against another hit."]
-    columns = leave_one_out(hits)
-    rows = [
-        (hit.name, ["-" if error is None else f"{error:+.3f} m/s" for error in errors])
-        for hit, *errors in zip(hits, *columns.values(), strict=True)
-    ]
-    sizes = [[abs(error) for error in column if error is not None] for column in columns.values()]
-    rows.append(("mean of absolute errors", [f"{mean(column):.3f} m/s" for column in sizes]))
-    rows.append(("worst", [f"{max(column):.3f} m/s" for column in sizes]))
-    table = _table(" | ".join(["hit", *columns]), [" | ".join([name, *cells]) for name, cells in rows])
-    said = f"{len(hits)} hits of one vehicle: a column of {len(hits)} errors is an example, no proof."
-    return ["Speed out predicted from all the other hits, less the measured one:", "", *table, said]
 
 
 def _text(number: Number, digits: int) -> str:
@@ -172,7 +150,7 @@ def _sprung(found: Identified, spring: Spring, base_name: str, base: Airframe) -
 
 def _rigid(found: Identified) -> str:
     # The model of an airframe's contact ends just below 1 and above 0.
-    number = found.restitution.restitution
+    number = found.restitution
     return f"""\
   fold_max_m: 0.0   # the contact is too short for the data to show a spring
   stop: {{restitution: {min(max(number.value, 0.01), 0.99):.3f}}}   # ± {number.sigma:.3f}"""

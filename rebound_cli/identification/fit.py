@@ -16,10 +16,6 @@ from rebound_cli.identification.hit import Floats, Hit, Push, Track
 # Positions see a spring only if the contact lasts this many of their intervals; eq. 2 bends the path three
 # times (touch, turn, release), and with fewer samples any stiff spring fits.
 _LEAST_CONTACT_INTERVALS = 2.5
-# Speed and loss are two numbers; from two hits they would follow without a check.
-FEWEST_FOR_LOSS = 3
-# Leaving one hit out has to leave at least two.
-FEWEST_FOR_LEAVE_ONE_OUT = 3
 
 _STARTS_RAD_S = (25.0, 60.0, 120.0, 250.0)
 _START_RATIO = 0.3
@@ -38,18 +34,6 @@ _SCALE = (0.3, 0.1, 0.1, 0.005, 0.01)
 class Number:
     value: float
     sigma: float
-
-
-@dataclass(frozen=True, slots=True)
-class Rebound:
-    """speed out = restitution * speed in - loss, never below zero; `loss_m_s` None is the model without it."""
-
-    restitution: Number
-    loss_m_s: Number | None = None
-
-    def speed_out(self, hit: Hit) -> float:
-        loss = self.loss_m_s.value if self.loss_m_s else 0.0
-        return max(0.0, self.restitution.value * hit.speed_in_m_s - loss)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +61,6 @@ class Spring:
         """Natural frequency (rad/s) and damping ratio, the latter kept below 1: more is not told apart."""
         share = math.sqrt(guards / 2)
         return self.natural_rad_s.value * share, min(self.ratio.value * share, 0.999)
-
-    def speed_out(self, hit: Hit) -> float:
-        return hit.speed_in_m_s * _restitution(self.on(hit.guards)[1])
 
     def contact_time_s(self, guards: int = 2) -> float:
         """First touch until the force is back at zero."""
@@ -112,18 +93,10 @@ def _path(since_touch_s: Floats, speed_m_s: float, natural_rad_s: float, ratio: 
     return depth + speed_m_s * (before - _restitution(ratio) * after)
 
 
-def fit_restitution(hits: Sequence[Hit]) -> Rebound:
+def fit_restitution(hits: Sequence[Hit]) -> Number:
     """The mean ratio; its standard error from the spread of the hits, or from the noise if there is one."""
     noise = [hit.speed_sigma_m_s * math.hypot(1, hit.ratio) / hit.speed_in_m_s for hit in hits]
-    return Rebound(_mean([hit.ratio for hit in hits], noise))
-
-
-def fit_restitution_with_loss(hits: Sequence[Hit]) -> Rebound:
-    """A line through the speeds; from FEWEST_FOR_LOSS hits of different speeds on."""
-    design = np.array([[hit.speed_in_m_s, -1.0] for hit in hits])
-    least_sigma = max(hit.speed_sigma_m_s for hit in hits)
-    numbers, sigmas = _linear(design, np.array([hit.speed_out_m_s for hit in hits]), least_sigma)
-    return Rebound(*map(Number, numbers.tolist(), sigmas.tolist()))
+    return _mean([hit.ratio for hit in hits], noise)
 
 
 def fit_friction(hits: Sequence[Hit]) -> Number | None:
@@ -146,11 +119,11 @@ def _mean(values: Sequence[float], noise: Sequence[float]) -> Number:
     return Number(float(np.mean(values)), sigma)
 
 
-def _linear(design: Floats, measured: Floats, least_sigma: float = 0.0) -> tuple[Floats, Floats]:
-    """Two numbers of a linear model and their standard deviations; `least_sigma` of the measurements."""
+def _linear(design: Floats, measured: Floats) -> tuple[Floats, Floats]:
+    """Two numbers of a linear model and their standard deviations."""
     numbers = np.linalg.lstsq(design, measured, rcond=None)[0].astype(np.float64)
     rest = measured - design @ numbers
-    variance = max(float(rest @ rest) / max(1, len(rest) - 2), least_sigma**2)
+    variance = float(rest @ rest) / max(1, len(rest) - 2)
     sigmas: Floats = np.sqrt(variance * np.diag(np.linalg.pinv(design.T @ design)))
     return numbers, sigmas
 
@@ -244,8 +217,7 @@ class Identified:
     """Everything fitted to the hits; None where they do not show it."""
 
     hits: Sequence[Hit]
-    restitution: Rebound
-    with_loss: Rebound | None
+    restitution: Number
     spring: Spring | None
     friction: Number | None
 
@@ -261,16 +233,4 @@ class Identified:
 
 
 def identify(hits: Sequence[Hit]) -> Identified:
-    with_loss = fit_restitution_with_loss(hits) if len(hits) >= FEWEST_FOR_LOSS else None
-    return Identified(hits, fit_restitution(hits), with_loss, fit_spring(hits), fit_friction(hits))
-
-
-def leave_one_out(hits: Sequence[Hit]) -> dict[str, list[float | None]]:
-    """Predicted minus measured speed out (m/s) of every hit, each model fitted to all the others."""
-    errors: dict[str, list[float | None]] = {}
-    for index, hit in enumerate(hits):
-        found = identify([*hits[:index], *hits[index + 1 :]])
-        models = {"restitution": found.restitution, "restitution and loss": found.with_loss, "spring": found.spring}
-        for name, model in models.items():
-            errors.setdefault(name, []).append(None if model is None else model.speed_out(hit) - hit.speed_out_m_s)
-    return {name: column for name, column in errors.items() if any(error is not None for error in column)}
+    return Identified(hits, fit_restitution(hits), fit_spring(hits), fit_friction(hits))

@@ -15,7 +15,7 @@ from rebound_cli.documents import parse_document, write_text
 from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.plan.reading import mission_of_plan
 from rebound_cli.plan.writing import plan_of_mission
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Place
 
 
 def run_import(options: Namespace) -> int:

@@ -11,8 +11,7 @@ from companion.mission.items import MAX_SPEED_M_S
 from rebound_cli.documents import Document, validated
 from rebound_cli.plan import shape
 from rebound_cli.plan.shape import PlanShape, SimpleItem
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 
 # Nearer to each other than this, two places of a plan are one: GPS knows no better.
 _SAME_PLACE_M = 0.5

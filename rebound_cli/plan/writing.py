@@ -10,8 +10,7 @@ from companion.mission import items
 from companion.mission.items import ExpectItem
 from companion.mission.model import Leg, Mission, itinerary
 from rebound_cli.plan import shape
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 
 # PX4 flies circles in missions as what they are made of: a corner every 15 degrees is 1 % off the circle.
 _CORNERS_A_TURN = 24

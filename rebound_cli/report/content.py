@@ -1,5 +1,9 @@
-"""Everything that the page shows, as data: what `page.js` and its neighbours read."""
+"""Everything that the page shows, as data: what `page.js` and its neighbours read.
 
+Columns of numbers are text: whole multiples of a resolution, little-endian, base64.
+"""
+
+import base64
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -8,16 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from companion.memory.patch import Patch
-from companion.memory.surroundings import outline
 from rebound_cli.flights.archive import without_places
 from rebound_cli.replay.listening import PHASES
 from rebound_cli.report.moments import Moment, moments_of
-from rebound_cli.report.packing import kept_rows, packed
-from rebound_cli.report.shown_flight import ShownFlight, patch_of
+from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
+from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
-from sim_vehicle.world import Motion, Obstacle, Pole
 
 Floats = npt.NDArray[np.float64]
 
@@ -45,11 +46,11 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "tables": _tables(flight, moments, no_position),
         "moments": [_moment(flight, moment, no_position) for moment in moments],
         "phases": [phase.value for phase in PHASES],
-        "modes": _modes(flight),
-        "recovering": _recovering(flight),
-        "obstacles": [] if no_position else _obstacles(flight),
+        "modes": modes(flight),
+        "recovering": recovering(flight),
+        "obstacles": [] if no_position else obstacles(flight),
         "surfaces": [] if no_position else surfaces(flight),
-        "vehicle": _vehicle(flight),
+        "vehicle": vehicle(flight),
         "has_places": not no_position,
         "link": link_rows(flight),
         "events": events,
@@ -78,11 +79,7 @@ def _told(flight: ShownFlight) -> Sequence[Mapping[str, Any]]:
 
 
 def _event(flight: ShownFlight, event: Mapping[str, Any]) -> dict[str, Any]:
-    return {"t": _seconds(flight, event["time_us"]), "kind": event["kind"], "text": str(event.get("text", ""))}
-
-
-def _seconds(flight: ShownFlight, at_us: float) -> float:
-    return round(flight.seconds(at_us), 6)
+    return {"t": rounded_s(flight, event["time_us"]), "kind": event["kind"], "text": str(event.get("text", ""))}
 
 
 # --- tables -----------------------------------------------------------------------------------------------------
@@ -177,9 +174,6 @@ def _packed(
     }
 
 
-# --- what is drawn ----------------------------------------------------------------------------------------------
-
-
 def _moment(flight: ShownFlight, moment: Moment, no_position: bool) -> dict[str, Any]:
     boot_us = flight.log.imu_time_boot_us
     first_us = boot_us[0] if len(boot_us) else 0.0
@@ -188,7 +182,7 @@ def _moment(flight: ShownFlight, moment: Moment, no_position: bool) -> dict[str,
     return {
         "kind": moment.kind,
         "title": moment.title,
-        "t": _seconds(flight, moment.at_us),
+        "t": rounded_s(flight, moment.at_us),
         "boot": round((moment.boot_us - first_us) * 1e-6, 6),
         "touched_ms": None if touched_us is None else round((touched_us - moment.boot_us) / 1e3, 3),
         "facts": moment.facts,
@@ -197,83 +191,6 @@ def _moment(flight: ShownFlight, moment: Moment, no_position: bool) -> dict[str,
         "normal": moment.normal_ned,
         "error_deg": round(moment.normal_error_deg, 1),
     }
-
-
-def _modes(flight: ShownFlight) -> list[tuple[float, str]]:
-    """The vehicle's flight modes from when on."""
-    return [
-        (_seconds(flight, event["time_us"]), event["text"].removeprefix("mode "))
-        for event in flight.events
-        if event["kind"] == "mode" and str(event.get("text", "")).startswith("mode ")
-    ]
-
-
-def _recovering(flight: ShownFlight) -> list[tuple[float, float]]:
-    """From each hit that was answered until it was recovered from, or the next one, or the end."""
-    told = [(event["kind"], _seconds(flight, event["time_us"])) for event in flight.events]
-    spans = []
-    for number, (kind, at_s) in enumerate(told):
-        if kind == "detection":
-            ends = (end_s for end, end_s in told[number + 1 :] if end in ("recovered", "unconfirmed", "detection"))
-            spans.append((at_s, next(ends, flight.ended_s)))
-    return spans
-
-
-def _obstacles(flight: ShownFlight) -> list[dict[str, Any]]:
-    scene = flight.scene
-    return [] if scene is None else [_obstacle(flight, obstacle) for _, obstacle in scene.obstacles()]
-
-
-def _obstacle(flight: ShownFlight, obstacle: Obstacle) -> dict[str, Any]:
-    motion = _motion(flight, obstacle.motion)
-    if isinstance(obstacle, Pole):
-        shape = {"foot": obstacle.foot_ned_m, "axis": obstacle.axis_ned, "radius": obstacle.radius_m}
-        return {"name": obstacle.name, "kind": "pole", "height": obstacle.height_m, **shape, "motion": motion}
-    box = obstacle.box()
-    shape = {"centre": box.centre_ned_m, "axes": box.axes_ned, "sizes": box.sizes_m}
-    return {"name": obstacle.name, "kind": "box", **shape, "motion": motion}
-
-
-def _motion(flight: ShownFlight, motion: Motion | None) -> dict[str, Any] | None:
-    """By the page's own clock."""
-    if motion is None or flight.truth is None:
-        return None
-    times_s = [_seconds(flight, flight.truth.at_us(time_s * 1e6)) for time_s in motion.times_s]
-    return {"t": times_s, "offsets": motion.offsets_ned_m}
-
-
-def surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
-    """What was believed of each surface from when until when: from each touch of it to the next."""
-    told = [
-        (_seconds(flight, event["time_us"]), patch_of(event["data"]))
-        for event in flight.events
-        if event["kind"] == "obstacle"
-    ]
-    known = [(0.0, patch) for patch in flight.patches if patch.found_at_us < flight.started_at_us]
-    shown = []
-    for number, (since_s, patch) in enumerate([*known, *told]):
-        later = [*known, *told][number + 1 :]
-        until_s = next((at_s for at_s, one in later if patch.touches_ned_m[0] in one.touches_ned_m), None)
-        shown.append({"t": since_s, "until": until_s, "corners": _corners(flight, patch)})
-    return shown
-
-
-def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
-    """In the vehicle's local frame; a wall's in its plane, a ceiling's or a floor's at its height."""
-    origin = flight.origin_ned_m
-    if patch.is_steep:
-        corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline(patch)[:-1]]
-    else:
-        (n, e, _), (north, east, _) = patch.centre_ned_m, patch.normal_ned
-        (left_m, right_m), (low_m, high_m) = patch.assumed_along_m(), patch.assumed_heights_m()
-        around = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
-        corners = [(n - along_m * east, e + along_m * north, -height_m) for along_m, height_m in around]
-    return [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]
-
-
-def _vehicle(flight: ShownFlight) -> dict[str, Any]:
-    guards = flight.config.estimate.guards
-    return {"centre": guards.centre_m, "radius": guards.radius_m, "height": guards.height_m}
 
 
 def as_text(data: Mapping[str, Any]) -> str:
@@ -291,3 +208,47 @@ def finite(data: Any) -> Any:
     if isinstance(data, (list, tuple)):
         return [finite(value) for value in data]
     return data
+
+
+# --- columns ----------------------------------------------------------------------------------------------------
+
+# The most negative number stands for "none".
+NONE = {"i2": -(1 << 15), "i4": -(1 << 31)}
+
+
+def packed(values: Floats, resolution: float) -> dict[str, Any]:
+    """One column, of two bytes a number where that fits, else of four; what is not finite is none."""
+    finite = values[np.isfinite(values)]
+    low, high = (math.floor(finite.min() / resolution), math.ceil(finite.max() / resolution)) if len(finite) else (0, 0)
+    middle = (low + high) // 2
+    kind = "i2" if high - low < 65_000 else "i4"
+    # What four bytes cannot hold is none: of times in steps of 10 us what is six hours from the middle.
+    steps = np.round(values / resolution) - middle
+    held = np.isfinite(steps) & (np.abs(steps) < -NONE[kind])
+    whole = np.where(held, np.where(held, steps, 0.0), NONE[kind]).astype(f"<{kind}")
+    return {
+        "kind": kind,
+        "offset": middle,
+        "resolution": resolution,
+        "data": base64.b64encode(whole.tobytes()).decode(),
+    }
+
+
+def kept_rows(seconds: Floats, loudness: Floats, near_s: Floats, around_s: float, most: int) -> npt.NDArray[np.int64]:
+    """Which rows of a long flight are shown: all around the moments `near_s`, elsewhere the loudest of each stretch.
+
+    Of at most `most` rows all are.
+    """
+    count = len(seconds)
+    if count <= most:
+        return np.arange(count)
+    keep = np.zeros(count, bool)
+    for moment_s in near_s:
+        keep |= np.abs(seconds - moment_s) <= around_s
+    left = np.flatnonzero(~keep)
+    # NaN is never the loudest.
+    order = np.nan_to_num(loudness, nan=-np.inf)
+    for part in np.array_split(left, max(most - int(keep.sum()), most // 4)):
+        if len(part):
+            keep[part[np.argmax(order[part])]] = True
+    return np.flatnonzero(keep)

@@ -16,30 +16,11 @@ from rebound_cli.report.tail import Tail, as_line
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import RunFolderError
 
-# The log is written twice a second; looked at twice as often it is at most a quarter of a second older.
-LOOK_S = 0.25
+# The log is written twice a second; read and passed on ten times a second it is little older in a browser.
+LOOK_S = 0.1
 # A browser that takes nothing for so long has gone, or sleeps: it asks again when it wakes.
 PATIENCE_S = 10.0
 _LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-
-
-class Told:
-    """Everything so far, for any number of readers, each at its own pace."""
-
-    def __init__(self) -> None:
-        self._lines: list[bytes] = []
-        self._news = threading.Condition()
-
-    def add(self, line: bytes) -> None:
-        with self._news:
-            self._lines.append(line)
-            self._news.notify_all()
-
-    def after(self, count: int, timeout_s: float) -> list[bytes]:
-        """The lines after the first `count`; none where nothing comes in time."""
-        with self._news:
-            self._news.wait_for(lambda: len(self._lines) > count, timeout_s)
-            return self._lines[count:]
 
 
 class WatchServer(ThreadingHTTPServer):
@@ -50,7 +31,8 @@ class WatchServer(ThreadingHTTPServer):
     def __init__(self, folder: Path, host: str, port: int) -> None:
         """Raises OSError, ReboundError."""
         super().__init__((host, port), _Handler)
-        self.told, self.is_over = Told(), threading.Event()
+        # Everything so far: it only grows, and each browser has its own place in it.
+        self.told, self.is_over = list[bytes](), threading.Event()
         self.page = live_page(unseen_flight(folder)).encode()
         self.names = _LOOPBACK if host in _LOOPBACK else ()
         self._tail = Tail(folder)
@@ -60,7 +42,7 @@ class WatchServer(ThreadingHTTPServer):
         while not self.is_over.is_set():
             chunk = self._tail.read()
             if chunk is not None:
-                self.told.add(as_line(chunk))
+                self.told.append(as_line(chunk))
             else:
                 self.is_over.wait(LOOK_S)
 
@@ -103,10 +85,11 @@ class _Handler(BaseHTTPRequestHandler):
     def _stream(self) -> None:
         sent = 0
         while not self.server.is_over.is_set():
-            lines = self.server.told.after(sent, 1.0)
+            lines = self.server.told[sent:]
             # A comment finds out whether anybody is there.
             self.wfile.write(b"".join(lines) or b": still\n\n")
             sent += len(lines)
+            self.server.is_over.wait(LOOK_S)
 
     def log_message(self, format: str, *arguments: Any) -> None:
         """Nothing: the terminal has one line, the address."""

@@ -61,7 +61,7 @@ def moments_of(flight: ShownFlight) -> list[Moment]:
 def _impact(flight: ShownFlight, finding: Finding) -> Moment:
     first, final = finding.first, finding.final
     boot_us = first.impact.sample_time_boot_us
-    touch = truth_of(flight, boot_us)
+    touch = flight.contact_at(boot_us)
     normal = _normal(flight, finding)
     error_deg = math.degrees(normal.error_rad)
     kind = "hit" if finding.is_collision else "contact"
@@ -96,14 +96,6 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
         normal_error_deg=error_deg,
         touched_boot_us=None if touch is None else touch.contact_at_boot_us,
     )
-
-
-def truth_of(flight: ShownFlight, boot_us: int) -> "Hit | None":
-    """The simulator's contact that an IMU sample belongs to."""
-    if flight.truth is None:
-        return None
-    index = index_of_hit(boot_us, flight.truth.hits)
-    return None if index is None else flight.truth.hits[index]
 
 
 def _normal(flight: ShownFlight, finding: Finding) -> Normal:

@@ -72,8 +72,8 @@ def libraries() -> list[dict[str, Any]]:
 
 
 def file_text(name: str) -> str:
-    """Of a file beside this one, to the byte."""
-    return (resources.files(__package__) / name).read_bytes().decode("utf-8")
+    """Of a file of the page's own, to the byte."""
+    return (resources.files(__package__) / "web" / name).read_bytes().decode("utf-8")
 
 
 def _digest(script: str) -> str:

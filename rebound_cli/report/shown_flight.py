@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
@@ -29,8 +29,11 @@ from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
 from rebound_cli.results import run_folder
 from rebound_cli.results.flight_log import FlightLog, flight_log_of, read_flight_log
-from rebound_cli.results.truth_match import FlightTruth
+from rebound_cli.results.truth_match import FlightTruth, Time, index_of_hit
 from sim_vehicle.scene import Scene
+
+if TYPE_CHECKING:
+    from sim_vehicle.truth import Hit
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +76,13 @@ class ShownFlight:
         times = (float(event["time_us"]) for event in self.events if event["kind"] == "unconfirmed")
         return next((at_us for at_us in times if hit.at_us < at_us <= until_us), None)
 
-    def seconds(self, at_us: float) -> float:
-        """Since the flight began."""
+    def contact_at(self, boot_us: int) -> "Hit | None":
+        """The simulator's contact that an IMU sample belongs to."""
+        index = None if self.truth is None else index_of_hit(boot_us, self.truth.hits)
+        return None if self.truth is None or index is None else self.truth.hits[index]
+
+    def seconds(self, at_us: Time) -> Time:
+        """Since the flight began, of one time or of many."""
         return (at_us - self.started_at_us) * 1e-6
 
     @property

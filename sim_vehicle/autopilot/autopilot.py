@@ -7,7 +7,6 @@ from sim_vehicle.autopilot.commander.commander import Commander, SystemStatus
 from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, ManualFlight
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
-from sim_vehicle.autopilot.ground_commands import Ground
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import (
     AttitudeTarget,
@@ -16,7 +15,6 @@ from sim_vehicle.autopilot.messages import (
     FlightInput,
     GlobalTarget,
     PositionTarget,
-    RadioChannels,
     Result,
     Severity,
     StatusText,
@@ -71,7 +69,8 @@ class Autopilot:
         self.commander = Commander(parameters, self.navigator, self.detector)
         self.modes, self.arming = self.commander.modes, self.commander.arming
         self.signal, self.battery = self.commander.signal, self.commander.battery
-        self.ground = Ground(parameters, self.origin, self.commander, self.navigator)
+        self.wants_reboot = False
+        """To be done by whoever switches the software on and off, once the answer is out."""
         self._offboard = OffboardControl(self.signal, self.origin)
         self.applied: Setpoint | None = None
         self.texts: list[StatusText] = []
@@ -99,8 +98,6 @@ class Autopilot:
             self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
         elif isinstance(message, StickInput):
             self.commander.sticks.heard(message, self._now_us)
-        elif isinstance(message, RadioChannels):
-            self.commander.sticks.heard_radio(message, self._now_us)
         else:
             self.navigator.follow(message)
 
@@ -127,7 +124,7 @@ class Autopilot:
         self._takeoff.state = TakeoffState.FLIGHT
         home = self.home_ned_m, self.home_yaw_rad
         self._look()
-        self.arm()
+        self.commander.arm()
         self.navigator.set_home(*home)
         self.commander.texts.clear()
         self.navigator.hold_at(goal)
@@ -163,23 +160,6 @@ class Autopilot:
         if result is Result.ACCEPTED and says_so is not None:
             self.say(Severity.INFO, says_so)
         return result
-
-    def refuse_mode(self, why: str) -> Result:
-        """Turn down a mode that does not exist."""
-        self.say(Severity.CRITICAL, why)
-        return Result.TEMPORARILY_REJECTED
-
-    def complain(self, why: str) -> None:
-        """Say what is wrong with a command."""
-        self.say(Severity.CRITICAL, why)
-
-    def arm(self) -> Result:
-        """Arm as a command asks."""
-        return self.commander.arm()
-
-    def disarm(self, forced: bool) -> Result:
-        """Disarm as a command asks."""
-        return self.commander.disarm(forced)
 
     def say(self, severity: Severity, text: str) -> None:
         """Tell the ground stations."""
@@ -298,11 +278,6 @@ class Autopilot:
     def home_yaw_rad(self) -> float:
         """Heading at home."""
         return self.navigator.view.home_yaw_rad
-
-    @property
-    def radio_channels(self) -> RadioChannels | None:
-        """What a radio last said, if there ever was one."""
-        return self.commander.sticks.channels
 
     @property
     def home_set_us(self) -> int:

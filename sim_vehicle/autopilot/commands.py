@@ -7,10 +7,11 @@ MavlinkReceiver::handle_message_command_both and Commander::handle_command of PX
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 from sim_vehicle.autopilot import flight_commands, ground_commands
-from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result
+from sim_vehicle.autopilot.flight_commands import CommandedVehicle
+from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result, Severity
 from sim_vehicle.autopilot.mode_numbers import AUTO_MAIN_MODE, CUSTOM_FLAG, mode_from_request
 from sim_vehicle.autopilot.modes import Mode
 
@@ -50,27 +51,8 @@ class StreamControl(Protocol):
     def announce_interval(self, message_id: int) -> None:
         """Send MESSAGE_INTERVAL with what was asked for."""
 
-    def send_now(self, message_id: int, index: int = 0) -> bool:
+    def send_now(self, message_id: int) -> bool:
         """Send one message at once; False for an unknown one and for one that has nothing new."""
-
-
-class CommandedFlight(Protocol):
-    """What commands may do to the flight."""
-
-    def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
-        """Change the mode; ``says_so`` is the text for a change that was accepted."""
-
-    def refuse_mode(self, why: str) -> Result:
-        """Turn down a mode that this vehicle does not know."""
-
-    def complain(self, why: str) -> None:
-        """Say what is wrong with a command."""
-
-    def arm(self) -> Result:
-        """Arm."""
-
-    def disarm(self, forced: bool) -> Result:
-        """Disarm."""
 
 
 def is_for_us(command: Command, us: Identity) -> bool:
@@ -113,7 +95,7 @@ def answer(command: Command, result: Result) -> CommandAck:
     return CommandAck(command.command, result, command.source_system, command.source_component)
 
 
-def execute(command: Command, flight: CommandedFlight) -> Result | None:
+def execute(command: Command, flight: CommandedVehicle) -> Result | None:
     """The commander's part: does it and returns its answer; None leaves the command unanswered."""
     handler = _HANDLERS.get(command.command)
     return Result.UNSUPPORTED if handler is None else handler(command, flight)
@@ -134,39 +116,40 @@ def _request_message(command: Command, streams: StreamControl) -> Result:
     if message_id == MESSAGE_INTERVAL_ID:
         streams.announce_interval(_whole(command.param2))
         return Result.ACCEPTED
-    return _sent(streams.send_now(message_id, _whole(command.param2, unset=0)))
+    return _sent(streams.send_now(message_id))
 
 
 def _sent(was_sent: bool) -> Result:
     return Result.ACCEPTED if was_sent else Result.DENIED
 
 
-def _set_mode(command: Command, flight: CommandedFlight) -> Result:
+def _set_mode(command: Command, flight: CommandedVehicle) -> Result:
     base, main, sub = _byte(command.param1), _byte(command.param2), _byte(command.param3)
     mode = mode_from_request(base, main, sub)
     if mode is not None:
         return flight.request_mode(mode)
     kind = "base" if not base & CUSTOM_FLAG else "auto" if main == AUTO_MAIN_MODE else "main"
-    return flight.refuse_mode(f"Unsupported {kind} mode")
+    flight.say(Severity.CRITICAL, f"Unsupported {kind} mode")
+    return Result.TEMPORARILY_REJECTED
 
 
-def _arm_disarm(command: Command, flight: CommandedFlight) -> Result | None:
+def _arm_disarm(command: Command, flight: CommandedVehicle) -> Result | None:
     action, forced = _whole(command.param1), _whole(command.param2) == FORCE
     if action not in (0, 1):
-        flight.complain(f"Unsupported ARM_DISARM param: {command.param1:.3f}")
+        flight.say(Severity.CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:.3f}")
         return None
-    return flight.arm() if action == 1 else flight.disarm(forced)
+    return flight.commander.arm() if action == 1 else flight.commander.disarm(forced)
 
 
-def _land(command: Command, flight: CommandedFlight) -> Result:
+def _land(command: Command, flight: CommandedVehicle) -> Result:
     return flight.request_mode(Mode.LAND, says_so="Landing at current position")
 
 
-def _return(command: Command, flight: CommandedFlight) -> Result:
+def _return(command: Command, flight: CommandedVehicle) -> Result:
     return flight.request_mode(Mode.RETURN, says_so="Returning to launch")
 
 
-_HANDLERS: dict[int, Callable[[Command, Any], Result | None]] = {
+_HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     **flight_commands.HANDLERS,
     DO_SET_MODE: _set_mode,
     COMPONENT_ARM_DISARM: _arm_disarm,

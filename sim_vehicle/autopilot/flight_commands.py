@@ -15,8 +15,8 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.mission import MissionCommand
 from sim_vehicle.autopilot.navigator.navigator import Navigator
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
+from sim_vehicle.parameters.store import Parameters
 
 NAV_TAKEOFF = 22
 DO_ORBIT = 34
@@ -32,16 +32,18 @@ _SWITCH_MODE = 1
 """MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: without it, or with any other flag, PX4 does not do it."""
 
 
-class SteeredFlight(Protocol):
-    """What these commands need of the autopilot."""
+class CommandedVehicle(Protocol):
+    """What commands need of the autopilot."""
 
     commander: Commander
     navigator: Navigator
     origin: Origin
     missions: MissionStore
+    parameters: Parameters
+    wants_reboot: bool
 
     def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
-        """Change the mode."""
+        """Change the mode; ``says_so`` is the text for a change that was accepted."""
 
     def say(self, severity: Severity, text: str) -> None:
         """Tell the ground stations."""
@@ -53,14 +55,14 @@ def from_mission(given: MissionCommand) -> Command:
     return Command(0, 0, 0, 0, given.command, p1, p2, p3, p4, p5, p6, p7)
 
 
-def _take_off(command: Command, flight: SteeredFlight) -> Result:
+def _take_off(command: Command, flight: CommandedVehicle) -> Result:
     altitude_m = _given(command.param7)
     down_m = None if altitude_m is None else flight.origin.place.altitude_m - altitude_m
     flight.navigator.take_off_to(_place(command, flight), down_m)
     return flight.request_mode(Mode.TAKEOFF)
 
 
-def _reposition(command: Command, flight: SteeredFlight) -> Result:
+def _reposition(command: Command, flight: CommandedVehicle) -> Result:
     if int(_given(command.param2) or 0) != _SWITCH_MODE:
         return Result.UNSUPPORTED
     if flight.commander.arming.armed:
@@ -68,7 +70,7 @@ def _reposition(command: Command, flight: SteeredFlight) -> Result:
     return flight.request_mode(Mode.LOITER)
 
 
-def _repositioned(command: Command, flight: SteeredFlight) -> NavigatorTarget:
+def _repositioned(command: Command, flight: CommandedVehicle) -> NavigatorTarget:
     """Where DO_REPOSITION leads: a place, another height over the same, another heading, or a stop."""
     navigator = flight.navigator
     place, yaw_rad, altitude_m = _place(command, flight), _given(command.param4), _given(command.param7)
@@ -82,7 +84,7 @@ def _repositioned(command: Command, flight: SteeredFlight) -> NavigatorTarget:
     )
 
 
-def _change_altitude(command: Command, flight: SteeredFlight) -> Result:
+def _change_altitude(command: Command, flight: CommandedVehicle) -> Result:
     altitude_m = _given(command.param1)
     if flight.commander.arming.armed:
         navigator = flight.navigator
@@ -92,18 +94,18 @@ def _change_altitude(command: Command, flight: SteeredFlight) -> Result:
     return flight.request_mode(Mode.LOITER)
 
 
-def _hold_at(target: NavigatorTarget, what: str, flight: SteeredFlight) -> None:
+def _hold_at(target: NavigatorTarget, what: str, flight: CommandedVehicle) -> None:
     if not flight.navigator.hold_at(target):
         flight.say(Severity.CRITICAL, f"{what} is outside geofence")
 
 
-def _change_speed(command: Command, flight: SteeredFlight) -> Result:
+def _change_speed(command: Command, flight: CommandedVehicle) -> Result:
     speed_m_s = _given(command.param2)
     flight.navigator.change_speed(speed_m_s if speed_m_s and speed_m_s > 0.0 else None)
     return Result.ACCEPTED
 
 
-def _orbit(command: Command, flight: SteeredFlight) -> Result:
+def _orbit(command: Command, flight: CommandedVehicle) -> Result:
     result = flight.request_mode(Mode.ORBIT)
     if result is not Result.ACCEPTED:
         flight.say(Severity.CRITICAL, "Orbit command rejected")
@@ -111,19 +113,13 @@ def _orbit(command: Command, flight: SteeredFlight) -> Result:
     place, altitude_m = _place(command, flight), _given(command.param7)
     north, east = (None, None) if place is None else place[:2]
     down_m = None if altitude_m is None else flight.origin.place.altitude_m - altitude_m
-    behaviour = _given(command.param3)
-    done = flight.navigator.change_orbit(
-        _given(command.param1),
-        _given(command.param2),
-        None if behaviour is None else round(behaviour),
-        (north, east, down_m),
-    )
+    done = flight.navigator.change_orbit(_given(command.param1), _given(command.param2), (north, east, down_m))
     if not done:
         flight.say(Severity.CRITICAL, "Orbit radius limit exceeded")
     return result
 
 
-def _start_mission(command: Command, flight: SteeredFlight) -> Result:
+def _start_mission(command: Command, flight: CommandedVehicle) -> Result:
     missions, first = flight.missions, _given(command.param1)
     if not missions.progress.valid:
         flight.say(Severity.CRITICAL, "Mission start denied! No valid mission")
@@ -136,18 +132,18 @@ def _start_mission(command: Command, flight: SteeredFlight) -> Result:
     return flight.commander.arm(Reason.MISSION) if result is Result.ACCEPTED else result
 
 
-def _terminate(command: Command, flight: SteeredFlight) -> Result:
+def _terminate(command: Command, flight: CommandedVehicle) -> Result:
     if not command.param1 > 0.5 or not flight.commander.arming.armed:
         return Result.DENIED
     return flight.request_mode(Mode.TERMINATION)
 
 
-def _look_at(command: Command, flight: SteeredFlight) -> Result:
-    """PX4 takes every region of interest; outside a mission this vehicle, like one without a gimbal, ignores it."""
+def _look_at(command: Command, flight: CommandedVehicle) -> Result:
+    """PX4 takes every region of interest; this vehicle, like one without a gimbal, ignores it."""
     return Result.ACCEPTED
 
 
-def _place(command: Command, flight: SteeredFlight) -> Vector3 | None:
+def _place(command: Command, flight: CommandedVehicle) -> Vector3 | None:
     latitude_deg, longitude_deg = _given(command.param5), _given(command.param6)
     if latitude_deg is None or longitude_deg is None:
         return None
@@ -158,7 +154,7 @@ def _given(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-HANDLERS: dict[int, Callable[[Command, SteeredFlight], Result | None]] = {
+HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     NAV_TAKEOFF: _take_off,
     DO_ORBIT: _orbit,
     DO_CHANGE_SPEED: _change_speed,

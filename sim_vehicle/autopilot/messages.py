@@ -43,15 +43,6 @@ class Severity(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class PeerHeartbeat:
-    """HEARTBEAT of another component; `type` is a MAV_TYPE."""
-
-    system_id: int
-    component_id: int
-    type: int
-
-
-@dataclass(frozen=True, slots=True)
 class Command:
     """COMMAND_LONG or COMMAND_INT; parameters as sent, so possibly NaN."""
 
@@ -68,7 +59,6 @@ class Command:
     """Latitude in degrees, where it is one; a COMMAND_LONG carries it with 24 bits only."""
     param6: float = 0.0
     param7: float = 0.0
-    confirmation: int = 0
     frame: int | None = None
     """MAV_FRAME of a COMMAND_INT; None for a COMMAND_LONG."""
 
@@ -80,8 +70,6 @@ class PositionTarget:
     In frame 1 all vectors are local NED; in frame 8 they are forward, right, down.
     """
 
-    target_system: int
-    target_component: int
     frame: int
     position_m: Axis3
     velocity_m_s: Axis3
@@ -90,38 +78,6 @@ class PositionTarget:
     yaw_rate_rad_s: float | None
     is_force: bool
     """The mask's bit 9: the acceleration is meant as a force, which PX4 does not support."""
-
-
-@dataclass(frozen=True, slots=True)
-class TimeSyncRequest:
-    """TIMESYNC with tc1 = 0: the peer asks for our clock; an answer to our own request never gets here."""
-
-    peer_time_ns: int
-
-
-@dataclass(frozen=True, slots=True)
-class SigningSetup:
-    """SETUP_SIGNING."""
-
-    key: bytes
-    time_stamp: int
-
-
-@dataclass(frozen=True, slots=True)
-class PingRequest:
-    """PING to everybody: it is sent back."""
-
-    time_us: int
-    number: int
-    source_system: int
-    source_component: int
-
-
-@dataclass(frozen=True, slots=True)
-class SetMode:
-    """SET_MODE, as the command that PX4 makes of it."""
-
-    command: Command
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,14 +128,7 @@ class StickInput:
     throttle: float
     yaw: float
     source: int
-    """1: a radio; 2 and more: the first link and those after it."""
-
-
-@dataclass(frozen=True, slots=True)
-class RadioChannels:
-    """RC_CHANNELS_OVERRIDE: pulses in microseconds, 18 of them; 0 and 65535 say nothing."""
-
-    pulses_us: tuple[int, ...]
+    """1 and more: the first link and those after it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,4 +141,4 @@ class FollowTarget:
     velocity_ned_m_s: Vector3
 
 
-FlightInput: TypeAlias = PositionTarget | GlobalTarget | AttitudeTarget | StickInput | RadioChannels | FollowTarget
+FlightInput: TypeAlias = PositionTarget | GlobalTarget | AttitudeTarget | StickInput | FollowTarget

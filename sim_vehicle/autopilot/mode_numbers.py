@@ -37,7 +37,6 @@ NUMBERS: dict[Mode, ModeNumbers] = {
     Mode.ALTCTL: ModeNumbers(custom_mode(2), _STICKS, 4, "Altitude"),
     Mode.POSCTL: ModeNumbers(custom_mode(3), _STICKS, 1, "Position"),
     Mode.ORBIT: ModeNumbers(custom_mode(3, 1), _AUTO, 2, "Orbit"),
-    Mode.POSITION_SLOW: ModeNumbers(custom_mode(3, 2), _STICKS, 0, "Position Slow"),
     Mode.TAKEOFF: ModeNumbers(custom_mode(4, 2), _AUTO, 8, "Takeoff"),
     Mode.LOITER: ModeNumbers(custom_mode(4, 3), _AUTO, 0, "Hold"),
     Mode.MISSION: ModeNumbers(custom_mode(4, 4), _AUTO, 6, "Mission"),
@@ -45,7 +44,6 @@ NUMBERS: dict[Mode, ModeNumbers] = {
     Mode.LAND: ModeNumbers(custom_mode(4, 6), _AUTO, 7, "Land"),
     Mode.FOLLOW_TARGET: ModeNumbers(custom_mode(4, 8), _AUTO, 0, "Follow Target"),
     Mode.PRECISION_LAND: ModeNumbers(custom_mode(4, 9), _AUTO, 0, "Precision Landing"),
-    Mode.ACRO: ModeNumbers(custom_mode(5), CUSTOM_FLAG | MANUAL_FLAG, 0, "Acro"),
     # Stabilised too as soon as a setpoint has said what is controlled: see `base_mode`.
     Mode.OFFBOARD: ModeNumbers(custom_mode(6), CUSTOM_FLAG, 0, "Offboard"),
     Mode.STABILIZED: ModeNumbers(custom_mode(7), _STICKS, 0, "Stabilized"),
@@ -56,7 +54,7 @@ NUMBERS: dict[Mode, ModeNumbers] = {
 
 _NOT_BY_NUMBER = (Mode.DESCEND, Mode.TERMINATION, Mode.ORBIT)
 _MODE_OF_CUSTOM = {numbers.custom_mode: mode for mode, numbers in NUMBERS.items() if mode not in _NOT_BY_NUMBER}
-_POSITION_MAIN_MODE, _SLOW_SUB_MODE = 3, 2
+_POSITION_MAIN_MODE = 3
 
 
 def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
@@ -70,12 +68,12 @@ def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
 def mode_from_request(base: int, main: int, sub: int) -> Mode | None:
     """The mode that DO_SET_MODE's three parameters name; None for one this vehicle does not know.
 
-    As Commander.cpp: AUTO without a sub mode is MISSION, POSCTL has a slow variant and takes every other sub mode
-    for itself, and without the custom flag the base mode's own bits decide.
+    As Commander.cpp: AUTO without a sub mode is MISSION, POSCTL takes every sub mode for itself, and without the
+    custom flag the base mode's own bits decide.
     """
     if base & CUSTOM_FLAG:
         if main == _POSITION_MAIN_MODE:
-            return Mode.POSITION_SLOW if sub == _SLOW_SUB_MODE else Mode.POSCTL
+            return Mode.POSCTL
         if main == AUTO_MAIN_MODE:
             return _MODE_OF_CUSTOM.get(custom_mode(main, sub)) if sub > 0 else Mode.MISSION
         return _MODE_OF_CUSTOM.get(custom_mode(main))

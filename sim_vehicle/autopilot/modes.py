@@ -18,8 +18,6 @@ class Mode(IntEnum):
     MISSION = 3
     LOITER = 4
     RETURN = 5
-    POSITION_SLOW = 6
-    ACRO = 10
     DESCEND = 12
     TERMINATION = 13
     OFFBOARD = 14
@@ -48,9 +46,7 @@ NEEDS: dict[Mode, frozenset[Need]] = {
     Mode.MANUAL: frozenset({Need.STICKS}),
     Mode.ALTCTL: frozenset({Need.STICKS}),
     Mode.POSCTL: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
-    Mode.POSITION_SLOW: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
     Mode.STABILIZED: frozenset({Need.STICKS}),
-    Mode.ACRO: frozenset({Need.STICKS}),
     Mode.MISSION: _PLACE | {Need.MISSION},
     Mode.LOITER: _PLACE,
     Mode.RETURN: _PLACE | {Need.HOME},
@@ -131,9 +127,7 @@ TRANSITIONS: tuple[Transition, ...] = (
     _request(Mode.MANUAL),
     _request(Mode.ALTCTL),
     _request(Mode.POSCTL),
-    _request(Mode.POSITION_SLOW),
     _request(Mode.STABILIZED),
-    _request(Mode.ACRO),
     _request(Mode.MISSION),
     _request(Mode.LOITER),
     _request(Mode.RETURN),

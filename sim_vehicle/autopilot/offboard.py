@@ -8,8 +8,7 @@ import math
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, GlobalTarget, PositionTarget, Severity, StatusText
 from sim_vehicle.estimator.estimate import yaw_of
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import (
     FREE,
@@ -118,8 +117,6 @@ def local_target(target: GlobalTarget, origin: Origin, home_ned_m: Vector3) -> P
     if position == FREE and target.velocity_m_s == FREE and target.acceleration_m_s2 == FREE:
         return None
     return PositionTarget(
-        target_system=0,
-        target_component=0,
         frame=FRAME_LOCAL_NED,
         position_m=position,
         velocity_m_s=target.velocity_m_s,

@@ -10,13 +10,14 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest, opposite
 from sim_vehicle.bench.strike import DURATION_S, strike
-from sim_vehicle.bench.timeline import Timeline
+from sim_vehicle.bench.timeline import Timeline, TimelineEntry
 from sim_vehicle.bench.truth import Truth, truth_of
 from sim_vehicle.errors import FaultError, ParameterError, SceneError
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.obstacles import BoxSpec, PoleSpec, WallSpec
 from sim_vehicle.parameters.definitions import definitions
 from sim_vehicle.scene import Scene, Start
+from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Obstacle
 
 ObstacleSpec = WallSpec | PoleSpec | BoxSpec
@@ -100,36 +101,55 @@ class Bench:
         self.vehicle = ChangeableVehicle(
             setup.airframe_loaded(), setup.scene(), setup.seed, epoch_at_boot_us, setup.parameters_checked()
         )
-        self.timeline = Timeline(self.vehicle)
+        self._timeline = Timeline(self.vehicle)
         self._placed = len(setup.obstacles)
         self._strikes = 0
         self._due: list[tuple[int, Callable[[], None]]] = []
 
     @property
+    def time_s(self) -> float:
+        """The vehicle's clock, seconds since boot."""
+        return self.vehicle.time_boot_us / 1e6
+
+    @property
     def truth(self) -> Truth:
+        """What is really so at this moment."""
         return truth_of(self.vehicle)
 
-    def advance(self) -> None:
+    @property
+    def recorded(self) -> TruthRecorder:
+        """The whole flight: its path as arrays, all hits, all faults."""
+        return self.vehicle.truth
+
+    @property
+    def timeline(self) -> tuple[TimelineEntry, ...]:
+        """What has happened so far."""
+        return self._timeline.events
+
+    def step(self) -> None:
         """One interval."""
         while self._due and self._due[0][0] <= self.vehicle.time_boot_us:
             self._due.pop(0)[1]()
         self.vehicle.advance()
-        self.timeline.look()
+        self._timeline.look()
 
     def place(self, *specs: ObstacleSpec) -> Handle:
-        """Put obstacles into the world; the times of a motion count from now. Raises SceneError."""
+        """Put obstacles into the world; the times of a motion count from now.
+
+        Raises SceneError for one that would be in the vehicle.
+        """
         obstacles = tuple(self._built(spec, self._placed + number) for number, spec in enumerate(specs, start=1))
         self.vehicle.place(obstacles)
         self._placed += len(obstacles)
         names = ", ".join(f"'{obstacle.name}'" for obstacle in obstacles)
-        self.timeline.note(f"placed {names}")
+        self._timeline.note(f"placed {names}")
         return Handle(lambda: self._take_away(obstacles, names))
 
     def hit(self, speed_m_s: float, bearing_deg: float = 0.0, elevation_deg: float = 0.0) -> str:
-        """Swing a plate at the vehicle; it touches 20 ms from now. Returns the plate's name.
+        """Swing a plate at the vehicle: it touches at that speed 20 ms from now, coming from there,
+        clockwise from the nose (90 is the right) or from above (elevation 90). Returns the name the hit will have.
 
-        ``speed_m_s``: against the vehicle as it moves now; ``bearing_deg``: where the plate comes from, clockwise
-        from the nose; ``elevation_deg``: 90 from above. Raises SceneError for no speed.
+        The speed is against the vehicle as it moves now. Raises SceneError for none.
         """
         if not speed_m_s > 0.0:
             raise SceneError(f"a hit needs a speed of more than 0 m/s, not {speed_m_s:g}.")
@@ -138,26 +158,24 @@ class Bench:
         plate = strike(vehicle.state, vehicle.constants, speed_m_s, bearing_deg, elevation_deg, name)
         vehicle.put((plate,))
         above = f", {elevation_deg:g} deg up" if elevation_deg else ""
-        self.timeline.note(f"{name} swung: {speed_m_s:g} m/s from {bearing_deg:g} deg{above}")
+        self._timeline.note(f"{name} swung: {speed_m_s:g} m/s from {bearing_deg:g} deg{above}")
         self._due.append((vehicle.time_boot_us + round(1e6 * DURATION_S), lambda: vehicle.remove((plate,))))
         return name
 
     def inject(self, request: FaultRequest, for_s: float | None = None, after_s: float = 0.0) -> Handle:
-        """Let something go wrong from now (or ``after_s`` later) on, for a while or until it is removed.
-
-        Raises FaultError.
+        """Let something of `sim_vehicle.testing.faults` go wrong now, or ``after_s`` later, for a while or until it is
+        removed. Raises FaultError.
         """
         if not after_s >= 0.0:
             raise FaultError(f"{request.kind}: after_s must not be less than 0.")
-        faults = request.timed(self.vehicle.time_boot_us / 1e6 + after_s, for_s)
+        faults = request.timed(self.time_s + after_s, for_s)
         for fault in faults:
             self.vehicle.add_fault(fault)
         return Handle(lambda: self._end(faults))
 
     def _end(self, faults: tuple[Fault, ...]) -> None:
         """End faults; what has already jumped jumps back."""
-        vehicle = self.vehicle
-        now_s = vehicle.time_boot_us / 1e6
+        vehicle, now_s = self.vehicle, self.time_s
         # One that happened once, and, where it was to be undone by itself, its opposite.
         happened = sum(fault.window_s[0] < now_s for fault in faults)
         undoing = opposite(faults[0], now_s) if happened == 1 else None
@@ -168,16 +186,10 @@ class Bench:
 
     def _take_away(self, obstacles: tuple[Obstacle, ...], names: str) -> None:
         self.vehicle.remove(obstacles)
-        self.timeline.note(f"removed {names}")
+        self._timeline.note(f"removed {names}")
 
     def _built(self, spec: ObstacleSpec, number: int) -> Obstacle:
-        obstacle: Obstacle
-        if isinstance(spec, WallSpec):
-            obstacle = spec.wall(number)
-        elif isinstance(spec, PoleSpec):
-            obstacle = spec.pole(number)
-        else:
-            obstacle = spec.box(number)
+        obstacle = spec.built(number)
         if obstacle.motion is None:
             return obstacle
-        return replace(obstacle, motion=obstacle.motion.later(self.vehicle.time_boot_us / 1e6))
+        return replace(obstacle, motion=obstacle.motion.later(self.time_s))

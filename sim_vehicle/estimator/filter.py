@@ -5,12 +5,13 @@ filterpy's `ExtendedKalmanFilter` estimates the error of a state that is carried
 an attitude stays one.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 from filterpy.kalman import ExtendedKalmanFilter
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.estimator.consistency import Innovations
 from sim_vehicle.estimator.sensors import wrapped
 from sim_vehicle.estimator.strapdown import (
     D_ACCELEROMETER,
@@ -42,6 +43,22 @@ FIRST_POSITION_M = 0.01
 FIRST_VELOCITY_M_S = 0.01
 
 FLOW_NAME, RANGE_NAME, HEADING_NAME, CAPTURE_NAME, REST_NAME = "flow", "range", "heading", "capture", "rest"
+
+
+@dataclass(slots=True)
+class Innovations:
+    """Of one sensor: NIS = y' S^-1 y, whose mean over a consistent filter is the number of its values."""
+
+    dimension: int
+    count: int = 0
+    total: float = 0.0
+    rejected: int = 0
+
+    def add(self, nis: float, accepted: bool) -> None:
+        """Count one innovation, whether it was fused or not."""
+        self.count += 1
+        self.total += nis
+        self.rejected += not accepted
 
 
 class ErrorFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types

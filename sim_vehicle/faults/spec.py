@@ -5,9 +5,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from sim_vehicle.obstacles import Finite, NotNegative, Part, Point
+from sim_vehicle.obstacles import Point
+from sim_vehicle.written import Finite, NotNegative, Part, Positive
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Motor = Annotated[int, Field(ge=0, le=3)]
 

@@ -16,7 +16,7 @@ def split(data: bytes) -> list[bytes]:
     """The frames in bytes that begin with one, by their stated lengths; what is none stays together as it came."""
     frames, start = [], 0
     while start < len(data):
-        size = _size(data, start)
+        size = packet_size(data, start)
         if size is None or start + size > len(data):
             frames.append(data[start:])
             break
@@ -25,7 +25,8 @@ def split(data: bytes) -> list[bytes]:
     return frames
 
 
-def _size(data: bytes, start: int) -> int | None:
+def packet_size(data: bytes, start: int) -> int | None:
+    """Of the packet that may begin at ``start``; None where none does, or its header is not complete."""
     if start + 3 > len(data):
         return None
     if data[start] == _MAVLINK_1:

@@ -1,46 +1,22 @@
 """The Earth under the simulated world: where its origin lies, its magnetic field and its air."""
 
-import math
-
-import numpy as np
-
-from sim_vehicle.hil.messages import Air, Place
+from sim_vehicle.geography import HOME, Place
+from sim_vehicle.hil.messages import Air
 from sim_vehicle.world import Vector3
 
-# Where PX4's own simulators put their home by default, so that its users know the place.
-HOME = Place(latitude_deg=47.397742, longitude_deg=8.545594, altitude_m=488.0)
 # Inside the five years of WMM2025; fixed, so that the same flight has the same field.
 FIELD_YEAR = 2026.0
 _FIELD_MODEL = "wmm/WMM_2025.COF"
 
-# The sphere of PX4's projection between geographic and local coordinates (lib/geo).
-EARTH_RADIUS_M = 6_371_000.0
 _NANOTESLA_PER_GAUSS = 1e5
-_PASCAL_PER_HECTOPASCAL = 100.0
-_KELVIN_AT_0_C = 273.15
-
-# The table of air reaches as far as any scene; metres above home. Linear interpolation over one metre
-# is wrong by 0.0002 Pa, a fiftieth of a millimetre.
-_LOWEST_M, _HIGHEST_M = -200, 2000
-
-
-def place_at(position_ned_m: Vector3, home: Place = HOME) -> Place:
-    """A local position on the Earth.
-
-    Meridians are taken as parallel: 100 m from home that is wrong by 1 mm, a tenth of HIL_GPS's resolution.
-    """
-    north_m, east_m, down_m = position_ned_m
-    parallel_radius_m = EARTH_RADIUS_M * math.cos(math.radians(home.latitude_deg))
-    return Place(
-        home.latitude_deg + math.degrees(north_m / EARTH_RADIUS_M),
-        home.longitude_deg + math.degrees(east_m / parallel_radius_m),
-        home.altitude_m - down_m,
-    )
+_SEA_LEVEL_PA, _SEA_LEVEL_K, _LAPSE_K_M = 101_325.0, 288.15, 0.0065
+# Gravity over the lapse rate and the gas constant of air.
+_EXPONENT = 9.80665 / (287.0528 * _LAPSE_K_M)
 
 
 def magnetic_field_ned_gauss(home: Place = HOME, year: float = FIELD_YEAR) -> Vector3:
     """The World Magnetic Model's field, the same all over a scene."""
-    # Here, as below: only a vehicle that is simulated needs it.
+    # Here: only a vehicle that is simulated needs it.
     from pygeomag import GeoMag
 
     field = GeoMag(coefficients_file=_FIELD_MODEL).calculate(
@@ -49,27 +25,9 @@ def magnetic_field_ned_gauss(home: Place = HOME, year: float = FIELD_YEAR) -> Ve
     return field.x / _NANOTESLA_PER_GAUSS, field.y / _NANOTESLA_PER_GAUSS, field.z / _NANOTESLA_PER_GAUSS
 
 
-class StandardAir:
-    """Pressure and temperature of the ICAO standard atmosphere near home."""
-
-    def __init__(self, home: Place = HOME) -> None:
-        # Here, because it brings scipy's optimizers, which take half a second to load.
-        from ambiance import Atmosphere
-
-        self._home_altitude_m = home.altitude_m
-        heights_m = home.altitude_m + np.arange(_LOWEST_M, _HIGHEST_M + 1)
-        atmosphere = Atmosphere(heights_m)
-        self._pressure_pa: list[float] = atmosphere.pressure.tolist()
-        self._temperature_k: list[float] = atmosphere.temperature.tolist()
-
-    def at(self, height_m: float, pressure_noise_pa: float = 0.0) -> Air:
-        """The air ``height_m`` above home; beyond the table the nearest that it has."""
-        steps = min(max(height_m, _LOWEST_M), _HIGHEST_M - 1e-6) - _LOWEST_M
-        index = int(steps)
-        share = steps - index
-        pressure_pa = self._pressure_pa[index] * (1 - share) + self._pressure_pa[index + 1] * share
-        return Air(
-            pressure_hpa=(pressure_pa + pressure_noise_pa) / _PASCAL_PER_HECTOPASCAL,
-            altitude_m=self._home_altitude_m + height_m,
-            temperature_c=self._temperature_k[index] - _KELVIN_AT_0_C,
-        )
+def air_at(altitude_m: float, noise_pa: float = 0.0) -> Air:
+    """The ICAO standard atmosphere of the lowest eleven kilometres, by its formula (PX4's lib/atmosphere)."""
+    share = 1 - _LAPSE_K_M * altitude_m / _SEA_LEVEL_K
+    pressure_pa = _SEA_LEVEL_PA * share**_EXPONENT + noise_pa
+    shown_m = _SEA_LEVEL_K / _LAPSE_K_M * (1 - (pressure_pa / _SEA_LEVEL_PA) ** (1 / _EXPONENT))
+    return Air(pressure_pa / 100, shown_m, _SEA_LEVEL_K * share - 273.15)

@@ -4,20 +4,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.geography import Place
 from sim_vehicle.world import Vector3
 
 Quadruple = tuple[float, float, float, float]
 
 MOTORS_STOPPED: Quadruple = (0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A point on the Earth; the altitude is above mean sea level."""
-
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,9 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.hil.earth import HOME, StandardAir, magnetic_field_ned_gauss, place_at
-from sim_vehicle.hil.messages import Air, HilGps, MotionCapture, Place, Quadruple
+from sim_vehicle.geography import HOME, Origin, Place
+from sim_vehicle.hil.earth import magnetic_field_ned_gauss
+from sim_vehicle.hil.messages import HilGps, MotionCapture, Quadruple
 from sim_vehicle.world import Vector3
 
 # Rates usual on flight controllers; PX4 asks for no particular ones.
@@ -55,25 +56,14 @@ class Magnetometer:
         return x + gauss(0, noise), y + gauss(0, noise), z + gauss(0, noise)
 
 
-class Barometer:
-    """The standard atmosphere's pressure at the body's height."""
-
-    def __init__(self, rng: random.Random) -> None:
-        self._air = StandardAir()
-        self._rng = rng
-
-    def sample(self, position_ned_m: Vector3) -> Air:
-        return self._air.at(-position_ned_m[2], self._rng.gauss(0, BAROMETER_NOISE_PA))
-
-
 class Gps:
     """A receiver as good as the estimate that the airframe file states for the built-in autopilot.
 
     That is an RTK fix: with a plain receiver's metres, no difference between two flights would mean anything.
     """
 
-    def __init__(self, airframe: Airframe, rng: random.Random, home: Place = HOME) -> None:
-        self._home = home
+    def __init__(self, airframe: Airframe, rng: random.Random, origin: Origin) -> None:
+        self._origin = origin
         estimate, period_s = airframe.estimate, 1e-6 * GPS_PERIOD_US
         self._accuracy_m = estimate.position_noise_m
         self._position = Wander(estimate.position_noise_m, estimate.position_correlation_s, period_s, rng)
@@ -83,7 +73,7 @@ class Gps:
         """A fix of the moment; a real receiver's is a tenth of a second late, and PX4's SITL assumes 10 ms."""
         return HilGps(
             time_us=time_us,
-            place=place_at(_sum(position_ned_m, self._position.next()), self._home),
+            place=self._origin.place_at(_sum(position_ned_m, self._position.next())),
             velocity_ned_m_s=_sum(velocity_ned_m_s, self._velocity.next()),
             accuracy_m=self._accuracy_m,
         )

@@ -5,15 +5,16 @@ import random
 
 from sim_vehicle.airframe import Airframe, Imu
 from sim_vehicle.estimator.samples import FlowSample
+from sim_vehicle.geography import Origin
 from sim_vehicle.hil.downward import DownwardSensors
-from sim_vehicle.hil.earth import place_at
-from sim_vehicle.hil.messages import HilSensor, HilState, Quadruple, ToPx4
+from sim_vehicle.hil.earth import air_at
+from sim_vehicle.hil.messages import Air, HilSensor, HilState, Quadruple, ToPx4
 from sim_vehicle.hil.sensors import (
+    BAROMETER_NOISE_PA,
     BAROMETER_PERIOD_US,
     GPS_PERIOD_US,
     MAGNETOMETER_PERIOD_US,
     MOTION_CAPTURE_PERIOD_US,
-    Barometer,
     Cameras,
     Gps,
     Magnetometer,
@@ -54,8 +55,8 @@ class HilVehicle:
         self._plant = Plant(sampled_every(airframe, sample_interval_us), scene, seed)
         rng = random.Random(seed)
         self._magnetometer = Magnetometer(rng)
-        self._barometer = Barometer(rng)
-        self._gps = Gps(airframe, rng)
+        self._rng, self._origin = rng, Origin()
+        self._gps = Gps(airframe, rng, self._origin)
         self._cameras = Cameras(rng)
         self.interval_us = self._plant.interval_us
         self._downward = DownwardSensors(airframe, self._plant.seen_faces, self.interval_us, random.Random(~seed))
@@ -87,7 +88,7 @@ class HilVehicle:
             if faults is None or not faults.is_lost(sensor, now_us / 1e6):
                 messages.append(sample)
         if self._is_due(STATE_PERIOD_US):
-            place = place_at(position_ned_m)
+            place = self._origin.place_at(position_ned_m)
             messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))
         is_magnetometer_due = self._is_due(MAGNETOMETER_PERIOD_US)
         messages.append(
@@ -96,10 +97,14 @@ class HilVehicle:
                 specific_force_frd_m_s2=output.specific_force_frd_m_s2,
                 angular_velocity_frd_rad_s=output.angular_velocity_frd_rad_s,
                 magnetic_field_frd_gauss=self._magnetometer.sample(attitude_wxyz) if is_magnetometer_due else None,
-                air=self._barometer.sample(position_ned_m) if self._is_due(BAROMETER_PERIOD_US) else None,
+                air=self._air(pz) if self._is_due(BAROMETER_PERIOD_US) else None,
             )
         )
         return tuple(messages)
+
+    def _air(self, down_m: float) -> Air:
+        altitude_m = self._origin.place.altitude_m - down_m
+        return air_at(altitude_m, self._rng.gauss(0, BAROMETER_NOISE_PA))
 
     def _is_due(self, period_us: int) -> bool:
         """Whether the interval just simulated contains a multiple of the period."""

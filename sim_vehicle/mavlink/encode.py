@@ -11,11 +11,11 @@ from typing import Any, TypeAlias
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
+from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText
 from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.framing import HEADER, MAGIC, Packed, flattened
+from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
 
@@ -26,7 +26,6 @@ NAN = math.nan
 _NO_OFFSET = (0.0, 0.0, 0.0, 0.0)
 _TEXT_BYTES = 50
 AUTOPILOT_VERSION_ID = 148
-_GREATEST_MAVLINK_1_ID = 255
 # HIGHRES_IMU.fields_updated: accelerometer and gyroscope; magnetometer; pressure, its altitude and temperature.
 _INERTIAL_FIELDS, _MAGNETIC_FIELDS, _AIR_FIELDS = 0x3F, 0x1C0, 0x1A00
 
@@ -36,19 +35,18 @@ class Encoder:
 
     def __init__(self, us: Identity) -> None:
         self._link = dialect.MAVLink(None, srcSystem=us.system, srcComponent=us.component)
-        self.speaks_mavlink_1 = False
 
-    def packet(self, message: Message) -> bytes | None:
-        """The message as a packet; None for one whose number MAVLink 1 has no room for."""
+    def packet(self, message: Message) -> bytes:
+        """The message as a packet."""
         link = self._link
         kind: Any = type(message)
         if kind is not tuple and (flat := flattened(kind)) is not None:
             layout, fields_of = flat
             kind, message = tuple, (layout, layout.pack(*fields_of(message)))
         if kind is tuple:
-            if self.speaks_mavlink_1 or link.signing.sign_outgoing:
-                return self._whole(message)
             layout, payload = message
+            if link.signing.sign_outgoing:
+                return self._signed(layout, payload)
             # Zeros at the end of a payload are left out, but for its first byte.
             sent = payload.rstrip(b"\0") or payload[:1]
             header = HEADER.pack(len(sent), 0, link.seq, link.srcSystem, link.srcComponent)
@@ -56,19 +54,14 @@ class Encoder:
             framed: bytes = header + layout.number_bytes + sent
             checksum: int = mcrf4xx(framed + layout.checked)
             return MAGIC + framed + checksum.to_bytes(2, "little")
-        if self.speaks_mavlink_1 and message.get_msgId() > _GREATEST_MAVLINK_1_ID:
-            return None
-        packet: bytes = message.pack(link, force_mavlink1=self.speaks_mavlink_1)
+        packet: bytes = message.pack(link)
         link.seq = (link.seq + 1) & 0xFF
         return packet
 
-    def _whole(self, message: Packed) -> bytes | None:
-        """A signed packet or one of MAVLink 1: pymavlink's whole."""
-        layout, payload = message
-        if self.speaks_mavlink_1 and layout.number > _GREATEST_MAVLINK_1_ID:
-            return None
+    def _signed(self, layout: Layout, payload: bytes) -> bytes:
+        """pymavlink's whole packet, which has the signature."""
         link, theirs = self._link, dialect.MAVLink_message(layout.number, layout.name)
-        packet: bytes = theirs._pack(link, layout.checked[0], payload, self.speaks_mavlink_1)
+        packet: bytes = theirs._pack(link, layout.checked[0], payload, False)
         link.seq = (link.seq + 1) & 0xFF
         return packet
 
@@ -213,16 +206,6 @@ def message_interval(message_id: int, interval_us: int) -> Message:
 
 def command_ack(ack: CommandAck) -> Message:
     return dialect.MAVLink_command_ack_message(ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
-
-
-def ping_answer(request: PingRequest) -> Message:
-    return dialect.MAVLink_ping_message(
-        request.time_us, request.number, request.source_system, request.source_component
-    )
-
-
-def timesync_reply(request: TimeSyncRequest, heard_at_us: int) -> Message:
-    return dialect.MAVLink_timesync_message(heard_at_us * 1000, request.peer_time_ns)
 
 
 def status_texts(text: StatusText, number: int) -> Iterator[Message]:

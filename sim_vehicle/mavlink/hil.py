@@ -42,20 +42,18 @@ class HilEncoder:
 
     def packet(self, message: ToPx4) -> bytes:
         """The message as a MAVLink 2 packet."""
-        packet = self._encoder.packet(_filled(message))
-        assert packet is not None, "MAVLink 2 has room for every message"
-        return packet
+        return self._encoder.packet(_filled(message))
 
 
 class HilDecoder:
     """Finds PX4's answers in its stream, which TCP may have cut anywhere."""
 
     def __init__(self) -> None:
-        self._decoder = Decoder(_SIMULATOR, readers={dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS: _answer})
+        self._decoder = Decoder(_SIMULATOR, (dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS,))
 
     def push(self, data: bytes) -> list[ActuatorControls]:
         """The answers completed by ``data``; PX4's greeting (HEARTBEAT, COMMAND_LONG) is dropped."""
-        return [answer for answer in self._decoder.push(data) if isinstance(answer, ActuatorControls)]
+        return [_answer(packet) for packet in self._decoder.push(data)]
 
 
 def _filled(message: ToPx4) -> Message:

@@ -59,19 +59,31 @@ class Line:
 FAST_LINE = Line()
 
 
-class Buffer:
-    """The transmit buffer of a serial port: bytes leave it at the line's speed; what does not fit is lost."""
+class Outbox:
+    """Messages in, packets out. Under it lies the transmit buffer of a serial port: bytes leave it at the line's speed,
+    and what does not fit is lost. Without a serial line everything fits.
+    """
 
-    def __init__(self, line: Line, now_us: int) -> None:
+    def __init__(self, encoder: Encoder, line: Line, now_us: int) -> None:
+        self._encoder = encoder
         self._bytes_per_us = None if line.baud is None else line.baud / _BITS / 1e6
         self._waiting = 0.0
         self._now_us = now_us
+        self._packets: list[bytes] = []
         self.lost = 0
 
-    @property
-    def is_endless(self) -> bool:
-        """Whether everything fits: no serial line."""
-        return self._bytes_per_us is None
+    def send(self, message: Message) -> None:
+        """Make a packet of the message."""
+        self.forward(self._encoder.packet(message))
+
+    def forward(self, packet: bytes) -> None:
+        """Send a packet as it is, be it somebody else's."""
+        if self._bytes_per_us is not None:
+            if not self.has_room(len(packet)):
+                self.lost += 1
+                return
+            self._waiting += len(packet)
+        self._packets.append(packet)
 
     def advance(self, now_us: int) -> None:
         """Let time pass."""
@@ -82,42 +94,6 @@ class Buffer:
     def has_room(self, count: int) -> bool:
         """Whether ``count`` bytes would fit."""
         return self._bytes_per_us is None or self._waiting + count <= _BUFFER_BYTES
-
-    def take(self, count: int) -> bool:
-        """Put ``count`` bytes in; False where they are lost."""
-        if self._bytes_per_us is None:
-            return True
-        if self._waiting + count > _BUFFER_BYTES:
-            self.lost += 1
-            return False
-        self._waiting += count
-        return True
-
-
-class Outbox:
-    """Messages in, packets out; what a full serial line cannot take is lost, as in a real transmit buffer."""
-
-    def __init__(self, encoder: Encoder, buffer: Buffer) -> None:
-        self._encoder = encoder
-        self._buffer = buffer
-        self._loses = not buffer.is_endless
-        self._packets: list[bytes] = []
-
-    def send(self, message: Message) -> None:
-        """Make a packet of the message."""
-        packet = self._encoder.packet(message)
-        if packet is None or (self._loses and not self._buffer.take(len(packet))):
-            return
-        self._packets.append(packet)
-
-    def forward(self, packet: bytes) -> None:
-        """Send somebody else's packet as it is."""
-        if self._buffer.take(len(packet)):
-            self._packets.append(packet)
-
-    def has_room(self, count: int) -> bool:
-        """Whether the line's buffer has room for these bytes."""
-        return self._buffer.has_room(count)
 
     def take(self) -> tuple[bytes, ...]:
         """All packets since the last call, in order."""

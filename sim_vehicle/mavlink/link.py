@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, PeerHeartbeat, PingRequest, SigningSetup, StatusText
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
-from sim_vehicle.mavlink.line import FAST_LINE, Buffer, Line, Outbox
+from sim_vehicle.mavlink.line import FAST_LINE, Line, Outbox
 from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.command_service import CommandService
 from sim_vehicle.mavlink.services.file_service import FileService
@@ -15,23 +17,19 @@ from sim_vehicle.mavlink.services.mission_service import MissionService
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
 from sim_vehicle.mavlink.services.service import BusyService, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
-from sim_vehicle.mavlink.services.timesync_service import TimeSyncService
-from sim_vehicle.mavlink.signing import is_optional
+from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, is_optional
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
-from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
+from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.parameters.store import Parameters
 
 # Of a serial line's buffer, for the streams between the packets of a long answer.
 _RESERVED_BYTES = 1_000
-# MAV_PROTO_VER: MAVLink 1 until somebody speaks MAVLink 2.
-_BEGINS_WITH_MAVLINK_1 = 1
 
 
 # What every link offers, a line a protocol, in the order in which they are brought up to date in an interval.
 SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
     CommandService,
-    TimeSyncService,
     SetpointService,
     ParameterService,
     MissionService,
@@ -68,23 +66,22 @@ class Link:
         self.now_us = board.telemetry.sample.time_boot_us
         self._board = board
         self._signing = board.signing.of_link()
-        self._decoder = Decoder(board.identity, self._signing)
         self._encoder = Encoder(board.identity)
         self._signed_with: bytes | None = None
-        self._buffer = Buffer(line, self.now_us)
-        self._outbox = Outbox(self._encoder, self._buffer)
+        self._outbox = Outbox(self._encoder, line, self.now_us)
         self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, line)
-        self._choose_protocol()
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
         self._busy = tuple(service for service in self._services if isinstance(service, BusyService))
-        self._handlers: dict[type, Handler] = {
-            PeerHeartbeat: self._hear_heartbeat,
-            PingRequest: self._answer_ping,
-            SigningSetup: self._set_up_signing,
+        self.handlers: dict[int, Handler] = {
+            HEARTBEAT_ID: self._hear_heartbeat,
+            4: self._answer_ping,
+            111: self._answer_timesync,
+            SETUP_SIGNING_ID: self._set_up_signing,
         }
         for service in self._services:
-            self._handlers.update(service.handlers)
+            self.handlers.update(service.handlers)
+        self._decoder = Decoder(board.identity, self.handlers, self._signing)
         if options.line.baud is not None:
             # Over a serial port PX4 introduces itself unasked.
             self.streams.send_now(encode.AUTOPILOT_VERSION_ID)
@@ -142,11 +139,8 @@ class Link:
         decoder, parameters = self._decoder, self._board.parameters
         decoder.foreign = [] if collects_foreign and self.options.forwards else None
         decoder.signing_is_optional = is_optional(parameters["MAV_SIGN_CFG"], self.options.is_usb)
-        for message in decoder.push(data):
-            handler = self._handlers.get(type(message))
-            if handler is not None:
-                handler(message)
-        self._choose_protocol()
+        for packet in decoder.push(data):
+            self.handlers[packet.get_msgId()](packet)
         return decoder.foreign or []
 
     def forward(self, packets: Iterable[ForeignPacket]) -> None:
@@ -160,8 +154,7 @@ class Link:
     def update(self, now_us: int, texts: Sequence[StatusText]) -> None:
         """Send what is due at the end of the interval."""
         self.now_us = now_us
-        if self.options.line.baud is not None:
-            self._buffer.advance(now_us)
+        self._outbox.advance(now_us)
         if self._signing.key is not self._signed_with or self._signed_with is not None:
             self._sign()
         for text in texts:
@@ -179,23 +172,31 @@ class Link:
             return bool(sources)
         return any(source[0] == system and component in (EVERY_ID, source[1]) for source in sources)
 
-    def _choose_protocol(self) -> None:
-        begins_with_1 = self._board.parameters["MAV_PROTO_VER"] <= _BEGINS_WITH_MAVLINK_1
-        self._encoder.speaks_mavlink_1 = begins_with_1 and not self._decoder.heard_mavlink_2
-
     def _sign(self) -> None:
         signing = self._signing
         key = self._signed_with = signing.key
         stamp = signing.next_stamp(self._board.telemetry.epoch_at_boot_us + self.now_us)
         self._encoder.sign(key, self._number, stamp)
 
-    def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
-        self._texts.heard(heartbeat, self.now_us)
-        if heartbeat.type == GROUND_STATION_TYPE:
+    # --- what concerns the link alone --------------------------------------------------------------------
+
+    def _hear_heartbeat(self, packet: dialect.MAVLink_heartbeat_message) -> None:
+        if packet.type == dialect.MAV_TYPE_GCS:
+            self._texts.heard_us = self.now_us
             self._board.autopilot.ground_station_heard()
 
-    def _answer_ping(self, request: PingRequest) -> None:
-        self.send(encode.ping_answer(request))
+    def _answer_ping(self, packet: dialect.MAVLink_ping_message) -> None:
+        """One to everybody is sent back."""
+        if (packet.target_system, packet.target_component) == (EVERY_ID, EVERY_ID):
+            asker = (packet.get_srcSystem(), packet.get_srcComponent())
+            self.send(dialect.MAVLink_ping_message(packet.time_usec, packet.seq, *asker))
 
-    def _set_up_signing(self, setup: SigningSetup) -> None:
-        self._signing.hear_setup(setup.key, setup.time_stamp, self.options.is_usb)
+    def _answer_timesync(self, packet: dialect.MAVLink_timesync_message) -> None:
+        """The vehicle's clock, for a request; an answer, to the vehicle's own, has a time in tc1."""
+        if packet.tc1 == 0:
+            # Bytes arrive anywhere in the interval since the last sample: on average in its middle.
+            heard_at_us = self.now_us + self._board.interval_us // 2
+            self.send(dialect.MAVLink_timesync_message(heard_at_us * 1000, packet.ts1))
+
+    def _set_up_signing(self, packet: dialect.MAVLink_setup_signing_message) -> None:
+        self._signing.hear_setup(bytes(packet.secret_key), packet.initial_timestamp, self.options.is_usb)

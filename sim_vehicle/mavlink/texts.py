@@ -7,11 +7,10 @@ announces itself as an onboard computer, on a link without a ground station, get
 from collections import deque
 from collections.abc import Iterator
 
-from sim_vehicle.autopilot.messages import PeerHeartbeat, StatusText
+from sim_vehicle.autopilot.messages import StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.encode import Message
 
-GROUND_STATION_TYPE = 6  # MAV_TYPE_GCS
 # telemetry_status HEARTBEAT_TIMEOUT_US: two lost heartbeats and a half.
 GROUND_STATION_TIMEOUT_US = 2_500_000
 # A text that nobody could hear for this long is not worth sending any more.
@@ -31,11 +30,6 @@ class TextLink:
         """When a ground station was heard last."""
         self._sent_us = -TEXT_INTERVAL_US
         self._number = 0
-
-    def heard(self, heartbeat: PeerHeartbeat, now_us: int) -> None:
-        """A heartbeat came over this link."""
-        if heartbeat.type == GROUND_STATION_TYPE:
-            self.heard_us = now_us
 
     def add(self, text: StatusText, now_us: int) -> None:
         """Queue a text."""

@@ -4,8 +4,7 @@ import math
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.gains import PositionGains
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
 
 _MICROSECONDS = 1_000_000

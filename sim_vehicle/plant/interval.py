@@ -15,7 +15,7 @@ from sim_vehicle.control.attitude import (
 )
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
 from sim_vehicle.physics.contact import relax_arms, settle_arms
-from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update_slope
+from sim_vehicle.physics.estimate import update_estimate, update_slope
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
 from sim_vehicle.physics.jit import borrowed, inlined, njit
@@ -54,33 +54,37 @@ TOUCH_MARGIN_M = 0.0005
 
 @njit
 def advance_interval(
-    state: PlantState,
-    asked: SetpointRows,
+    states: Floats,
+    setpoints: Floats,
     motors: int,
     noise: Floats,
     fine_steps: int,
-    constants: Constants,
-    disturbance: Disturbance,
+    all_constants: Floats,
+    disturbances: Floats,
     faces: Floats,
     moving: Ints,
     behind: Ints,
     near: Ints,
     forces: Floats,
-    scratch: Scratch,
-    errors: EstimateErrors,
+    scratches: Floats,
+    all_errors: Floats,
     past: Floats,
     report: Floats,
 ) -> None:
-    """Advance ``state`` by one integration interval, renew the vehicle's estimate, fill ``report``.
+    """Advance the state by one integration interval, renew the vehicle's estimate, fill ``report``.
 
     Who drives the motors from outside has an estimate and a frame of its own: a hit notes no offset of ours then.
 
-    ``motors``: off, idling, flying the setpoint, or driven (as `PlantState.motor_command_n` says). ``noise`` is
-    standard normal: six values a raw sample, then nine for the estimate.
-    ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
+    Each record comes as an array of one. ``motors``: off, idling, flying the setpoint, or driven (as
+    `PlantState.motor_command_n` says). ``noise`` is standard normal: six values a raw sample, then nine for the
+    estimate. ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
     the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory. ``moving`` are the rows of
     ``faces`` that have a velocity: they are moved on. ``past`` without rows: the estimate comes from elsewhere.
     """
+    state, asked, constants, disturbance = states[0], setpoints[0], all_constants[0], disturbances[0]
+    scratch, errors, noise, past = scratches[0], all_errors[0], borrowed(noise), borrowed(past)
+    faces, moving, behind = borrowed(faces), borrowed(moving), borrowed(behind)
+    near, forces = borrowed(near), borrowed(forces)
     state.peak_force_n = 0.0
     state.finished_count = 0
     state.specific_force_sum[:] = 0.0
@@ -107,47 +111,7 @@ def advance_interval(
         update_slope(state, errors, interval_s)
     if motors == MOTORS_DRIVEN:
         state.frame_offset_ned_m[:] = 0.0
-    write_report(state, constants, report)
-
-
-@njit
-def advance_boxed(
-    states: Floats,
-    asked: Floats,
-    motors: int,
-    noise: Floats,
-    fine_steps: int,
-    constants: Floats,
-    disturbances: Floats,
-    faces: Floats,
-    moving: Ints,
-    behind: Ints,
-    near: Ints,
-    forces: Floats,
-    scratches: Floats,
-    errors: Floats,
-    past: Floats,
-    report: Floats,
-) -> None:
-    """The same, with each record as an array of one."""
-    advance_interval(
-        states[0],
-        asked[0],
-        motors,
-        borrowed(noise),
-        fine_steps,
-        constants[0],
-        disturbances[0],
-        borrowed(faces),
-        borrowed(moving),
-        borrowed(behind),
-        borrowed(near),
-        borrowed(forces),
-        scratches[0],
-        errors[0],
-        borrowed(past),
-        borrowed(report),
-    )
+    write_report(state, constants, borrowed(report))
 
 
 @njit

@@ -25,7 +25,7 @@ from sim_vehicle.plant.interval import (
     MOTORS_FLYING,
     MOTORS_IDLE,
     MOTORS_OFF,
-    advance_boxed,
+    advance_interval,
 )
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import Setpoint
@@ -223,7 +223,7 @@ class Plant:
             around.move(int(self.state.time_us))
         if self.faults is not None:
             self.faults.before(self.state, self.disturbance)
-        advance_boxed(
+        advance_interval(
             self._state_box,
             self._asked.box,
             motors,

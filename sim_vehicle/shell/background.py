@@ -180,12 +180,12 @@ class RunningVehicle:
     @property
     def recorded(self) -> TruthRecorder:
         """The whole flight: its path as arrays, all hits, all faults. It goes on growing until the vehicle stops."""
-        return self._bench.vehicle.truth
+        return self._bench.recorded
 
     @property
     def timeline(self) -> tuple[TimelineEntry, ...]:
         """What has happened so far."""
-        return self._read(lambda: self._bench.timeline.events)
+        return self._read(lambda: self._bench.timeline)
 
     def save_truth(self, path: Path) -> None:
         """Write hits, faults and path as `.npz`, as `rebound sim --truth` does."""
@@ -221,7 +221,7 @@ class RunningVehicle:
             self._control.refuse(self._ended())
 
     def _advance(self) -> None:
-        self._bench.advance()
+        self._bench.step()
         if self._waiting:
             truth, now_us = self._bench.truth, self._bench.vehicle.time_boot_us
             self._waiting = [waiting for waiting in self._waiting if not waiting.is_over(truth, now_us)]

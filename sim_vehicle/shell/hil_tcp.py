@@ -1,16 +1,15 @@
 """The simulated vehicle's body for a real PX4: a TCP server at `simulator_mavlink`'s port."""
 
-import errno
 import socket
 import struct
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-from sim_vehicle.errors import PortInUse
 from sim_vehicle.hil.exchange import Exchange, ExchangePhase
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
+from sim_vehicle.shell.port import bound_socket
 from sim_vehicle.shell.truth_file import save_truth
 
 PX4_SIMULATOR_PORT = 4560
@@ -165,18 +164,8 @@ def _now_us() -> int:
 
 
 def _listening_socket(host: str, port: int) -> socket.socket:
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    try:
-        # A PX4 that has just gone leaves its connection in TIME_WAIT, which must not hold up the next start.
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind((host, port))
-        listener.listen(1)
-    except OSError as problem:
-        listener.close()
-        reason = "is in use" if problem.errno == errno.EADDRINUSE else f"cannot be opened ({problem.strerror})"
-        raise PortInUse(
-            f"TCP port {port} {reason}: another simulator may be running; stop it or choose another port."
-        ) from problem
+    listener = bound_socket(socket.SOCK_STREAM, host, port)
+    listener.listen(1)
     listener.settimeout(_LONGEST_WAIT_S)
     return listener
 

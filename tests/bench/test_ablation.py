@@ -4,12 +4,8 @@ import importlib
 
 import pytest
 
-from bench.ablation.command import detections_table, table
-from bench.ablation.detections import detections_campaign, work_out
-from bench.ablation.flights import ablation_campaign
-from bench.ablation.rules import RULES, Rule
-from bench.ablation.switching import switched
-from bench.campaign.run import Results
+from bench.studies.ablation import detections_campaign, detections_table, flights_table, work_out_heard
+from bench.studies.rules import RULES, Rule, switched
 from companion.reflex import halfspace, planner
 
 RULE = Rule("away", "away from what was hit", "companion.reflex.halfspace:plus", lambda arguments, found: (9, 9, 9))
@@ -65,13 +61,12 @@ def test_every_rule_is_a_function_of_the_companion(rule):
 
 
 def test_the_table_counts_what_is_lost_without_a_rule():
-    campaign = ablation_campaign(1, 7, ("trust", "hand"))
     well = {"failures": [], "hits": [RECOVERED]}
-    flights = {
-        0: {"with": well, "without": {"trust": {"failures": ["fell"], "hits": [RECOVERED | {"rest_s": None}]}}},
-        1: {"with": well, "without": {"trust": {"failures": [], "hits": [RECOVERED | {"past_m": 0.06}]}}},
-    }
-    lines = table(campaign, Results(flights, {})).splitlines()
+    flights = [
+        {"with": well, "without": {"trust": {"failures": ["fell"], "hits": [RECOVERED | {"rest_s": None}]}}},
+        {"with": well, "without": {"trust": {"failures": [], "hits": [RECOVERED | {"past_m": 0.06}]}}},
+    ]
+    lines = flights_table([rule for rule in RULES if rule.name in ("trust", "hand")], flights).splitlines()
     trust = next(line for line in lines if line.startswith("| trust"))
     assert [cell.strip() for cell in trust.split("|")][3:6] == ["2", "+1", "+2"]
     hand = next(line for line in lines if line.startswith("| hand"))
@@ -83,18 +78,17 @@ def test_a_drawn_hit_is_heard_with_and_without_each_rule():
     # Given a hit, and the rule by which alone the detector hears velocities
     heard = detections_campaign(1, 71_003, ("trust", "hand"), None).cases
     assert {one.kind for one in heard} == {"plain", "hand", "flight"}
-    said = work_out(heard[0])
+    said = work_out_heard(heard[0])
     assert set(said["with"]) == {"50", "100", "246"}
     assert all(set(entry) == {"found", "ms", "false"} for entry in said["with"].values())
     assert set(said["without"]) <= {"trust", "hand"}
 
 
 def test_the_detectors_table_counts_hits_alarms_and_what_came_sooner():
-    campaign = detections_campaign(1, 7, ("trust", "hand"), None)
     found, late, missed = ({"found": f, "ms": ms, "false": 0} for f, ms in ((True, 4.0), (True, 40.0), (False, None)))
-    cases = {
-        0: {"kind": "plain", "with": {"50": found, "246": found}, "without": {"trust": {"50": missed, "246": late}}},
-        1: {"kind": "hand", "with": {"50": {"false": 0}}, "without": {"hand": {"50": {"false": 1}}}},
-    }
-    lines = detections_table(campaign, Results(cases, {})).splitlines()
-    assert "| trust | 1 | +1 | +0 | 1 |" in lines and "| hand | 1 | +0 | -1 | 0 |" in lines
+    cases = [
+        {"kind": "plain", "with": {"50": found, "246": found}, "without": {"trust": {"50": missed, "246": late}}},
+        {"kind": "hand", "with": {"50": {"false": 0}}, "without": {"hand": {"50": {"false": 1}}}},
+    ]
+    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in detections_table(RULES, cases).splitlines()]
+    assert ["trust", "1", "+1", "+0", "1"] in lines and ["hand", "1", "+0", "-1", "0"] in lines

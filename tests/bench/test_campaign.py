@@ -12,10 +12,8 @@ from pathlib import Path
 import dask
 import pytest
 
-from bench.campaign import run as running
-from bench.campaign.plan import Campaign, work_out
-from bench.campaign.record import Record, RecordError
-from bench.campaign.run import CampaignError, Workers, failures_text, run_campaign
+from bench.fly import campaign as running
+from bench.fly.campaign import Campaign, CampaignError, Workers, run_campaign, work_out
 from tests.rebound_cli.command import ROOT
 
 pytestmark = pytest.mark.slow
@@ -25,7 +23,7 @@ import sys
 from pathlib import Path
 from tests.bench.test_campaign import campaign, table, throw_and_die_once
 from distributed import LocalCluster
-from bench.campaign.run import Workers, run_campaign
+from bench.fly.campaign import Workers, run_campaign
 if __name__ == "__main__":
     who, folder = sys.argv[1], Path(sys.argv[2])
     if who == "killed":
@@ -71,17 +69,6 @@ def table(results):
     return json.dumps([results.results, results.failures])
 
 
-@pytest.fixture
-def in_process(monkeypatch):
-    """Everything in this process, tasks one after the other: what is tested here is not Dask's."""
-
-    def outcomes(campaign, missing, workers):
-        for numbered in missing:
-            yield from work_out(campaign.work_out, [numbered])
-
-    monkeypatch.setattr(running, "_outcomes", outcomes)
-
-
 def test_one_two_or_a_schedulers_workers_give_the_same_bytes(tmp_path):
     # Given the same campaign in folders of its own
     texts = []
@@ -96,15 +83,15 @@ def test_one_two_or_a_schedulers_workers_give_the_same_bytes(tmp_path):
     assert len(results) == 28 and set(failures) == {"4", "17"}
 
 
-def test_a_failing_case_is_listed_with_its_seed_and_cause_and_stops_nothing(tmp_path, in_process):
+def test_a_failing_case_is_listed_with_its_seed_and_cause_and_stops_nothing(tmp_path):
     results = run_campaign(campaign(), Workers(), tmp_path)
     assert set(results.failures) == {4, 17} and set(results.results) == set(range(30)) - {4, 17}
-    text = failures_text(campaign(), results)
+    text = results.text(campaign())
     assert "case 4 failed: ValueError: nothing falls upwards" in text and "seed=1004" in text
 
 
 @pytest.mark.parametrize("torn", ["", '{"case":9,"resu'])
-def test_a_broken_off_campaign_goes_on_and_ends_as_an_unbroken_one(tmp_path, monkeypatch, in_process, torn):
+def test_a_broken_off_campaign_goes_on_and_ends_as_an_unbroken_one(tmp_path, monkeypatch, torn):
     # Given a run that ends after ten cases, perhaps in the middle of a line
     whole = table(run_campaign(campaign(), Workers(), tmp_path / "whole"))
     (path,) = (tmp_path / "whole").iterdir()
@@ -114,11 +101,11 @@ def test_a_broken_off_campaign_goes_on_and_ends_as_an_unbroken_one(tmp_path, mon
     # When the same campaign is run again
     again = []
 
-    def outcomes(campaign, missing, workers):
+    def outcomes(function, missing, workers):
         again.extend(number for number, _ in missing)
-        yield from work_out(campaign.work_out, missing)
+        yield from work_out(function, missing)
 
-    monkeypatch.setattr(running, "_outcomes", outcomes)
+    monkeypatch.setattr(running, "outcomes", outcomes)
     resumed = table(run_campaign(campaign(), Workers(), tmp_path / "broken"))
     # Then only what was missing or had failed is worked out, and the results are the same
     assert again == [4, *range(10, 30)]
@@ -126,32 +113,29 @@ def test_a_broken_off_campaign_goes_on_and_ends_as_an_unbroken_one(tmp_path, mon
 
 
 def test_other_parameters_are_another_campaign(tmp_path):
-    assert campaign(30).key == campaign(30).key
-    assert len({campaign(30).key, campaign(31).key, campaign(30, hits=5).key}) == 3
+    assert campaign(30).record_path() == campaign(30).record_path()
+    assert len({one.record_path() for one in (campaign(30), campaign(31), campaign(30, hits=5))}) == 3
 
 
 def test_another_version_of_the_code_is_another_campaign(monkeypatch):
-    before = campaign().key
-    monkeypatch.setattr("bench.campaign.plan.code_version", lambda name: "changed")
-    assert campaign().key != before
+    before = campaign().record_path()
+    monkeypatch.setattr("bench.fly.campaign.code_version", lambda name: "changed")
+    assert campaign().record_path() != before
 
 
 @pytest.mark.parametrize("line", [b"nonsense", b"\xff", b"3", b'{"result":1}', b'{"case":[]}'])
 def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
-    record = Record(campaign(), tmp_path)
-    record.close()
-    with record.path.open("ab") as file:
+    run_campaign(campaign(0), Workers(), tmp_path)
+    with campaign(0).record_path(tmp_path).open("ab") as file:
         file.write(line + b"\n")
-    with pytest.raises(RecordError, match=r"is damaged in line 2; move it away\.$"):
-        Record(campaign(), tmp_path)
+    with pytest.raises(CampaignError, match=r"is damaged in line 2; move it away\.$"):
+        run_campaign(campaign(0), Workers(), tmp_path)
 
 
 def test_a_file_of_another_campaign_is_refused(tmp_path):
-    wanted = campaign()
-    path = tmp_path / f"throws-{wanted.key}.jsonl"
-    path.write_text('{"campaign":"walks"}\n')
-    with pytest.raises(RecordError, match="another campaign"):
-        Record(wanted, tmp_path)
+    campaign().record_path(tmp_path).write_text('{"campaign":"walks"}\n')
+    with pytest.raises(CampaignError, match="another campaign"):
+        run_campaign(campaign(), Workers(), tmp_path)
 
 
 def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path, monkeypatch):
@@ -160,17 +144,13 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path, monkeypatch):
         run_campaign(campaign(), Workers(scheduler="tcp://127.0.0.1:9"), tmp_path)
 
 
-def test_of_a_longer_campaigns_record_a_shorter_one_takes_its_own_cases(tmp_path, in_process, monkeypatch):
-    monkeypatch.setattr(Campaign, "key", "the same")
+def test_of_a_longer_campaigns_record_a_shorter_one_takes_its_own_cases(tmp_path):
     run_campaign(campaign(), Workers(), tmp_path)
-    head = {"parameters": {"cases": 30}, "campaign": "throws", "version": campaign().version}
-    record = tmp_path / "throws-the same.jsonl"
-    assert json.loads(record.read_text().partition("\n")[0]) == head
     shorter = Campaign("throws", {"cases": 30}, campaign().cases[:12], throw)
     assert set(run_campaign(shorter, Workers(), tmp_path).results) == {*range(12)} - {4}
 
 
-def test_the_record_grows_one_line_a_case(tmp_path, in_process):
+def test_the_record_grows_one_line_a_case(tmp_path):
     run_campaign(campaign(), Workers(), tmp_path)
     (path,) = Path(tmp_path).iterdir()
     head, *lines = [json.loads(line) for line in path.read_text().splitlines()]

@@ -6,12 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from bench.corpus import command
-from bench.corpus.comparison import comparison_text
-from bench.corpus.recording import record
-from bench.corpus.verdict import verdict
+from bench.cases.missions import MissionCase
 from bench.main import main
-from bench.random_missions.generator import MissionCase
+from bench.studies import corpus
+from bench.studies.corpus import comparison_text, record, verdict
 from companion.reflex.normal import Normal
 from rebound_cli.replay.watching import Findings
 from rebound_cli.results.run_folder import TLOG_NAME, TRUTH_NAME
@@ -75,7 +73,7 @@ def test_a_collision_that_is_told_twice_or_of_nothing_is_false():
 
 def test_drawn_vehicles_of_both_kinds_fly_a_mission_of_each_seed(monkeypatch, tmp_path):
     flown = []
-    monkeypatch.setattr(command, "in_processes", lambda work, places, jobs: flown.extend(places))
+    monkeypatch.setattr(corpus, "worked_out", lambda work, places, workers: flown.extend(places))
     words = ["--missions", "2", "--first-seed", "7"]
     assert main(["corpus", "record", str(tmp_path / "corpus"), *words]) == 0
     assert [(folder.name, case.seed, case.airframe, case.is_drawn) for folder, case in flown] == [

@@ -2,12 +2,12 @@
 
 import pytest
 
-from bench.detectors.campaigns import Drawing, hits_campaign
-from bench.detectors.hits import draw_case, fly_hit, vehicle_of_hit
-from bench.detectors.recording import VehicleRecording
-from bench.detectors.scoring import first_possible
-from bench.detectors.watching import ASKED_HZ, configuration, streams_asked_hz
-from bench.detectors.wire import BUILDERS, Wire
+from bench.cases.hits import draw_case, vehicle_of_hit
+from bench.fly.cruise import fly_hit
+from bench.fly.watching import ASKED_HZ, configuration, streams_asked_hz
+from bench.fly.wire import BUILDERS, VehicleRecording, Wire
+from bench.rows.heard import first_possible
+from bench.studies.detectors import Drawing, hits_campaign
 from companion.mavlink.decode import Decoder
 from companion.messages import ExtendedState, MessageId
 from companion.reflex.detector import Situation
@@ -58,8 +58,8 @@ def without_landed_state(samples):
 
 
 def test_a_hit_is_drawn_from_its_seed_alone():
-    assert draw_case("plain", 7) == draw_case("plain", 7)
-    drawn = [draw_case("plain", seed) for seed in range(40)]
+    assert draw_case("plain", 7, ()) == draw_case("plain", 7, ())
+    drawn = [draw_case("plain", seed, ()) for seed in range(40)]
     assert {case.airframe for case in drawn} == {"foldable", "rigid"}
     first, again = (fly_hit(drawn[0], vehicle_of_hit(drawn[0]).airframe) for _ in range(2))
     assert first[0].samples == again[0].samples and first[1] == again[1]
@@ -82,7 +82,7 @@ def test_drawn_cases_have_a_vehicle_each_whose_detector_knows_its_sensor():
 @pytest.mark.parametrize("seed", range(10))
 def test_a_hit_is_the_one_that_was_asked_for(seed):
     # Given any approach
-    case = draw_case("plain", seed)
+    case = draw_case("plain", seed, ())
     airframe = vehicle_of_hit(case).airframe
     # When it is flown
     recording, hit = fly_hit(case, airframe)
@@ -102,7 +102,7 @@ def test_a_hit_is_the_one_that_was_asked_for(seed):
 
 def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
     # Given a hit, heard at every rate
-    case = draw_case("plain", 0)
+    case = draw_case("plain", 0, ())
     recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     first_us = {}
     for rate in ASKED_HZ:

@@ -1,20 +1,15 @@
 """The bench's hits over a bad link, struck hovers and hands: what is flown, what arrives, and the verdicts."""
 
-import dataclasses
 import math
 
 import pytest
 
-from bench.detectors.campaigns import HANDS_AT_MOST, SIDE_HITS_AT_MOST, hands_campaign, hits_campaign
-from bench.detectors.hands import draw_hand, hover_in_hand, work_out_hand
-from bench.detectors.hits import draw_case, fly_hit, vehicle_of_hit, work_out_hit
-from bench.detectors.links import JITTERY, LINKS, over_link
-from bench.detectors.scoring import first_possible
-from bench.detectors.watching import streams_asked_hz
-from bench.detectors.wire import Wire
-from bench.detectors_report.bars import MET, MISSED
-from bench.detectors_report.families import families_text, family_bars, hand_bars, hands_text
-from bench.detectors_report.numbers import Hits
+from bench.cases.hits import draw_case, draw_hand, vehicle_of_hit
+from bench.fly.cruise import fly_hit, hover_in_hand
+from bench.fly.watching import streams_asked_hz
+from bench.fly.wire import JITTERY, LINKS, Wire, over_link
+from bench.rows.heard import first_possible, work_out_hand, work_out_hit
+from bench.studies.detectors import HANDS_AT_MOST, SIDE_HITS_AT_MOST, hands_campaign, hits_campaign
 from companion.messages import ImuSample
 from sim_vehicle.airframe import load_built_in
 
@@ -22,7 +17,7 @@ from sim_vehicle.airframe import load_built_in
 
 
 def sent_and_arrived(fault, seed=4):
-    case = draw_case("link", 0)
+    case = draw_case("link", 0, ())
     recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     sent = Wire(recording).heard(streams_asked_hz(246), seed)
     return recording, hit, sent, over_link(sent, recording, fault, seed)
@@ -66,7 +61,7 @@ def test_a_link_that_only_delays_shows_the_hit_by_so_much_later():
 @pytest.mark.parametrize("seed", range(10))
 def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
     # Given an obstacle of any kind that comes at a hovering vehicle
-    case = draw_case("struck", seed, is_struck=True)
+    case = draw_case("struck", seed, (), is_struck=True)
     _, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     # Then it is the obstacle that moves, at the speed asked for, and it meets the vehicle head-on or at a slant
     assert 0.5 <= case.speed_m_s <= 3.0
@@ -101,37 +96,6 @@ def test_every_bench_has_some_of_each_and_a_large_one_not_too_many():
         families = [case.family for case in hits_campaign(hits).cases]
         assert families.count("link") == families.count("struck") == side
         assert len(hands_campaign(hits).cases) == hands
-
-
-def made_up(**changes):
-    """A hit over a bad link and a struck hover for each airframe, all found; `changes` in every one."""
-    cases = [draw_case("link", seed, ("fused",), link=JITTERY) for seed in (0, 1)]
-    cases += [draw_case("struck", seed, ("fused",), is_struck=True) for seed in (0, 1)]
-    cases = [dataclasses.replace(case, speed_m_s=1.0) for case in cases]
-    entry = {"false": 0, "blind": 0, "latency_ms": 2.0, "kind": "wall", "touches": 0, **changes}
-    entry = {key: value for key, value in entry.items() if value is not None}
-    rate = {"possible_ms": 2.0, "detectors": {"fused": entry}}
-    return Hits(cases, {n: {"rates": {"50": rate, "100": rate, "246": rate}} for n in range(4)})
-
-
-def test_a_hit_missed_over_a_bad_link_or_in_hover_misses_the_bar():
-    assert {bar.verdict for bar in family_bars(made_up())} == {MET} and len(family_bars(made_up())) == 12
-    assert {bar.verdict for bar in family_bars(made_up(latency_ms=None))} == {MISSED}
-    assert "| struck in hover | fused | rigid | 246 | 1 | 100.00 | 2.0 / 2.0 | 0 | 0 | 0 | wall 1 |" in families_text(
-        made_up()
-    )
-
-
-def test_one_hand_taken_for_a_collision_misses_the_bar():
-    cases = [draw_hand(seed, ("fused",)) for seed in range(4)]
-
-    def results(collisions):
-        held = {"collisions": collisions, "told_after_ms": 40.0}
-        return {n: {"rates": {str(hz): {"detectors": {"fused": held}} for hz in (50, 100, 246)}} for n in range(4)}
-
-    assert {bar.verdict for bar in hand_bars(cases, results([]))} == {MET}
-    assert {bar.verdict for bar in hand_bars(cases, results(["wall"]))} == {MISSED}
-    assert "| held | fused | 246 | 2 | 0 | 2 | 40.0 |  |" in hands_text(cases, results([]))
 
 
 def test_the_default_detector_finds_them_and_lets_hands_be():

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from bench.detectors import flights
-from bench.detectors.flights import FlightCase, fly_healthy
-from bench.detectors.recorded import DataError, averaged, data_files, turned, with_impact
+from bench.cases.mishaps import FlightCase
+from bench.fly import cruise
+from bench.fly.cruise import fly_healthy
+from bench.fly.recorded import DataError, averaged, data_files, turned, with_impact
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry
 from rebound_cli.logs.log import Log, LoggedSample
 from sim_vehicle.airframe import load_built_in
@@ -20,7 +21,7 @@ REST = np.array([0.0, 0.0, -9.81])
 
 def test_a_healthy_flight_goes_from_the_ground_to_the_ground_and_is_hard(monkeypatch):
     # Given a pilot with half a minute in the air
-    monkeypatch.setattr(flights, "AIRBORNE_S", 30.0)
+    monkeypatch.setattr(cruise, "AIRBORNE_S", 30.0)
     flown = fly_healthy(FlightCase("calm", 0, "foldable", ()), load_built_in("foldable"))
     samples, situations = flown.recording.samples, flown.recording.situations
     phases = np.array(flown.phases)
@@ -40,8 +41,8 @@ def test_a_healthy_flight_goes_from_the_ground_to_the_ground_and_is_hard(monkeyp
 def test_a_flip_goes_all_the_way_round_and_is_caught(monkeypatch):
     # Given a pilot who knows nothing but flips
     for manoeuvre in ("_dash", "_jump", "_stop", "_slalom", "_spin", "_hover"):
-        monkeypatch.setattr(flights.Pilot, manoeuvre, flights.Pilot._flip)
-    monkeypatch.setattr(flights, "AIRBORNE_S", 4.0)
+        monkeypatch.setattr(cruise.Pilot, manoeuvre, cruise.Pilot._flip)
+    monkeypatch.setattr(cruise, "AIRBORNE_S", 4.0)
     flown = fly_healthy(FlightCase("calm", 3, "rigid", ()), load_built_in("rigid"))
     # Then the vehicle was upside down on the way, and upright soon after
     upright = [1 - 2 * (s.attitude_wxyz[1] ** 2 + s.attitude_wxyz[2] ** 2) for s in flown.recording.samples]

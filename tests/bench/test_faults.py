@@ -2,25 +2,25 @@
 
 import math
 import random
+import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from bench.campaign.plan import Json
-from bench.campaign.record import Record
-from bench.faults import command, latency
-from bench.faults.air import POSCTL, Air, Injector, When
-from bench.faults.catalogue import FILES, FLOWN
-from bench.faults.envelope import outside
-from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault
-from bench.faults.flight import fly, fly_from_one_take_off
+from bench.faults.catalogue import FILES, FLOWN, GROUPS
+from bench.faults.files import tried
 from bench.faults.injectors import Rewritten, Simulated, setting
-from bench.faults.kinds.files import tried
-from bench.faults.kinds.pilot import Taken
-from bench.faults.latency import spread as spread_of
-from bench.faults.packets import ARM, IMU, SET_MODE, made
-from bench.faults.table import Row, text_of
+from bench.faults.pilot import Taken
+from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
+from bench.fly.faulted import FaultedFlight
+from bench.fly.packets import ARM, IMU, SET_MODE, made, outside
 from bench.main import main
+from bench.rows.faulted import judged, work_out_fault, work_out_seed
+from bench.studies import faults as study
+from bench.studies.faults import faults_table
 from companion.mavlink.encode import COMPONENT_ID
 from rebound_cli.background import Background
 from rebound_cli.live.interrupts import Interrupts
@@ -34,8 +34,7 @@ SETPOINT = {"x": 1.0, "z": -1.5, "type_mask": 0xDF8}
 
 
 def test_every_group_has_rows_and_there_are_as_many_as_promised() -> None:
-    groups = {fault.group for fault in FLOWN.values()} | {fault.group for fault in FILES.values()}
-    assert len(FLOWN) + len(FILES) >= 44 and len(groups) == 10
+    assert len(FLOWN) + len(FILES) >= 44 and len(GROUPS) == 9 and all(GROUPS.values())
     assert not {*FLOWN} & {*FILES}
 
 
@@ -58,17 +57,21 @@ def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
 
 
+def branched(number: int, faults: Sequence[Fault]) -> dict[str, Any]:
+    """What became of each fault's flight, by name; all from one take-off."""
+    with tempfile.TemporaryDirectory() as folder:
+        quiet = Fault("none", "", lambda _: Injector())
+        return FaultedFlight(number, quiet, Path(folder)).fly_branched(faults, judged)
+
+
 @pytest.mark.slow
 def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
     # Given a sensor that says nothing true any more, and nothing at all
-    blind = Fault(
-        "blind", "sensors", "", lambda _: Rewritten(When("mission"), (IMU,), setting(xgyro=math.nan)), Expected()
-    )
-    calm = Fault("calm", "link", "", lambda _: Injector(), Expected((COMPLETED,)))
+    blind = Fault("blind", "", lambda _: Rewritten(When("mission"), (IMU,), setting(xgyro=math.nan)), Expected())
+    calm = Fault("calm", "", lambda _: Injector(), Expected((COMPLETED,)))
     # When both fly on from one take-off
-    results: dict[str, Json] = {}
     # (a wall that the blind one falls beside at once, and does not scratch along for half a minute)
-    fly_from_one_take_off(3, [blind, calm], results.__setitem__)
+    results = branched(3, [blind, calm])
     # Then the hit is found by the one that could, and the other is told as what it is
     assert results["calm"]["found"] and results["calm"]["complaints"] == []
     assert not results["blind"]["found"] and "hit not found" in results["blind"]["complaints"]
@@ -156,9 +159,8 @@ def test_a_judge_names_each_kind_of_loss() -> None:
             other("push", force_ned_n=(0.0, 12.0, 0.0), rise_s=0.01), When("mission", 0.3, 0.1)
         ),
     }
-    faults = [Fault(words, "link", "", inject, no_wall) for words, inject in bad.items()]
-    results: dict[str, Json] = {}
-    fly_from_one_take_off(7, faults, results.__setitem__)
+    faults = [Fault(words, "", inject, no_wall) for words, inject in bad.items()]
+    results = branched(7, faults)
     assert [*results] == [*bad]
     for words, result in results.items():
         assert any(text.startswith(words) for text in result["complaints"]), (words, result)
@@ -168,24 +170,20 @@ def test_a_judge_names_each_kind_of_loss() -> None:
 def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_says_that_something_can() -> None:
     # Given an accelerometer that is off in the second of a hit
     hidden = FLOWN["accelerometer zero"]
-    results: list[Json] = []
-    faults = [hidden, replace(hidden, expected=replace(hidden.expected, blinds=False))]
-    fly_from_one_take_off(42, faults, lambda _, result: results.append(result))
-    told, untold = results
+    faults = [hidden, replace(hidden, name="told", expected=replace(hidden.expected, blinds=False))]
+    told, untold = branched(42, faults).values()
     assert told["unseen"] and told["complaints"] == []
     assert not untold["unseen"] and any(text.startswith(("fell: ", "tumbled: ")) for text in untold["complaints"])
 
 
 @pytest.mark.slow
 def test_a_killed_companion_leaves_a_vehicle_that_lands_and_a_log() -> None:
-    results: dict[str, Json] = {}
-    fly_from_one_take_off(8, [FLOWN["SIGKILL in a recovery"]], results.__setitem__)
-    (result,) = results.values()
+    (result,) = work_out_seed((8, ["SIGKILL in a recovery"])).values()
     assert result["outcome"] == "killed" and result["complaints"] == [] and result["ground_m_s"] < 1.2
 
 
 def test_a_pilot_who_takes_over_in_the_climb_is_left_alone() -> None:
-    result = fly(9, FLOWN["takes over in take-off"])
+    result = work_out_fault(9, FLOWN["takes over in take-off"])
     assert result["outcome"] == "aborted" and result["complaints"] == [] and result["after_told"] == 0
 
 
@@ -197,37 +195,21 @@ def test_files_that_mean_harm_are_refused_in_words(name: str) -> None:
 def test_the_table_counts_what_was_not_as_expected() -> None:
     good = {"complaints": [], "outcome": "read", "seconds": 0.1}
     bad = good | {"complaints": ["taken as good"], "seconds": 2.5}
-    text = text_of([Row(FILES["YAML bomb"], [good, bad])], None, "Made")
-    assert "1 faults, 2 flights and files; 0 rows as expected in every one, 1 not." in text
-    assert "| 2 | read 2 | 2.5 s of processor time | **1 of 2 not** |" in text
-    assert "- **YAML bomb**, 1 of 2:\n  - 1 × taken as good" in text
-
-
-def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies() -> None:
-    spread = spread_of([0.004, 0.006, None])
-    assert (spread["found"], spread["p50"], spread["most"]) == (2, 6.0, math.inf)
-    text = text_of([], {"hits": 3, "load": 1.0, "busy": spread, "quiet": spread}, "Made")
-    assert "| p50 6.0 ms, p99 more than 500 ms, p99.9 more than 500 ms, most more than 500 ms | 2 of 3 |" in text
+    row = faults_table({"YAML bomb": [good, bad]}).splitlines()[-1]
+    cells = [cell.strip() for cell in row.split("|")[1:-1]]
+    assert cells[4:] == ["2", "read 2", "2.5 s of processor time", "**1 of 2 not**"]
 
 
 @pytest.mark.slow
 def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, capsys) -> None:
     # Given one row, of which one seed has been tried before
     monkeypatch.chdir(tmp_path)
-    missing, wanted, spread = command._missing, [], spread_of([0.004])
-    monkeypatch.setattr(latency, "measured", lambda hits: {"hits": hits, "load": 1.0, "busy": spread, "quiet": spread})
-
-    def of_one_row(record: Record, number: int) -> list[str]:
-        names = [name for name in missing(record, number) if name == "obstacle file cut"]
-        wanted.append((number, names))
-        return names
-
-    monkeypatch.setattr(command, "_missing", of_one_row)
-    words = ["faults", "--jobs", "1", "--hits", "1", "--out", str(tmp_path / "faults.md")]
+    monkeypatch.setattr(study, "FLOWN", {})
+    monkeypatch.setattr(study, "FILES", {"obstacle file cut": FILES["obstacle file cut"]})
+    words = ["faults", "--jobs", "1", "--out", str(tmp_path / "faults.md")]
     assert main([*words, "--seeds", "1"]) == 0
     # When two are asked for
     assert main([*words, "--seeds", "2"]) == 0
     # Then only the other is tried, and the table has both
-    assert wanted == [(0, ["obstacle file cut"]), (0, []), (1, ["obstacle file cut"])]
-    assert "1 rows, 0 not as expected." in capsys.readouterr().out
-    assert "refused in one sentence within 60 s | 2 | refused 2 |" in (tmp_path / "faults.md").read_text()
+    assert "going on after 1 of 2 cases" in capsys.readouterr().err
+    assert "refused in one sentence within 60 s" in (tmp_path / "faults.md").read_text()

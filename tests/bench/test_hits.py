@@ -9,30 +9,42 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.corpus.verdict import CorpusCase
-from bench.corpus.verdict import work_out as work_out_bytes
-from bench.detectors.hits import HitCase
-from bench.hits.flight import FlownHit, begun, draw_flown, flown_campaign, to_rest, work_out_flown
-from bench.hits.flight import judged as judged_by_truth
-from bench.hits.rewind import Moment
-from bench.hits.verdicts import (
+from bench.cases.hits import HitCase
+from bench.fly.campaign import Campaign, Results
+from bench.fly.guarded import (
     FREE_S,
     HITS_AN_APPROACH,
-    PATIENCE_S,
+    LED_PATIENCE_S,
     Approach,
+    FlownHit,
     Verdict,
     again,
+    begun,
+    draw_flown,
+    to_rest,
     velocity_of,
-    verdict_campaign,
 )
-from bench.hits.worst import MEETING, NO_HIT, VEHICLE, SearchCase, begun_with, how_good, margin, recovery
-from bench.hits_report import verdicts
-from bench.hits_report.cells import Flown, at_most, cells, lead, seeds
-from bench.hits_report.command import _stamp
-from bench.hits_report.verdicts import at_most_of_groups
-from bench.hits_report.worst import keep, worst
+from bench.fly.moments import Moment
 from bench.main import build_parser
-from bench.recoveries.hits import RecoveryCase, work_out
+from bench.rows.hits import judged as judged_by_truth
+from bench.rows.hits import work_out_flown
+from bench.rows.tables import at_most, at_most_of_groups
+from bench.studies.corpus import work_out as work_out_bytes
+from bench.studies.hits import flown_campaign, flown_parts, flown_rows, verdict_campaign, verdict_parts, verdict_rows
+from bench.studies.laws import RecoveryCase, work_out
+from bench.studies.worst import (
+    MEETING,
+    NO_HIT,
+    VEHICLE,
+    SearchCase,
+    begun_with,
+    how_good,
+    keep,
+    margin,
+    recovery,
+    search,
+    worst_table,
+)
 from companion.companion import StepResult
 
 pytestmark = pytest.mark.slow
@@ -92,18 +104,19 @@ def test_a_cell_with_a_miss_too_many_is_named():
         "lost_m": 0.0,
         "rest_s": 1.0,
     }
-    hit |= {"again": 0, "seconds": 3.0}
-    cases = flown_campaign(1600, 1, False).cases
+    hit |= {"again": 0, "seconds": 3.0, "cost": {"processor_s": 0.1}}
+    campaign = flown_campaign(1600, 1, False)
     results = {number: dict(hit) for number in range(1600)}
-    missed = next(number for number, case in enumerate(cases) if (case.hit.airframe, case.imu_hz) == ("rigid", 50))
-    several = [n for n, case in enumerate(cases) if (case.hit.airframe, case.imu_hz) == ("rigid", 50)][:3]
+    several = [n for n, case in enumerate(campaign.cases) if (case.hit.airframe, case.imu_hz) == ("rigid", 50)][:3]
     for number in several:
         results[number] |= {"found": False, "rest_s": None}
-    text = "\n".join([*lead(Flown(cases, results)), *cells(Flown(cases, results)), *seeds(Flown(cases, results))])
-    assert "| rigid, 50 Hz | 1 to 2 | 400 | 3 |" in text
-    open_cells = text.partition("false alarms:\n")[2]
-    assert "rigid, 50 Hz, 1 to 2 m/s" in open_cells and "foldable, 50 Hz, 1 to 2 m/s" not in open_cells
-    assert f"Missed at 0.5 m/s and more: 3, by seed {cases[missed].hit.seed}" in text
+    parts = flown_parts(flown_rows(campaign, Results(results, {})))
+    cells = parts["By airframe, rate and speed"]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in cells.splitlines()]
+    assert ["rigid, 50 Hz", "[1.0, 2.0)", "400", "3"] in [row[:4] for row in rows]
+    open_cells = cells.partition("Not shown")[2]
+    assert "rigid, 50 Hz, [1.0, 2.0) m/s" in open_cells and "foldable, 50 Hz" not in open_cells
+    assert f"{campaign.cases[several[0]].hit.seed}/" in parts["To look at again"]
 
 
 def test_what_is_rewound_flies_on_to_the_same_bytes():
@@ -186,18 +199,22 @@ def test_hits_by_one_vehicle_count_as_fewer():
 
 def test_a_page_of_verdicts_counts_misses_by_cell_and_names_them():
     campaign = verdict_campaign(8 * HITS_AN_APPROACH, 1, False)
-    one = {"watched_s": 1.5, "false": False, "agrees": True, "kept": True}
+    one = {"watched_s": 1.5, "false": False, "agrees": True, "kept": True, "cost": {"processor_s": 0.1}}
     results = {at: {**one, "hits": [[n, 1.5, 8.0] for n in range(HITS_AN_APPROACH)]} for at in range(8)}
     results[2]["hits"][7][2] = None
     results[3] |= {"agrees": False, "false": True}
-    hits = verdicts.judged(campaign.cases, results)
-    text = "\n".join([*verdicts.lead(results, hits), *verdicts.cells(hits)])
-    text += "\n".join(verdicts.seeds(results, campaign.cases, hits))
+    rows = verdict_rows(campaign, Results(results, {}))
+    parts = verdict_parts(rows, list(results.values()))
     case = campaign.cases[2]
-    assert f"| {case.hit.airframe}, {case.imu_hz} Hz | 1 to 2 | 96 | 2 | 1 | 1.042 % |" in text
-    assert "8 in all" in text and "7 have the same verdict" in text and "False alarms: 1, in" in text
-    assert f"by seed/number: {case.hit.seed}/7." in text
-    assert f"when flown again, by seed: {campaign.cases[3].hit.seed}." in text
+    cells = [
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in parts["By airframe, rate and speed"].splitlines()
+    ]
+    assert [f"{case.hit.airframe}, {case.imu_hz} Hz", "[1.0, 2.0)", "96", "2", "1", "1.042"] in [
+        row[:6] for row in cells
+    ]
+    assert "8 were flown again from the beginning, 7 have the same verdict" in parts[""]
+    assert "False alarms: 1, in" in parts[""]
+    assert f"{case.hit.seed}/7/" in parts["Missed at 0.5 m/s and more"]
 
 
 def test_a_margin_is_smaller_where_the_vehicle_shakes_more_and_below_one_the_hit_is_missed():
@@ -236,7 +253,7 @@ def test_a_recovery_of_the_search_is_that_of_the_same_hit_flown_from_the_beginni
     flight = begun(approach.built, approach.case, velocity_of(approach.case.hit), scene, keeps_path=True)
     while flight.vehicle.time_boot_us < approach.flight.vehicle.time_boot_us:
         flight.step()
-    rest_us = to_rest(flight, PATIENCE_S)
+    rest_us = to_rest(flight, LED_PATIENCE_S)
     assert hit["found"] and hit == judged_by_truth(flight.vehicle, flight.guard.collisions(), rest_us)
 
 
@@ -248,15 +265,13 @@ def test_walls_that_lean_over_the_vehicle_are_no_part_of_the_search_and_others_a
 
 def test_a_bare_worst_is_the_margin_and_its_page_names_all_that_makes_a_hit_again():
     parse = build_parser().parse_args
-    for words, part in ((["--worst"], "margin"), (["--worst", "recovery"], "recovery"), (["--growth"], "growth")):
+    for words, part in ((["--worst"], "margin"), (["--worst", "recovery"], "recovery"), (["--verdicts"], "verdicts")):
         assert parse(["hits", *words]).part == part
-    options = parse(["hits", "--hits", "60", "--first-seed", "7", "--worst", "recovery"])
-    assert "--hits 60 --first-seed 7 --worst recovery`" in _stamp(options, options.part)
     hit = {"closing_m_s": 1.234, "latency_ms": 4.0, "tilt_deg": 91.0, "lost_m": 3.0, "again": 1, "rest_s": None}
-    text = "\n".join(worst([SearchCase("rigid", 50, 7, 60, "recovery")], {0: {**hit, "flown": 60, **MIDDLE}}))
-    assert "its seed is 7." in text and "| rest_s | – |" in text and "| closing_m_s | 1.234 |" in text
-    assert "| approach | wall |" in text
-    assert all(f"| {name} | {value:.6g} |" in text for name, value in MIDDLE.items() if name != "approach")
+    campaign = Campaign("worst", {}, [SearchCase("rigid", 50, 7, 60, "recovery")], search)
+    text = worst_table(campaign, Results({0: {**hit, "flown": 60, **MIDDLE}}, {}))
+    rows = {line.split("|")[1].strip(): line.split("|")[2].strip() for line in text.splitlines()}
+    assert rows["closing_m_s"] == "1.234" and rows["approach"] == "wall" and {*MIDDLE} <= {*rows}
 
 
 def test_a_hit_that_is_kept_is_judged_from_its_bytes_as_it_was_flown(tmp_path):
@@ -265,7 +280,7 @@ def test_a_hit_that_is_kept_is_judged_from_its_bytes_as_it_was_flown(tmp_path):
     for name, vibration_m_s2, is_found in (("found", 0.2, True), ("missed", 8.0, False)):
         keep(case, {**MIDDLE, "speed_m_s": 1.0, "vibration_log": math.log(vibration_m_s2)}, tmp_path / name)
         # When the corpus' judge reads its bytes, then it comes to the same
-        judgement = work_out_bytes(CorpusCase(str(tmp_path / name)))["rates"]["recorded"]
+        judgement = work_out_bytes(str(tmp_path / name))["rates"]["recorded"]
         (hit, *_) = judgement["hits"]
         assert ("latency_ms" in hit) is is_found and judgement["false_boot_us"] == []
 

@@ -4,11 +4,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import pandas as pd
 import pytest
 
-from bench.campaign.run import Results
-from bench.kills.command import table
-from bench.kills.killed import KILLED_S, SPEEDS_M_S, _killed, cases, kills_campaign, work_out
+from bench.studies.kills import KILLED_S, SPEEDS_M_S, _killed, cases, kills_table, work_out
 from tests.bench.random_missions.made_up import hit
 
 
@@ -51,7 +50,7 @@ def test_a_second_contact_is_the_hardest_after_the_kill_the_touch_itself_apart(k
         hits=[touch, hit(10.2, 0.8), hit(10.6, 0.6)], series=lambda: {"velocity_ned_m_s": [(0.0, 0.3, 0.4)]}
     )
     vehicle = SimpleNamespace(time_boot_us=killed_at_s * 1e6, truth=truth)
-    flight: Any = SimpleNamespace(vehicle=vehicle, fall=lambda: None, is_down=True)
+    flight: Any = SimpleNamespace(vehicle=vehicle, fall=lambda most_s: None, is_down=True)
     kill = _killed(flight, touch)
     assert kill["again_m_s"] == pytest.approx(again_m_s) and kill["ground_m_s"] == pytest.approx(0.5)
 
@@ -63,10 +62,8 @@ def test_the_table_has_a_line_for_every_100_ms_and_counts_the_hard_contacts():
         {"kill_s": 0.69, "again_m_s": 0.2, "ground_m_s": 1.1},
         {"kill_s": -0.05, "again_m_s": 1.5, "ground_m_s": None},
     ]
-    flight = {"touch_m_s": 2.0, "again_m_s": 0.0, "kills": kills}
-    text = table(kills_campaign(3, 1), Results({0: flight}, {}))
-    assert "| 600 to 700 ms | 2 | 1 (50.0 %) | 0.90 m/s | 0.90 m/s | 1.10 m/s |" in text
-    assert "| -100 to 0 ms | 1 | 1 (100.0 %) | 1.50 m/s | – | – |" in text
-    assert "| **after it** | 2 | 1 (50.0 %)" in text
-    assert text.count("ms |") == 18
-    assert "0 of 1 of these flights" in text
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in kills_table(pd.DataFrame(kills)).splitlines()]
+    assert ["600 to 700 ms", "2", "1 (50.0 %)", "0.90", "0.90", "1.10"] in rows
+    assert ["-100 to 0 ms", "1", "1 (100.0 %)", "1.50", "–", "–"] in rows
+    assert ["**after it**", "2", "1 (50.0 %)", "0.90", "0.90", "1.10"] in rows
+    assert sum(row[0].endswith("ms") for row in rows) == 18

@@ -2,10 +2,11 @@
 
 import math
 import random
+from copy import copy
 
 import pytest
 
-from bench.baselines.lateral import LateralConfig, LateralDetector
+from bench.detectors.lateral import LateralConfig, LateralDetector
 from companion.messages import ImuSample
 from companion.reflex.detector import Phase, Situation
 
@@ -40,7 +41,7 @@ def run(samples, window_us=4000, off=lambda sample: None, **config):
     state, impacts, states = detector.initial(), [], []
     for sample in samples:
         state, impact = detector.step(state, sample, Situation(off(sample)))
-        states.append(state)
+        states.append(copy(state))
         if impact is not None:
             impacts.append(impact)
     return impacts, states

@@ -2,28 +2,36 @@
 
 import dataclasses
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bench.baselines.config import BaselineMission
-from bench.head_on import head_on
+from bench.cases.walls import approach
+from bench.detectors.config import BaselineMission
+from bench.fly.cruise import head_on
 from bench.main import main
-from bench.paper import command
-from bench.paper.approach import approach
-from bench.paper.flights import StudyContact, StudyFlight, StudyResult, fly, share_received
-from bench.paper.studies import (
+from bench.studies.paper import (
     arm,
     causes,
     claims,
+    command,
     directions,
     flight_tests,
     imu_rate,
-    sample_scenario,
-    simulation_experiment,
+    scenarios,
 )
-from bench.paper.table import ClaimRow, around, at_least, at_most, rows_text, within_factor
+from bench.studies.paper.flights import StudyContact, StudyFlight, StudyResult, fly, share_received
+from bench.studies.paper.study import (
+    NO_OVERSHOOT_M,
+    ClaimRow,
+    around,
+    at_least,
+    at_most,
+    is_lost,
+    rows_text,
+    sampling_text,
+    within_factor,
+)
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
 
@@ -140,11 +148,11 @@ def test_the_wall_stands_square_to_the_flight_before_braking_begins():
 
 @pytest.fixture(scope="module")
 def sample() -> StudyResult:
-    return fly(sample_scenario.flights(1)[0])
+    return fly(scenarios.SAMPLE.flights(1)[0])
 
 
 def test_the_sample_scenario_agrees_and_its_picture_marks_everything(sample):
-    findings = sample_scenario.conclude([sample])
+    findings = scenarios.SAMPLE.conclude([sample])
     assert [row.claim for row in findings.rows if not row.agrees] == []
     figure = findings.pictures["sample_scenario.png"]
     names = {text.get_text() for text in figure.legends[0].get_texts()}
@@ -155,7 +163,7 @@ def test_the_sample_scenario_agrees_and_its_picture_marks_everything(sample):
 
 
 def test_the_same_flight_gives_the_same_numbers(sample):
-    again = fly(sample_scenario.flights(1)[0])
+    again = fly(scenarios.SAMPLE.flights(1)[0])
     assert again.contacts == sample.contacts and again.imu_received_hz == sample.imu_received_hz
 
 
@@ -166,7 +174,7 @@ def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
     back_m, off_m = x - contact.setpoint_in_world_ned_m[0], contact.hit.frame_offset_ned_m[0]
     for wrong_m in (-back_m, 2 * back_m, back_m / 2):
         moved: StudyContact = dataclasses.replace(contact, setpoint_ned_m=(x - wrong_m + off_m, y, z))
-        rows = sample_scenario.conclude([dataclasses.replace(sample, contacts=(moved,))]).rows
+        rows = scenarios.SAMPLE.conclude([dataclasses.replace(sample, contacts=(moved,))]).rows
         assert [row.claim for row in rows if not row.agrees] == [claim]
 
 
@@ -182,11 +190,11 @@ def papers_numbers(axis):
 
 
 def test_the_papers_own_numbers_are_drawn_where_its_text_gives_any(sample):
-    position, velocity, _, fold = sample_scenario.conclude([sample]).pictures["sample_scenario.png"].axes
+    position, velocity, _, fold = scenarios.SAMPLE.conclude([sample]).pictures["sample_scenario.png"].axes
     assert papers_numbers(velocity) == [1.4, -0.28] and papers_numbers(fold) == [30.0]
     assert papers_numbers(position) == []
     # 1.05 m back in its simulation, 0.95 m in its experiment, at 2.1 m/s
-    pictures = simulation_experiment.conclude(results_like(sample, simulation_experiment.flights(1))).pictures
+    pictures = scenarios.EXPERIMENT.conclude(results_like(sample, scenarios.EXPERIMENT.flights(1))).pictures
     position, velocity = pictures["simulation_experiment.png"].axes
     backs_m = [sample.track.touch_m - place_m for place_m in papers_numbers(position)]
     assert backs_m == pytest.approx([1.05, 0.95]) and papers_numbers(velocity) == [2.1]
@@ -203,12 +211,11 @@ def test_the_papers_own_numbers_are_drawn_where_its_text_gives_any(sample):
     assert times_ms == [[25.0], [1.0]]
 
 
-@pytest.mark.parametrize("study", [flight_tests, causes, directions, imu_rate, simulation_experiment])
+@pytest.mark.parametrize("study", [flight_tests, causes, directions, imu_rate, scenarios.EXPERIMENT])
 def test_each_study_states_how_the_sensor_was_received(sample, study):
     findings = study.conclude(results_like(sample, study.flights(1)))
     assert findings.rows and findings.pictures
-    assert "HIGHRES_IMU" in findings.text or "received [Hz]" in findings.text
-    assert " ms" in findings.text or "[ms]" in findings.text
+    assert re.search(r"HIGHRES_IMU` as received: \d+ Hz, each sample the mean of \S+ ms", sampling_text([sample]))
     assert rows_text(findings.rows).count("\n") == len(findings.rows) + 2
 
 
@@ -234,10 +241,8 @@ def test_a_guard_that_swings_in_while_the_arms_unfold_ends_the_same_collision(sa
 
 
 def test_a_lost_hit_is_told_from_one_that_was_seen(sample):
-    assert not flight_tests.is_lost(sample)
-    assert flight_tests.is_lost(
-        dataclasses.replace(sample, contacts=(dataclasses.replace(sample.first, share_received=0.05),))
-    )
+    assert not is_lost(sample)
+    assert is_lost(dataclasses.replace(sample, contacts=(dataclasses.replace(sample.first, share_received=0.05),)))
 
 
 # --- the document and the command ---------------------------------------------------------------------------------
@@ -268,28 +273,10 @@ def test_every_equation_has_its_function_and_its_test():
         assert "def test_" in (ROOT / test.strip("`")).read_text()
 
 
-def test_every_picture_of_the_document_is_made_and_the_other_way_round(sample):
-    named = {Path(name).name for row in table_of("Figures") for name in re.findall(r"\((images/paper/\S+)\)", row[2])}
-    made = set(arm.conclude([]).pictures) | set(sample_scenario.conclude([sample]).pictures)
-    for study in (flight_tests, causes, directions, imu_rate, simulation_experiment, claims):
-        made |= set(study.conclude(results_like(sample, study.flights(1))).pictures)
-    assert named == made
-
-
-def test_only_what_stands_between_the_marks_is_written_anew(tmp_path, sample):
-    findings = [sample_scenario.conclude([sample])]
-    (tmp_path / "paper.md").write_text("before\n<!-- generated: paper results -->\nstale text\n<!-- end -->\nafter\n")
-    command.write(tmp_path, findings, seeds=1)
-    text = (tmp_path / "paper.md").read_text()
-    assert text.startswith("before\n") and text.endswith("\nafter\n") and "stale text" not in text
-    assert "agrees" in text and "--seeds 1" in text
-    assert (tmp_path / "images" / "paper" / "sample_scenario.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_foldable_flight_at_one_metre_per_second_neither_returns_nor_overshoots():
     result = fly(StudyFlight(("quick",), approach(1.0, cruise_s=1.5), "foldable", 1))
     assert result.is_completed and len(result.contacts) == 1
-    assert result.first.is_detected and result.overshoots_m[0] <= flight_tests.NO_OVERSHOOT_M
+    assert result.first.is_detected and result.overshoots_m[0] <= NO_OVERSHOOT_M
     assert 0.15 < result.first.hit.rebound_speed_m_s / result.first.impact_speed_m_s < 0.3
 
 

@@ -13,12 +13,7 @@ from bench.stamps import ROOT, stamp_text, stamped_anew, stamps_in
 from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL, run_here
 
-KEPT = sorted(
-    path
-    for folder in ("docs/images", "bench/notes/images")
-    for path in (ROOT / folder).rglob("*.*")
-    if path.suffix != ".svg"
-)
+KEPT = sorted(path for path in (ROOT / "docs/images").rglob("*.*") if path.suffix != ".svg")
 
 
 def least_ink(path):

@@ -2,15 +2,17 @@
 
 import pytest
 
-from bench.random_missions.campaign import MissionCase, work_out_mission
-from bench.recoveries.command import _lines
-from bench.recoveries.hits import RecoveryCase, cases, work_out
+from bench.cases.missions import MissionCase
+from bench.fly.campaign import Results
+from bench.rows.judge import work_out_mission
+from bench.rows.tables import MET, MISSED
+from bench.studies.laws import RecoveryCase, law_bars, law_table, laws_campaign, rows, work_out
 
 pytestmark = pytest.mark.slow
 
 
 def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_wall():
-    """This cell; bench/notes/campaign.md has the median of all."""
+    """This cell; bench/notes/results.md has the median of all."""
     paper, adaptive = (work_out(RecoveryCase(law, "foldable", 0, 2.0, 1)) for law in ("paper", "adaptive"))
     assert (paper["outcome"], adaptive["outcome"]) == ("completed", "completed")
     assert adaptive["settled_s"] < 0.8 * paper["settled_s"]
@@ -51,7 +53,7 @@ def test_a_motion_that_is_at_first_too_much_for_the_hit_is_looked_at_again():
 
 
 def test_the_table_has_a_line_for_each_kind_of_hit():
-    flown = cases(1)
+    campaign = laws_campaign(1)
     figures = {
         "settled_s": 2.0,
         "past_m": 0.01,
@@ -61,12 +63,35 @@ def test_the_table_has_a_line_for_each_kind_of_hit():
         "recontacts": 0,
         "returned": 0,
     }
-    results = {n: {**figures, "settled_s": 4.0 if case.law == "paper" else 1.0} for n, case in enumerate(flown)}
-    results[1] = {"outcome": "aborted", "recontacts": 0}
-    text = "\n".join(_lines(flown, results, 1))
-    assert (
-        "| foldable, 0° | 1 m/s | 4.00 s → – (1 not) | 0.01 → – | 0.50 → – | 0.02 → – | 0.00 → – | 0 (0) → 0 (0) |"
-        in text
-    )
-    assert "| rigid, 30° | 5 m/s | 4.00 s → 1.00 s |" in text
-    assert "Of the 19 hits after which both settled, `adaptive` settles 75 % sooner in the median." in text
+    settled_s = {"paper": 4.0, "adaptive": 1.0}
+    results = {n: {**figures, "settled_s": settled_s[case.law]} for n, case in enumerate(campaign.cases)}
+    text = law_table(rows(campaign, Results(results, {})))
+    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()]
+    both = "0.01 → 0.01", "0.50 → 0.50", "0.02 → 0.02", "0.00 → 0.00", "0 (0) → 0 (0)"
+    assert ["foldable, 0°", "1 m/s", "4.00 s (0 not) → 1.00 s (0 not)", *both] in lines and len(lines) == 2 + 20
+
+
+def laws(**adaptive):
+    """Hits with both laws: `adaptive` as asked."""
+    campaign = laws_campaign(1)
+    touches = {"recontacts": 0, "returned": 0}
+    paper = {"settled_s": 3.0, "past_m": 0.0, "clear_m": 1.0, "lost_m": 0.02, "risen_m": 0.0, **touches}
+    good = {**paper, "settled_s": 1.5, "clear_m": 0.6, **adaptive}
+    results = {n: dict(paper if case.law == "paper" else good) for n, case in enumerate(campaign.cases)}
+    return law_bars(rows(campaign, Results(results, {})))
+
+
+@pytest.mark.parametrize(
+    ("adaptive", "word"),
+    [
+        ({"settled_s": 2.4}, "settles sooner"),
+        ({"past_m": 0.06}, "overshoot, worst"),
+        ({"recontacts": 1}, "wall again"),
+        ({"clear_m": 0.45}, "clear by"),
+        ({"lost_m": 0.11}, "height lost"),
+        ({"risen_m": 0.06}, "height gained"),
+    ],
+)
+def test_each_figure_of_the_laws_has_its_bar(adaptive, word):
+    assert {bar.verdict for bar in laws() if bar.is_met is not None} == {MET}
+    assert next(bar.verdict for bar in laws(**adaptive) if word in bar.what) == MISSED

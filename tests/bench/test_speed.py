@@ -1,17 +1,13 @@
 """The calls of an interval in lockstep are counted: a number without noise, which a busy machine does not change."""
 
-import threading
+import math
 
 import pytest
 
-from bench.faults.latency import recorded
-from bench.speed import px4
-from bench.speed.calls import calls_an_interval, held_to
-from bench.speed.flight import fly
-from bench.speed.latency import of_peer
-from bench.speed.parts import PARTS
-from tests.sim_vehicle.hil.px4_client import Px4Client
-from tests.sim_vehicle.hil.test_hil_tcp import free_port
+from bench.studies.speed.calls import calls_an_interval, held_to
+from bench.studies.speed.flight import fly
+from bench.studies.speed.latency import of_peer, recorded, spread
+from bench.studies.speed.parts import PARTS
 
 # A change that costs more is looked at: it is made cheaper, or the count is renewed by `python -m bench speed --calls`.
 MOST_MORE = 1.05
@@ -47,34 +43,6 @@ def test_a_program_that_only_answers_is_timed_at_each_hit(name):
     assert all(seconds is not None and 0.0 < seconds < 0.5 for seconds in taken)
 
 
-@pytest.mark.realtime
-def test_a_step_of_the_lockstep_is_measured_with_a_body_and_without(monkeypatch):
-    # Given a PX4 that answers every sample
-    monkeypatch.setattr(px4, "_SETTLES_S", 0.2)
-    monkeypatch.setattr(px4, "_MEASURED_S", 0.5)
-    port, times_us = free_port(), []
-    answering = threading.Thread(target=_answer_all, args=(port, times_us))
-    answering.start()
-    # When its lockstep is measured
-    rows = {cells[1]: cells[2:4] for line in px4.lockstep_table(port, 1000) if (cells := line.split("|"))}
-    answering.join()
-    # Then both are told (which is longer is the machine's to say), and PX4's clock goes on evenly through both parts
-    body_us, again_us = (float(cell) for cell in rows[" a step "])
-    assert body_us > 0.0 and again_us > 0.0
-    assert times_us == [1000 * step for step in range(1, len(times_us) + 1)]
-
-
-def _answer_all(port, times_us):
-    while True:
-        try:
-            client = Px4Client(port)
-            break
-        except ConnectionRefusedError:
-            continue
-    try:
-        while True:
-            client.next_step()
-            times_us.append(client.times_us[-1])
-            client.answer([0.0] * 4)
-    except (EOFError, ConnectionError):
-        client.close()
+def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies():
+    found = spread([0.004, 0.006, None])
+    assert (found["found"], found["p50"], found["most"]) == (2, 6.0, math.inf)

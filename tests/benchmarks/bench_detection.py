@@ -10,7 +10,7 @@ import random
 import statistics
 import time
 
-from bench.baselines.config import BaselineConfig
+from bench.detectors.config import BaselineConfig
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.reflex.detector import Situation
 from companion.reflex.monitor import advance, start_monitor

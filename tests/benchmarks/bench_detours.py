@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.bench_detours [FLIGHTS]
 
-Flies each wall with both airframes and prints a line for each, and what bench/notes/memory.md says of all.
+Flies each wall with both airframes and prints a line for each, and what bench/notes/results.md says of all.
 """
 
 import random

@@ -1,6 +1,6 @@
 """The vehicle's own filter, measured: `python -m tests.benchmarks.bench_estimator [--missions]`, in a minute.
 
-Prints the figures of bench/notes/estimator.md; with ``--missions`` also five flights of each mission by the filter.
+Prints the figures of bench/notes/results.md on its filter; with ``--missions`` also five flights of each mission.
 Nothing here passes or fails.
 """
 

@@ -7,7 +7,7 @@ from functools import cache
 
 from pymavlink.dialects.v20 import development as mav
 
-from bench.faults.envelope import outside
+from bench.fly.packets import outside
 from companion.mavlink.readers import READERS
 from tests.companion.fake_vehicle import INTERVAL_US, FakeVehicle, Flight, flight
 

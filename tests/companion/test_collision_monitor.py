@@ -5,7 +5,7 @@ import pickle
 
 import pytest
 
-from bench.baselines.config import BaselineConfig
+from bench.detectors.config import BaselineConfig
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
 from companion.reflex.config import StreamHealthConfig

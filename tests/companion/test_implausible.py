@@ -5,7 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from bench.faults.packets import made
+from bench.fly.packets import made
 from companion.messages import (
     Attitude,
     ImuSample,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.faults.packets import made
+from bench.fly.packets import made
 from companion.fence import Fence
 from companion.flight.context import Target
 from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded

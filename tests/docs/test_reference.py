@@ -6,10 +6,13 @@ import pytest
 
 from bench.reference import events, summary
 from bench.reference.command import FOLDER, PAGES, page_text
+from bench.reference.states import mermaid_diagram, transitions
+from companion.flight import states as flight_states
+from companion.guard import states as guard_states
 from rebound_cli import exit_codes
 from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth
-from tests.rebound_cli.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
+from tests.rebound_cli.results.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -24,6 +27,18 @@ def test_every_kind_of_event_has_its_meaning():
 def test_an_event_that_is_told_under_a_name_is_found():
     call = next(events._calls(ast.parse('flight.report(now_us, "hold", text, hold_s=3)')))
     assert call.args[1].value == "hold"
+
+
+@pytest.mark.parametrize("states", [flight_states.TABLE, guard_states.TABLE], ids=["flight", "guard"])
+def test_diagram_and_table_show_every_transition(states):
+    diagram = mermaid_diagram(states)
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in transitions(states).splitlines()]
+    for state, row in states.rows.items():
+        for trigger, target in row.items():
+            arrow = f"{state.value} --> {target.value}\n".replace(" ", "_").replace("_-->_", " --> ")
+            assert state is target or arrow in diagram
+            (inside,) = [where for what, where, to in rows if (what, to) == (trigger.value, target.value)]
+            assert state.value in inside.split(", ")
 
 
 def test_every_key_of_the_summary_has_its_meaning():

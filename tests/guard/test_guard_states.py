@@ -2,7 +2,6 @@
 
 import pytest
 
-from bench.reference.states import markdown_table, mermaid_diagram
 from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.messages import Sticks
@@ -83,11 +82,3 @@ def test_whoever_takes_the_vehicle_from_the_guard_has_it_and_a_hit_never_takes_i
 )
 def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
     assert has_moved(Sticks(before), Sticks(now)) is counts
-
-
-def test_diagram_and_table_show_every_transition():
-    diagram, table = mermaid_diagram(TABLE), markdown_table(TABLE)
-    for (state, trigger), target in EXPECTED.items():
-        line = f"{state.value.replace(' ', '_')} --> {target.value.replace(' ', '_')}: {trigger.value}\n"
-        assert line in diagram
-        assert f"| {state.value} | {trigger.value} | {target.value} |\n" in table

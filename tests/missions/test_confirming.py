@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from bench.faults.packets import ODOMETRY, POSITION, changed
+from bench.fly.packets import ODOMETRY, POSITION, changed
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.report import Event

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.random_missions.campaign import MissionCase, work_out_mission
-from bench.random_missions.crashes import tilts_deg
+from bench.cases.missions import MissionCase
+from bench.rows.crashes import tilts_deg
+from bench.rows.judge import work_out_mission
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.live.interrupts import Interrupts

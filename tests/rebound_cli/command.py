@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -62,6 +63,25 @@ def run_here(*arguments):
             for number, handler in handlers:
                 signal.signal(number, handler)
     return subprocess.CompletedProcess(arguments, code, stdout.getvalue(), stderr.getvalue())
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextlib.contextmanager
+def vehicle_on_air(*options):
+    """A simulated vehicle of its own; the port at which it expects its companion."""
+    port = free_port()
+    vehicle = start("sim", "--port", "0", "--remote", f"127.0.0.1:{port}", *options)
+    vehicle.stdout.readline()
+    try:
+        yield port
+    finally:
+        vehicle.terminate()
+        vehicle.communicate(timeout=20)
 
 
 def events_of(folder):

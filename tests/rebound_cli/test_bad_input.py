@@ -8,7 +8,15 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from rebound_cli.main import main
-from tests.rebound_cli.command import SQUARE, WALL, assert_one_clear_sentence, processes_naming, run, run_here
+from tests.rebound_cli.command import (
+    SQUARE,
+    WALL,
+    assert_one_clear_sentence,
+    free_port,
+    processes_naming,
+    run,
+    run_here,
+)
 
 MULTICOPTER, PLANE = dialect.MAV_TYPE_QUADROTOR, dialect.MAV_TYPE_FIXED_WING
 PX4, ARDUPILOT = dialect.MAV_AUTOPILOT_PX4, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
@@ -40,12 +48,6 @@ def test_a_wall_through_the_start_position(tmp_path, how):
     assert not (tmp_path / "run").exists()
 
 
-def test_an_unknown_airframe():
-    assert_one_clear_sentence(
-        run_here("fly", WALL, "--lockstep", "--airframe", "foldible"), "foldible", "foldable, rigid"
-    )
-
-
 def test_a_port_in_use(tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
@@ -57,18 +59,6 @@ def test_a_port_in_use(tmp_path):
         assert_one_clear_sentence(result, port, "in use")
 
 
-def test_a_missing_serial_port():
-    result = run_here("fly", SQUARE, "--connect", "serial:///dev/ttyNONE:921600")
-    assert_one_clear_sentence(result, "/dev/ttyNONE does not exist")
-
-
-def test_a_wrong_address():
-    assert_one_clear_sentence(
-        run_here("fly", SQUARE, "--connect", "0.0.0.0:14540"), "did you mean udpin://0.0.0.0:14540?"
-    )
-    assert_one_clear_sentence(run_here("fly", SQUARE, "--connect", "the drone"), "udpin://HOST:PORT")
-
-
 @pytest.mark.parametrize("url", ["udpout://0.0.0.0:14580", "udpout://127.0.0.1:70000", "udpout://no.invalid:14580"])
 @pytest.mark.parametrize("command", [("fly", SQUARE), ("guard",), ("preflight",)], ids=lambda words: words[0])
 def test_an_address_that_nobody_can_answer_from(tmp_path, command, url):
@@ -77,48 +67,66 @@ def test_an_address_that_nobody_can_answer_from(tmp_path, command, url):
     assert not (tmp_path / "run").exists()
 
 
+CONNECTED = ("fly", SQUARE, "--connect")
+
+
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("command", "words"),
     [
-        (("--truth", "nowhere/truth.npz"), ("--truth nowhere/truth.npz", "there is no folder nowhere")),
-        (("--truth", "missions"), ("--truth missions", "give another file")),
-        (("--remote", "nobody.invalid:14540"), ("Host 'nobody.invalid' is unknown",)),
-        (("--set", "walls=3"), ("--set walls=3", "begins with sim.")),
-        (("--set", "sim.walls=3"), ("sim.walls: must be a list, not 3",)),
+        (("fly", WALL, "--lockstep", "--airframe", "foldible"), ("foldible", "foldable, rigid")),
+        (("airframe", "px4", "--airframe", "none"), ("foldable", "rigid")),
+        (("fly", "--sim", "no-such-mission.yaml"), ("no-such-mission.yaml",)),
+        ((*CONNECTED, "serial:///dev/ttyNONE:921600"), ("/dev/ttyNONE does not exist",)),
+        ((*CONNECTED, "0.0.0.0:14540"), ("did you mean udpin://0.0.0.0:14540?",)),
+        ((*CONNECTED, "the drone"), ("udpin://HOST:PORT",)),
+        (("preflight", "--connect", "nowhere"), ("'nowhere' is not a connection address",)),
+        (("sim", "--truth", "nowhere/truth.npz"), ("--truth nowhere/truth.npz", "there is no folder nowhere")),
+        (("sim", "--truth", "missions"), ("--truth missions", "give another file")),
+        (("sim", "--remote", "nobody.invalid:14540"), ("Host 'nobody.invalid' is unknown",)),
+        (("sim", "--set", "walls=3"), ("--set walls=3", "begins with sim.")),
+        (("sim", "--set", "sim.walls=3"), ("sim.walls: must be a list, not 3",)),
+        ((*CONNECTED, "udpin://:14540", "--seed", "2"), ("--seed",)),
+        (("fly", SQUARE, "--lockstep", "--wait"), ("--wait belongs to --connect",)),
+        (("fly", SQUARE, "--lockstep", "--signing-key", "key"), ("--signing-key belongs to --connect",)),
+        (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
+        (("identify", "missing.csv"), ("missing.csv: No such file",)),
+        (("check", WALL, "--set", "obstacles.file=none.json"), ("none.json: no such file",)),
+    ],
+    ids=lambda given: " ".join(map(str, given[:1])),
+)
+def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
+    assert_one_clear_sentence(run_here(*command), *words)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("fly",), "MISSION"),
+        ((), "COMMAND"),
+        (("fly", "a", "--sim", "--lockstep"), "--lockstep"),
+        (("sim", "--port", "x"), "'x' is not a port"),
+        (("sim", "--speed", "-2"), "'-2' is not a speed: give a number from 0 to 1000"),
+        (("sim", "--speed", "fast"), "'fast' is not a speed"),
+        (("sim", "--sensor-rate", "333"), "--sensor-rate"),
+        (("sim", "--autopilot", "apm"), "--autopilot"),
+        (("identify", "hit.csv", "--mass", "nan"), "'nan' is not a mass"),
+        (("plan", "export", "missions/hover.yaml", "--home", "nan,8"), "'nan,8' is not LAT,LON"),
     ],
 )
-def test_what_the_simulated_vehicle_alone_cannot_do(options, words):
-    assert_one_clear_sentence(run_here("sim", *options), *words)
-
-
-def test_options_of_the_simulated_vehicle_with_a_real_one():
-    assert_one_clear_sentence(run_here("fly", SQUARE, "--connect", "udpin://:14540", "--seed", "2"), "--seed")
+def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):
+    result = run_here(*command)
+    assert result.returncode == 2 and words in result.stderr and "Traceback" not in result.stderr
 
 
 def test_nothing_waits_to_arm_a_vehicle_that_nobody_has_looked_at_and_none_for_a_simulated_one(tmp_path):
     connected = ("fly", SQUARE, "--connect", "udpin://127.0.0.1:0", "--out", tmp_path / "run", "--yes")
     for wish in (("--wait",), ("--set", "companion.link.wait=true")):
         assert_one_clear_sentence(run_here(*connected, *wish), "--wait with --yes")
-    assert_one_clear_sentence(run_here("fly", SQUARE, "--lockstep", "--wait"), "--wait belongs to --connect")
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_that_holds_a_flight(tmp_path):
-    (tmp_path / "flight.tlog").write_bytes(b"")
-    assert_one_clear_sentence(run_here("fly", WALL, "--lockstep", "--out", tmp_path), "already holds a flight")
-    assert (tmp_path / "flight.tlog").read_bytes() == b""
-
-
-@pytest.mark.parametrize("arguments", [("fly",), (), ("sim", "--port", "x"), ("fly", "a", "--sim", "--lockstep")])
-def test_wrong_arguments_exit_with_2(arguments):
-    result = run_here(*arguments)
-    assert result.returncode == 2 and "Traceback" not in result.stderr
-
-
 def fly_without_reply(folder, *extra):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     options = ("--set", "companion.link.heartbeat_wait_s=1.0", "--out", folder, "--yes", "--json", *extra)
     return port, lambda: run_here("fly", SQUARE, "--connect", f"udpin://127.0.0.1:{port}", *options)
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bench.detectors.vehicles import vehicle_of
+from bench.cases.vehicles import vehicle_of
 from sim_vehicle.autopilot.autopilot import LandedState
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.scene import Scene

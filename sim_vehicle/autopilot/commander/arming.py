@@ -19,7 +19,6 @@ class Reason(StrEnum):
     """Who armed or disarmed, in PX4's words."""
 
     COMMAND = "external command"
-    GESTURE = "stick gesture"
     MISSION = "mission start"
     FAILSAFE = "failsafe"
     LANDING = "landing"
@@ -110,7 +109,4 @@ def preflight_problems(
         found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
     if navigator.fence.breached:
         found.append(StatusText(Severity.CRITICAL, navigator.fence.breach_text))
-    if parameters["COM_ARM_MIS_REQ"] and not navigator.progress.valid:
-        # An event without a text in PX4 too.
-        found.append(StatusText(Severity.INFO, ""))
     return found

@@ -12,7 +12,7 @@ from sim_vehicle.autopilot.commander.failsafe import Failsafe
 from sim_vehicle.autopilot.commander.failsafe_table import Action, FailsafeSituation
 from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
 from sim_vehicle.autopilot.commander.ground_station import GroundStation
-from sim_vehicle.autopilot.commander.manual_control import Gesture, ManualInput
+from sim_vehicle.autopilot.commander.manual_control import ManualInput
 from sim_vehicle.autopilot.commander.positioning import Positioning
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
@@ -86,15 +86,15 @@ class Commander:
         return Result.ACCEPTED
 
     def arm(self, reason: Reason = Reason.COMMAND) -> Result:
-        """Arm as a command or a gesture asks."""
+        """Arm as a command asks."""
         was_armed = self.arming.armed
-        refusal = None if was_armed else self._stick_refusal(reason)
+        refusal = None if was_armed else self._stick_refusal()
         if refusal is not None:
             self._say(Severity.CRITICAL, f"Arming denied: {refusal}")
             return Result.TEMPORARILY_REJECTED
         result = self.arming.arm(self._now_us, self.checks_pass)
         if result is not Result.ACCEPTED:
-            self.texts += [problem for problem in self._problems if problem.text]
+            self.texts += self._problems
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
         elif not was_armed:
             self._say(Severity.INFO, f"Armed by {reason}")
@@ -107,26 +107,21 @@ class Commander:
             self._judge()
         return result
 
-    def _stick_refusal(self, reason: Reason) -> str | None:
-        """What is wrong with the throttle in a mode that sticks fly, or with the mode for a gesture."""
+    def _stick_refusal(self) -> str | None:
+        """What is wrong with the throttle in a mode that sticks fly."""
         sticks, mode = self.sticks.sticks, self.modes.flown
-        if Need.STICKS not in NEEDS[mode]:
-            return "switch to manual mode first" if reason is Reason.GESTURE else None
-        if sticks is None:
+        if Need.STICKS not in NEEDS[mode] or sticks is None:
             return None
         if mode in _CLIMB_CONTROLLED:
             return "throttle above center" if sticks.throttle > _CENTRE_THROTTLE else None
         return "high throttle" if sticks.throttle > _LOW_THROTTLE else None
 
     def disarm(self, forced: bool, reason: Reason = Reason.COMMAND) -> Result:
-        """Disarm as a command, a gesture or a failsafe asks."""
+        """Disarm as a command or a failsafe asks."""
         was_armed = self.arming.armed
-        by_gesture = reason is Reason.GESTURE
-        may_fall = by_gesture and self.modes.flown in _BY_THRUST and bool(self._parameters["COM_DISARM_MAN"])
-        result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced or may_fall)
+        result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced)
         if result is not Result.ACCEPTED:
-            if not by_gesture:
-                self._say(Severity.CRITICAL, "Disarming denied: not landed")
+            self._say(Severity.CRITICAL, "Disarming denied: not landed")
         elif was_armed:
             self._disarmed(reason)
         return result
@@ -168,10 +163,6 @@ class Commander:
         return ModeEvent.MISSION_AFTER_TAKEOFF if goes_on else ModeEvent.TAKEOFF_REACHED
 
     def _obey_sticks(self) -> None:
-        if self.sticks.gesture is Gesture.ARM:
-            self.arm(Reason.GESTURE)
-        elif self.sticks.gesture is Gesture.DISARM:
-            self.disarm(False, Reason.GESTURE)
         if self.sticks.sticks is None:
             return
         if not self.arming.armed:
@@ -308,6 +299,4 @@ class Commander:
 
 
 _ENDS_BY_ITSELF = (Mode.MISSION, Mode.TAKEOFF)
-_CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL, Mode.POSITION_SLOW)
-# Modes in which the pilot's throttle is the thrust: there COM_DISARM_MAN lets him disarm in the air.
-_BY_THRUST = (Mode.MANUAL, Mode.STABILIZED, Mode.ACRO)
+_CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL)

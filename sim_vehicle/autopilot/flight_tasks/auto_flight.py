@@ -1,27 +1,11 @@
 """How a target is flown: PX4's FlightTaskAuto with its parameters."""
 
 import math
-from enum import IntEnum
 
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, Vector3, towards, turned_towards
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
-
-
-class YawMode(IntEnum):
-    """MPC_YAW_MODE."""
-
-    TO_WAYPOINT = 0
-    TO_HOME = 1
-    FROM_HOME = 2
-    ALONG_TRAJECTORY = 3
-    TO_WAYPOINT_FIRST = 4
-    FIXED = 5
-
-
-# Slower than this there is no telling where the trajectory leads (FlightTaskAuto::_generateHeadingAlongTraj).
-_LEADS_SOMEWHERE_M_S = 1.0
 
 
 class AutoFlight:
@@ -52,8 +36,7 @@ class AutoFlight:
 
     def _fly(self, target: NavigatorTarget, view: View, step_s: float) -> TrajectorySetpoint:
         smoother = self._smoother
-        place = smoother.position_ned_m if self._waits_for_yaw() else target.position_ned_m
-        smoother.advance(place, step_s, self._cruise_m_s(target))
+        smoother.advance(target.position_ned_m, step_s, self._cruise_m_s(target))
         return TrajectorySetpoint(
             position_ned_m=smoother.position_ned_m,
             velocity_ned_m_s=smoother.velocity_ned_m_s,
@@ -64,12 +47,6 @@ class AutoFlight:
     def _cruise_m_s(self, target: NavigatorTarget) -> float:
         wanted = target.speed_m_s or self.cruise_m_s or self._parameters["MPC_XY_CRUISE"]
         return min(wanted, self._parameters["MPC_XY_VEL_MAX"])
-
-    def _waits_for_yaw(self) -> bool:
-        if self._parameters["MPC_YAW_MODE"] != YawMode.TO_WAYPOINT_FIRST:
-            return False
-        away_rad = abs(math.remainder(self._asked_yaw_rad - self._yaw_rad, 2 * math.pi))
-        return away_rad > math.radians(self._parameters["MIS_YAW_ERR"])
 
     def _climb(self, target: NavigatorTarget, view: View, step_s: float) -> TrajectorySetpoint:
         """Climb at the takeoff's speed; the height follows the vehicle, so that only the speed counts."""
@@ -95,33 +72,17 @@ class AutoFlight:
         smoother.start((north, east, view.position_ned_m[2]), (v_north, v_east, v_down))
         return TrajectorySetpoint((north, east, None), (v_north, v_east, v_down), yaw_rad=self._yaw_rad)
 
-    # --- heading ---------------------------------------------------------------------------------------------
-
     def _turn(self, target: NavigatorTarget, view: View, step_s: float) -> None:
+        """As the target says, else towards its place; within NAV_ACC_RAD of that the nose stays as it is."""
         if target.yaw_rad is not None:
             self._asked_yaw_rad = target.yaw_rad
         elif target.kind in (Kind.POSITION, Kind.HOLD):
-            self._asked_yaw_rad = self._yaw_of_mode(target, view)
+            north, east, _ = view.position_ned_m
+            to_north, to_east = target.position_ned_m[0] - north, target.position_ned_m[1] - east
+            if math.hypot(to_north, to_east) > self._parameters["NAV_ACC_RAD"]:
+                self._asked_yaw_rad = math.atan2(to_east, to_north)
         most_rad = math.radians(self._parameters["MPC_YAWRAUTO_MAX"]) * step_s
         self._yaw_rad = turned_towards(self._yaw_rad, self._asked_yaw_rad, most_rad)
-
-    def _yaw_of_mode(self, target: NavigatorTarget, view: View) -> float:
-        """Where the nose should point; within NAV_ACC_RAD of that point it stays as it is."""
-        mode = self._parameters["MPC_YAW_MODE"]
-        north, east, _ = view.position_ned_m
-        to_north, to_east = 0.0, 0.0
-        if mode in (YawMode.TO_WAYPOINT, YawMode.TO_WAYPOINT_FIRST):
-            to_north, to_east = target.position_ned_m[0] - north, target.position_ned_m[1] - east
-        elif mode in (YawMode.TO_HOME, YawMode.FROM_HOME):
-            sign = 1.0 if mode == YawMode.TO_HOME else -1.0
-            to_north, to_east = sign * (view.home_ned_m[0] - north), sign * (view.home_ned_m[1] - east)
-        elif mode == YawMode.ALONG_TRAJECTORY:
-            v_north, v_east, _ = self._smoother.velocity_ned_m_s
-            is_moving = math.hypot(v_north, v_east) > _LEADS_SOMEWHERE_M_S
-            return math.atan2(v_east, v_north) if is_moving else self._asked_yaw_rad
-        if math.hypot(to_north, to_east) <= self._parameters["NAV_ACC_RAD"]:
-            return self._asked_yaw_rad
-        return math.atan2(to_east, to_north)
 
 
 def land_speed_m_s(height_m: float, parameters: Parameters) -> float:

@@ -9,8 +9,7 @@ import math
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, turned_towards
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import FollowTarget
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 
@@ -18,8 +17,6 @@ from sim_vehicle.setpoint import TrajectorySetpoint
 _HAS_COURSE_M_S = 0.5
 # Without a message for this long there is no target (TARGET_TIMEOUT_US).
 _TARGET_LOST_US = 2_500_000
-_HEIGHT_FOLLOWS_TARGET = 2
-"""FLW_TGT_ALT_M: height above the target's own; otherwise above home."""
 
 
 class Follow:
@@ -54,16 +51,14 @@ class Follow:
             age_s = 1e-6 * (view.now_us - self._heard_us)
             v_north, v_east, _ = self._target.velocity_ned_m_s
             place_now = Place(self._target.latitude_deg, self._target.longitude_deg, self._target.altitude_m)
-            north, east, down = self._origin.position_of(place_now)
+            north, east, _ = self._origin.position_of(place_now)
             north, east = north + v_north * age_s, east + v_east * age_s
             angle_rad = self._course_rad + math.radians(parameters["FLW_TGT_FA"])
             distance_m = parameters["FLW_TGT_DST"]
-            follows_height = parameters["FLW_TGT_ALT_M"] == _HEIGHT_FOLLOWS_TARGET
-            below_m = down if follows_height else view.home_ned_m[2]
             place = (
                 north + distance_m * math.cos(angle_rad),
                 east + distance_m * math.sin(angle_rad),
-                below_m - parameters["FLW_TGT_HT"],
+                view.home_ned_m[2] - parameters["FLW_TGT_HT"],
             )
             yaw_rad = math.atan2(east - view.position_ned_m[1], north - view.position_ned_m[0])
             most_rad = math.radians(parameters["MPC_YAWRAUTO_MAX"]) * step_s

@@ -1,7 +1,7 @@
-"""How sticks fly: position, altitude, stabilised and acro mode.
+"""How sticks fly: position, altitude and stabilised mode.
 
 Sources: PX4's flight_mode_manager (ManualAcceleration, ManualAltitudeSmoothVel, StickAccelerationXY), lib/stick_yaw and
-mc_att_control, mc_rate_control.
+mc_att_control.
 """
 
 import math
@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import StickInput
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import AttitudeSetpoint, Axis3, RatesSetpoint, Setpoint, TrajectorySetpoint
+from sim_vehicle.setpoint import AttitudeSetpoint, Axis3, Setpoint, TrajectorySetpoint
 
 GRAVITY_M_S2 = 9.80665
 # Sticks::getPositionExpo: MPC_XY_MAN_EXPO and its like were replaced by this figure.
@@ -21,15 +21,12 @@ TAKEOFF_STICK = 0.3
 # StickAccelerationXY: drag is half of it, so the stick asks for twice the acceleration.
 _DRAG_FACTOR = 2.0
 _BOOST_TIME_CONSTANT_S = 0.8
-_SLOW_SHARE = 0.3
-"""POSITION_SLOW in place of MPC_VEL_MANUAL: the share that MC_SLOW_DEF_HVEL's 3 m/s have of its 10 m/s."""
 _STILL_M_S = 1e-3
 # The throttle's upper limit grows from nothing within 2 s of arming (mc_att_control).
 _THROTTLE_RISE_PER_S = 0.5
 
-BY_POSITION = (Mode.POSCTL, Mode.POSITION_SLOW)
-BY_ALTITUDE = (*BY_POSITION, Mode.ALTCTL)
-BY_STICKS = (*BY_ALTITUDE, Mode.MANUAL, Mode.STABILIZED, Mode.ACRO)
+BY_ALTITUDE = (Mode.POSCTL, Mode.ALTCTL)
+BY_STICKS = (*BY_ALTITUDE, Mode.MANUAL, Mode.STABILIZED)
 
 
 class ManualFlight:
@@ -63,8 +60,6 @@ class ManualFlight:
 
     def demand(self, mode: Mode, sticks: StickInput, view: View, step_s: float) -> Setpoint:
         """The next setpoint of a stick mode."""
-        if mode is Mode.ACRO:
-            return self._acro(sticks)
         yaw_rate = self._expo(sticks.yaw) * math.radians(self._parameters["MPC_MAN_Y_MAX"])
         yaw_rad = self._locked_yaw(yaw_rate, view)
         if mode not in BY_ALTITUDE:
@@ -74,8 +69,7 @@ class ManualFlight:
             a_north, a_east = self._tilt(sticks, view)
             acceleration: Axis3 = (a_north, a_east, None)
             return TrajectorySetpoint((None, None, down), (None, None, v_down), acceleration, yaw_rad, yaw_rate)
-        slow = _SLOW_SHARE if mode is Mode.POSITION_SLOW else 1.0
-        self._accelerate(sticks, view, slow, step_s)
+        self._accelerate(sticks, view, step_s)
         north, east = self._place_m or (None, None)
         return TrajectorySetpoint(
             (north, east, down), (*self._velocity_m_s, v_down), (*self._acceleration_m_s2, None), yaw_rad, yaw_rate
@@ -83,15 +77,14 @@ class ManualFlight:
 
     # --- along the ground --------------------------------------------------------------------------------------
 
-    def _accelerate(self, sticks: StickInput, view: View, share: float, step_s: float) -> None:
+    def _accelerate(self, sticks: StickInput, view: View, step_s: float) -> None:
         """The stick is an acceleration, drag makes of it a speed; a vehicle that stands keeps its place."""
         parameters = self._parameters
-        most_m_s = share * parameters["MPC_VEL_MANUAL"]
-        scale = _DRAG_FACTOR * parameters["MPC_ACC_HOR"] * share
-        forward, right = self._slowed(*_within_circle(self._expo(sticks.pitch), self._expo(sticks.roll)))
+        most_m_s, scale = parameters["MPC_VEL_MANUAL"], _DRAG_FACTOR * parameters["MPC_ACC_HOR"]
+        forward, right = _within_circle(self._expo(sticks.pitch), self._expo(sticks.roll))
         stick_north, stick_east = _turned(forward, right, self._yaw_rad if self._yaw_rad is not None else view.yaw_rad)
         is_free = forward == 0.0 and right == 0.0
-        boost = max(2.0, math.sqrt(parameters["MPC_VEL_MANUAL"])) if is_free else 1.0
+        boost = max(2.0, math.sqrt(most_m_s)) if is_free else 1.0
         self._boost += (boost - self._boost) * step_s / (step_s + _BOOST_TIME_CONSTANT_S)
         north, east = self._velocity_m_s
         drag = self._boost * scale / most_m_s
@@ -103,17 +96,6 @@ class ManualFlight:
         north, east = self._velocity_m_s
         self._velocity_m_s = (north + a_north * step_s, east + a_east * step_s)
         self._keep_place(is_free, view)
-
-    def _slowed(self, forward: float, right: float) -> tuple[float, float]:
-        """MPC_VEL_MAN_SIDE and MPC_VEL_MAN_BACK: speeds of their own to the side and backwards, unless negative."""
-        parameters = self._parameters
-        ahead_m_s, side_m_s = parameters["MPC_VEL_MANUAL"], parameters["MPC_VEL_MAN_SIDE"]
-        back_m_s = parameters["MPC_VEL_MAN_BACK"]
-        if side_m_s >= 0.0:
-            right *= side_m_s / ahead_m_s
-        if back_m_s >= 0.0 and forward < 0.0:
-            forward *= back_m_s / ahead_m_s
-        return forward, right
 
     def _keep_place(self, is_free: bool, view: View) -> None:
         moves = math.hypot(*self._velocity_m_s) > _STILL_M_S
@@ -162,7 +144,7 @@ class ManualFlight:
         x = math.copysign((abs(stick) - dead) / (1.0 - dead), stick)
         return (1.0 - EXPO) * x + EXPO * x**3
 
-    # --- by attitude and by rates ------------------------------------------------------------------------------
+    # --- by attitude -------------------------------------------------------------------------------------------
 
     def _stabilised(self, sticks: StickInput, yaw_rad: float | None, yaw_rate: float, view: View) -> AttitudeSetpoint:
         most_rad = math.radians(self._parameters["MPC_MAN_TILT_MAX"])
@@ -178,30 +160,17 @@ class ManualFlight:
         return AttitudeSetpoint(attitude, self._throttle(sticks.throttle, view), yaw_rate)
 
     def _throttle(self, stick: float, view: View) -> float:
-        """MPC_THR_CURVE: 1 leaves the stick as it is, everything else puts hovering in its middle."""
+        """Hovering is in the stick's middle (MPC_THR_CURVE 0)."""
         parameters = self._parameters
         rises_s = max(0.0, self._armed_s - parameters["COM_SPOOLUP_TIME"])
         allowed = min(1.0, _THROTTLE_RISE_PER_S * rises_s)
         least = 0.0 if view.landed else parameters["MPC_MANTHR_MIN"]
         most = parameters["MPC_THR_MAX"]
-        if parameters["MPC_THR_CURVE"] == 1:
-            thrust = least + (stick + 1.0) / 2.0 * (most - least)
-        elif stick < 0.0:
+        if stick < 0.0:
             thrust = self._hover_thrust + stick * (self._hover_thrust - least)
         else:
             thrust = self._hover_thrust + stick * (most - self._hover_thrust)
         return min(thrust, allowed)
-
-    def _acro(self, sticks: StickInput) -> RatesSetpoint:
-        roll, pitch, yaw = (
-            stick * math.radians(self._parameters[name])
-            for stick, name in (
-                (sticks.roll, "MC_ACRO_R_MAX"),
-                (-sticks.pitch, "MC_ACRO_P_MAX"),
-                (sticks.yaw, "MC_ACRO_Y_MAX"),
-            )
-        )
-        return RatesSetpoint((roll, pitch, yaw), (sticks.throttle + 1.0) / 2.0)
 
 
 def _within_circle(x: float, y: float) -> tuple[float, float]:

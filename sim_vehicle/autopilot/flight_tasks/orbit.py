@@ -1,8 +1,10 @@
-"""ORBIT: round a point at a radius and a speed. Source: PX4's FlightTaskOrbit.cpp (its sticks left out)."""
+"""ORBIT: round a point at a radius and a speed, the nose to the centre.
+
+Source: PX4's FlightTaskOrbit.cpp (its sticks and its other headings left out).
+"""
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards, turned_towards
 from sim_vehicle.autopilot.flight_tasks.target import Vector3, View
@@ -15,17 +17,6 @@ ACCELERATION_MAX_M_S2 = 2.0
 _ON_CIRCLE_M = 2.0
 
 
-class YawBehaviour(IntEnum):
-    """ORBIT_YAW_BEHAVIOUR."""
-
-    TO_CENTRE = 0
-    INITIAL = 1
-    UNCONTROLLED = 2
-    TANGENT = 3
-    STICKS = 4
-    UNCHANGED = 5
-
-
 @dataclass(frozen=True, slots=True)
 class OrbitStatus:
     """What ORBIT_EXECUTION_STATUS tells."""
@@ -33,7 +24,6 @@ class OrbitStatus:
     radius_m: float
     """Positive: clockwise."""
     centre_ned_m: Vector3
-    yaw_behaviour: int
 
 
 class Orbit:
@@ -46,8 +36,7 @@ class Orbit:
         self._radius_m = RADIUS_MIN_M
         self._speed_m_s = 1.0
         """Positive: clockwise."""
-        self._behaviour = YawBehaviour.TO_CENTRE
-        self._initial_yaw_rad = self._yaw_rad = 0.0
+        self._yaw_rad = 0.0
         self._slewed_m_s = 0.0
         self._approaches = True
 
@@ -55,7 +44,7 @@ class Orbit:
         """Begin round the place where the vehicle is."""
         self._centre_ned_m = view.position_ned_m
         self._radius_m, self._speed_m_s = RADIUS_MIN_M, 1.0
-        self._initial_yaw_rad = self._yaw_rad = view.yaw_rad
+        self._yaw_rad = view.yaw_rad
         self._approach(view)
 
     def change(
@@ -63,7 +52,6 @@ class Orbit:
         view: View,
         radius_m: float | None,
         speed_m_s: float | None,
-        yaw_behaviour: int | None,
         centre_ned_m: tuple[float | None, float | None, float | None],
     ) -> bool:
         """Take what a DO_ORBIT says; None leaves as it is. False where the radius is beyond MC_ORBIT_RAD_MAX."""
@@ -75,11 +63,6 @@ class Orbit:
         most_m_s = min(self._parameters["MPC_XY_VEL_MAX"], math.sqrt(ACCELERATION_MAX_M_S2 * radius))
         self._radius_m = radius
         self._speed_m_s = math.copysign(min(abs(speed), most_m_s), speed if clockwise else -speed)
-        if yaw_behaviour is not None:
-            known = yaw_behaviour in range(YawBehaviour.UNCHANGED)
-            chosen = yaw_behaviour if known else int(self._parameters["MC_ORBIT_YAW_MOD"])
-            self._behaviour = YawBehaviour(chosen)
-        self._initial_yaw_rad = view.yaw_rad
         north, east, down = (
             old if new is None else new for old, new in zip(self._centre_ned_m, centre_ned_m, strict=True)
         )
@@ -91,7 +74,7 @@ class Orbit:
     @property
     def status(self) -> OrbitStatus:
         """As it is flown."""
-        return OrbitStatus(math.copysign(self._radius_m, self._speed_m_s), self._centre_ned_m, self._behaviour)
+        return OrbitStatus(math.copysign(self._radius_m, self._speed_m_s), self._centre_ned_m)
 
     def demand(self, view: View, step_s: float) -> TrajectorySetpoint:
         """The next setpoint: straight to the circle, then along it."""
@@ -125,21 +108,13 @@ class Orbit:
         speed, outside_m = self._slewed_m_s, self._radius_m - view.distance_m(self._centre_ned_m)
         v_north, v_east = -out_east * speed + outside_m * out_north, out_north * speed + outside_m * out_east
         inward_m_s2 = speed * speed / self._radius_m
-        yaw_rate = speed / self._radius_m
-        if self._behaviour is YawBehaviour.TO_CENTRE:
-            self._turn(math.atan2(-out_east, -out_north), step_s)
-        elif self._behaviour is YawBehaviour.TANGENT:
-            sign = math.copysign(1.0, self._speed_m_s)
-            self._turn(math.atan2(sign * out_north, -sign * out_east), step_s)
-        elif self._behaviour is YawBehaviour.INITIAL:
-            self._turn(self._initial_yaw_rad, step_s)
-        follows = self._behaviour in (YawBehaviour.TO_CENTRE, YawBehaviour.TANGENT)
+        self._turn(math.atan2(-out_east, -out_north), step_s)
         return TrajectorySetpoint(
             (None, None, self._centre_ned_m[2]),
             (v_north, v_east, 0.0),
             (-out_north * inward_m_s2, -out_east * inward_m_s2, None),
-            None if self._behaviour is YawBehaviour.UNCONTROLLED else self._yaw_rad,
-            yaw_rate if follows else 0.0,
+            self._yaw_rad,
+            speed / self._radius_m,
         )
 
     def _outward(self, view: View) -> tuple[float, float]:

@@ -126,7 +126,6 @@ def _is_near(target: NavigatorTarget, accepts: Acceptance, view: View) -> bool:
 
 
 def _is_turned(yaw_rad: float | None, view: View, parameters: Parameters) -> bool:
-    """MIS_YAW_TMT at or above zero: headings are asked for, but not waited for."""
-    if yaw_rad is None or parameters["MIS_YAW_TMT"] >= 0.0:
+    if yaw_rad is None:
         return True
     return abs(math.remainder(yaw_rad - view.yaw_rad, 2 * math.pi)) < math.radians(parameters["MIS_YAW_ERR"])

@@ -1,20 +1,14 @@
-"""Which mission items PX4 takes, what it keeps of them, and what they are.
-
-Source: PX4's mavlink_mission.cpp, parse_mavlink_mission_item and format_mavlink_mission_item. An item with a place must
-be global; one without must be in MAV_FRAME_MISSION. What PX4 does not keep comes back as zero.
-"""
+"""The items of missions, geofences and rally points: their numbers, and what the vehicle keeps of each."""
 
 import math
+from dataclasses import dataclass
+from enum import IntEnum
 
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionResult, MissionType, StoredItem, WireItem
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.setpoint import Vector3
 
 FRAME_GLOBAL, FRAME_MISSION, FRAME_GLOBAL_RELATIVE = 0, 2, 3
 FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT = 5, 6
-_GLOBAL_FRAMES = (FRAME_GLOBAL, FRAME_GLOBAL_RELATIVE)
-_GLOBAL_INT_FRAMES = (FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT)
 
 WAYPOINT = 16
 LOITER_UNLIMITED = 17
@@ -49,31 +43,6 @@ WITH_POSITION = frozenset(
     {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LAND, TAKEOFF, LOITER_TO_ALTITUDE, VTOL_TAKEOFF, VTOL_LAND}
 )
 """Items to fly to; the others act where the vehicle is."""
-
-# Of the first four parameters of a global item: kept as they are (k), as whether they are positive (b), as a
-# heading within 0 to 360 degrees (h), as a whole number (n), or not at all (-).
-_KEPT: dict[int, str] = {
-    WAYPOINT: "kk-h",
-    LOITER_UNLIMITED: "--kh",
-    LOITER_TIME: "kbkb",
-    LAND: "-k-h",
-    TAKEOFF: "---h",
-    LOITER_TO_ALTITUDE: "bk-b",
-    ROI: "----",
-    DO_SET_ROI: "----",
-    DO_SET_ROI_LOCATION: "----",
-    VTOL_TAKEOFF: "---h",
-    VTOL_LAND: "---h",
-    CONDITION_GATE: "----",
-    FENCE_RETURN_POINT: "----",
-    FENCE_POLYGON_INCLUSION: "n---",
-    FENCE_POLYGON_EXCLUSION: "n---",
-    FENCE_CIRCLE_INCLUSION: "k---",
-    FENCE_CIRCLE_EXCLUSION: "k---",
-    RALLY_POINT: "----",
-    ARM_DISARM: "n---",
-    DO_AUTOTUNE_ENABLE: "nn--",
-}
 # Cameras, gimbals and other payload that this vehicle has none of: PX4 stores their items and flies on past them.
 PAYLOAD = frozenset(
     {
@@ -81,70 +50,55 @@ PAYLOAD = frozenset(
         *(3000, 42600),
     }
 )
-_WITHOUT_PLACE = PAYLOAD | {
+
+
+WITHOUT_POSITION = PAYLOAD | {
     *(DO_JUMP, ROI, DO_SET_ROI, DO_CHANGE_SPEED, DO_SET_HOME, DO_LAND_START, DELAY, RETURN_TO_LAUNCH),
     *(DO_SET_ROI_WPNEXT_OFFSET, DO_SET_ROI_NONE, CONDITION_DELAY, CONDITION_DISTANCE, DO_AUTOTUNE_ENABLE, ARM_DISARM),
 }
-_DEGREES_PER_UNIT = 1e-7
+"""Items that act where the vehicle is."""
 
 
-def parse(wire: WireItem) -> StoredItem | MissionResult:
-    """The item as it is stored, or why it is refused."""
-    if wire.frame in _GLOBAL_FRAMES or (wire.is_int and wire.frame in _GLOBAL_INT_FRAMES):
-        return _with_place(wire)
-    if wire.frame == FRAME_MISSION:
-        return _without_place(wire)
-    return MissionResult.UNSUPPORTED_FRAME
+class MissionType(IntEnum):
+    """MAV_MISSION_TYPE."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+    ALL = 255
 
 
-def _with_place(wire: WireItem) -> StoredItem | MissionResult:
-    kept = _KEPT.get(wire.command)
-    if kept is None:
-        return MissionResult.UNSUPPORTED
-    params = tuple(_kept(rule, value) for rule, value in zip(kept, wire.params, strict=True))
-    if wire.command in (ROI, DO_SET_ROI):
-        mode = _whole(wire.params[0])
-        if mode not in (ROI_LOCATION, ROI_NONE):
-            return MissionResult.INVALID_PARAM1
-        params = (float(mode), *params[1:])
-    scale = _DEGREES_PER_UNIT if wire.is_int else 1.0
-    return _item(wire, params, wire.x * scale, wire.y * scale)
+@dataclass(frozen=True, slots=True)
+class StoredItem:
+    """A stored item: what PX4 keeps of what it was sent."""
 
+    frame: int
+    command: int
+    autocontinue: int
+    params: tuple[float, float, float, float, float, float, float]
+    """The fifth and sixth are latitude and longitude in degrees where the frame is global; the seventh is metres."""
 
-def _without_place(wire: WireItem) -> StoredItem | MissionResult:
-    if wire.command not in _WITHOUT_PLACE:
-        return MissionResult.UNSUPPORTED
-    if wire.command in (ROI, DO_SET_ROI) and _whole(wire.params[0]) not in (ROI_NONE, ROI_WPNEXT, ROI_WPINDEX):
-        return MissionResult.INVALID_PARAM1
-    return _item(wire, wire.params, wire.x, wire.y)
+    @property
+    def latitude_deg(self) -> float:
+        return self.params[4]
 
+    @property
+    def longitude_deg(self) -> float:
+        return self.params[5]
 
-def _item(wire: WireItem, params: tuple[float, ...], x: float, y: float) -> StoredItem:
-    p1, p2, p3, p4 = params
-    command = DO_SET_ROI if wire.command == ROI else wire.command
-    return StoredItem(wire.frame, command, wire.autocontinue, (p1, p2, p3, p4, x, y, wire.z))
+    @property
+    def altitude_m(self) -> float:
+        return self.params[6]
 
+    @property
+    def is_relative(self) -> bool:
+        """The altitude counts from home, not from the sea."""
+        return self.frame in (3, 6)
 
-def _kept(rule: str, value: float) -> float:
-    if rule == "k":
-        return value
-    if rule == "b":
-        return float(value > 0)
-    if rule == "h":
-        return value % 360.0 if math.isfinite(value) else math.nan
-    return float(_whole(value)) if rule == "n" else 0.0
-
-
-def _whole(value: float) -> int:
-    return int(value + 0.5) if math.isfinite(value) else -1
-
-
-def fits(item: StoredItem, kind: int) -> bool:
-    """Whether the item may be in a list of this MAV_MISSION_TYPE."""
-    if kind == MissionType.MISSION:
-        return item.command not in NOT_IN_A_MISSION
-    has_too_few_corners = item.command in FENCE_POLYGONS and item.params[0] < 3
-    return kind != MissionType.FENCE or not has_too_few_corners
+    @property
+    def yaw_rad(self) -> float | None:
+        """The fourth parameter as a heading; None where it is not given."""
+        return math.radians(self.params[3]) if math.isfinite(self.params[3]) else None
 
 
 def place_of(item: StoredItem, origin: Origin, home_ned_m: Vector3) -> Vector3:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType, StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 
 # dataman.h and the SITL board's configuration.
 MOST_ITEMS = {MissionType.MISSION: 10_000, MissionType.FENCE: 64, MissionType.RALLY: 32}

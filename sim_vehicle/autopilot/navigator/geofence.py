@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from sim_vehicle.autopilot.flight_tasks.target import Vector3, View
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items
-from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
 
 # GEOFENCE_CHECK_INTERVAL_US.

@@ -20,14 +20,11 @@ from sim_vehicle.autopilot.flight_tasks.target import (
 )
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 
-# Behind MIS_COMMAND_TOUT PX4 goes on past a winch, a gripper or a gimbal that does not answer.
-_WITH_TIMEOUT = (211, 1000, 42600)
 # A mission of jumps alone ends where it has jumped more often than it has items.
 _MOST_JUMPS_PER_ITEM = 1
 
@@ -60,7 +57,6 @@ class MissionFlight:
         self._climb_down_m: float | None = None
         self._jumps_left: dict[int, int] = {}
         self._entered_us = 0
-        self._roi: StoredItem | None = None
         self._was_disarmed = False
         self._was_flown = False
         self.runs = False
@@ -105,7 +101,7 @@ class MissionFlight:
         self._was_disarmed = True
 
     def _announce(self, view: View) -> None:
-        self._work, self._roi = Work.ITEM, None
+        self._work = Work.ITEM
         progress = self._store.progress
         progress.reached, progress.finished = -1, False
         if self._store.mission.items and progress.valid:
@@ -144,7 +140,6 @@ class MissionFlight:
             self._given = []
         if not self.runs:
             return
-        self._look_at_roi(view)
         item = self._store.mission.items[self._store.current]
         if not self._is_over(item, view):
             return
@@ -166,10 +161,6 @@ class MissionFlight:
                 return False
             if command == kinds.DELAY:
                 return view.now_us - self._entered_us >= 1e6 * max(item.params[0], 0.0)
-            if command in _WITH_TIMEOUT:
-                return view.now_us - self._entered_us > 1e6 * self._parameters["MIS_COMMAND_TOUT"]
-            if command == kinds.CONDITION_GATE:
-                return self._is_through(item, view)
             if command not in kinds.WITH_POSITION:
                 return True
         return self._arrival.is_reached(self.target, self._acceptance(item, view), view, self._parameters)
@@ -186,12 +177,6 @@ class MissionFlight:
         return Acceptance(
             horizontal_m, vertical_m, inside_s=max(item.params[0], 0.0) if stays else 0.0, yaw_rad=self.target.yaw_rad
         )
-
-    def _is_through(self, item: StoredItem, view: View) -> bool:
-        """Past the plane through the gate that faces the next place."""
-        north, east, _ = self._place(item, view)
-        to_north, to_east = self.target.position_ned_m[0] - north, self.target.position_ned_m[1] - east
-        return to_north * (view.position_ned_m[0] - north) + to_east * (view.position_ned_m[1] - east) >= 0.0
 
     def _advance(self) -> bool:
         """The next item's number, jumps taken; False behind the last."""
@@ -240,17 +225,10 @@ class MissionFlight:
             self._fly_to(item, view)
             return
         self._work = Work.ITEM
-        if item.command == kinds.CONDITION_GATE:
-            self._fly_through(view)
-            return
         if self.target.kind in (Kind.TAKEOFF, Kind.IDLE, Kind.LAND) and not view.landed:
             self.target = NavigatorTarget(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
         elif view.landed:
             self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
-        if item.command in (kinds.DO_SET_ROI, kinds.DO_SET_ROI_LOCATION, kinds.DO_SET_ROI_NONE):
-            is_place = item.frame != kinds.FRAME_MISSION and item.params[0] != kinds.ROI_NONE
-            is_place = is_place or item.command == kinds.DO_SET_ROI_LOCATION
-            self._roi = item if is_place and item.command != kinds.DO_SET_ROI_NONE else None
         self._given.append(MissionCommand(item.command, item.params))
 
     def _begin_with_jump(self, view: View) -> None:
@@ -290,23 +268,6 @@ class MissionFlight:
             self.target = NavigatorTarget(Kind.POSITION, (place[0], place[1], height[2]))
         else:
             self.target = NavigatorTarget(Kind.LAND, place)
-
-    def _fly_through(self, view: View) -> None:
-        """A gate: the place to fly to is that of the next item that has one."""
-        for item in self._store.mission.items[self._store.current + 1 :]:
-            if item.command in kinds.WITH_POSITION:
-                self.target = NavigatorTarget(Kind.POSITION, self._place(item, view), item.yaw_rad)
-                return
-
-    def _look_at_roi(self, view: View) -> None:
-        """A region of interest turns the vehicle while it is farther than the radius at which places are reached."""
-        if self._roi is None or self.target.kind not in (Kind.POSITION, Kind.HOLD):
-            return
-        north, east, _ = self._place(self._roi, view)
-        to_north, to_east = north - view.position_ned_m[0], east - view.position_ned_m[1]
-        if math.hypot(to_north, to_east) > self._parameters["NAV_ACC_RAD"]:
-            yaw_rad = math.atan2(to_east, to_north)
-            self.target = NavigatorTarget(self.target.kind, self.target.position_ned_m, yaw_rad, self.target.speed_m_s)
 
     def _place(self, item: StoredItem, view: View) -> Vector3:
         return place_of(item, self._origin, view.home_ned_m)

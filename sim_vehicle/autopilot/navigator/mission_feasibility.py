@@ -8,14 +8,15 @@ from collections.abc import Sequence
 
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 
 # Stored by the link, yet no item that the navigator could fly.
-_NOT_FLOWN = frozenset({kinds.CONDITION_DELAY, kinds.CONDITION_DISTANCE, kinds.FENCE_RETURN_POINT})
+_NOT_FLOWN = frozenset(
+    {kinds.CONDITION_DELAY, kinds.CONDITION_DISTANCE, kinds.CONDITION_GATE, kinds.FENCE_RETURN_POINT}
+)
 # What may stand before a takeoff: it has no place. Of payload, all but a winch, a gripper and an actuator.
 _PLACELESS = frozenset(
     {
@@ -46,7 +47,6 @@ class MissionCheck:
         if self._all_can_be_flown(items):
             self._check_first_place(items)
             self._check_takeoff(items)
-            self._check_ends(items)
         self._check_fence(items)
         return not self.problems
 
@@ -87,21 +87,6 @@ class MissionCheck:
                     self.problems.append("Mission rejected: takeoff not first waypoint item")
                     return
             has_place = has_place or item.command not in _PLACELESS
-
-    def _check_ends(self, items: Sequence[StoredItem]) -> None:
-        """MIS_TKO_LAND_REQ."""
-        takes_off = any(item.command == kinds.TAKEOFF for item in items)
-        lands = any(item.command == kinds.LAND for item in items)
-        wanted = self._parameters["MIS_TKO_LAND_REQ"]
-        if wanted == 1 and not takes_off:
-            self.problems.append("Mission rejected: Takeoff waypoint required.")
-        elif (wanted == 2 or (wanted == 5 and not self._view.landed)) and not lands:
-            self.problems.append("Mission rejected: Landing waypoint/pattern required.")
-        elif wanted == 3 and not (takes_off and lands):
-            self.problems.append("Mission rejected: Takeoff or Landing item missing.")
-        elif (wanted == 4 or (wanted == 5 and self._view.landed)) and takes_off is not lands:
-            what = "Landing item or remove Takeoff" if takes_off else "Takeoff item or remove Landing"
-            self.problems.append(f"Mission rejected: Add {what}.")
 
     def _check_fence(self, items: Sequence[StoredItem]) -> None:
         for number, item in enumerate(items, start=1):

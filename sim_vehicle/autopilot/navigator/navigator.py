@@ -94,11 +94,10 @@ class Navigator:
         self,
         radius_m: float | None,
         speed_m_s: float | None,
-        yaw_behaviour: int | None,
         centre_ned_m: tuple[float | None, float | None, float | None],
     ) -> bool:
         """DO_ORBIT, when the mode is ORBIT."""
-        return self._orbit.change(self.view, radius_m, speed_m_s, yaw_behaviour, centre_ned_m)
+        return self._orbit.change(self.view, radius_m, speed_m_s, centre_ned_m)
 
     def follow(self, target: FollowTarget) -> None:
         """FOLLOW_TARGET."""
@@ -126,7 +125,7 @@ class Navigator:
         elif mode is Mode.TAKEOFF:
             self._begin_takeoff()
         elif mode is Mode.RETURN:
-            self._return.begin(self.view, self._missions, previous is Mode.MISSION)
+            self._return.begin(self.view, self._missions)
         elif mode in LANDING_MODES or mode is Mode.DESCEND:
             self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
         elif mode is Mode.MISSION:

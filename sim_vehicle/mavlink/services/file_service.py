@@ -6,7 +6,6 @@ there; this vehicle has none of either.
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -28,34 +27,16 @@ _REFUSALS = {
 _ROOT = (b"", b"/")
 
 
-@dataclass(frozen=True, slots=True)
-class FileRequest:
-    """One operation on the server, as it came."""
-
-    source_system: int
-    source_component: int
-    payload: bytes
-
-
-def read(packet: dialect.MAVLink_file_transfer_protocol_message) -> FileRequest:
-    return FileRequest(packet.get_srcSystem(), packet.get_srcComponent(), bytes(packet.payload))
-
-
-READERS = {110: read}
-
-
 class FileService:
     """Says that there is nothing."""
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
+        self.handlers: Mapping[int, Handler] = {110: self._answer}
 
-    @property
-    def handlers(self) -> Mapping[type, Handler]:
-        return {FileRequest: self._answer}
-
-    def _answer(self, request: FileRequest) -> None:
-        number, session, operation, size, *_ = _HEADER.unpack_from(request.payload)
+    def _answer(self, packet: dialect.MAVLink_file_transfer_protocol_message) -> None:
+        asked = bytes(packet.payload)
+        number, session, operation, size, *_ = _HEADER.unpack_from(asked)
         if operation >= _ACK:
             return
         next_number = (number + 1) & 0xFFFF
@@ -63,10 +44,10 @@ class FileService:
             answer = _HEADER.pack(next_number, session, _ACK, 0, operation, 0, 0, 0)
         else:
             why = _REFUSALS.get(operation, _UNKNOWN_COMMAND)
-            if operation == _LIST and request.payload[_HEADER.size :][:size].rstrip(b"\0") in _ROOT:
+            if operation == _LIST and asked[_HEADER.size :][:size].rstrip(b"\0") in _ROOT:
                 # As after the last name of a folder
                 why = _END_OF_FILE
             answer = _HEADER.pack(next_number, session, _NAK, 1, operation, 0, 0, 0) + bytes([why])
         payload = answer.ljust(PAYLOAD_BYTES, b"\0")
-        target = (request.source_system, request.source_component)
+        target = (packet.get_srcSystem(), packet.get_srcComponent())
         self._link.send(dialect.MAVLink_file_transfer_protocol_message(0, *target, payload))

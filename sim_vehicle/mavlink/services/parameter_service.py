@@ -5,8 +5,7 @@ Source: PX4's mavlink/mavlink_parameters.cpp. What is wrong (a name, an index, a
 
 import struct
 import zlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -19,54 +18,7 @@ _FLOAT, _WHOLE = struct.Struct("<f"), struct.Struct("<i")
 _MARKER_V2, _HEADER_V2, _HEADER_V1 = 0xFD, 10, 6
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterList:
-    """PARAM_REQUEST_LIST."""
-
-    target_system: int
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterRead:
-    """PARAM_REQUEST_READ; a negative index stands for none: the name counts."""
-
-    target_system: int
-    name: str
-    index: int
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterSet:
-    """PARAM_SET: the four bytes of its value mean a float or a whole number, as `is_whole` says."""
-
-    target_system: int
-    name: str
-    value: float
-    is_whole: bool | None
-    """None for a type that PX4 has not."""
-
-
-def _list(packet: dialect.MAVLink_param_request_list_message) -> ParameterList:
-    return ParameterList(packet.target_system)
-
-
-def _read(packet: dialect.MAVLink_param_request_read_message) -> ParameterRead:
-    return ParameterRead(packet.target_system, packet.param_id, packet.param_index)
-
-
-def _set(packet: dialect.MAVLink_param_set_message) -> ParameterSet:
-    # From the bytes: as a Python float some whole numbers would come back changed (signalling NaNs).
-    raw = packet.get_msgbuf()
-    begin = _HEADER_V2 if raw[0] == _MARKER_V2 else _HEADER_V1
-    is_whole = _IS_WHOLE.get(packet.param_type)
-    value = (_WHOLE if is_whole else _FLOAT).unpack_from(raw, begin)[0]
-    return ParameterSet(packet.target_system, packet.param_id, value, is_whole)
-
-
 _IS_WHOLE = {dialect.MAV_PARAM_TYPE_INT32: True, dialect.MAV_PARAM_TYPE_REAL32: False}
-
-READERS: dict[int, Callable[[dialect.MAVLink_message], object | None]] = {20: _read, 21: _list, 23: _set}
-
 
 HASH_NAME = "_HASH_CHECK"
 NO_INDEX = 0xFFFF
@@ -92,10 +44,7 @@ class ParameterService:
         """Index of what is sent next of a list; -1 for the hash, None while no list is sent."""
         self._told = board.parameters.sets
         self._announce_at_us: int | None = None
-
-    @property
-    def handlers(self) -> Mapping[type, Handler]:
-        return {ParameterList: self._list, ParameterRead: self._read, ParameterSet: self._set}
+        self.handlers: Mapping[int, Handler] = {20: self._read, 21: self._list, 23: self._set}
 
     def update(self, now_us: int) -> None:
         """Go on with the list; tell of what has changed."""
@@ -104,35 +53,39 @@ class ParameterService:
         if self._parameters.sets != self._told:
             self._announce(now_us)
 
-    def _list(self, request: ParameterList) -> None:
-        if request.target_system == self._us.system:
+    def _list(self, packet: dialect.MAVLink_param_request_list_message) -> None:
+        if packet.target_system == self._us.system:
             # Asked again while sending, PX4 begins anew without the hash.
             self._next = -1 if self._next is None else 0
 
-    def _read(self, request: ParameterRead) -> None:
-        if request.target_system != self._us.system:
+    def _read(self, packet: dialect.MAVLink_param_request_read_message) -> None:
+        if packet.target_system != self._us.system:
             return
-        if request.index >= 0:
-            if request.index < len(self._names):
-                self._send(self._names[request.index])
-        elif request.name == HASH_NAME:
+        if packet.param_index >= 0:
+            if packet.param_index < len(self._names):
+                self._send(self._names[packet.param_index])
+        elif packet.param_id == HASH_NAME:
             self._link.send(_hash_value(self._parameters))
-        elif request.name in self._index:
-            self._send(request.name)
+        elif packet.param_id in self._index:
+            self._send(packet.param_id)
 
-    def _set(self, request: ParameterSet) -> None:
-        if request.target_system != self._us.system:
+    def _set(self, packet: dialect.MAVLink_param_set_message) -> None:
+        if packet.target_system != self._us.system:
             return
-        if request.name == HASH_NAME:
+        if packet.param_id == HASH_NAME:
             # A ground station that knows all values from its cache: it wants no more of them.
             if self._parameters["MAV_HASH_CHK_EN"]:
                 self._next = None
             return
-        definition = self._parameters.definition(request.name)
-        if definition is None or request.is_whole is not definition.is_whole:
+        definition, is_whole = self._parameters.definition(packet.param_id), _IS_WHOLE.get(packet.param_type)
+        if definition is None or is_whole is not definition.is_whole:
             return
-        self._parameters.set(request.name, request.value)
-        self._send(request.name)
+        # From the bytes: as a Python float some whole numbers would come back changed (signalling NaNs).
+        raw = packet.get_msgbuf()
+        begin = _HEADER_V2 if raw[0] == _MARKER_V2 else _HEADER_V1
+        (value,) = (_WHOLE if is_whole else _FLOAT).unpack_from(raw, begin)
+        self._parameters.set(packet.param_id, value)
+        self._send(packet.param_id)
 
     def _send_burst(self) -> None:
         for _ in range(self._link.burst(BURST, BURST_SERIAL, PACKET_BYTES)):

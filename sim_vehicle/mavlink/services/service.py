@@ -28,9 +28,8 @@ class Channel(Protocol):
 class Service(Protocol):
     """One protocol on one link, each message answered at once. What all links share is the autopilot's."""
 
-    @property
-    def handlers(self) -> Mapping[type, Handler]:
-        """What to do with a message, by the class of its value; called in the order of arrival."""
+    handlers: Mapping[int, Handler]
+    """What to do with a packet, by its message's id; called in the order of arrival."""
 
 
 @runtime_checkable

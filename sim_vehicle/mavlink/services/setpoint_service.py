@@ -1,7 +1,6 @@
 """What steers the flight on a link: setpoints, sticks, targets to follow."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from math import isfinite
 
 from pymavlink.dialects.v20 import development as dialect
@@ -11,7 +10,6 @@ from sim_vehicle.autopilot.messages import (
     FollowTarget,
     GlobalTarget,
     PositionTarget,
-    RadioChannels,
     StickInput,
 )
 from sim_vehicle.mavlink.services.board import Board
@@ -22,15 +20,11 @@ _FORCE_BIT, _YAW_IGNORED, _YAW_RATE_IGNORED = 0x200, 0x400, 0x800
 _NO_RATES = (0x1, 0x2, 0x4)
 _NO_THRUST, _NO_ATTITUDE = 0x40, 0x80
 _FULL_STICK = 1000
-_UNKNOWN_SOURCE = 0
-"""The link puts its own number in."""
 
 
-def _position_target(packet: dialect.MAVLink_set_position_target_local_ned_message) -> PositionTarget:
+def position_target(packet: dialect.MAVLink_set_position_target_local_ned_message) -> PositionTarget:
     mask = packet.type_mask
     return PositionTarget(
-        target_system=packet.target_system,
-        target_component=packet.target_component,
         frame=packet.coordinate_frame,
         position_m=_axes(mask, packet.x, packet.y, packet.z),
         velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
@@ -41,7 +35,7 @@ def _position_target(packet: dialect.MAVLink_set_position_target_local_ned_messa
     )
 
 
-def _global_target(packet: dialect.MAVLink_set_position_target_global_int_message) -> GlobalTarget:
+def global_target(packet: dialect.MAVLink_set_position_target_global_int_message) -> GlobalTarget:
     mask = packet.type_mask
     place = (packet.lat_int / 1e7, packet.lon_int / 1e7, packet.alt)
     return GlobalTarget(
@@ -55,7 +49,7 @@ def _global_target(packet: dialect.MAVLink_set_position_target_global_int_messag
     )
 
 
-def _attitude_target(packet: dialect.MAVLink_set_attitude_target_message) -> AttitudeTarget:
+def attitude_target(packet: dialect.MAVLink_set_attitude_target_message) -> AttitudeTarget:
     mask = packet.type_mask
     roll, pitch, yaw = (
         _value(mask & bit, rate)
@@ -68,24 +62,18 @@ def _attitude_target(packet: dialect.MAVLink_set_attitude_target_message) -> Att
     return AttitudeTarget(None if mask & _NO_ATTITUDE else (w, x, y, z), (roll, pitch, yaw), thrust)
 
 
-def _manual_control(packet: dialect.MAVLink_manual_control_message) -> StickInput:
+def stick_input(packet: dialect.MAVLink_manual_control_message, source: int) -> StickInput:
     """Values out of range count as centred; the throttle goes from 0 to 1000."""
     throttle = packet.z / (_FULL_STICK / 2) - 1.0 if 0 <= packet.z <= _FULL_STICK else 0.0
-    return StickInput(_stick(packet.y), _stick(packet.x), throttle, _stick(packet.r), _UNKNOWN_SOURCE)
+    return StickInput(_stick(packet.y), _stick(packet.x), throttle, _stick(packet.r), source)
 
 
 def _stick(value: int) -> float:
     return value / _FULL_STICK if abs(value) <= _FULL_STICK else 0.0
 
 
-def _radio_channels(packet: dialect.MAVLink_rc_channels_override_message) -> RadioChannels:
-    return RadioChannels(tuple(getattr(packet, f"chan{number}_raw") for number in range(1, 19)))
-
-
-def _follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget | None:
+def follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget:
     v_north, v_east, v_down = (value if isfinite(value) else 0.0 for value in packet.vel)
-    if not isfinite(packet.alt):
-        return None
     return FollowTarget(packet.lat * 1e-7, packet.lon * 1e-7, packet.alt, (v_north, v_east, v_down))
 
 
@@ -101,35 +89,17 @@ def _value(ignored: int, value: float) -> float | None:
     return None if ignored or not isfinite(value) else value
 
 
-READERS: dict[int, Callable[[dialect.MAVLink_message], object | None]] = {
-    69: _manual_control,
-    70: _radio_channels,
-    82: _attitude_target,
-    84: _position_target,
-    86: _global_target,
-    144: _follow_target,
-}
-
-
 class SetpointService:
     """Hands them to the autopilot, whatever the mode; PX4 answers none of them."""
 
     def __init__(self, link: Channel, board: Board) -> None:
-        self._autopilot = board.autopilot
-        self._source = board.autopilot.commander.sticks.new_link_source()
-
-    @property
-    def handlers(self) -> Mapping[type, Handler]:
-        """Every kind of it."""
-        receive = self._autopilot.receive
-        return {
-            PositionTarget: self._autopilot.setpoint,
-            GlobalTarget: receive,
-            AttitudeTarget: receive,
-            RadioChannels: receive,
-            FollowTarget: receive,
-            StickInput: self._take_sticks,
+        receive = board.autopilot.receive
+        source = board.autopilot.commander.sticks.new_link_source()
+        self.handlers: Mapping[int, Handler] = {
+            69: lambda packet: receive(stick_input(packet, source)),
+            82: lambda packet: receive(attitude_target(packet)),
+            84: lambda packet: receive(position_target(packet)),
+            86: lambda packet: receive(global_target(packet)),
+            # One without a height is none.
+            144: lambda packet: receive(follow_target(packet)) if isfinite(packet.alt) else None,
         }
-
-    def _take_sticks(self, sticks: StickInput) -> None:
-        self._autopilot.receive(replace(sticks, source=self._source))

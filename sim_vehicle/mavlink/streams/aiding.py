@@ -3,10 +3,12 @@
 Source: PX4's mavlink/streams/OPTICAL_FLOW_RAD.hpp, DISTANCE_SENSOR.hpp and HIL_STATE_QUATERNION.hpp.
 """
 
+from collections.abc import Callable
+
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -22,39 +24,19 @@ _NO_AIRSPEED, _NO_ACCELERATION = (0, 0), (0, 0, 0)
 
 
 def optical_flow_rad(state: Telemetry) -> Message:
-    sample = state.flow
-    assert sample is not None, "streamed only once there is a sample"
-    flow_x, flow_y = sample.flow_frd_rad
-    turn_x, turn_y, turn_z = sample.gyroscope_frd_rad
-    return dialect.MAVLink_optical_flow_rad_message(
-        sample.time_us,
-        0,
-        sample.integration_us,
-        flow_x,
-        flow_y,
-        turn_x,
-        turn_y,
-        turn_z,
-        0,
-        sample.quality,
-        0,
-        _UNKNOWN_DISTANCE,
-    )
+    assert state.flow is not None, "streamed only once there is a sample"
+    return _flow(dialect.MAVLink_optical_flow_rad_message, state.flow)
 
 
 def hil_optical_flow(sample: FlowSample) -> Message:
-    """The same sample for PX4's simulator port; the distance goes in a DISTANCE_SENSOR of its own."""
-    return dialect.MAVLink_hil_optical_flow_message(
-        sample.time_us,
-        0,
-        sample.integration_us,
-        *sample.flow_frd_rad,
-        *sample.gyroscope_frd_rad,
-        0,
-        sample.quality,
-        0,
-        _UNKNOWN_DISTANCE,
-    )
+    """The same sample for PX4's simulator port."""
+    return _flow(dialect.MAVLink_hil_optical_flow_message, sample)
+
+
+def _flow(kind: Callable[..., Message], sample: FlowSample) -> Message:
+    """The distance goes in a DISTANCE_SENSOR of its own."""
+    seen = (*sample.flow_frd_rad, *sample.gyroscope_frd_rad)
+    return kind(sample.time_us, 0, sample.integration_us, *seen, 0, sample.quality, 0, _UNKNOWN_DISTANCE)
 
 
 def distance_sensor(state: Telemetry) -> Message:

@@ -34,7 +34,6 @@ _LOAD_PER_MILLE = 100
 _UNKNOWN_16 = 0xFFFF
 _UNKNOWN_TEMPERATURE = 0x7FFF
 _GRAVITY_M_S2 = 9.80665
-_FULL_STRENGTH = 100
 # PWM of the simulated outputs: off, and from least to greatest.
 PWM_OFF_US, PWM_LEAST_US, PWM_SPAN_US = 900, 1000, 1000
 OUTPUTS = 16
@@ -105,16 +104,6 @@ def _pulse_widths(state: Telemetry) -> list[int]:
     if not state.autopilot.arming.armed:
         return [PWM_OFF_US] * 4
     return [round(PWM_LEAST_US + PWM_SPAN_US * fraction) for fraction in state.sample.motor_fractions]
-
-
-def rc_channels(state: Telemetry) -> Message:
-    """What came as RC_CHANNELS_OVERRIDE: this vehicle has no receiver of its own."""
-    channels = state.autopilot.radio_channels
-    assert channels is not None, "streamed only once something was received"
-    pulses = channels.pulses_us
-    count = max((number for number, pulse in enumerate(pulses, 1) if pulse not in (0, _UNKNOWN_16)), default=0)
-    shown = [pulse if number <= count else _UNKNOWN_16 for number, pulse in enumerate(pulses, 1)]
-    return dialect.MAVLink_rc_channels_message(boot_ms(state.sample), count, *shown, _FULL_STRENGTH)
 
 
 def manual_control(state: Telemetry) -> Message:

@@ -37,7 +37,6 @@ _ONBOARD: dict[int, float] = {
     49: 1.0,  # GPS_GLOBAL_ORIGIN
     242: 0.5,  # HOME_POSITION
     147: 0.5,  # BATTERY_STATUS
-    65: 20.0,  # RC_CHANNELS
     2: 1.0,  # SYSTEM_TIME
     4: 1.0,  # PING
     29: 1.0,  # SCALED_PRESSURE
@@ -65,7 +64,6 @@ _NORMAL: dict[int, float] = {
     49: 1.0,
     242: 0.5,
     147: 0.5,
-    65: 5.0,
     4: 0.1,
     29: 1.0,
 }
@@ -74,7 +72,6 @@ _NORMAL: dict[int, float] = {
 _NORMAL_SITL: dict[int, float] = {
     **_NORMAL,
     **dict.fromkeys((85, 32, 33, 30, 31, 83, 36), 50.0),
-    65: 20.0,
     106: 10.0,
 }
 

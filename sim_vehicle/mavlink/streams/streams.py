@@ -17,7 +17,6 @@ from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.line import FAST_LINE, Line, Outbox
 from sim_vehicle.mavlink.streams import aiding, condition, navigation
-from sim_vehicle.mavlink.streams.on_request import ANSWERS
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.topics import NEVER_SENT, OPTIONAL, Topic, Topics
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -83,7 +82,6 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(147, Topic.BATTERY, condition.battery_status),
     StreamKind(2, Topic.ALWAYS_NEW, condition.system_time),
     StreamKind(4, Topic.ALWAYS_NEW, condition.ping),
-    StreamKind(65, Topic.RADIO, condition.rc_channels),
     StreamKind(69, Topic.STICKS, condition.manual_control),
     StreamKind(29, Topic.AIR, condition.scaled_pressure),
     StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
@@ -272,14 +270,8 @@ class Streams:
         interval_us = NOT_STREAMED_US if stream is None else stream.interval_us
         self._outbox.send(encode.message_interval(message_id, interval_us))
 
-    def send_now(self, message_id: int, index: int = 0) -> bool:
+    def send_now(self, message_id: int) -> bool:
         """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent, but the origin always."""
-        answer = ANSWERS.get(message_id)
-        if answer is not None:
-            messages = answer(index)
-            for message in messages:
-                self._outbox.send(message)
-            return bool(messages)
         stream = self._by_id.get(message_id)
         if stream is None:
             return False

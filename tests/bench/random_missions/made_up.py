@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.random_missions.flight import JudgedFlight
+from bench.fly.lockstep import JudgedFlight
 from companion.mission.model import Mission
 from companion.report import CollisionReport, Event, FlightReport
 from rebound_cli.results.truth_match import FlightTruth

@@ -5,13 +5,13 @@ from collections import Counter
 import pytest
 import yaml
 
-from bench.random_missions.generator import (
-    AIRFRAMES,
+from bench.cases.missions import (
     WIND_MAX_M_S,
     MissionCase,
     airframe_of,
     random_mission,
 )
+from bench.cases.vehicles import AIRFRAMES
 from companion.mission.model import Mission
 from sim_vehicle.scene import Scene, check_start_is_free
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.random_missions.contacts import Role, contacts_of
-from bench.random_missions.judge import failures
-from bench.random_missions.obedience import disobediences
-from bench.random_missions.recovered import recoveries
+from bench.rows.contacts import Role, contacts_of
+from bench.rows.judge import failures
+from bench.rows.obedience import disobediences
+from bench.rows.recovered import recoveries
 from sim_vehicle.world import Wall
 from tests.bench.random_missions.made_up import (
     DONE_S,

@@ -5,8 +5,8 @@ import math
 import pytest
 import yaml
 
-from bench.random_missions.generator import AIRFRAMES, MissionCase, airframe_of, random_mission
-from bench.random_missions.vehicle import drawn_vehicle
+from bench.cases.missions import MissionCase, airframe_of, random_mission
+from bench.cases.vehicles import AIRFRAMES, drawn_vehicle
 from companion.mission.config import CompanionConfig
 from sim_vehicle.airframe import Airframe, with_base
 

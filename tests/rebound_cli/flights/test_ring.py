@@ -117,25 +117,23 @@ def test_the_budget_counts_the_present_flight_as_it_grows(tmp_path, disk):
 
 
 @pytest.mark.parametrize(
-    ("taken", "free", "is_long"),
-    # Of a budget of 160 MB an eighth; with less room than the last 10 MiB there is none for another record.
-    [(20 * MB - 3 * BLOCK, GIB, False), (20 * MB + BLOCK, GIB, True), (20 * MB + BLOCK, LAST_BYTES - 1, False)],
+    ("budget_mb", "taken", "free", "is_long"),
+    [
+        # Of a budget of 160 MB an eighth; with less room than the last 10 MiB there is none for another record.
+        (160, 20 * MB - 3 * BLOCK, GIB, False),
+        (160, 20 * MB + BLOCK, GIB, True),
+        (160, 20 * MB + BLOCK, LAST_BYTES - 1, False),
+        # However small the budget, what is less than the last room is not long.
+        (0, LAST_BYTES - 2 * BLOCK, GIB, False),
+    ],
 )
-def test_a_record_is_long_when_it_takes_an_eighth_of_the_budget(tmp_path, disk, taken, free, is_long):
+def test_a_record_is_long_when_it_takes_an_eighth_of_the_budget(tmp_path, disk, budget_mb, taken, free, is_long):
     present = pretend(tmp_path, PRESENT, taken)
     disk(tmp_path, free)
-    kept = Ring(present, DiskConfig.model_validate({"max_use_mb": 160}))
+    kept = Ring(present, DiskConfig.model_validate({"max_use_mb": budget_mb}))
     with contextlib.suppress(OSError):
         kept.make_room(EPOCH_US)
     assert kept.is_long is is_long
-
-
-def test_a_record_of_less_than_the_last_room_is_not_long_however_small_the_budget(tmp_path, disk):
-    present = pretend(tmp_path, PRESENT, LAST_BYTES - 2 * BLOCK)
-    disk(tmp_path, GIB)
-    kept = Ring(present, DiskConfig.model_validate({"max_use_mb": 0}))
-    kept.make_room(EPOCH_US)
-    assert not kept.is_long
 
 
 def test_nothing_is_removed_that_is_not_a_flight_of_a_vehicle_which_we_have_named(tmp_path, disk):
@@ -151,8 +149,9 @@ def test_nothing_is_removed_that_is_not_a_flight_of_a_vehicle_which_we_have_name
     disk(tmp_path, 0)
     # When there is no room at all
     kept = Ring(present, DiskConfig.model_validate({"max_use_mb": 0}))
-    with pytest.raises(OSError, match="less than 10 MiB"):
+    with pytest.raises(OSError, match="less than 10 MiB") as caught:
         kept.make_room(EPOCH_US)
+    assert caught.value.errno == errno.ENOSPC
     # Then all of them stay
     assert sorted(path.name for path in tmp_path.iterdir()) == before
     assert (elsewhere / TLOG_NAME).exists()
@@ -211,14 +210,6 @@ def test_on_a_disk_that_is_as_good_as_full_packets_end_events_go_on_and_it_is_to
     disk(tmp_path, LAST_BYTES)
     again = Ring(folder, DiskConfig.model_validate({"keep_free_mb": 10}))
     again.make_room(EPOCH_US)
-
-
-def test_no_room_is_the_error_of_a_full_disk(tmp_path, disk):
-    present = pretend(tmp_path, PRESENT)
-    disk(tmp_path, 0)
-    with pytest.raises(OSError) as caught:
-        Ring(present, DiskConfig()).make_room(EPOCH_US)
-    assert caught.value.errno == errno.ENOSPC
 
 
 def test_a_folder_that_cannot_be_removed_does_not_end_the_flight(tmp_path, disk, monkeypatch):

@@ -5,8 +5,6 @@ import json
 import os
 import signal
 import socket
-import subprocess
-import sys
 import threading
 
 import pytest
@@ -19,17 +17,11 @@ from rebound_cli.guard import run_guard
 from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
-from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
+from tests.rebound_cli.command import assert_comes_again, events_of, run, start, vehicle_on_air, wait_for_event
 
 pytestmark = pytest.mark.realtime
 
 QUICK = ("--set", "companion.streams.window_s=0.5", "--set", "companion.link.heartbeat_wait_s=30")
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.mark.parametrize(
@@ -72,21 +64,17 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     systemd.bind(str(tmp_path / "notify"))
     monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
     monkeypatch.setenv("WATCHDOG_USEC", "1000000")
-    port = free_port()
-    simulator = [sys.executable, "-m", "rebound_cli", "sim", "--port", "0", "--remote", f"127.0.0.1:{port}"]
-    vehicle = subprocess.Popen(
-        [*simulator, "--stop-with-stdin"], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL
-    )
-    guard = start("guard", "--connect", f"udpin://127.0.0.1:{port}", "--out", tmp_path, "--then", "previous", *QUICK)
-    try:
-        wait_for_event(tmp_path, "standing_by")
-        status = ask(tmp_path / "run" / "status.sock")
-        guard.send_signal(signal.SIGTERM)
-        stdout, stderr = guard.communicate(timeout=20)
-    finally:
-        guard.kill()
-        vehicle.stdin.close()
-        vehicle.wait(20)
+    with vehicle_on_air() as port:
+        guard = start(
+            "guard", "--connect", f"udpin://127.0.0.1:{port}", "--out", tmp_path, "--then", "previous", *QUICK
+        )
+        try:
+            wait_for_event(tmp_path, "standing_by")
+            status = ask(tmp_path / "run" / "status.sock")
+            guard.send_signal(signal.SIGTERM)
+            stdout, stderr = guard.communicate(timeout=20)
+        finally:
+            guard.kill()
     assert guard.returncode == 0, stderr
     assert status["command"] == "guard" and status["pid"] == guard.pid and status["folder"] == str(tmp_path)
     assert status["age_s"] < 5.0 and status["hits"] == 0

@@ -12,10 +12,9 @@ import yaml
 
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
-from rebound_cli.main import main
 from rebound_cli.plan.reading import mission_of_plan
 from rebound_cli.plan.writing import plan_of_mission
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Place
 from tests.rebound_cli.command import run_here as rebound
 
 HOME = Place(47.3977, 8.5456, 488.0)
@@ -62,22 +61,21 @@ def read(*items, **more):
     return Mission.model_validate(data), data["items"], notes
 
 
-def test_north_of_home_is_north_of_the_arming_position():
-    _, items, _ = read(TAKEOFF, waypoint(north=0.1, height=7.0, yaw=90, hold=3), item(20, *[0] * 7))
-    north_m, east_m, down_m = items[1]["go_to"]["position_ned_m"]
-    assert (north_m, east_m, down_m) == pytest.approx((0.1 * MILLIDEGREE_M, 0.0, -7.0), abs=1e-3)
+@pytest.mark.parametrize(
+    ("place", "position_ned_m"),
+    [
+        # Heights above the sea are taken from the home's
+        ({"north": 0.1, "height": 7.0}, (0.1 * MILLIDEGREE_M, 0.0, -7.0)),
+        ({"east": 0.1}, (0.0, 0.1 * MILLIDEGREE_M, -5.0)),
+        ({"height": HOME.altitude_m + 6.0, "frame": 0}, (0.0, 0.0, -6.0)),
+    ],
+    ids=["north", "east", "above the sea"],
+)
+def test_a_place_beside_home_is_beside_the_arming_position(place, position_ned_m):
+    _, items, _ = read(TAKEOFF, waypoint(yaw=90, hold=3, **place), item(20, *[0] * 7))
+    assert items[1]["go_to"]["position_ned_m"] == pytest.approx(position_ned_m, abs=2e-3)
     assert items[1]["go_to"]["yaw_deg"] == 90.0
     assert items[2:] == [{"hold": {"duration_s": 3.0}}, {"return": {}}]
-
-
-def test_east_of_home_is_east_of_the_arming_position():
-    _, items, _ = read(TAKEOFF, waypoint(east=0.1), item(20, *[0] * 7))
-    assert items[1]["go_to"]["position_ned_m"] == pytest.approx([0.0, 0.1 * MILLIDEGREE_M, -5.0], abs=2e-3)
-
-
-def test_heights_above_the_sea_are_taken_from_the_homes():
-    _, items, _ = read(TAKEOFF, waypoint(height=HOME.altitude_m + 6.0, frame=0), item(20, *[0] * 7))
-    assert items[1]["go_to"]["position_ned_m"][2] == -6.0
 
 
 def test_speeds_turns_delays_and_circles():
@@ -259,9 +257,3 @@ def test_a_plan_with_any_part_of_another_kind_is_read_or_refused(wrong):
             functools.reduce(operator.getitem, way, damaged)[last] = wrong
             with contextlib.suppress(ConfigurationError):
                 mission_of_plan(damaged, "t")
-
-
-def test_a_place_that_is_no_number_is_refused(capsys):
-    with pytest.raises(SystemExit):
-        main(["plan", "export", "missions/hover.yaml", "--home", "nan,8"])
-    assert "'nan,8' is not LAT,LON" in capsys.readouterr().err

@@ -12,7 +12,6 @@ from rebound_cli.preflight.command import serial_line
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.rebound_cli.command import run_here
 
 
 def surveyed(damaged: Callable[[bytes], bytes] = bytes) -> tuple[Preflight, SimulatedVehicle]:
@@ -94,10 +93,3 @@ def test_a_remedy_that_is_taken_is_taken_by_the_vehicle():
         exchange(preflight, vehicle)
     assert preflight.survey.parameters["COM_RCL_EXCEPT"] == 4
     assert {finding.item: finding for finding in findings(preflight.survey)}["COM_RCL_EXCEPT"].verdict is Verdict.GOOD
-
-
-def test_an_address_that_is_none_is_one_sentence():
-    done = run_here("preflight", "--connect", "nowhere")
-    assert done.returncode != 0
-    assert "Traceback" not in done.stderr
-    assert "'nowhere' is not a connection address" in done.stderr

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.baselines.config import BaselineConfig
+from bench.detectors.config import BaselineConfig
 from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState, LocalPosition
 from companion.px4_mode import OFFBOARD
 from rebound_cli.logs.log import Log, LoggedSample

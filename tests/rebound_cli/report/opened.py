@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 
-from rebound_cli.report.packing import NONE
+from rebound_cli.report.content import NONE
 
 
 def unpacked(column):

@@ -15,8 +15,8 @@ from rebound_cli.report.moments import moments_of
 from rebound_cli.report.page import page
 from rebound_cli.report.shown_flight import followed_flight, recorded_flight, replayed_flight
 from tests.rebound_cli.command import WALL
+from tests.rebound_cli.live.flying import fly
 from tests.rebound_cli.replay.flying import HIT_US, flight
-from tests.rebound_cli.test_control_path import fly
 
 
 def test_a_flight_that_is_listened_to_comes_again_to_the_bit(wall_folder):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rebound_cli.main import main
-from rebound_cli.report.live_server import Told, WatchServer
+from rebound_cli.report.live_server import WatchServer
 from rebound_cli.report.tail import COLUMNS, Tail, as_line
 from rebound_cli.results.flight_log import read_flight_log
 from tests.rebound_cli.report.opened import Opened
@@ -141,7 +141,7 @@ def test_what_is_none_of_the_pages_business_is_refused(wall_folder):
 def test_browsers_that_do_not_read_or_have_gone_disturb_nobody(wall_folder):
     with served(wall_folder) as server:
         # Given more than any socket holds
-        server.told.add(b": " + b"x" * 30_000_000 + b"\n\n")
+        server.told.append(b": " + b"x" * 30_000_000 + b"\n\n")
         lazy = [socket.create_connection(("127.0.0.1", server.server_port)) for _ in range(5)]
         for client in lazy:
             # Asks, and takes nothing of the answer; every other one is gone at once
@@ -152,14 +152,6 @@ def test_browsers_that_do_not_read_or_have_gone_disturb_nobody(wall_folder):
         assert stream_until(server, "done")
         for client in lazy:
             client.close()
-
-
-def test_a_reader_gets_what_came_since_and_waits_no_longer_than_it_may():
-    told = Told()
-    assert told.after(0, 0.0) == []
-    told.add(b"a")
-    told.add(b"b")
-    assert told.after(0, 0.0) == [b"a", b"b"] and told.after(1, 0.0) == [b"b"] and told.after(2, 0.0) == []
 
 
 def test_where_there_is_no_flight_that_is_said(tmp_path, capsys):

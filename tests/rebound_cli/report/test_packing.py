@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rebound_cli.report.packing import kept_rows, packed
+from rebound_cli.report.content import kept_rows, packed
 from tests.rebound_cli.report.opened import unpacked
 
 

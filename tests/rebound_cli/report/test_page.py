@@ -22,7 +22,7 @@ from rebound_cli.results.flight_log import read_flight_log
 from sim_vehicle.obstacles import WallSpec
 from tests.rebound_cli.report.opened import Opened, rows
 
-PACKAGE = Path(rebound_cli.report.__file__).parent
+PACKAGE = Path(rebound_cli.report.__file__).parent / "web"
 HOSTILE = "</script><img src=x onerror=alert(1)><script>alert(2)</script><!-- &amp;"
 MEGABYTE = 1_000_000
 

@@ -8,7 +8,7 @@ import pytest
 
 from companion.report import Status
 from rebound_cli.live.console import Console
-from tests.rebound_cli.test_control_path import fly
+from tests.rebound_cli.live.flying import fly
 
 
 @pytest.fixture

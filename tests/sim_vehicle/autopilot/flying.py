@@ -5,7 +5,7 @@ import math
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE, NAV_TAKEOFF
 from sim_vehicle.autopilot.messages import Result, StickInput
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType, StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from sim_vehicle.autopilot.mode_numbers import NUMBERS
 from sim_vehicle.autopilot.modes import Mode

@@ -131,8 +131,6 @@ class Flight:
 def target(position: Axis3 = FREE, velocity: Axis3 = FREE, **others: object) -> PositionTarget:
     """A setpoint for this vehicle in the local frame."""
     fields: dict[str, object] = {
-        "target_system": 1,
-        "target_component": 1,
         "frame": 1,
         "position_m": position,
         "velocity_m_s": velocity,

@@ -13,27 +13,6 @@ def armed_at_zero() -> Arming:
     return arming
 
 
-def test_failing_checks_refuse_arming():
-    arming = Arming(Parameters())
-    assert arming.arm(0, checks_pass=False) is Result.TEMPORARILY_REJECTED
-    assert not arming.armed
-
-
-def test_arming_or_disarming_twice_is_accepted():
-    arming = armed_at_zero()
-    assert arming.arm(5, checks_pass=False) is Result.ACCEPTED
-    assert arming.disarm(landed=True, forced=False) is Result.ACCEPTED
-    assert arming.disarm(landed=False, forced=False) is Result.ACCEPTED
-
-
-def test_disarming_in_the_air_needs_force():
-    arming = armed_at_zero()
-    assert arming.disarm(landed=False, forced=False) is Result.TEMPORARILY_REJECTED
-    assert arming.armed
-    assert arming.disarm(landed=False, forced=True) is Result.ACCEPTED
-    assert not arming.armed
-
-
 def test_without_takeoff_it_disarms_after_eleven_seconds():
     arming = armed_at_zero()
     assert arming.disarm_by_itself(11 * SECOND - 4000, landed=True) is None

@@ -8,7 +8,7 @@ from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_RETURN_TO_L
 from sim_vehicle.autopilot.flight_commands import DO_CHANGE_ALTITUDE, DO_CHANGE_SPEED, DO_ORBIT, DO_REPOSITION
 from sim_vehicle.autopilot.messages import FollowTarget, Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
 from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, item, place, set_mode, upload

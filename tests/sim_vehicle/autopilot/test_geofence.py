@@ -8,7 +8,7 @@ from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.flight_commands import DO_REPOSITION
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import CHECK_PERIOD_US, shapes_of
 from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, item, place, set_mode, upload

@@ -1,19 +1,19 @@
-"""Sticks: whose count, how they fly each mode, what they ask for by gesture."""
+"""Sticks: whose count, and how they fly each mode."""
 
 import math
 
 import pytest
 
-from sim_vehicle.autopilot.commander.manual_control import FIRST_LINK_SOURCE, RADIO_SOURCE, ManualInput
+from sim_vehicle.autopilot.commander.manual_control import ManualInput
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
-from sim_vehicle.autopilot.messages import RadioChannels, Result, StickInput
+from sim_vehicle.autopilot.messages import Result, StickInput
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.autopilot.flying import set_mode, sticks
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
-RADIO, FIRST, SECOND = RADIO_SOURCE, FIRST_LINK_SOURCE, FIRST_LINK_SOURCE + 1
+FIRST, SECOND = 1, 2
 
 
 def flying(mode: Mode, **parameters: float) -> Flight:
@@ -37,62 +37,25 @@ def flying(mode: Mode, **parameters: float) -> Flight:
 
 # --- whose sticks ------------------------------------------------------------------------------------------------
 
-# COM_RC_IN_MODE: who flies after the first, and then the second, has begun to send; both go on.
-CHOICES = [
-    (0, RADIO, FIRST, RADIO, RADIO),
-    (0, FIRST, RADIO, None, RADIO),
-    (1, RADIO, FIRST, None, FIRST),
-    (1, FIRST, SECOND, FIRST, FIRST),
-    (2, FIRST, RADIO, FIRST, FIRST),
-    (2, RADIO, FIRST, RADIO, RADIO),
-    (3, FIRST, RADIO, FIRST, FIRST),
-    (4, FIRST, RADIO, None, None),
-    (5, FIRST, RADIO, FIRST, RADIO),
-    (5, SECOND, FIRST, SECOND, FIRST),
-    (6, RADIO, SECOND, RADIO, SECOND),
-    (6, SECOND, FIRST, SECOND, FIRST),
-    (7, SECOND, RADIO, SECOND, RADIO),
-    (7, FIRST, SECOND, FIRST, SECOND),
-    (8, RADIO, FIRST, RADIO, FIRST),
-    (8, FIRST, SECOND, FIRST, SECOND),
-]
 
-
-def chosen(manual: ManualInput) -> int | None:
-    return manual.sticks.source if manual.sticks is not None else None
-
-
-@pytest.mark.parametrize(("mode", "first", "second", "alone", "both"), CHOICES)
-def test_whose_sticks_count(mode, first, second, alone, both):
+@pytest.mark.parametrize(("mode", "counts"), [(0, False), (1, True), (2, True), (4, False)])
+def test_whether_links_count_is_com_rc_in_mode(mode, counts):
     manual = ManualInput(Parameters({"COM_RC_IN_MODE": mode}))
-    manual.heard(StickInput(0, 0, 0, 0, first), 0)
-    assert chosen(manual) == alone
-    manual.heard(StickInput(0, 0, 0, 0, second), 20_000)
-    assert chosen(manual) == both
+    manual.heard(StickInput(0, 0, 0, 0, FIRST), 0)
+    assert (manual.sticks is not None) is counts
 
 
-def test_with_fallback_the_other_takes_over_and_with_the_first_kept_it_does_not():
-    for mode, then in ((2, RADIO), (3, None)):
-        manual = ManualInput(Parameters({"COM_RC_IN_MODE": mode, "COM_RC_LOSS_T": 0.5}))
-        manual.heard(StickInput(0, 0, 0, 0, FIRST), 0)
-        # Looked for every 200 ms: COM_RC_LOSS_T is over after 500, which shows after 600
-        manual.update(599_000)
-        assert chosen(manual) == FIRST
-        manual.update(600_000)
-        assert chosen(manual) is None
-        manual.heard(StickInput(0, 0, 0, 0, RADIO), 610_000)
-        assert chosen(manual) == then
-
-
-def test_a_radios_channels_are_mapped_by_rc_map():
-    manual = ManualInput(Parameters({"COM_RC_IN_MODE": 0, "RC_MAP_ROLL": 4, "RC_MAP_YAW": 1}))
-    pulses = (1250, 2000, 1000, 1750, *[0] * 14)
-    manual.heard_radio(RadioChannels(pulses), 0)
-    assert manual.sticks == StickInput(roll=0.5, pitch=1.0, throttle=-1.0, yaw=-0.5, source=RADIO)
-    # A radio that sends no throttle is none
-    manual = ManualInput(Parameters({"COM_RC_IN_MODE": 0}))
-    manual.heard_radio(RadioChannels((1500, 1500, 65535, 1500, *[0] * 14)), 0)
+def test_the_first_that_comes_counts_until_it_is_lost():
+    manual = ManualInput(Parameters({"COM_RC_LOSS_T": 0.5}))
+    manual.heard(StickInput(0, 0, 0, 0, FIRST), 0)
+    manual.heard(StickInput(0, 0, 0, 0, SECOND), 20_000)
+    # Looked for every 200 ms: COM_RC_LOSS_T is over after 500, which shows after 600
+    manual.update(599_000)
+    assert manual.sticks.source == FIRST
+    manual.update(600_000)
     assert manual.sticks is None
+    manual.heard(StickInput(0, 0, 0, 0, SECOND), 610_000)
+    assert manual.sticks.source == SECOND
 
 
 def test_only_a_stick_that_is_moved_fast_enough_counts_as_moved():
@@ -135,12 +98,6 @@ def test_forward_is_where_the_nose_points():
     sticks(flight, 4.0, pitch=0.6)
     v_north, v_east, _ = flight.state.velocity_ned_m_s
     assert math.atan2(v_east, v_north) == pytest.approx(yaw_rad, abs=0.1)
-
-
-def test_slow_position_mode_is_slow():
-    flight = flying(Mode.POSITION_SLOW, MPC_VEL_MANUAL=10.0)
-    sticks(flight, 8.0, pitch=1.0)
-    assert flight.state.velocity_ned_m_s[0] == pytest.approx(3.0, abs=0.2)
 
 
 @pytest.mark.parametrize("mode", [Mode.POSCTL, Mode.ALTCTL])
@@ -204,56 +161,7 @@ def test_after_arming_the_throttle_waits_for_the_motors_and_then_rises_slowly():
         assert flight.autopilot.applied.thrust_fraction == pytest.approx(thrust, abs=0.02)
 
 
-def test_acro_sticks_are_rates():
-    flight = flying(Mode.ACRO)
-    sticks(flight, 0.1, roll=1.0, pitch=0.5, yaw=-1.0)
-    rates = [math.degrees(rate) for rate in flight.autopilot.applied.rates_frd_rad_s]
-    assert rates == pytest.approx([100.0, -50.0, -100.0])
-
-
 # --- arming ------------------------------------------------------------------------------------------------------
-
-
-def test_the_gestures_arm_and_disarm():
-    flight = Flight()
-    sticks(flight, 0.5, throttle=-1.0)
-    sticks(flight, 0.9, throttle=-1.0, yaw=1.0)
-    assert not flight.autopilot.arming.armed
-    sticks(flight, 0.2, throttle=-1.0, yaw=1.0)
-    assert flight.autopilot.arming.armed
-    assert flight.texts()[-1] == "Armed by stick gesture"
-    sticks(flight, 1.2, throttle=-1.0, yaw=-1.0)
-    assert not flight.autopilot.arming.armed
-
-
-@pytest.mark.parametrize(
-    ("mode", "allowed", "falls"), [(Mode.STABILIZED, 1, True), (Mode.STABILIZED, 0, False), (Mode.ALTCTL, 1, False)]
-)
-def test_in_the_air_the_gesture_disarms_where_the_throttle_is_the_thrust_and_com_disarm_man_lets_it(
-    mode, allowed, falls
-):
-    flight = flying(mode, COM_DISARM_MAN=allowed)
-    flight.autopilot.texts.clear()
-    sticks(flight, 1.2, throttle=-1.0, yaw=-1.0)
-    assert flight.autopilot.arming.armed is not falls
-    # A gesture that is refused is refused without a word
-    assert "Disarming denied: not landed" not in flight.texts()
-
-
-def test_backwards_and_to_the_side_it_may_be_slower():
-    limits = {"MPC_VEL_MANUAL": 6.0, "MPC_VEL_MAN_SIDE": 3.0, "MPC_VEL_MAN_BACK": 2.0}
-    for held, speed in (({"pitch": 1}, (6.0, 0.0)), ({"pitch": -1}, (-2.0, 0.0)), ({"roll": 1}, (0.0, 3.0))):
-        flight = flying(Mode.POSCTL, **limits)
-        sticks(flight, 8.0, **held)
-        assert flight.state.velocity_ned_m_s[:2] == pytest.approx(speed, abs=0.15)
-
-
-def test_a_gesture_does_not_arm_a_mode_that_sticks_do_not_fly():
-    flight = Flight()
-    set_mode(flight, Mode.LOITER)
-    sticks(flight, 1.5, throttle=-1.0, yaw=1.0)
-    assert not flight.autopilot.arming.armed
-    assert flight.texts()[-1] == "Arming denied: switch to manual mode first"
 
 
 @pytest.mark.parametrize(

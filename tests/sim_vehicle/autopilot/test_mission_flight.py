@@ -9,7 +9,7 @@ from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.flight_commands import DO_CHANGE_SPEED, MISSION_START
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType, StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
@@ -181,17 +181,6 @@ def test_an_item_without_autocontinue_is_stayed_at():
     assert math.dist(north_east(flight), (10.0, 0.0)) < 0.1
 
 
-def test_a_gate_is_flown_through_and_a_region_of_interest_looked_at():
-    gate = StoredItem(6, kinds.CONDITION_GATE, 1, item(kinds.WAYPOINT, 10.0).params)
-    looks = StoredItem(6, kinds.DO_SET_ROI_LOCATION, 1, item(kinds.WAYPOINT, 0.0, 40.0).params)
-    flight = begun(TAKEOFF, gate, looks, item(kinds.WAYPOINT, 30.0))
-    reached(flight, 1)
-    assert north_east(flight)[0] >= 10.0
-    flight.fly(3.0)
-    bearing = math.atan2(40.0 - north_east(flight)[1], -north_east(flight)[0])
-    assert yaw_of(flight.state.attitude_wxyz) == pytest.approx(bearing, abs=0.15)
-
-
 def test_pause_holds_and_resume_goes_on_with_the_same_item():
     flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
     reached(flight, 1)
@@ -258,25 +247,6 @@ def test_missions_that_cannot_be_flown_are_stored_but_not_started(items, text):
     assert text in flight.texts()
     assert flight.ask(MISSION_START, 0) is Result.DENIED
     assert "Mission start denied! No valid mission" in flight.texts()
-
-
-@pytest.mark.parametrize(
-    ("wanted", "items", "valid"),
-    [
-        (0, [NORTH], True),
-        (1, [NORTH], False),
-        (1, [TAKEOFF], True),
-        (2, [TAKEOFF], False),
-        (3, [TAKEOFF, NORTH], False),
-        (3, [TAKEOFF, LAND_AT_HOME], True),
-        (4, [NORTH], True),
-        (4, [TAKEOFF, NORTH], False),
-    ],
-)
-def test_takeoff_and_landing_can_be_demanded(wanted, items, valid):
-    flight = Flight(None, MIS_TKO_LAND_REQ=wanted)
-    upload(flight, *items)
-    assert flight.autopilot.missions.progress.valid is valid
 
 
 def test_a_first_place_far_away_is_only_a_warning():

@@ -5,7 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.hil.earth import place_at
+from sim_vehicle.geography import Origin
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
@@ -67,7 +67,7 @@ def test_the_truth_is_sent_on_request_alone():
     wire.ask(HIL_STATE_QUATERNION, 50)
     assert wire.rate_hz(HIL_STATE_QUATERNION, 2.0) == pytest.approx(50, rel=0.05)
     truth = wire.received[HIL_STATE_QUATERNION][-1]
-    place = place_at((30.0, -20.0, -0.08))
+    place = Origin().place_at((30.0, -20.0, -0.08))
     assert (truth.lat, truth.lon) == (round(1e7 * place.latitude_deg), round(1e7 * place.longitude_deg))
     assert truth.alt == pytest.approx(1e3 * place.altitude_m, abs=20)
     assert truth.attitude_quaternion == pytest.approx([math.sqrt(0.5), 0, 0, math.sqrt(0.5)], abs=0.01)

@@ -6,7 +6,8 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, HilState, MotionCapture, Place
+from sim_vehicle.geography import Place
+from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, HilState, MotionCapture
 from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
 
 ZURICH = Place(47.397742, 8.545594, 488.123)

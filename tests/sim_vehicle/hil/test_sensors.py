@@ -7,7 +7,8 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.estimator.samples import BEST_QUALITY, FlowSample, RangeSample
-from sim_vehicle.hil.earth import HOME, StandardAir, magnetic_field_ned_gauss, place_at
+from sim_vehicle.geography import HOME, Origin
+from sim_vehicle.hil.earth import air_at, magnetic_field_ned_gauss
 from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, HilState, MotionCapture
 from sim_vehicle.hil.sensors import Cameras, Gps, Magnetometer, to_body, turned
 from sim_vehicle.hil.vehicle import HilVehicle
@@ -76,34 +77,15 @@ def test_a_small_turn_to_the_right_moves_the_nose_east():
 
 
 def test_pressure_is_the_standard_atmospheres_and_falls_with_height():
-    air = StandardAir()
-    # ICAO 7488: 954.61 hPa at 500 m, 0.115 hPa less a metre there.
-    assert air.at(500.0 - HOME.altitude_m).pressure_hpa == pytest.approx(954.61, abs=0.05)
-    assert air.at(0.0).pressure_hpa - air.at(1.0).pressure_hpa == pytest.approx(0.115, abs=0.002)
-    assert air.at(0.5).pressure_hpa == pytest.approx(
-        (air.at(0.0).pressure_hpa + air.at(1.0).pressure_hpa) / 2, abs=1e-4
-    )
-    assert air.at(0.0).temperature_c == pytest.approx(15 - 0.0065 * HOME.altitude_m, abs=0.1)
-
-
-def test_air_beyond_the_table_is_the_nearest_of_it():
-    air = StandardAir()
-    assert air.at(1e6).pressure_hpa < air.at(1900.0).pressure_hpa
-    assert air.at(-1e6).pressure_hpa > air.at(-100.0).pressure_hpa
-
-
-def test_a_kilometre_north_is_a_larger_latitude_and_a_kilometre_east_a_larger_longitude():
-    assert place_at((0.0, 0.0, 0.0)) == HOME
-    north, east, up = place_at((1000.0, 0, 0)), place_at((0, 1000.0, 0)), place_at((0, 0, -50.0))
-    assert north.latitude_deg - HOME.latitude_deg == pytest.approx(0.0089932, abs=1e-6)
-    assert north.longitude_deg == HOME.longitude_deg
-    shrink = math.cos(math.radians(HOME.latitude_deg))
-    assert east.longitude_deg - HOME.longitude_deg == pytest.approx(0.0089932 / shrink, abs=1e-6)
-    assert up.altitude_m == HOME.altitude_m + 50
+    # ICAO 7488: 954.61 hPa at 500 m, 0.115 hPa less a metre there; 9 deg C at 924 m.
+    assert air_at(500.0).pressure_hpa == pytest.approx(954.61, abs=0.05)
+    assert air_at(500.0).pressure_hpa - air_at(501.0).pressure_hpa == pytest.approx(0.115, abs=0.002)
+    assert air_at(924.0).temperature_c == pytest.approx(9.0, abs=0.1)
+    assert air_at(500.0).altitude_m == pytest.approx(500.0)
 
 
 def test_the_gps_is_as_noisy_as_the_airframe_file_says():
-    gps = Gps(FOLDABLE, random.Random(1))
+    gps = Gps(FOLDABLE, random.Random(1), Origin())
     fixes = [gps.sample(0, (0.0, 0.0, 0.0), (1.0, -2.0, 0.5)) for _ in range(4000)]
     heights = [fix.place.altitude_m - HOME.altitude_m for fix in fixes]
     north = [fix.velocity_ned_m_s[0] - 1.0 for fix in fixes]

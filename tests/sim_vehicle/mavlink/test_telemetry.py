@@ -1,21 +1,16 @@
 """What a client is told unasked on each kind of link, and whether it fits together."""
 
 import math
-import struct
 from collections import Counter
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
-from pymavlink.generator.mavcrc import x25crc
 
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.earth import StandardAir
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.geography import Origin, Place
 from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
-from sim_vehicle.slow_sensors import air_at
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_MODE, TAKEOFF, Client
@@ -229,27 +224,6 @@ def test_the_world_lies_where_the_parameters_say():
     assert last["ALTITUDE"].altitude_monotonic == pytest.approx(20.0, abs=3.0)
 
 
-def test_radio_channels_show_once_somebody_sends_them():
-    client = Client()
-    client.run(1.0)
-    assert client.all("RC_CHANNELS") == []
-    pulses = (1500, 1500, 1200, 1500, *[0] * 14)
-    for _ in range(20):
-        client.send(dialect.MAVLink_rc_channels_override_message(1, 1, *pulses))
-        client.run(0.05)
-    channels = client.last("RC_CHANNELS")
-    assert (channels.chancount, channels.chan3_raw, channels.chan5_raw) == (4, 1200, 0xFFFF)
-    assert len(client.all("RC_CHANNELS")) == pytest.approx(20, abs=2)
-
-
-@pytest.mark.parametrize("height_m", [-100.0, 0.0, 350.0, 1_500.0])
-def test_the_barometers_formula_is_the_standard_atmosphere(height_m):
-    expected, found = StandardAir().at(height_m), air_at(488.0 + height_m)
-    assert found.pressure_hpa == pytest.approx(expected.pressure_hpa, rel=2e-4)
-    assert found.altitude_m == pytest.approx(488.0 + height_m, abs=0.01)
-    assert found.temperature_c == pytest.approx(expected.temperature_c, abs=0.05)
-
-
 def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
     client = Client(system=255, component=190)
     client.command(TAKEOFF)
@@ -267,39 +241,3 @@ def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
     client.forget()
     client.run(1.0)
     assert client.all("ORBIT_EXECUTION_STATUS") == []
-
-
-def requested(client: Client, *params: float) -> None:
-    client.forget()
-    client.command(REQUEST_MESSAGE, *params)
-    client.run(0.02)
-    assert client.results(REQUEST_MESSAGE) == [0]
-
-
-def test_the_modes_that_there_are_can_be_asked_for_all_at_once_or_one_by_one():
-    client = Client(system=255, component=190)
-    requested(client, 435)
-    modes = client.all("AVAILABLE_MODES")
-    assert [mode.mode_index for mode in modes] == list(range(1, modes[0].number_modes + 1))
-    # Rows of a SITL's list: standard modes have no name
-    rows = {(mode.custom_mode, mode.standard_mode, mode.properties, mode.mode_name) for mode in modes}
-    assert {
-        (0x60000, 0, 1, "Offboard"),
-        (0x30000, 1, 0, ""),
-        (0x5040000, 5, 1, ""),
-        (0xA0000, 0, 3, "Termination"),
-    } <= rows
-    requested(client, 435, 3)
-    (one,) = client.all("AVAILABLE_MODES")
-    assert one.to_dict() == modes[2].to_dict()
-
-
-def test_the_version_of_the_protocol_is_told():
-    client = Client(system=255, component=190)
-    requested(client, 300)
-    (packet,) = [raw for raw in client.sent if raw[7:10] == (300).to_bytes(3, "little")]
-    assert struct.unpack("<HHH", packet[10:-2].ljust(6, b"\0")) == (200, 100, 200)
-    # Its checksum, with the seed that MAVLink's definition of PROTOCOL_VERSION yields
-    checksum = x25crc(packet[1:-2])
-    checksum.accumulate(bytes([217]))
-    assert checksum.crc.to_bytes(2, "little") == packet[-2:]

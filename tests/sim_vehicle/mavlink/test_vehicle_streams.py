@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink.encode import Encoder
-from sim_vehicle.mavlink.line import Buffer, Line, Outbox
+from sim_vehicle.mavlink.line import Line, Outbox
 from sim_vehicle.mavlink.streams import streams as module
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import Streams, interval_from_request
@@ -35,7 +35,7 @@ class Link:
         telemetry = Telemetry(self.sample, self.sample, self.autopilot, VibrationMetrics(), 1e-4, 1e-3, 1e-5)
         self.telemetry = telemetry
         self.topics = Topics(telemetry)
-        self.outbox = Outbox(Encoder(Identity()), Buffer(Line(), 0))
+        self.outbox = Outbox(Encoder(Identity()), Line(), 0)
         self.streams = Streams(telemetry, self.topics, self.outbox, LinkKind.ONBOARD, seed)
         self.parser = dialect.MAVLink(None)
         self.sent_us: dict[int, list[int]] = {}

@@ -1,1 +1,0 @@
-"""What each special rule of the companion is worth: the same flights with and without it."""

@@ -1,1 +1,0 @@
-"""`bench campaign`: random missions, and hits with both laws, judged by what must be shown; bench/notes/campaign.md."""

@@ -1,0 +1,188 @@
+"""Hits and hands of vehicles in free air: what is met, how, by whom, drawn from a seed."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
+from sim_vehicle.airframe import Airframe
+
+Floats = npt.NDArray[np.float64]
+# What is hit and how; each as often as the others.
+APPROACHES = ("wall", "slanted wall", "leaning wall", "ceiling", "pole")
+SPEEDS_M_S = (0.5, 5.0)
+# Below the speeds that are asked for, to see where it ends.
+SLOW_SPEEDS_M_S = (0.3, 0.5)
+SLOW_SHARE = 0.06
+# Of an obstacle that comes towards a hovering vehicle: a person who walks, a door that swings.
+STRUCK_SPEEDS_M_S = (0.5, 3.0)
+# Off the ground by more than any fall within a hit; nothing about the ground is wanted here.
+HEIGHT_M = 30.0
+SLANT_MAX_DEG = 60.0
+LEAN_MAX_DEG = 45.0
+# Of a flight into a ceiling against the horizontal, and of the ceiling itself against level.
+CLIMB_DEG = (30.0, 90.0)
+CEILING_TILT_MAX_DEG = 10.0
+POLE_RADIUS_M = (0.02, 0.30)
+# Beside the middle, as a share of what still touches if a guard points there; where the vehicle slips by between two of
+# them, the same pole again, nearer to the middle.
+POLE_OFFSET_SHARES = (0.8, 0.4, 0.0)
+GRIPS = ("held", "pushed")
+# A vehicle that holds its position wanders: half of what still counts as a hover, or its noise alone would end it.
+DRIFT_MAX_M_S = 0.1
+FROM_S, LASTS_S, LOOKED_AFTER_S = (1.5, 1.9), (0.4, 1.5), 0.5
+# Of an arm that holds still (Mussa-Ivaldi, Hogan and Bizzi, 1985), about critically damped for half a kilogram.
+STIFFNESS_N_M, DAMPING_N_S_M = (100.0, 400.0), (10.0, 30.0)
+# Per unit mass: a push that a vehicle's position control still holds against, risen as fast as an arm moves.
+PUSH_M_S2, RISE_S = (2.0, 6.0), (0.08, 0.2)
+
+
+@dataclass(frozen=True, slots=True)
+class HitCase:
+    """One hit; everything that is not here is drawn from the seed. `family` says what is varied."""
+
+    family: str
+    seed: int
+    airframe: str
+    approach: str
+    speed_m_s: float
+    detectors: tuple[str, ...]
+    vibration_m_s2: float | None = None
+    """Standard deviation of an IMU sample on each axis; None: the airframe's own."""
+    velocity_noise_m_s: float | None = None
+    """RMS on each axis of the vehicle's velocity estimate; None: the airframe's own."""
+    sweeps: bool = False
+    """Whether the detectors' thresholds are swept, too."""
+    is_struck: bool = False
+    """The vehicle hovers, and the obstacle comes at it with the speed."""
+    link: str | None = None
+    """By name, of what the link to the companion does to packets; None: nothing."""
+    is_drawn: bool = False
+    """Whether the vehicle, too, is drawn from the seed: one of the airframe's kind, with other numbers."""
+
+
+def draw_case(family: str, seed: int, detectors: tuple[str, ...], **settings: Any) -> HitCase:
+    """The case that belongs to a seed: airframes and approaches in turn, speeds at random."""
+    rng = np.random.default_rng([seed, 0])
+    speeds = SLOW_SPEEDS_M_S if rng.random() < SLOW_SHARE else SPEEDS_M_S
+    if settings.get("is_struck"):
+        speeds = STRUCK_SPEEDS_M_S
+    return HitCase(
+        family=family,
+        seed=seed,
+        airframe=AIRFRAMES[seed % 2],
+        approach=APPROACHES[seed // 2 % len(APPROACHES)],
+        speed_m_s=round(float(rng.uniform(*speeds)), 3),
+        detectors=detectors,
+        **settings,
+    )
+
+
+def vehicle_of_hit(case: HitCase) -> BenchVehicle:
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    airframe = vehicle.airframe
+    if case.vibration_m_s2 is not None:
+        imu = airframe.imu.model_copy(update={"accelerometer_noise_m_s2": case.vibration_m_s2})
+        airframe = airframe.model_copy(update={"imu": imu})
+    if case.velocity_noise_m_s is not None:
+        estimate = airframe.estimate.model_copy(update={"velocity_noise_m_s": case.velocity_noise_m_s})
+        airframe = airframe.model_copy(update={"estimate": estimate})
+    return BenchVehicle(airframe, vehicle.settings)
+
+
+def velocity_towards(case: HitCase, airframe: Airframe, rng: np.random.Generator) -> Floats:
+    """Level but towards ceilings, whose climb is within the airframe's limit."""
+    heading = rng.uniform(-math.pi, math.pi)
+    elevation = 0.0
+    if case.approach == "ceiling":
+        steepest = math.asin(min(1.0, airframe.control.climb_max_m_s / case.speed_m_s))
+        elevation = min(math.radians(rng.uniform(*CLIMB_DEG)), steepest)
+    level = math.cos(elevation)
+    direction = np.array([level * math.cos(heading), level * math.sin(heading), -math.sin(elevation)])
+    return case.speed_m_s * direction
+
+
+def obstacle_before(
+    case: HitCase,
+    airframe: Airframe,
+    at_ned_m: Floats,
+    velocity: Floats,
+    rng: np.random.Generator,
+    offset_share: float,
+) -> Mapping[str, Any]:
+    """The scene with the obstacle where the vehicle's centre then is at about `at_ned_m` when it touches."""
+    heading = math.atan2(velocity[1], velocity[0])
+    reach_m = airframe.geometry.reach_m
+    if case.approach == "pole":
+        radius_m = float(rng.uniform(*POLE_RADIUS_M))
+        offset_m = offset_share * (reach_m + radius_m) * float(rng.uniform(-1.0, 1.0))
+        along = np.array([math.cos(heading), math.sin(heading), 0.0])
+        across = np.array([-along[1], along[0], 0.0])
+        foot = at_ned_m + (reach_m + radius_m) * along + offset_m * across
+        foot[2] = 0.0
+        return {"poles": [{"point_ned_m": foot.tolist(), "radius_m": radius_m, "height_m": 2.0 * HEIGHT_M}]}
+    slant, lean = 0.0, 0.0
+    if case.approach == "slanted wall":
+        slant = math.radians(rng.uniform(-SLANT_MAX_DEG, SLANT_MAX_DEG))
+    elif case.approach == "leaning wall":
+        slant, lean = math.radians(rng.uniform(-30.0, 30.0)), math.radians(rng.uniform(-LEAN_MAX_DEG, LEAN_MAX_DEG))
+    elif case.approach == "ceiling":
+        slant = rng.uniform(-math.pi, math.pi)
+        lean = math.radians(90.0 - rng.uniform(0.0, CEILING_TILT_MAX_DEG))
+    facing = heading + math.pi + slant
+    normal = np.array([math.cos(lean) * math.cos(facing), math.cos(lean) * math.sin(facing), math.sin(lean)])
+    # How far the vehicle sticks out towards the obstacle: guards all round, little up and down.
+    sideways, upward = math.hypot(normal[0], normal[1]), abs(normal[2])
+    extent_m = math.hypot(reach_m * sideways, airframe.geometry.guard_height_m * upward)
+    point = at_ned_m - extent_m * normal
+    return {"walls": [{"point_ned_m": point.tolist(), "normal_ned": normal.tolist(), "width_m": 60, "height_m": 40}]}
+
+
+def coming(scene: Mapping[str, Any], velocity: Floats, after_s: float) -> dict[str, Any]:
+    """The scene with its obstacle on the way at a velocity, where it was asked to be after so long."""
+    motion = {"velocity_ned_m_s": velocity.tolist()}
+    return {
+        kind: [
+            {**one, "point_ned_m": (np.array(one["point_ned_m"]) - after_s * velocity).tolist(), "motion": motion}
+            for one in obstacles
+        ]
+        for kind, obstacles in scene.items()
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class HandCase:
+    """One grip; everything that is not here is drawn from the seed."""
+
+    grip: str
+    seed: int
+    airframe: str
+    detectors: tuple[str, ...]
+    is_drawn: bool = False
+
+
+def draw_hand(seed: int, detectors: tuple[str, ...]) -> HandCase:
+    """Airframes and grips in turn."""
+    return HandCase(GRIPS[seed // 2 % len(GRIPS)], seed, AIRFRAMES[seed % 2], detectors)
+
+
+def held_by(rng: np.random.Generator) -> dict[str, Any]:
+    return {
+        "kind": "hand_catch",
+        "stiffness_n_m": float(rng.uniform(*STIFFNESS_N_M)),
+        "damping_n_s_m": float(rng.uniform(*DAMPING_N_S_M)),
+    }
+
+
+def pushed_by(rng: np.random.Generator, airframe: Airframe) -> dict[str, Any]:
+    """Level, from any side, at the middle."""
+    side, force_n = rng.uniform(-math.pi, math.pi), airframe.mass_kg * rng.uniform(*PUSH_M_S2)
+    return {
+        "kind": "push",
+        "force_ned_n": [force_n * math.cos(side), force_n * math.sin(side), 0.0],
+        "rise_s": float(rng.uniform(*RISE_S)),
+    }

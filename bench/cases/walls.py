@@ -1,0 +1,98 @@
+"""Missions into a wall: up, straight at it at a steady speed, hit, recovery, down."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+# What the paper used, whatever the defaults become: its law and gain, a detector on the inertial sensor alone.
+DETECTOR, LAW, GAMMA_S = "lateral", "paper", 0.5
+ACCELERATION_M_S2 = 2.0
+# After the acceleration, until drag and tilt are in balance: the integral of eq. 6 takes that long to find it.
+CRUISE_S = 3.0
+# The paper flew half a metre up. A hit at 5 m/s leans the vehicle so far that it loses up to 0.9 m; the errors of
+# optical flow grow with the height, so no higher than that asks for.
+HEIGHT_M = 1.5
+# The mission's target is so far behind the wall that braking for it has not begun: a second of flight.
+BEHIND_S = 1.0
+# The wall is wider than any flight bounces along it.
+WALL_WIDTH_M, WALL_HEIGHT_M = 20.0, 3.8
+FENCE_MARGIN_M = 10.0
+RUN_UP_M_S2 = 3.0
+# After speeding up, the vehicle flies steadily for this long before the wall.
+STEADY_S = 1.0
+
+
+def into_a_wall(name: str, speed_m_s: float, slant_deg: float, height_m: float) -> dict[str, Any]:
+    """Up, and at the speed into a wall; the target is so far behind it that braking has not begun there."""
+    wall_m = round(0.5 * speed_m_s**2 / RUN_UP_M_S2 + STEADY_S * speed_m_s + 1.0, 3)
+    beyond_m = wall_m + speed_m_s**2 / RUN_UP_M_S2 + 2.0
+    slant = math.radians(slant_deg)
+    go_to = {"position_ned_m": [beyond_m, 0, -height_m], "speed_m_s": speed_m_s, "acceleration_m_s2": RUN_UP_M_S2}
+    wall = {
+        "point_ned_m": [wall_m, 0, -4],
+        "normal_ned": [-math.cos(slant), -math.sin(slant), 0],
+        "width_m": 40,
+        "height_m": 8,
+    }
+    return {
+        "name": name,
+        "items": [{"takeoff": {"height_m": height_m}}, {"go_to": go_to}, {"land": {}}],
+        "companion": {"flight": {"speeding_up_m_s2": RUN_UP_M_S2}},
+        "fence": {"radius_m": 40, "max_height_m": 8},
+        "sim": {"walls": [wall]},
+    }
+
+
+def pinned(mission: Mapping[str, Any]) -> dict[str, Any]:
+    """The mission with the paper's detector, law and gain stated, so that no default can change them."""
+    return {
+        **mission,
+        "companion": {**mission.get("companion", {}), "detector": DETECTOR},
+        "recovery": {"law": LAW, "gamma": GAMMA_S},
+    }
+
+
+def approach(
+    speed_m_s: float,
+    heading_deg: float = 0.0,
+    height_m: float = HEIGHT_M,
+    cruise_s: float = CRUISE_S,
+    slant_deg: float = 0.0,
+    companion: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Mission towards `heading_deg` at a wall square to it, or turned from there by `slant_deg`.
+
+    The nose stays north: the heading chooses the arms that are hit.
+    """
+    north, east = math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))
+    facing = math.radians(heading_deg + 180.0 + slant_deg)
+    ramp_m = speed_m_s**2 / (2.0 * ACCELERATION_M_S2)
+    wall_m = ramp_m + cruise_s * speed_m_s
+    target_m = wall_m + ramp_m + BEHIND_S * speed_m_s
+    wall = {
+        "name": "wall",
+        "point_ned_m": [wall_m * north, wall_m * east, -0.5 * WALL_HEIGHT_M - 0.1],
+        "normal_ned": [math.cos(facing), math.sin(facing), 0.0],
+        "width_m": WALL_WIDTH_M,
+        "height_m": WALL_HEIGHT_M,
+    }
+    go_to = {
+        "position_ned_m": [target_m * north, target_m * east, -height_m],
+        "speed_m_s": speed_m_s,
+        "acceleration_m_s2": ACCELERATION_M_S2,
+        "yaw_deg": 0.0,
+    }
+    flight = {"arrival_timeout_s": 2.0, "speeding_up_m_s2": ACCELERATION_M_S2}
+    settings: dict[str, Any] = {"streams": {"window_s": 0.5}, "flight": flight}
+    for part, values in (companion or {}).items():
+        settings[part] = {**settings.get(part, {}), **values} if isinstance(values, Mapping) else values
+    return pinned(
+        {
+            "name": "approach",
+            "items": [{"takeoff": {"height_m": height_m}}, {"go_to": go_to}, {"land": {}}],
+            "on_collision": {"then": "land"},
+            "fence": {"radius_m": target_m + FENCE_MARGIN_M, "max_height_m": height_m + 4.0},
+            "companion": settings,
+            "sim": {"walls": [wall]},
+        }
+    )

@@ -1,0 +1,53 @@
+"""What every baseline has: a loudness, a threshold, and one impact for one contact."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from companion.messages import MessageId, Vector3
+from companion.reflex.detector import DetectorState, Impact, Phase
+
+# A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
+REARM_US = 40_000
+
+
+class Baseline:
+    """Built from its settings, as the drone's own detector is."""
+
+    losses: ClassVar[Mapping[MessageId, str]] = {}
+
+    def __init__(self, config: Any, averaging_interval_us: int) -> None:
+        self._config = config
+        self._averaging_us = averaging_interval_us
+
+
+def judge(
+    state: DetectorState,
+    time_us: int,
+    free_until_us: int,
+    force_frd_m_s2: Vector3,
+    size_m_s2: float,
+    is_loud: bool,
+    off_reason: str | None,
+) -> Impact | None:
+    """Move the state's phase by one sample; the impact if it is the first loud one of a contact."""
+    before, state.last_sample_boot_us = state.phase, time_us
+    if off_reason is not None:
+        state.phase, state.off_reason = Phase.OFF, off_reason
+        return None
+    state.off_reason = ""
+    if not is_loud:
+        if before is Phase.OFF:
+            state.phase, state.last_loud_boot_us = Phase.QUIET, time_us
+        elif time_us - state.last_loud_boot_us >= REARM_US:
+            state.phase = Phase.ARMED
+        return None
+    state.last_loud_boot_us = time_us
+    if before is Phase.ARMED:
+        state.phase = Phase.CONTACT
+        state.peak_specific_force_m_s2 = size_m_s2
+        return Impact(time_us, free_until_us, force_frd_m_s2)
+    if before is Phase.CONTACT:
+        state.peak_specific_force_m_s2 = max(state.peak_specific_force_m_s2, size_m_s2)
+    else:
+        state.phase = Phase.QUIET
+    return None

@@ -1,1 +1,0 @@
-"""The faults and attacks, one file a kind."""

@@ -1,0 +1,338 @@
+"""Between the companion and the simulated vehicle: the connection and the clock of a real loop, in virtual time.
+
+Whatever an injector does, it does here: to the bytes of either direction, to the clock, to the loop, to the vehicle.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from bench.fly.packets import (
+    ARM,
+    COMMAND,
+    GROUND_STATION,
+    SET_MODE,
+    SETPOINT,
+    custom_mode,
+    decoded,
+    made,
+    outside,
+)
+from companion.companion import Companion
+from companion.mavlink.packet import message_id_of
+from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
+from rebound_cli.background import Background
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.simulation.lockstep import EPOCH_US
+from sim_vehicle.bench.changeable import ChangeableVehicle
+from sim_vehicle.bench.faults import FaultRequest
+from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+
+# A clock that is read goes on.
+_READING_US = 4
+# A ground station's own rates; sticks come at 10 Hz or more.
+_STICKS_EVERY, _BEAT_EVERY = 20, 250
+# PX4's modes as DO_SET_MODE takes them: main and sub mode.
+POSCTL = 3 << 16
+COMPLETED, HANDED_OVER, FAILED, KILLED = "completed", "aborted", "failed", "killed"
+_WORDS = {
+    COMPLETED: "lands as the mission says",
+    HANDED_OVER: "ends, vehicle handed over",
+    FAILED: "fault told, vehicle handed over",
+    KILLED: "PX4's own failsafe lands it",
+}
+
+
+class Injector:
+    """Does nothing; each fault overrides where it acts."""
+
+    def begin(self, air: Air) -> None:
+        """Before the first interval."""
+
+    def end(self) -> None:
+        """After the last one."""
+
+    def each(self, air: Air) -> None:
+        """Before every interval of the vehicle."""
+
+    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        return frames
+
+    def to_vehicle(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        return frames
+
+    def clock_us(self, air: Air, now_us: int) -> int:
+        """What the companion's clock shows."""
+        return now_us
+
+    def console(self) -> Console:
+        """Where the timeline is printed."""
+        return Console(io.StringIO())
+
+    def writer(self) -> Background | None:
+        """Who writes the log; None: it is written at once."""
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """From some time after the companion was first in a state, and for how long."""
+
+    state: str
+    after_s: float = 0.0
+    for_s: float = math.inf
+
+    def is_on(self, air: Air) -> bool:
+        return self.is_on_at(air, air.now_s)
+
+    def is_on_at(self, air: Air, at_s: float) -> bool:
+        """Whether it was on then, by the vehicle's clock."""
+        since_s = air.since.get(self.state)
+        return since_s is not None and 0.0 <= at_s - since_s - self.after_s < self.for_s
+
+    def ended_s(self, air: Air) -> float:
+        """When it ends; of what has not begun never."""
+        return air.since.get(self.state, math.inf) + self.after_s + self.for_s
+
+    @classmethod
+    def flying(cls, chance: random.Random, for_s: float = math.inf) -> When:
+        """In the cruise towards the wall, or at the hit: at a random instant of the first 1.5 s of the item."""
+        return cls("mission", chance.uniform(0.0, 1.5), for_s)
+
+    @classmethod
+    def recovering(cls, chance: random.Random, for_s: float = math.inf) -> When:
+        """At a random instant of the first 0.6 s after the hit."""
+        return cls("recovering", chance.uniform(0.0, 0.6), for_s)
+
+
+class Killed(BaseException):
+    """SIGKILL: nothing of the program goes on."""
+
+
+class Hung(BaseException):
+    """The flight has taken longer than any should."""
+
+
+class Landing(BaseException):
+    """The vehicle has been landing by itself for a second; the rest is its own affair."""
+
+
+class Branched(BaseException):
+    """Every fault has flown on from here."""
+
+
+@dataclass
+class Air:
+    """One flight's wire, clock and vehicle."""
+
+    vehicle: ChangeableVehicle
+    companion: Companion
+    interrupts: Interrupts
+    injector: Injector
+    chance: random.Random
+    limit_s: float
+    to_the_ground: bool = True
+    """Whether the vehicle's own landing is waited for."""
+    branch: Callable[[], None] | None = None
+    """Called once, when the first item begins."""
+    since: dict[str, float] = field(default_factory=dict)
+    """When the companion was first in a state; seconds of the vehicle's clock."""
+    stall_s: float = 0.0
+    """How long the process gets no time, from now on."""
+    outside: list[str] = field(default_factory=list)
+    """Setpoints outside the envelope."""
+    pilot_mode: int | None = None
+    """What a pilot has taken."""
+    pilot_at_s: float | None = None
+    is_told: bool = False
+    """Whether the companion has been handed a packet that says so."""
+    after_told: int = 0
+    """Setpoints and commands for mode or arming that it sent afterwards."""
+    has_left_offboard: bool = False
+    """Whether somebody else has flown since the first item: PX4's failsafe, its landing, a pilot."""
+    is_overruled: bool = False
+    """Whether the vehicle has left the pilot's mode."""
+    _to_vehicle: list[bytes] = field(default_factory=list)
+    _waiting: list[bytes] = field(default_factory=list)
+    _pilot: Link | None = None
+    _readings: int = 0
+    _intervals: int = 0
+
+    @property
+    def now_s(self) -> float:
+        """Of the vehicle, since it was switched on."""
+        return self.vehicle.time_boot_us * 1e-6
+
+    @property
+    def state(self) -> str:
+        """The companion's."""
+        core = self.companion.core
+        return "" if core is None else core.machine.state.value
+
+    # --- the clock and the connection of the loop
+
+    def now_us(self) -> int:
+        self._readings += 1
+        return self.injector.clock_us(self, EPOCH_US + self.vehicle.time_boot_us + _READING_US * self._readings)
+
+    def sleep(self, duration_s: float) -> None:
+        until_s = self.now_s + duration_s
+        while self.now_s < until_s:
+            self._waiting += self.passed()
+
+    def receive(self, timeout_s: float) -> bytes:
+        """A wait lets one interval pass, or a stall's many; what has arrived then waits packet by packet."""
+        if self._waiting:
+            return self._hand_over([self._waiting.pop(0)])
+        if timeout_s <= 0.0:
+            return b""
+        frames = self.passed()
+        until_s, self.stall_s = self.now_s + self.stall_s, 0.0
+        if self.now_s >= until_s:
+            return self._hand_over(frames)
+        self._waiting = list(frames)
+        while self.now_s < until_s:
+            self._waiting += self.passed()
+        # A socket that is full drops what is new.
+        del self._waiting[MOST_DATAGRAMS:]
+        return self.receive(timeout_s)
+
+    def news(self) -> str | None:
+        return None
+
+    @property
+    def counts(self) -> LinkCounts:
+        return LinkCounts()
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+    def send(self, frame: bytes) -> None:
+        core = self.companion.core
+        wrong = None if core is None else outside(core, frame)
+        if wrong is not None:
+            self.outside.append(f"{wrong} at {self.now_s:.2f} s")
+        if self.is_told and _takes_control(frame):
+            self.after_told += 1
+        self._to_vehicle.append(frame)
+
+    def _hand_over(self, frames: Sequence[bytes]) -> bytes:
+        if self.pilot_mode is not None and not self.is_told:
+            self.is_told = any(custom_mode(frame) == self.pilot_mode for frame in frames if len(frame) > 12)
+        return b"".join(frames)
+
+    # --- the vehicle's side
+
+    def passed(self) -> list[bytes]:
+        """One interval of the vehicle; what reaches the companion of it."""
+        if self.now_s > self.limit_s:
+            raise Hung
+        state = self.state
+        if state == "mission" and self.branch is not None:
+            branch, self.branch = self.branch, None
+            branch()
+        self.has_left_offboard |= "mission" in self.since and self.vehicle.mode != "Offboard"
+        began_s = self.since.setdefault(state, self.now_s)
+        if state == "landing" and not self.to_the_ground and self.now_s - began_s > 1.0 and self.vehicle.mode == "Land":
+            raise Landing
+        self.injector.each(self)
+        self._fly_sticks()
+        frames, self._to_vehicle = self._to_vehicle, []
+        said = self.vehicle.step(b"".join(self.injector.to_vehicle(self, frames)))
+        if self._pilot is not None:
+            self._pilot.take()
+        if self.pilot_mode is not None and self.pilot_at_s is not None and self.now_s > self.pilot_at_s + 0.1:
+            self.is_overruled |= self.vehicle.mode != "Position"
+        return list(self.injector.to_companion(self, list(said)))
+
+    def alone(self, seconds: float) -> None:
+        """The vehicle goes on until it is disarmed, or for this long; nobody reads what it says."""
+        until_s = self.now_s + seconds
+        while self.now_s < until_s and self.vehicle.is_armed:
+            self.vehicle.step(b"")
+            self._fly_sticks()
+            self.has_left_offboard |= self.vehicle.mode != "Offboard"
+
+    # --- what injectors do
+
+    def inject(self, request: FaultRequest, for_s: float | None = None) -> None:
+        """A fault of the simulated vehicle's, from now on."""
+        for fault in request.timed(self.now_s, for_s):
+            self.vehicle.add_fault(fault)
+
+    def kill(self) -> None:
+        raise Killed
+
+    def add_pilot(self) -> None:
+        """A ground station with centred sticks, on a link of its own."""
+        self._pilot = self.vehicle.add_link(LinkOptions(LinkKind.GROUND))
+
+    def take_over(self) -> None:
+        """The pilot takes position mode."""
+        assert self._pilot is not None, "there is a pilot from the beginning"
+        self._push("COMMAND_LONG", command=SET_MODE, param1=1.0, param2=3.0, target_system=1, target_component=1)
+        self.pilot_mode, self.pilot_at_s = POSCTL, self.now_s
+
+    def _fly_sticks(self) -> None:
+        self._intervals += 1
+        if self._pilot is None:
+            return
+        if self._intervals % _STICKS_EVERY == 0:
+            self._push("MANUAL_CONTROL", target=1, z=500)
+        if self._intervals % _BEAT_EVERY == 0:
+            self._push("HEARTBEAT", type=6, autopilot=8)
+
+    def _push(self, name: str, **fields: Any) -> None:
+        assert self._pilot is not None, "only with a pilot"
+        self._pilot.push(made(name, fields, GROUND_STATION, self._intervals % 256))
+
+
+def _takes_control(frame: bytes) -> bool:
+    number = message_id_of(frame)
+    if number == SETPOINT:
+        return True
+    message = decoded(frame) if number == COMMAND else None
+    return message is not None and message.command in (SET_MODE, ARM)
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """Beside what holds for every row: no loss of vehicle, log or authority, no setpoint outside the envelope."""
+
+    outcomes: tuple[str, ...] = (COMPLETED,)
+    """How a flight may end, by the report."""
+    finds: bool = True
+    """The hit is found."""
+    has_wall: bool = True
+    """Without one where nobody could see it: a hit that nobody answers shows PX4 and the airframe, not this program."""
+    false_hits: int = 0
+    """Recoveries from nothing that a flight may count as a collision."""
+    blinds: bool = False
+    """While it acts nothing shows a hit. What the wall does to a vehicle that meets it then shows PX4 and the airframe,
+    not this program; the hit may be told when the sensor is back, as late as any other after its touch."""
+
+    def text(self) -> str:
+        parts = [" or ".join(_WORDS[outcome] for outcome in self.outcomes)]
+        parts += ["the hit found"] if self.finds else [] if self.has_wall else ["(no wall in the way)"]
+        parts += [] if self.false_hits else ["nothing else taken for one"]
+        parts += ["who meets the wall meanwhile is PX4's and the airframe's"] if self.blinds else []
+        return "; ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A row of the table. `inject` makes the fault anew for every flight, as its chance has it."""
+
+    name: str
+    injected: str
+    inject: Callable[[random.Random], Injector]
+    expected: Expected = Expected()
+    from_the_start: bool = False
+    """Whether the fault acts before the first item, so that every flight has to be flown from its take-off."""

@@ -1,0 +1,182 @@
+"""One flight into a wall with a fault, through the loop of real flights in virtual time."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import shutil
+import tempfile
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from bench.cases.vehicles import AIRFRAMES
+from bench.fly.air import COMPLETED, KILLED, Air, Branched, Fault, Hung, Killed, Landing
+from bench.fly.campaign import Json
+from bench.fly.moments import Copies
+from companion.companion import Companion, StepResult
+from companion.mission.model import Mission
+from companion.shell.tlog import may_be_logged
+from rebound_cli.background import Background
+from rebound_cli.inputs import resolved, with_guards
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import FlightRecorder
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.bench.changeable import ChangeableVehicle
+from sim_vehicle.scene import Scene
+
+SPEEDS_M_S, MOST_SLANT_DEG = (1.0, 2.0), 30.0
+HEIGHT_M, WALL_M = 1.0, 2.0
+# The mission takes 20 s; links that are cut are given up after some seconds.
+LIMIT_S = 60.0
+# What an aborted flight leaves hovers, or comes down by itself from this height within 12 s.
+LEFT_ALONE_S, KILLED_FOR_S = 1.5, 12.0
+# So many flights of each row end on the ground; of the others the vehicle's own landing is not waited for.
+TO_THE_GROUND = 1
+
+
+class Noting(FlightRecorder):
+    """Keeps the vehicle's time of every event: the companion's own clock may be what is wrong."""
+
+    def __init__(self, folder: Path, writer: Background | None, air: Air) -> None:
+        super().__init__(folder, writer)
+        self.folder, self._air = folder, air
+        self.told_s: list[float] = []
+        self.counted = 0
+
+    def record(self, now_us: int, result: StepResult) -> None:
+        self.told_s += [self._air.now_s] * len(result.events)
+        self.counted += sum(map(may_be_logged, result.received_frames)) + len(result.sent_frames)
+        super().record(now_us, result)
+
+    def move_to(self, folder: Path, writer: Background | None) -> None:
+        """Go on in a copy of the folder, as only a process that was forked may."""
+        shutil.copytree(self.folder, folder, dirs_exist_ok=True)
+        for file, name in (
+            (self._tlog._file, run_folder.TLOG_NAME),
+            (self._events_file, run_folder.EVENTS_NAME),
+            (self._inputs_file, run_folder.INPUTS_NAME),
+        ):
+            descriptor = os.open(folder / name, os.O_WRONLY | os.O_APPEND)
+            os.dup2(descriptor, file.fileno())
+            os.close(descriptor)
+        self.folder = self._folder = folder
+        if writer is not None:
+            self.writer, self._do = writer, writer.give
+
+
+def mission_of(number: int) -> Mission:
+    """Up, into a wall that nobody knows of, and down."""
+    chance = random.Random(number)
+    speed, slant = round(chance.uniform(*SPEEDS_M_S), 2), math.radians(chance.uniform(-MOST_SLANT_DEG, MOST_SLANT_DEG))
+    go_to = {"position_ned_m": [7, 0, -HEIGHT_M], "speed_m_s": speed, "acceleration_m_s2": 2.0}
+    wall = {
+        "point_ned_m": [WALL_M, 0, -2.5],
+        "normal_ned": [-math.cos(slant), -math.sin(slant), 0],
+        "width_m": 20,
+        "height_m": 5,
+    }
+    data: dict[str, Any] = {
+        "name": "faults",
+        "items": [{"takeoff": {"height_m": HEIGHT_M}}, {"go_to": go_to}, {"land": {}}],
+        "on_collision": {"then": "land"},
+        "on_interrupt": "hold",
+        "fence": {"radius_m": 12, "max_height_m": 4},
+        "companion": {"streams": {"window_s": 0.5}},
+        "sim": {"walls": [wall], "airframe": AIRFRAMES[number % 2], "seed": 1 + number},
+    }
+    return Mission.model_validate(with_guards(data, load_built_in(AIRFRAMES[number % 2])))
+
+
+class FaultedFlight:
+    """The mission of a number with a fault. Files are left in the folder of `recorder`."""
+
+    def __init__(self, number: int, fault: Fault, folder: Path) -> None:
+        self.number, self.fault = number, fault
+        self.mission = mission_of(number)
+        self.scene = Scene.model_validate(self.mission.sim or {})
+        self.airframe = load_built_in(self.scene.airframe)
+        self.injector = fault.inject(self._chance())
+        vehicle = ChangeableVehicle(self.airframe, self.scene, self.scene.seed, 0, {})
+        self.interrupts, self.companion = Interrupts(), Companion(self.mission)
+        self.air = Air(vehicle, self.companion, self.interrupts, self.injector, self._chance(), LIMIT_S)
+        self.air.to_the_ground = number < TO_THE_GROUND
+        self._begin()
+        self.fault_text, self.ended = "", ""
+        """What the loop says of a fault inside the program; how the flight ended if not by its mission's rules."""
+        self.killed_at_s = 0.0
+        run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(self.mission, None))
+        run_folder.write_json(folder / run_folder.VERSIONS_NAME, {})
+        run_folder.write_json(folder / run_folder.SUMMARY_NAME, {})
+        self.recorder = Noting(folder, self.injector.writer(), self.air)
+
+    def fly(self) -> None:
+        air, console = self.air, self.injector.console()
+        try:
+            loop = Loop(self.companion, air, _clock(air), self.recorder, console, self.interrupts)
+            fly_realtime(self.companion, loop, ConfirmAtOnce())
+        except FlightFaultError as error:
+            self.fault_text = str(error)
+        except (Killed, Hung, Landing) as end:
+            self.ended = {Killed: KILLED, Hung: "hung", Landing: COMPLETED}[type(end)]
+        self.injector.end()
+        self.killed_at_s = air.now_s
+        air.alone({KILLED: KILLED_FOR_S, COMPLETED: 0.0}.get(self.ended, LEFT_ALONE_S))
+        if self.ended == KILLED:
+            # What a killed process had in memory is gone; what it had given to the system is not.
+            self.recorder._tlog._pending.clear()
+        self.recorder.close()
+
+    def fly_branched(self, faults: Sequence[Fault], judge: Callable[[FaultedFlight], Json]) -> dict[str, Json]:
+        """To the first item, and from there on once with each fault, in a process each; what was judged, by name."""
+        copies = Copies()
+
+        def branch() -> None:
+            for fault in faults:
+                if copies.fork(fault.name):
+                    self._become(fault)
+                    return
+            raise Branched
+
+        def judged() -> Json:
+            try:
+                return judge(self)
+            finally:
+                shutil.rmtree(self.recorder.folder, ignore_errors=True)
+
+        self.air.branch = branch
+        try:
+            self.fly()
+        except Branched:
+            return copies.found
+        except BaseException:
+            text = traceback.format_exc()
+            copies.leave(lambda: {"complaints": [text], "outcome": "broken"})
+        copies.leave(judged)
+        raise AssertionError("only a copy flies on from its first item")
+
+    def _chance(self) -> random.Random:
+        return random.Random(f"{self.fault.name} {self.number}")
+
+    def _become(self, fault: Fault) -> None:
+        """From here on this is a flight with that fault."""
+        self.fault = fault
+        self.injector = self.air.injector = fault.inject(self._chance())
+        self.air.chance = self._chance()
+        self.recorder.move_to(Path(tempfile.mkdtemp()), self.injector.writer())
+        self._begin()
+
+    def _begin(self) -> None:
+        vehicle = self.air.vehicle
+        if not self.fault.expected.has_wall:
+            vehicle.remove(vehicle.obstacles)
+        self.injector.begin(self.air)
+
+
+def _clock(air: Air) -> Any:
+    """The air is the clock, too."""
+    return air

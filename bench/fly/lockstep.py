@@ -1,0 +1,121 @@
+"""A mission flown in lockstep through the whole wire, and what is known of the flight afterwards."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from companion.companion import Companion
+from companion.mission.model import Mission
+from companion.report import Event, FlightReport
+from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.flight_log import FlightLog, read_flight_log
+from rebound_cli.results.run_folder import TLOG_NAME, FlightRecorder
+from rebound_cli.results.summary import Flown
+from rebound_cli.results.truth_match import FlightTruth, Vector3
+from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.scene import Scene
+from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.vehicle import SimulatedVehicle
+from sim_vehicle.world import Obstacle
+
+# Closer than this to how it stands, a vehicle is on the ground.
+STANDS_M = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFlight:
+    """What a judge may look at: the mission, what the companion told, what really happened."""
+
+    mission: Mission
+    report: FlightReport
+    events: Sequence[Event]
+    truth: FlightTruth
+    start_ned_m: Vector3 = (0.0, 0.0, 0.0)
+    standing_m: float = 0.08
+    """Height of the centre when the vehicle stands on the ground."""
+    arm_m: float = 0.0
+    """From the centre to a motor's axis, about which a guard goes round with `guard_m`."""
+    guard_m: float = 0.0
+    obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
+    """By name."""
+
+    def boot_us(self, event: Event) -> float:
+        return event.time_us - self.truth.epoch_at_boot_us
+
+
+def flown_in(
+    folder: Path, mission: Mission, scene: Scene, airframe: Airframe
+) -> tuple[Flown, TruthRecorder, Sequence[Event]]:
+    """From take-off to the end, log and events left in the folder."""
+    recorder = FlightRecorder(folder)
+    try:
+        flown, truth = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
+    finally:
+        recorder.close()
+    return flown, truth, tuple(recorder.events)
+
+
+def flown_with_log(mission: Mission, scene: Scene, airframe: Airframe) -> tuple[Flown, FlightTruth, FlightLog]:
+    """The same; nothing is kept but what is returned."""
+    with tempfile.TemporaryDirectory() as name:
+        flown, _, _ = flown_in(Path(name), mission, scene, airframe)
+        log = read_flight_log(Path(name) / TLOG_NAME)
+    assert flown.truth is not None, "a lockstep flight has its truth"
+    return flown, flown.truth, log
+
+
+def fly(mission: Mission, scene: Scene, airframe: Airframe) -> JudgedFlight:
+    """The same, for a judge."""
+    with tempfile.TemporaryDirectory() as name:
+        flown, _, events = flown_in(Path(name), mission, scene, airframe)
+    assert flown.truth is not None, "a lockstep flight has its truth"
+    return judged_flight(mission, flown.report, events, flown.truth, scene, airframe)
+
+
+def judged_flight(
+    mission: Mission,
+    report: FlightReport,
+    events: Sequence[Event],
+    truth: FlightTruth,
+    scene: Scene,
+    airframe: Airframe,
+) -> JudgedFlight:
+    frame = airframe.geometry
+    parts = frame.foot_depth_m, frame.motor_radius_m, frame.guard_radius_m
+    obstacles = {obstacle.name: obstacle for _, obstacle in scene.obstacles()}
+    return JudgedFlight(mission, report, events, truth, scene.start.position_ned_m, *parts, obstacles)
+
+
+class SteppedFlight:
+    """A mission beside the simulated vehicle, interval by interval, without a log."""
+
+    def __init__(self, mission: Mission, scene: Scene, airframe: Airframe) -> None:
+        self.mission = mission
+        self.standing_m = airframe.geometry.foot_depth_m
+        self.companion, self.vehicle = Companion(mission), SimulatedVehicle(airframe, scene, scene.seed)
+        self.companion.confirm_plan()
+        self._pending = b""
+
+    def fly_until(self, boot_us: float) -> None:
+        """With the companion; its last packets are on their way."""
+        while self.vehicle.time_boot_us < boot_us and not self.companion.finished:
+            self.fly()
+
+    def fly(self) -> None:
+        frames = self.vehicle.step(self._pending)
+        now_us = EPOCH_US + self.vehicle.time_boot_us
+        self._pending = b"".join(self.companion.step(b"".join(frames), now_us).sent_frames)
+
+    def fall(self, most_s: float) -> None:
+        """Without the companion, until the vehicle is on the ground."""
+        until_us = self.vehicle.time_boot_us + most_s * 1e6
+        while self.vehicle.time_boot_us < until_us and not self.is_down:
+            self.vehicle.step(self._pending)
+            self._pending = b""
+
+    @property
+    def is_down(self) -> bool:
+        return float(self.vehicle.truth.series()["position_ned_m"][-1, 2]) > -self.standing_m - STANDS_M

@@ -1,1 +1,0 @@
-"""What the hits through the whole wire show: bench/notes/hits.md."""

@@ -1,1 +1,0 @@
-"""What becomes of a vehicle whose companion is killed, at random instants around a hit."""

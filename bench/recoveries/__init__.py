@@ -1,1 +1,0 @@
-"""Recovery laws side by side: the same hits, flown through the whole wire."""

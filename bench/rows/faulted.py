@@ -1,0 +1,187 @@
+"""What became of a flight with a fault, by the simulator's truth, and of every fault with one seed."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bench.faults.catalogue import FILES, FLOWN
+from bench.faults.files import tried
+from bench.faults.injectors import Rewritten
+from bench.fly.air import FAILED, HANDED_OVER, KILLED, Fault, Injector
+from bench.fly.campaign import Json
+from bench.fly.faulted import FaultedFlight
+from bench.fly.lockstep import JudgedFlight, judged_flight
+from bench.rows.crashes import AIRBORNE_M, crashes, heights_m, tilts_deg
+from companion.shell.tlog import read_tlog
+from rebound_cli.replay.recording import read_recording, reproduce
+from rebound_cli.results import run_folder
+from rebound_cli.results.truth_match import FlightTruth
+from rebound_cli.simulation.lockstep import EPOCH_US
+from sim_vehicle.truth import Hit
+
+# The slowest hit that a detector's bars promise to find.
+NOTICED_M_S = 0.5
+# From the touch to the event: a contact of 0.12 s, the slowest stream's 50 ms, and a link that holds packets back.
+FOUND_WITHIN_S = 0.5
+# A bounce of the same touch.
+SAME_TOUCH_S = 0.25
+STANDS_M = 0.03
+# A flight decided again costs as much as flown: only the first of each row is.
+DECIDED_AGAIN = 1
+CLIPPED_PART = 0.001
+
+
+def work_out_seed(case: tuple[int, Sequence[str]]) -> Json:
+    """Each of these faults with one seed: those that act in flight from one take-off, the others each from its own."""
+    number, names = case
+    branching = [FLOWN[name] for name in names if name in FLOWN and not FLOWN[name].from_the_start]
+    found: dict[str, Json] = {}
+    if branching:
+        with tempfile.TemporaryDirectory() as folder:
+            quiet = Fault("none", "", lambda _: Injector())
+            found = FaultedFlight(number, quiet, Path(folder)).fly_branched(branching, judged)
+    for name in names:
+        if name in FILES:
+            found[name] = tried(FILES[name], number)
+        elif FLOWN[name].from_the_start:
+            found[name] = work_out_fault(number, FLOWN[name])
+    return {name: _told(found[name]) for name in names}
+
+
+def work_out_fault(number: int, fault: Fault) -> Json:
+    """One flight of a fault from its take-off."""
+    with tempfile.TemporaryDirectory() as folder:
+        flight = FaultedFlight(number, fault, Path(folder))
+        flight.fly()
+        return judged(flight)
+
+
+def _told(result: Json) -> Json:
+    return {"complaints": ["the flight broke off"]} if "failure" in result else result
+
+
+def judged(flight: FaultedFlight) -> Json:
+    flown, expected = _flown(flight), flight.fault.expected
+    touches = [hit for hit in flown.truth.hits if hit.closing_speed_m_s >= 0.0]
+    told_s = [at for at, event in zip(flight.recorder.told_s, flown.events, strict=True) if event.kind == "detection"]
+    first = next((hit for hit in touches if hit.closing_speed_m_s >= NOTICED_M_S), None)
+    blind_until_us = _blind_until_us(flight, first)
+    unseen = blind_until_us is not None
+    if first is not None and blind_until_us is not None:
+        touches.append(replace(first, ended_at_boot_us=max(first.ended_at_boot_us, blind_until_us)))
+    is_found = first is not None and any(_is_of(first, at_s) for at_s in told_s)
+    beside = [at_s for at_s in told_s if not any(_is_of(hit, at_s) for hit in touches) and _is_up(flown, at_s)]
+    counted_false = max(0, len(beside) - flown.report.unconfirmed)
+    outcome = flight.ended or flown.report.outcome
+    again = [hit.closing_speed_m_s for hit in touches if first is not None and _is_later(hit, first)]
+    complaints = [f"{cause}: {details}" for cause, details in crashes(flown) if _counts(flight, cause) and not unseen]
+    complaints += [f"setpoint outside: {flight.air.outside[0]}"] if flight.air.outside else []
+    complaints += _authority(flight) + _log(flight)
+    outcomes = (*expected.outcomes, HANDED_OVER) if unseen else expected.outcomes
+    complaints += [f"{outcome}: {flown.report.reason}"] if outcome not in outcomes else []
+    complaints += ["hit not found"] if expected.finds and first is not None and not is_found else []
+    complaints += [f"{counted_false} false hits counted"] if counted_false > expected.false_hits else []
+    if flight.fault_text and FAILED not in expected.outcomes:
+        complaints.append(flight.fault_text)
+    return {
+        "complaints": complaints,
+        "outcome": outcome,
+        "hit": first is not None,
+        "found": is_found,
+        "unseen": unseen,
+        "false": counted_false,
+        "unconfirmed": flown.report.unconfirmed,
+        "tilt_deg": round(float(tilts_deg(flown.truth.series["attitude_wxyz"]).max()), 1),
+        "ground_m_s": _ground_m_s(flown),
+        "again_m_s": round(max(again, default=0.0), 2),
+        "after_told": flight.air.after_told,
+    }
+
+
+def _blind_until_us(flight: FaultedFlight, hit: Hit | None) -> float | None:
+    """When the fault's end lets a hit be seen that it hid; None for one that it did not hide."""
+    if hit is None or not flight.fault.expected.blinds:
+        return None
+    assert isinstance(flight.injector, Rewritten), "what hides a hit rewrites the sensor's messages"
+    when = flight.injector.when
+    return 1e6 * when.ended_s(flight.air) if when.is_on_at(flight.air, 1e-6 * hit.contact_at_boot_us) else None
+
+
+def _counts(flight: FaultedFlight, cause: str) -> bool:
+    """A landing that PX4 or a pilot flies may come at any time."""
+    return cause != "touched the ground" or not flight.air.has_left_offboard
+
+
+def _flown(flight: FaultedFlight) -> JudgedFlight:
+    truth = flight.air.vehicle.truth
+    # By the vehicle's clock, whatever the companion's showed.
+    events = [
+        replace(event, time_us=round(EPOCH_US + at_s * 1e6))
+        for event, at_s in zip(flight.recorder.events, flight.recorder.told_s, strict=True)
+    ]
+    known = FlightTruth(truth.hits, truth.series(), EPOCH_US, truth.faults)
+    return judged_flight(flight.mission, flight.companion.report(), events, known, flight.scene, flight.airframe)
+
+
+def _authority(flight: FaultedFlight) -> list[str]:
+    air = flight.air
+    found = [f"{air.after_told} setpoints or commands after the pilot was heard"] if air.after_told else []
+    return found + (["the pilot was overruled"] if air.is_overruled else [])
+
+
+def _log(flight: FaultedFlight) -> list[str]:
+    """Whether the log can be read, is whole, and is decided again to the bit."""
+    if flight.recorder.writer is not None and flight.recorder.writer.loss is not None:
+        # A disk that takes nothing has no log; that it is told is the row's own affair.
+        is_told = any(event.kind == "lost" for event in flight.recorder.events)
+        return [] if is_told else ["nobody was told of the log's gaps"]
+    events = (flight.recorder.folder / run_folder.EVENTS_NAME).read_text(encoding="utf-8").splitlines()
+    if len(events) != len(flight.recorder.events):
+        return [f"log lost: {len(flight.recorder.events) - len(events)} events"]
+    stamps = [stamp for stamp, _ in read_tlog(flight.recorder.folder / run_folder.TLOG_NAME)]
+    if flight.ended == KILLED:
+        # TlogWriter hands on twice a second.
+        late_s = flight.killed_at_s - (stamps[-1] - EPOCH_US) * 1e-6
+        return [f"log lost: the last {late_s:.1f} s"] if late_s > 0.6 else []
+    # Noise that looks like a header may hide the packet after it from who reads the file.
+    if abs(len(stamps) - flight.recorder.counted) > flight.recorder.counted * CLIPPED_PART:
+        return [f"log lost: {flight.recorder.counted - len(stamps)} of {flight.recorder.counted} packets"]
+    if flight.number < DECIDED_AGAIN and not flight.fault_text and _is_reproducible(flight):
+        difference = reproduce(read_recording(flight.recorder.folder)).first_difference
+        return [] if difference is None else [f"decided otherwise from the log: {difference}"]
+    return []
+
+
+def _is_reproducible(flight: FaultedFlight) -> bool:
+    """A fault inside the program is in no log."""
+    return not any(event.kind == "fault" for event in flight.recorder.events)
+
+
+def _is_up(flown: JudgedFlight, at_s: float) -> bool:
+    """Whether the vehicle is off the ground then."""
+    time_us = flown.truth.series["time_boot_us"]
+    index = min(int(np.searchsorted(time_us, at_s * 1e6)), len(time_us) - 1)
+    return bool(heights_m(flown)[index] > STANDS_M)
+
+
+def _ground_m_s(flown: JudgedFlight) -> float | None:
+    """Speed down at the first touch of the ground; None where it stays up."""
+    height_m = heights_m(flown)
+    airborne = np.flatnonzero(height_m > AIRBORNE_M)
+    if not len(airborne):
+        return None
+    touching = np.flatnonzero(height_m[airborne[0] :] < STANDS_M)
+    if not len(touching):
+        return None
+    return round(float(flown.truth.series["velocity_ned_m_s"][airborne[0] + touching[0], 2]), 2)
+
+
+def _is_of(hit: Hit, at_s: float) -> bool:
+    return at_s - 1e-6 * hit.contact_at_boot_us >= 0.0 and at_s - 1e-6 * hit.ended_at_boot_us <= FOUND_WITHIN_S
+
+
+def _is_later(hit: Hit, first: Hit) -> bool:
+    return hit.contact_at_boot_us - first.ended_at_boot_us > SAME_TOUCH_S * 1e6

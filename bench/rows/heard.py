@@ -1,0 +1,306 @@
+"""What each detector reported of a hit, a hand, a healthy flight or a recorded one, beside the truth."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.cases.hits import HandCase, HitCase, vehicle_of_hit
+from bench.cases.mishaps import FlightCase
+from bench.cases.vehicles import BenchVehicle, vehicle_of
+from bench.detectors.config import BaselineConfig
+from bench.fly.cruise import FlownHealthy, fly_healthy, hit_of, hover_in_hand
+from bench.fly.recorded import (
+    DROP_STEP_S,
+    DROPS_FILE,
+    ELEVATION_MAX_DEG,
+    LOGS_FOLDER,
+    LONGEST_INTERVAL_US,
+    RECORDED_RATES,
+    SLICE_BEFORE_S,
+    HealthyCase,
+    InjectedCase,
+    drops,
+    moments_of,
+    read,
+    scaled,
+    turned,
+    with_impact,
+)
+from bench.fly.watching import (
+    ASKED_HZ,
+    FOUND_WITHIN_US,
+    SWEPT_FACTORS,
+    Found,
+    configuration,
+    streams_asked_hz,
+    watch_all,
+)
+from bench.fly.wire import LINKS, HeardStep, VehicleRecording, Wire, over_link
+from companion.messages import ImuSample, Vector3
+from companion.reflex.impact import ImpactEstimate
+from rebound_cli.replay.watching import watch_log
+from sim_vehicle.truth import Hit
+
+# A force counts as above the noise floor from this many standard deviations of an IMU sample on: of ten hours at
+# 250 Hz on three axes, 2.7e7 numbers, noise alone takes one above six with a probability of 0.05.
+NOISE_FLOOR_SIGMAS = 6.0
+SWEPT_RATES = (50, 246)
+SWEPT_RATE = 246
+
+
+@dataclass(frozen=True, slots=True)
+class Possible:
+    """The first sample that shows the contact, or None where the contact fell between the samples."""
+
+    time_boot_us: int | None
+    imu_times_boot_us: Sequence[int]
+
+    def samples_late(self, found_boot_us: int) -> int | None:
+        """How many IMU samples the report came after the first possible one; 0: with it."""
+        first = self.time_boot_us
+        if first is None:
+            return None
+        if found_boot_us <= first:
+            return 0
+        return sum(first < time_us <= found_boot_us for time_us in self.imu_times_boot_us)
+
+
+def first_possible(
+    recording: VehicleRecording, arrived: Sequence[HeardStep], touch_boot_us: float, floor_m_s2: float
+) -> Possible:
+    """By the truth: the first received sample whose averaging window holds the contact's force above the floor."""
+    # A sample's own interval: over a bad link it may arrive in a later one.
+    stamps = (sample.time_boot_us for sample in recording.samples)
+    contact_m_s2 = dict(zip(stamps, recording.contact_m_s2, strict=True))
+    times, first = [], None
+    for step in arrived:
+        stamps_heard = [sample.time_boot_us for sample in step.samples if isinstance(sample, ImuSample)]
+        if not stamps_heard:
+            continue
+        times.append(step.time_boot_us)
+        shows = any(stamp >= touch_boot_us and contact_m_s2[stamp] > floor_m_s2 for stamp in stamps_heard)
+        if shows and first is None:
+            first = step.time_boot_us
+    return Possible(first, times)
+
+
+def score_hit(
+    recording: VehicleRecording,
+    hit: Hit,
+    vehicle: BenchVehicle,
+    seed: int,
+    detectors: Sequence[str],
+    sweeps: bool,
+    link: str | None = None,
+) -> dict[str, Any]:
+    """What the tables need of one hit, for every rate and detector."""
+    touch_us = hit.contact_at_boot_us
+    floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
+    result: dict[str, Any] = {
+        "speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
+        "off_head_on_deg": angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
+        "clipped": _clipped(recording, hit),
+        "contact_s": hit.contact_duration_s,
+        "rates": {},
+    }
+    wire = Wire(recording)
+    for rate in ASKED_HZ:
+        arrived = wire.heard(streams_asked_hz(rate), seed + rate)
+        if link is not None:
+            arrived = over_link(arrived, recording, LINKS[link], seed + rate)
+        possible = first_possible(recording, arrived, touch_us, floor_m_s2)
+        entries, swept = {}, {}
+        for name in detectors:
+            found, touches, blind = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
+            told_us = [touch.impact.sample_time_boot_us for touch in touches]
+            entries[name] = _entry(found, hit, possible, blind) | {"touches": sum(t >= touch_us for t in told_us)}
+            if sweeps and rate in SWEPT_RATES:
+                configs = [configuration(name, vehicle.settings, factor) for factor in SWEPT_FACTORS]
+                swept[name] = [_is_found(config, arrived, recording, touch_us) for config in configs]
+        possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
+        result["rates"][str(rate)] = {"possible_ms": possible_ms, "detectors": entries, "swept": swept}
+    return result
+
+
+def _is_found(
+    config: BaselineConfig, arrived: Sequence[HeardStep], recording: VehicleRecording, touch_us: float
+) -> bool:
+    found, _, _ = watch_all(config, arrived, recording.situations)
+    return _first_of(found, touch_us) is not None
+
+
+def _first_of(found: Sequence[Found], touch_us: float) -> Found | None:
+    return next((f for f in found if touch_us <= f.time_boot_us <= touch_us + FOUND_WITHIN_US), None)
+
+
+def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> dict[str, Any]:
+    """One detector's report on one hit."""
+    touch_us = hit.contact_at_boot_us
+    entry: dict[str, Any] = {"false": sum(f.time_boot_us < touch_us for f in found), "blind": blind}
+    first = _first_of(found, touch_us)
+    if first is None:
+        return entry
+    velocity, true_velocity = first.final.velocity_ned_m_s, hit.impact_velocity_ned_m_s
+    return entry | {
+        "latency_ms": 1e-3 * (first.time_boot_us - touch_us),
+        "samples_late": possible.samples_late(first.time_boot_us),
+        "evidence": first.first.impact.evidence.value,
+        "speed_error_m_s": math.hypot(*velocity) - math.hypot(*true_velocity),
+        "velocity_error_m_s": math.dist(velocity, true_velocity),
+        "normal_error_deg": angle_deg(first.final.normal.direction_ned, hit.normal_ned),
+        "first_normal_error_deg": angle_deg(first.first.normal.direction_ned, hit.normal_ned),
+        "time_error_ms": 1e-3 * (first.final.time_boot_us - touch_us),
+        "kind": first.final.impact.kind.value,
+        "confidence": first.final.impact.confidence,
+        "bound": first.final.is_lower_bound,
+        "impulse": _ratio(first.final, hit),
+    }
+
+
+def _ratio(estimate: ImpactEstimate, hit: Hit) -> float:
+    """Impulse per unit mass over the true change of velocity that the obstacle made."""
+    change = math.dist(hit.rebound_velocity_ned_m_s, hit.impact_velocity_ned_m_s)
+    return estimate.impulse_m_s / change if change > 0.0 else 0.0
+
+
+def _clipped(recording: VehicleRecording, hit: Hit) -> bool:
+    """Whether the accelerometer reached its range during the contact."""
+    before = after = recording.samples[0].clipping_counts
+    for sample in recording.samples:
+        if sample.time_boot_us <= hit.contact_at_boot_us:
+            before = sample.clipping_counts
+        after = sample.clipping_counts
+        if sample.time_boot_us > hit.ended_at_boot_us:
+            break
+    return before != after
+
+
+def _minus(vector: Vector3) -> Vector3:
+    return -vector[0], -vector[1], -vector[2]
+
+
+def angle_deg(one: Vector3, other: Vector3) -> float:
+    lengths = math.hypot(*one) * math.hypot(*other)
+    if lengths == 0.0:
+        return 180.0
+    cosine = sum(a * b for a, b in zip(one, other, strict=True)) / lengths
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
+
+
+def work_out_flight(case: FlightCase) -> dict[str, Any]:
+    """Fly it, let every detector hear it at every rate, list what they report."""
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    flown = fly_healthy(case, vehicle.airframe)
+    samples = flown.recording.samples
+    result: dict[str, Any] = {
+        "seconds": 1e-6 * (samples[-1].time_boot_us - samples[0].time_boot_us),
+        "clipped": sum(samples[-1].clipping_counts),
+        "rates": {},
+    }
+    wire = Wire(flown.recording)
+    for rate in ASKED_HZ:
+        result["rates"][str(rate)] = _reports(case, vehicle, flown, wire, rate)
+    return result
+
+
+def _reports(case: FlightCase, vehicle: BenchVehicle, flown: FlownHealthy, wire: Wire, rate: int) -> dict[str, Any]:
+    arrived = wire.heard(streams_asked_hz(rate), case.seed + rate)
+    situations = flown.recording.situations
+    index_at = {step.time_boot_us: step.index for step in arrived}
+    detectors: dict[str, Any] = {}
+    for name in case.detectors:
+        found, touches, blind = watch_all(configuration(name, vehicle.settings), arrived, situations)
+        entry: dict[str, Any] = {
+            "alarms": [
+                _told(f.time_boot_us, flown.phases[index_at[f.time_boot_us]], f.first.impact.kind) for f in found
+            ],
+            "touches": len(touches),
+            "blind": blind,
+        }
+        if case.sweeps and rate == SWEPT_RATE:
+            configs = [configuration(name, vehicle.settings, factor) for factor in SWEPT_FACTORS]
+            entry["swept"] = [len(watch_all(config, arrived, situations)[0]) for config in configs]
+        detectors[name] = entry
+    return detectors
+
+
+def _told(time_boot_us: int, phase: str, kind: Any) -> Sequence[Any]:
+    return [round(1e-6 * time_boot_us, 3), phase, kind.value]
+
+
+def work_out_hit(case: HitCase) -> dict[str, Any]:
+    """Fly it once, then let every detector hear it at every rate."""
+    vehicle = vehicle_of_hit(case)
+    recording, hit = hit_of(case, vehicle.airframe)
+    return score_hit(recording, hit, vehicle, case.seed, case.detectors, case.sweeps, case.link)
+
+
+def work_out_hand(case: HandCase) -> dict[str, Any]:
+    """Hold it once, then let every detector hear it at every rate."""
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    recording, began_us = hover_in_hand(case, vehicle.airframe)
+    wire = Wire(recording)
+    result: dict[str, Any] = {"rates": {}}
+    for rate in ASKED_HZ:
+        arrived = wire.heard(streams_asked_hz(rate), case.seed + rate)
+        entries: dict[str, Any] = {}
+        for name in case.detectors:
+            found, touches, _ = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
+            told_us = [t.impact.sample_time_boot_us for t in touches if t.impact.sample_time_boot_us >= began_us]
+            entries[name] = {
+                "collisions": [f.final.impact.kind.value for f in found],
+                "told_after_ms": 1e-3 * (told_us[0] - began_us) if told_us else None,
+            }
+        result["rates"][str(rate)] = {"detectors": entries}
+    return result
+
+
+def work_out_healthy(case: HealthyCase) -> dict[str, Any]:
+    """Collisions and touches that each detector reports, in seconds after the log's start."""
+    log = read(Path(case.folder) / LOGS_FOLDER / case.log)
+    if case.scale != 1.0:
+        log = replace(log, heard=tuple(scaled(log, case.scale)))
+    result: dict[str, Any] = {"seconds": log.duration_s, "rates": {}}
+    for rate, asked_hz in RECORDED_RATES.items():
+        detectors = {}
+        for name in case.detectors:
+            findings = watch_log(log, configuration(name), asked_hz)
+            detectors[name] = {
+                "collisions": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.collisions],
+                "touches": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.contacts],
+                "blind_s": sum(span.duration_s for span in findings.blind),
+            }
+        result["rates"][rate] = detectors
+    return result
+
+
+def work_out_injected(case: InjectedCase) -> dict[str, Any]:
+    """Whether and when each detector reports it, at each rate; what it reported before."""
+    rng = np.random.default_rng([case.seed, 3])
+    folder = Path(case.folder)
+    log = read(folder / LOGS_FOLDER / case.log)
+    force, elevation = drops(folder / DROPS_FILE)[case.drop], math.radians(ELEVATION_MAX_DEG)
+    side, up = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(-elevation, elevation))
+    towards = (math.cos(up) * math.cos(side), math.cos(up) * math.sin(side), math.sin(up))
+    force = turned(force, towards, float(rng.uniform(-math.pi, math.pi)))
+    moments = moments_of(folder / LOGS_FOLDER / case.log)
+    hit_us = moments[int(rng.integers(len(moments)))] + int(rng.integers(LONGEST_INTERVAL_US))
+    # When the link sends its first sample has nothing to do with when the hit comes.
+    begun_us = hit_us - round(1e6 * SLICE_BEFORE_S) - int(rng.integers(LONGEST_INTERVAL_US))
+    struck = with_impact(log, force, begun_us, hit_us)
+    result: dict[str, Any] = {"rates": {}, "impulse_m_s": float(np.linalg.norm(force.sum(axis=0)) * DROP_STEP_S)}
+    for rate, asked_hz in RECORDED_RATES.items():
+        detectors: dict[str, Any] = {}
+        for name in case.detectors:
+            collisions = watch_log(struck, configuration(name), asked_hz).collisions
+            times = [f.at_us for f in collisions]
+            late = [time - hit_us for time in times if 0 <= time - hit_us <= FOUND_WITHIN_US]
+            detectors[name] = {"false": sum(time < hit_us for time in times)}
+            if late:
+                detectors[name]["latency_ms"] = 1e-3 * late[0]
+        result["rates"][rate] = detectors
+    return result

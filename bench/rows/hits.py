@@ -1,0 +1,98 @@
+"""What became of a hit in free flight, by the simulator's truth. SI units."""
+
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from bench.fly.campaign import Json
+from bench.fly.guarded import FREE_S, MOST_RECOVERY_S, Approach, FlownHit, Verdict, again, fly
+from bench.fly.watching import FOUND_WITHIN_US
+from bench.rows.crashes import tilts_deg
+from companion.report import CollisionReport
+from rebound_cli.results.truth_match import LATE_SAMPLE_US, FlightTruth
+from rebound_cli.simulation.lockstep import EPOCH_US
+from sim_vehicle.truth import Hit
+from sim_vehicle.vehicle import SimulatedVehicle
+
+# A vehicle that leaves a wall does not come nearer again; its estimate has nothing to do with this.
+CAME_BACK_M = 0.02
+
+
+def work_out_flown(case: FlownHit) -> Json:
+    """What became of it by the simulator's truth, and what it cost. SI units."""
+    began_s = process_time()
+    vehicle, guard, rest_us = fly(case)
+    cost = {"processor_s": round(process_time() - began_s, 4)}
+    return {**judged(vehicle, guard.collisions(), rest_us), "cost": cost}
+
+
+def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:
+    """Found: the companion told of the first contact, or of one that a guard's bounce made soon after."""
+    hits, series = vehicle.truth.hits, vehicle.truth.series()
+    false = sum(not any(_tells_of(hit, collision) for hit in hits) for collision in told)
+    result: Json = {"seconds": round(1e-6 * vehicle.time_boot_us, 3), "false": false, "touched": bool(hits)}
+    if not hits:
+        return result
+    first = hits[0]
+    touched_us = first.contact_at_boot_us
+    after = series["time_boot_us"] >= touched_us
+    late_us = [c.sample_time_boot_us - touched_us for c in told if c.sample_time_boot_us >= touched_us]
+    is_found = bool(late_us) and late_us[0] <= FOUND_WITHIN_US
+    result |= {
+        "found": is_found,
+        "closing_m_s": round(first.closing_speed_m_s, 3),
+        "tilt_deg": round(float(tilts_deg(series["attitude_wxyz"][after]).max()), 1),
+        "lost_m": round(max(0.0, float(series["position_ned_m"][after, 2].max()) - first.contact_position_ned_m[2]), 3),
+        "rest_s": None if rest_us is None else round(1e-6 * (rest_us - touched_us), 3),
+    }
+    if is_found:
+        until_s = MOST_RECOVERY_S if rest_us is None else 1e-6 * (rest_us - touched_us)
+        result["latency_ms"] = round(1e-3 * late_us[0], 1)
+        result["again"] = returns(FlightTruth(hits, series, EPOCH_US), np.array(first.normal_ned), until_s)
+    return result
+
+
+def _tells_of(hit: Hit, collision: CollisionReport) -> bool:
+    """While the contact lasts, or as soon after its first touch as the detectors' bench calls it found."""
+    until_us = max(hit.ended_at_boot_us + LATE_SAMPLE_US, hit.contact_at_boot_us + FOUND_WITHIN_US)
+    return hit.contact_at_boot_us <= collision.sample_time_boot_us <= until_us
+
+
+def returns(truth: FlightTruth, normal: np.ndarray, until_s: float) -> int:
+    """Touches in the recovery to which the centre had come back; the others are another guard swinging in."""
+    hit, time_us = truth.hits[0], truth.series["time_boot_us"]
+    off_m = truth.series["position_ned_m"] @ normal
+    returned = 0
+    for touch in truth.hits[1:]:
+        if touch.contact_at_boot_us > hit.contact_at_boot_us + 1e6 * until_s:
+            break
+        between = off_m[(time_us >= hit.ended_at_boot_us) & (time_us <= touch.contact_at_boot_us)]
+        returned += len(between) > 0 and float(between.max() - between[-1]) > CAME_BACK_M
+    return returned
+
+
+def work_out_approach(case: FlownHit) -> Json:
+    """Its hits in the order flown, and whether one of them, flown again from the beginning, is the same."""
+    began_s = process_time()
+    approach = Approach(case)
+    flown = list(approach.hits())
+    cost_s = process_time() - began_s
+    touched = [(number, verdict) for number, (_, verdict) in enumerate(flown) if verdict.touched_us is not None]
+    result: Json = {
+        "watched_s": round(1e-6 * approach.flight.vehicle.time_boot_us - FREE_S, 3),
+        "false": approach.is_false or any(verdict.is_early for _, verdict in flown),
+        "hits": [_entry(number, verdict) for number, verdict in touched if not verdict.is_early],
+        "cost": {"processor_s": round(cost_s, 4)},
+    }
+    if flown:
+        scene, verdict = flown[case.hit.seed % len(flown)]
+        told, result["kept"] = again(case, scene)
+        result["agrees"] = verdict == told
+    return result
+
+
+def _entry(number: int, verdict: Verdict) -> list[Any]:
+    """Its number, which says what was met, the speed into the surface, and after how many ms it was found."""
+    late_us = verdict.late_us
+    return [number, round(verdict.closing_m_s, 3), None if late_us is None else round(1e-3 * late_us, 1)]

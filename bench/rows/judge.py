@@ -1,0 +1,148 @@
+"""Whether a flight ended as its mission says, by what really happened; what kept it from it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.cases.missions import MissionCase, flyable, random_mission
+from bench.fly.campaign import Json
+from bench.fly.lockstep import JudgedFlight, fly
+from bench.rows.contacts import JudgedContact, Role, contacts_of, without_contact
+from bench.rows.crashes import crashes
+from bench.rows.memory import given_up, repeated
+from bench.rows.obedience import disobediences
+from bench.rows.recovered import recoveries
+from companion.mission.items import GoToItem, PathItem, TakeoffItem, program
+from companion.report import Event
+
+Floats = npt.NDArray[np.float64]
+
+# The slowest hit that a mission may be sure of: the detectors' bars begin here.
+NOTICED_M_S = 0.5
+# The companion counts a goal as reached within 0.5 m of its estimate, which has drifted by up to half as much.
+REACHED_M = 0.75
+# Home is reached within 0.5 m of the estimate; wind, landing and drift add as much.
+HOME_M = 1.0
+# From where it was told to land to where it stands: gusts, and a glancing wall on the way down.
+LANDED_BESIDE_M = 1.0
+# While it holds, apart from being pushed.
+HELD_M = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """`cause` is what failures are counted by."""
+
+    cause: str
+    details: str
+
+
+def failures(flight: JudgedFlight) -> list[Failure]:
+    """The gravest first; empty where the flight ended as the mission says."""
+    contacts = contacts_of(flight)
+    found = [Failure(cause, details) for cause, details in crashes(flight)]
+    found += _noticing(flight, contacts)
+    found += [Failure("not as the mission says", text) for text in disobediences(flight)]
+    found += [Failure("not where the mission says", text) for text in _places(flight, contacts)]
+    found += [Failure("flew into a known surface", text) for text in repeated(flight, contacts)]
+    found += [Failure("gave up a goal in the open", text) for text in given_up(flight)]
+    return found
+
+
+def _noticing(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[Failure]:
+    for contact in contacts:
+        if contact.role is Role.HIT and contact.collision is None and contact.closing_m_s >= NOTICED_M_S:
+            text = f"{contact.hit.obstacle} at {contact.speed_m_s:.2f} m/s ({contact.closing_m_s:.2f} square to it)"
+            yield Failure("hit not noticed", f"{text} {_at(flight, contact.hit.contact_at_boot_us)}")
+    for collision in without_contact(flight):
+        yield Failure("answered a hit that was none", _at(flight, collision.sample_time_boot_us))
+
+
+def _places(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[str]:
+    """Goals, holds, home and landings, where the vehicle really was."""
+    steps = program(flight.mission.items)
+    goes_home = False
+    told = [event for event in flight.events if event.kind in _TELLING or event.data.get("left_out")]
+    for event, following in pairwise(told):
+        goes_home |= event.kind == "return"
+        if event.kind == "hold":
+            off_m = _wandered_m(flight, event, following, contacts)
+            if off_m > HELD_M:
+                yield f"moved by {off_m:.2f} m while holding {_at(flight, flight.boot_us(event))}"
+        if following.kind == "item" and event.kind in ("armed", "item"):
+            step = steps[0 if event.kind == "armed" else int(str(event.data["step"]))]
+            goal = _goal(step.action)
+            if goal is not None:
+                off_m = float(np.linalg.norm((_place(flight, following) - goal)[~np.isnan(goal)]))
+                if off_m > REACHED_M:
+                    yield f"item {step.label} ({step.name}) ended {off_m:.2f} m beside its goal"
+    last = next((event for event in reversed(told) if event.kind == "landing"), None)
+    if last is not None and told[-1].kind == "done":
+        end = flight.truth.series["position_ned_m"][-1, :2]
+        beside_m = float(np.linalg.norm(end - (_place(flight, last)[:2] + flight.start_ned_m[:2])))
+        home_m = float(np.linalg.norm(end - flight.start_ned_m[:2]))
+        if beside_m > LANDED_BESIDE_M:
+            yield f"stands {beside_m:.2f} m beside where it was told to land"
+        if goes_home and told[told.index(last) - 1].kind == "return" and home_m > HOME_M:
+            yield f"stands {home_m:.2f} m from home"
+
+
+# A time-out, a hit, a goal out of reach, points left out: such items were not flown one after the other.
+_TELLING = ("armed", "item", "detection", "unreachable", "timeout", "hold", "return", "landing", "done", "aborted")
+
+
+def _goal(action: object) -> Floats | None:
+    """Where an item ends, mission coordinates; NaN where it does not say; None where that depends on its start."""
+    match action:
+        case GoToItem(position_ned_m=place):
+            return np.array(place)
+        case PathItem(points_ned_m=points):
+            return np.array(points[-1])
+        case TakeoffItem(height_m=height_m):
+            return np.array([np.nan, np.nan, -height_m])
+    return None
+
+
+def _place(flight: JudgedFlight, event: Event) -> Floats:
+    """Where the vehicle truly was, mission coordinates."""
+    series = flight.truth.series
+    index = min(int(np.searchsorted(series["time_boot_us"], flight.boot_us(event))), len(series["time_boot_us"]) - 1)
+    place: Floats = series["position_ned_m"][index] - np.array(flight.start_ned_m) + [0.0, 0.0, flight.standing_m]
+    return place
+
+
+def _wandered_m(flight: JudgedFlight, begin: Event, end: Event, contacts: Sequence[JudgedContact]) -> float:
+    """Furthest from where it was at first, unless something touched it."""
+    first_us, last_us = flight.boot_us(begin), flight.boot_us(end)
+    if any(first_us <= contact.hit.contact_at_boot_us <= last_us for contact in contacts):
+        return 0.0
+    time_us = flight.truth.series["time_boot_us"]
+    path = flight.truth.series["position_ned_m"][(time_us >= first_us) & (time_us <= last_us)]
+    return float(np.linalg.norm(path - path[0], axis=1).max()) if len(path) else 0.0
+
+
+def _at(flight: JudgedFlight, boot_us: float) -> str:
+    return f"at {1e-6 * (boot_us + flight.truth.epoch_at_boot_us - flight.report.started_at_us):.2f} s"
+
+
+def work_out_mission(case: MissionCase) -> Json:
+    """The row of a random mission: what was drawn, how it ended, and each of its hits."""
+    drawn = random_mission(case)
+    flight = fly(*flyable(case, drawn))
+    contacts = contacts_of(flight)
+    return {
+        "room": drawn.room,
+        "stream_hz": drawn.stream_hz,
+        "wind_m_s": drawn.wind_m_s,
+        "extras": list(drawn.extras),
+        "items": [next(iter(item)) for item in drawn.data["items"]],
+        "outcome": flight.report.outcome,
+        "seconds": round(1e-6 * (flight.report.ended_at_us - flight.report.started_at_us), 3),
+        "failures": [[failure.cause, failure.details] for failure in failures(flight)],
+        "detours": sum(event.kind == "detour" for event in flight.events),
+        "unreachable": sum(event.kind == "unreachable" for event in flight.events),
+        "hits": recoveries(flight, contacts),
+    }

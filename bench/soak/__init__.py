@@ -1,1 +1,0 @@
-"""The guard as a service for hours, by the clock."""

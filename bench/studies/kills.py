@@ -1,0 +1,163 @@
+"""`bench kills`: a companion that is killed at random instants around a hit. By the truth."""
+
+import math
+import random
+from argparse import Namespace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from bench.cases.vehicles import AIRFRAMES
+from bench.cases.walls import into_a_wall
+from bench.fly.campaign import Campaign, Json, Workers, run_campaign
+from bench.fly.lockstep import SteppedFlight
+from bench.fly.moments import Copies
+from bench.rows.tables import Page, table
+from companion.mission.model import Mission
+from rebound_cli.inputs import with_guards
+from rebound_cli.simulation.lockstep import virtual_time_limit_s
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.scene import Scene
+from sim_vehicle.truth import Hit
+
+SPEEDS_M_S = (0.7, 5.0)
+# From before the touch to after it.
+KILLED_S = (-0.3, 1.5)
+KILLS_A_FLIGHT = 10
+IMU_HZ = (250, 50)
+MOST_SLANT_DEG = 45.0
+HEIGHT_M = 1.5
+# A landing from this height takes 5 s; what is not down by then has another trouble, which is told.
+WATCHED_S = 12.0
+# How long a vehicle that keeps its companion is followed after the last instant: what follows then is the next item's.
+WITH_IT_S = 1.5
+BIN_S = 0.1
+# A softer touch than this is what guards are for: the goal counts harder ones alone.
+SECOND_M_S = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A flight, and when after the first touch its companion is killed."""
+
+    airframe: str
+    imu_hz: int
+    speed_m_s: float
+    slant_deg: float
+    seed: int
+    kills_s: tuple[float, ...]
+
+
+def kills_campaign(kills: int, first_seed: int) -> Campaign:
+    parameters = {"kills": kills, "first_seed": first_seed}
+    return Campaign("kills", parameters, cases(kills, first_seed), work_out)
+
+
+def cases(kills: int, first_seed: int) -> list[Case]:
+    """Airframes and IMU rates in turn; all else as the seed draws it."""
+    found: list[Case] = []
+    for number in range(math.ceil(kills / KILLS_A_FLIGHT)):
+        seed = first_seed + number
+        draw = random.Random(seed)
+        speed_m_s, slant_deg = draw.uniform(*SPEEDS_M_S), draw.uniform(-MOST_SLANT_DEG, MOST_SLANT_DEG)
+        count = min(KILLS_A_FLIGHT, kills - KILLS_A_FLIGHT * number)
+        instants_s = tuple(round(draw.uniform(*KILLED_S), 3) for _ in range(count))
+        airframe, imu_hz = AIRFRAMES[number % 2], IMU_HZ[number // 2 % 2]
+        found.append(Case(airframe, imu_hz, round(speed_m_s, 3), round(slant_deg, 1), seed, instants_s))
+    return found
+
+
+def mission_data(case: Case) -> dict[str, Any]:
+    """With the case's IMU rate; nobody knows of the wall."""
+    data = into_a_wall("kills", case.speed_m_s, case.slant_deg, HEIGHT_M)
+    data["companion"]["streams"] = {"highres_imu_hz": case.imu_hz}
+    return data
+
+
+def begun(case: Case) -> SteppedFlight:
+    airframe = load_built_in(case.airframe)
+    mission = Mission.model_validate(with_guards(mission_data(case), airframe))
+    scene = Scene.model_validate({**(mission.sim or {}), "airframe": case.airframe, "seed": case.seed})
+    return SteppedFlight(mission, scene, airframe)
+
+
+def work_out(case: Case) -> Json:
+    """Every kill of a flight, and what the same flight does when nobody is killed."""
+    first = begun(case)
+    limit_us = virtual_time_limit_s(first.mission) * 1e6
+    while not first.vehicle.truth.hits and first.vehicle.time_boot_us < limit_us and not first.companion.finished:
+        first.fly()
+    if not first.vehicle.truth.hits:
+        raise AssertionError("the vehicle never reached the wall")
+    touch = first.vehicle.truth.hits[0]
+    flight, copies = begun(case), Copies()
+    for kill_s in sorted(case.kills_s):
+        flight.fly_until(touch.contact_at_boot_us + kill_s * 1e6)
+        if copies.fork(str(kill_s)):
+            copies.leave(lambda: _killed(flight, touch))
+    flight.fly_until(touch.contact_at_boot_us + 1e6 * (KILLED_S[1] + WITH_IT_S))
+    again_m_s = _hardest(flight.vehicle.truth.hits[1:])
+    return {"touch_m_s": touch.closing_speed_m_s, "again_m_s": again_m_s, "kills": [*copies.found.values()]}
+
+
+def _killed(flight: SteppedFlight, touch: Hit) -> Json:
+    killed_at_us = flight.vehicle.time_boot_us
+    since_s = 1e-6 * (killed_at_us - touch.contact_at_boot_us)
+    flight.fall(WATCHED_S)
+    truth = flight.vehicle.truth
+    # The touch itself is no second one, whenever it came.
+    later = [hit for hit in truth.hits if hit.contact_at_boot_us >= killed_at_us][1 if since_s < 0.0 else 0 :]
+    return {
+        "kill_s": since_s,
+        "again_m_s": _hardest(later),
+        "ground_m_s": math.hypot(*truth.series()["velocity_ned_m_s"][-1]) if flight.is_down else None,
+    }
+
+
+def _hardest(hits: Sequence[Hit]) -> float:
+    """0 where there is none."""
+    return max((hit.closing_speed_m_s for hit in hits), default=0.0)
+
+
+def run_kills(options: Namespace) -> int:
+    """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
+    page, campaign = Page(options.out, "kills"), kills_campaign(options.kills, options.first_seed)
+    results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
+    flights = list(results.results.values())
+    kills = pd.json_normalize(flights, "kills", ["touch_m_s"])
+    parts = {"": f"{_lead(flights)}\n\n{kills_table(kills)}", "Not flown": results.text(campaign) or "None.\n"}
+    page.write("A companion that is killed around a hit", options.typed, parts, rows=kills)
+    return 1 if results.failures else 0
+
+
+def _lead(flights: Sequence[Json]) -> str:
+    again = sum(flight["again_m_s"] > SECOND_M_S for flight in flights)
+    return (
+        f"After the kill nothing is sent. Second contact: the centre closes with the wall at over {SECOND_M_S:g} "
+        f"m/s after the kill, the hit itself apart. With nobody killed, {again} of {len(flights)} flights do."
+    )
+
+
+def kills_table(kills: pd.DataFrame) -> str:
+    """By the instant of the kill after the touch."""
+    first, last = (round(edge / BIN_S) for edge in KILLED_S)
+    since = kills["kill_s"] / BIN_S
+    bins = {
+        f"{n * BIN_S * 1e3:.0f} to {(n + 1) * BIN_S * 1e3:.0f} ms": (n <= since) & (since < n + 1)
+        for n in range(first, last)
+    }
+    bins |= {"**before the touch**": since < 0.0, "**after it**": since >= 0.0}
+    return table([{"killed": name, **_cells(kills[inside])} for name, inside in bins.items()])
+
+
+def _cells(kills: pd.DataFrame) -> dict[str, Any]:
+    again, ground = kills["again_m_s"][kills["again_m_s"] > SECOND_M_S], kills["ground_m_s"].dropna()
+    return {
+        "kills": len(kills),
+        "second contact": f"{len(again)} ({100 * len(again) / max(len(kills), 1):.1f} %)",
+        "hardest [m/s]": f"{again.max():.2f}" if len(again) else "–",
+        "at the ground, median [m/s]": f"{ground.median():.2f}" if len(ground) else "–",
+        "most [m/s]": f"{ground.max():.2f}" if len(ground) else "–",
+    }

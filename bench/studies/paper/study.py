@@ -1,0 +1,177 @@
+"""What every study of the paper is: flights to fly, rows of the paper's numbers beside ours, tables and pictures."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bench.rows.tables import table
+from bench.studies.paper.flights import StudyFlight, StudyResult
+from rebound_cli.results.summary import BREAKING_FORCE_N
+
+PASSED, FAILED = "agrees", "**differs**"
+# A hit counts as lost on the way when less than this share of it lies in samples that arrived: a tenth of a
+# millisecond, clipped at 157 m/s^2, adds 3.9 m/s^2 to a mean over 4 ms, just below the detector's threshold.
+LOST_SHARE = 0.1
+# An overshoot below this cannot be seen in the paper's plots, nor told from the noise of an estimate.
+NO_OVERSHOOT_M = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimRow:
+    """One number. `low` and `high` are what ours may be; a row without bounds only reports."""
+
+    claim: str
+    paper: str
+    ours: float
+    unit: str
+    low: float | None
+    high: float | None
+    note: str = ""
+
+    @property
+    def is_judged(self) -> bool:
+        return self.low is not None or self.high is not None
+
+    @property
+    def agrees(self) -> bool:
+        above = self.low is None or self.ours >= self.low
+        return above and (self.high is None or self.ours <= self.high)
+
+    @property
+    def verdict(self) -> str:
+        return (PASSED if self.agrees else FAILED) if self.is_judged else "for comparison"
+
+    @property
+    def tolerance(self) -> str:
+        if self.low is not None and self.high is not None:
+            return f"{number(self.low)} to {number(self.high)}"
+        if self.high is not None:
+            return f"at most {number(self.high)}"
+        return f"at least {number(self.low)}" if self.low is not None else ""
+
+
+def around(claim: str, paper: str, expected: float, ours: float, unit: str, share: float, note: str = "") -> ClaimRow:
+    """A row whose tolerance is a share of the expected value: less than half, so that no factor of two fits."""
+    assert 0.0 < share < 0.5, "a factor of two would pass"
+    margin = share * abs(expected)
+    return ClaimRow(claim, paper, ours, unit, expected - margin, expected + margin, note)
+
+
+def within_factor(
+    claim: str, paper: str, expected: float, ours: float, unit: str, factor: float, note: str = ""
+) -> ClaimRow:
+    """A row for a number that the paper gives in round figures ("≈") and without saying how it was measured."""
+    assert 1.0 < factor < 2.0, "a factor of two would pass"
+    return ClaimRow(claim, paper, ours, unit, expected / factor, expected * factor, note)
+
+
+def at_most(claim: str, paper: str, high: float, ours: float, unit: str, note: str = "") -> ClaimRow:
+    return ClaimRow(claim, paper, ours, unit, None, high, note)
+
+
+def at_least(claim: str, paper: str, low: float, ours: float, unit: str, note: str = "") -> ClaimRow:
+    return ClaimRow(claim, paper, ours, unit, low, None, note)
+
+
+def number(value: float) -> str:
+    """Three digits that count, no exponent for what people say in full, no minus before zero."""
+    text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+    return "0" if float(text) == 0.0 else text
+
+
+def rows_text(rows: Sequence[ClaimRow]) -> str:
+    return table(
+        [
+            {
+                "claim": row.claim,
+                "paper": row.paper,
+                "ours": f"{number(row.ours)} {row.unit}".strip(),
+                "tolerance": row.tolerance,
+                "verdict": row.verdict,
+                "remark": row.note,
+            }
+            for row in rows
+        ]
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFindings:
+    """`tables` by their headings; pictures by the name of their file."""
+
+    title: str
+    rows: tuple[ClaimRow, ...]
+    pictures: Mapping[str, Figure] = field(default_factory=dict)
+    tables: Mapping[str, str] = field(default_factory=dict)
+
+
+class Study(Protocol):
+    """`flights` is told how many seeds are asked for; the results come in the order of the flights.
+
+    Only the study of walls from any side grows with the seeds. The others fly what their pictures and rows need.
+    """
+
+    def flights(self, seeds: int) -> list[StudyFlight]: ...
+
+    def conclude(self, results: Sequence[StudyResult]) -> StudyFindings: ...
+
+
+def is_lost(result: StudyResult) -> bool:
+    """Whether the first hit was lost between the sensor and the companion."""
+    return result.first.share_received < LOST_SHARE
+
+
+def worst_overshoot_m(results: Iterable[StudyResult]) -> float:
+    return max((overshoot for result in results for overshoot in result.overshoots_m), default=0.0)
+
+
+def worst_overshoot_by_estimate_m(results: Iterable[StudyResult]) -> float:
+    return max((overshoot for result in results for overshoot in result.overshoots_by_estimate_m), default=0.0)
+
+
+def safety_text(peak_force_n: float) -> str:
+    """The paper's factor of safety at this force, flagged where the arm would not hold."""
+    factor = BREAKING_FORCE_N / peak_force_n
+    return f"{factor:.2f}" if factor >= 1.0 else f"**{factor:.2f}**"
+
+
+def cells(results: Sequence[StudyResult]) -> dict[str, object]:
+    """Of flights that hit the wall. Overshoot by the truth, and as the vehicle itself saw it."""
+    first = [result.first for result in results]
+    ratios = [contact.hit.rebound_speed_m_s / contact.impact_speed_m_s for contact in first]
+    peak_n = max(contact.hit.peak_force_n for result in results for contact in result.contacts)
+    late_ms = [1e3 * contact.latency_s for contact in first if contact.latency_s is not None]
+    back_m = [
+        float(np.hypot(*np.subtract(c.hit.contact_position_ned_m, c.setpoint_in_world_ned_m)[:2]))
+        for c in first
+        if c.setpoint_in_world_ned_m is not None
+    ]
+    return {
+        "flights": len(results),
+        "`HIGHRES_IMU` received [Hz]": f"{np.mean([result.imu_received_hz for result in results]):.0f}",
+        "first hit lost": sum(is_lost(result) for result in results),
+        "first hit seen": len(late_ms),
+        "latency, mean [ms]": f"{np.mean(late_ms):.1f}" if late_ms else "",
+        "touched again": sum(result.recontacts > 0 for result in results),
+        "with a second hit": sum(result.second_hits > 0 for result in results),
+        "contact, mean [ms]": f"{1e3 * np.mean([c.hit.contact_duration_s for c in first]):.1f}",
+        "speed after / before": f"{np.mean(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})",
+        "setpoint from true x(t_c) [m]": f"{np.mean(back_m):.2f}" if back_m else "",
+        "overshoot, max [m]": number(round(worst_overshoot_m(results), 3)),
+        "by its own estimate [m]": number(round(worst_overshoot_by_estimate_m(results), 3)),
+        "lean into the wall, max [°]": f"{np.degrees(max(r.greatest_lean_rad for r in results)):.0f}",
+        "peak force, max [N]": f"{peak_n:.0f}",
+        "factor of safety": safety_text(peak_n),
+    }
+
+
+def sampling_text(results: Sequence[StudyResult]) -> str:
+    """How the inertial sensor was received: the range over these flights."""
+    rates = sorted(result.imu_received_hz for result in results)
+    intervals = sorted({result.integration_interval_us for result in results})
+    rate = f"{rates[0]:.0f}" if f"{rates[0]:.0f}" == f"{rates[-1]:.0f}" else f"{rates[0]:.0f} to {rates[-1]:.0f}"
+    lengths = " or ".join(f"{1e-3 * interval:g}" for interval in intervals)
+    return f"`HIGHRES_IMU` as received: {rate} Hz, each sample the mean of {lengths} ms."

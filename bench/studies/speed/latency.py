@@ -1,0 +1,266 @@
+"""From a hit's datagram to the setpoint on the wire, in real time at 250 Hz, quiet and beside two busy loops.
+
+Rebound beside the least that a program can do on pymavlink and on MAVSDK (peers.py), in one run.
+"""
+
+import contextlib
+import io
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.fly.campaign import Json
+from bench.fly.faulted import mission_of
+from bench.fly.packets import IMU, SETPOINT, decoded
+from bench.studies.speed.peers import PEERS
+from companion.companion import Companion
+from companion.mavlink.decode import Decoder
+from companion.mavlink.packet import message_id_of
+from companion.shell.clock import Clock
+from companion.shell.connection import udp_out
+from rebound_cli.background import Background
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import Loop
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.simulation.lockstep import EPOCH_US
+from rebound_cli.timing import undisturbed
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+
+BUSY_LOOPS = 2
+# Intervals in real time before the hit.
+LEAD = 30
+# Intervals after the hit in which a setpoint is waited for: half of PX4's COM_OF_LOSS_T.
+AFTER = 125
+# The cruise's setpoint moves by 6 cm from one to the next at 3 m/s; a recovery's jumps, or is a lean.
+JUMP_M = 0.2
+# POSITION_TARGET_TYPEMASK: x and y are not asked for.
+LEVEL_IGNORED = 0x003
+OURS = "Rebound"
+_FLIGHTS = 5
+# Heartbeats come once a second; MAVSDK has found the vehicle after one, and then asks for what it wants to know.
+_GREETED_S = 4.0
+_INTERVAL_S = 0.004
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What the vehicle said in each interval, and the interval whose packets show the hit."""
+
+    number: int
+    said: Sequence[bytes]
+    hit: int
+
+
+Answers = Callable[[Recorded, int], Iterator[float | None]]
+
+
+class Going(Clock):
+    """The real clock, from a moment of the recording on."""
+
+    def __init__(self, from_us: int) -> None:
+        super().__init__()
+        self._ahead_us = from_us - super().now_us()
+
+    def now_us(self) -> int:
+        return super().now_us() + self._ahead_us
+
+
+def recorded(number: int) -> Recorded:
+    """The flight of that number up to its hit, and what the vehicle says after it to whoever does nothing."""
+    mission = mission_of(number)
+    scene = Scene.model_validate(mission.sim or {})
+    companion, vehicle = Companion(mission), SimulatedVehicle(load_built_in(scene.airframe), scene, scene.seed)
+    companion.confirm_plan()
+    said: list[bytes] = []
+    pending = b""
+    while not companion.finished:
+        said.append(b"".join(vehicle.step(pending)))
+        result = companion.step(said[-1], _now_us(len(said) - 1))
+        pending = b"".join(result.sent_frames)
+        if any(event.kind == "detection" for event in result.events):
+            hit = len(said) - 1
+            said += [b"".join(vehicle.step(b"")) for _ in range(AFTER)]
+            return Recorded(number, said, hit)
+    raise AssertionError("the vehicle never met the wall")
+
+
+def _now_us(interval: int) -> int:
+    return EPOCH_US + 4000 * (interval + 2)
+
+
+def timed(flight: Recorded, times: int) -> Iterator[float | None]:
+    """Seconds from the hit's datagram to the recovery setpoint; None where there was none in time."""
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ours:
+        ours.bind(("127.0.0.1", 0))
+        for trial in range(times):
+            (place := Path(folder) / str(trial)).mkdir()
+            child = os.fork()
+            if child == 0:
+                with contextlib.suppress(BaseException):
+                    _fly_on(flight, ours.getsockname()[1], place)
+                os._exit(0)
+            yield exchanged(flight, flight.hit - LEAD, ours, _address_of_child(ours))
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+
+
+def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
+    """The child: the loop of real flights, log and all. It flies to there itself, in memory that is its own."""
+    companion, start = Companion(mission_of(flight.number)), flight.hit - LEAD
+    companion.confirm_plan()
+    for interval in range(start):
+        companion.step(flight.said[interval], _now_us(interval))
+    connection = udp_out("127.0.0.1", port)
+    recorder = FlightRecorder(folder, Background("log"))
+    clock = Going(_now_us(start))
+    loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())
+    with undisturbed():
+        connection.send(b"\0")
+        while True:
+            loop.exchange()
+
+
+def exchanged(flight: Recorded, start: int, ours: socket.socket, theirs: tuple[str, int]) -> float | None:
+    """Plays what the vehicle said from an interval on. Seconds from the hit's datagram until a setpoint that jumps."""
+    began_s, hit_s, last = time.monotonic(), math.inf, None
+    for interval in range(start, len(flight.said)):
+        due_s = began_s + 0.004 * (interval - start)
+        while (left_s := due_s - time.monotonic()) > 0.0:
+            ours.settimeout(left_s)
+            try:
+                frame = ours.recv(65_536)
+            except TimeoutError:
+                break
+            at_s = time.monotonic()
+            if len(frame) > 12 and message_id_of(frame) == SETPOINT:
+                message = decoded(frame)
+                assert message is not None, "the companion's own"
+                place = (message.type_mask, message.x, message.y)
+                if last is not None and _jumps(last, place):
+                    return at_s - hit_s
+                last = place
+        if interval == flight.hit:
+            hit_s = time.monotonic()
+        ours.sendto(flight.said[interval], theirs)
+    return None
+
+
+def _address_of_child(ours: socket.socket) -> tuple[str, int]:
+    """Where its first packet came from; what an earlier child sent last is passed over."""
+    ours.settimeout(10.0)
+    data, sender = b"", ("", 0)
+    while data != b"\0":
+        data, sender = ours.recvfrom(65_536)
+    return sender
+
+
+def _jumps(last: tuple[int, float, float], place: tuple[int, float, float]) -> bool:
+    """To another place, or to a lean, which asks for none; a setpoint that only comes to rest does neither."""
+    return bool((last[0] ^ place[0]) & LEVEL_IGNORED) or math.dist(last[1:], place[1:]) > JUMP_M
+
+
+@contextlib.contextmanager
+def busy(loops: int) -> Iterator[None]:
+    """Processes of the same priority that do nothing but reckon."""
+    children = []
+    for _ in range(loops):
+        child = os.fork()
+        if child == 0:
+            while True:
+                math.fsum(range(1000))
+        children.append(child)
+    try:
+        yield
+    finally:
+        for child in children:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+
+
+def spread(taken: Sequence[float | None]) -> Json:
+    """Milliseconds; one that did not come in time is without bound, and counts. One before the hit is below none."""
+    sizes = sorted(math.inf if seconds is None else 1e3 * seconds for seconds in taken)
+    early = sum(size < 0.0 for size in sizes)
+    at = [sizes[math.ceil(share * len(sizes)) - 1] for share in (0.5, 0.99, 0.999)]
+    found = sum(map(math.isfinite, sizes)) - early
+    return {"found": found, "early": early, "p50": at[0], "p99": at[1], "p999": at[2], "most": sizes[-1]}
+
+
+def compared(hits: int) -> dict[str, dict[str, Json]]:
+    """By program, quiet and busy: how the milliseconds of so many hits are spread."""
+    flights = [recorded(number) for number in range(_FLIGHTS)]
+    times = -(-hits // _FLIGHTS)
+    programs: dict[str, Answers] = {OURS: timed} | {name: of_peer(name) for name in PEERS}
+
+    def measured(answers: Answers) -> Json:
+        return spread([taken for flight in flights for taken in answers(flight, times)])
+
+    found = {name: {"quiet": measured(answers)} for name, answers in programs.items()}
+    with busy(BUSY_LOOPS):
+        for name, answers in programs.items():
+            found[name]["busy"] = measured(answers)
+    return found
+
+
+def of_peer(name: str) -> Answers:
+    """How it answers the hits of a flight: each is played to it again."""
+
+    def answers(flight: Recorded, times: int) -> Iterator[float | None]:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ours, _peer(name, flight) as theirs:
+            ours.bind(("127.0.0.1", 0))
+            _play(flight, flight.hit - LEAD - round(_GREETED_S / _INTERVAL_S), ours, theirs)
+            for _ in range(times):
+                # The answer to the hit before is over when the setpoint is the calm one again.
+                _play(flight, flight.hit - 2 * LEAD, ours, theirs)
+                yield exchanged(flight, flight.hit - LEAD, ours, theirs)
+
+    return answers
+
+
+@contextmanager
+def _peer(name: str, flight: Recorded) -> Iterator[tuple[str, int]]:
+    """Its process, and where it is heard."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "bench.speed.peers", name, str(port), str(_stamp_us(flight))]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield "127.0.0.1", port
+    finally:
+        process.kill()
+        process.wait()
+
+
+def _stamp_us(flight: Recorded) -> int:
+    """Of the sample that comes with the hit."""
+    for frame, _ in Decoder().feed(flight.said[flight.hit]):
+        if message_id_of(frame) == IMU:
+            message = decoded(frame)
+            assert message is not None, "the vehicle's own"
+            return int(message.time_usec)
+    raise AssertionError("a hit is found in a sample of the IMU")
+
+
+def _play(flight: Recorded, start: int, ours: socket.socket, theirs: tuple[str, int]) -> None:
+    """What the vehicle said up to shortly before the hit, at its pace; what comes back is passed over."""
+    began_s = time.monotonic()
+    for number, interval in enumerate(range(max(start, 0), flight.hit - LEAD)):
+        time.sleep(max(began_s + number * _INTERVAL_S - time.monotonic(), 0.0))
+        ours.sendto(flight.said[interval], theirs)
+    ours.setblocking(False)
+    with suppress(BlockingIOError):
+        while True:
+            ours.recv(65_536)

@@ -1,0 +1,54 @@
+"""A flight's picture and page in its folder: at once, or by a process beside what a person does next."""
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from rebound_cli.live.console import Console
+from rebound_cli.replay.recording import Followed
+from rebound_cli.results.run_folder import FIGURE_NAME, REPORT_NAME, TLOG_NAME
+
+
+def show_flight(folder: Path, followed: Followed | None = None) -> None:
+    """The picture is of simulated flights. One that was followed is not decided again. Raises ReboundError, OSError."""
+    # A drone that only offers the page never loads what makes it.
+    from rebound_cli.report.shown_flight import followed_flight, recorded_flight
+    from rebound_cli.report.writer import write_page
+
+    # Where nothing was heard, that is what reading it says.
+    is_followed = followed is not None and followed.started_at_us
+    flight = followed_flight(folder, followed) if followed is not None and is_followed else recorded_flight(folder)
+    if flight.scene is not None:
+        from rebound_cli.figure.flight import draw_flight
+
+        draw_flight(flight, folder / FIGURE_NAME)
+    write_page(flight, folder / REPORT_NAME)
+
+
+def show_later(folder: Path) -> None:
+    """Returns at once; each file is there when it is whole."""
+    nobody = subprocess.DEVNULL
+    command = [sys.executable, "-m", "rebound_cli.figure.showing", str(folder)]
+    subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody, start_new_session=True)
+
+
+def offer_page(folder: Path, console: Console) -> None:
+    """Of a real vehicle's flight: where a person sits at a terminal of more than a drone's install, else how to.
+
+    Of a flight in which nothing was heard there is none.
+    """
+    if (folder / TLOG_NAME).stat().st_size == 0:
+        return
+    if console.is_terminal and find_spec("matplotlib") is not None:
+        show_later(folder)
+        console.print(f"{REPORT_NAME} follows.")
+    else:
+        console.print(f"A page to look at: rebound report {folder}")
+
+
+if __name__ == "__main__":
+    # Everything else on the computer goes before it.
+    os.nice(19)
+    show_flight(Path(sys.argv[1]))

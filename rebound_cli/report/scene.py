@@ -1,0 +1,90 @@
+"""What stands in a flight's scene, moves in it and is remembered of it, by the flight's clock: for all who draw it."""
+
+from typing import Any
+
+from companion.memory.patch import Patch
+from companion.memory.surroundings import outline
+from rebound_cli.report.shown_flight import ShownFlight, patch_of
+from sim_vehicle.world import Motion, Obstacle, Pole
+
+
+def rounded_s(flight: ShownFlight, at_us: float) -> float:
+    """To the microsecond."""
+    return round(flight.seconds(at_us), 6)
+
+
+def modes(flight: ShownFlight) -> list[tuple[float, str]]:
+    """The vehicle's flight modes from when on."""
+    return [
+        (rounded_s(flight, event["time_us"]), event["text"].removeprefix("mode "))
+        for event in flight.events
+        if event["kind"] == "mode" and str(event.get("text", "")).startswith("mode ")
+    ]
+
+
+def recovering(flight: ShownFlight) -> list[tuple[float, float]]:
+    """From each hit that was answered until it was recovered from, or the next one, or the end."""
+    told = [(event["kind"], rounded_s(flight, event["time_us"])) for event in flight.events]
+    spans = []
+    for number, (kind, at_s) in enumerate(told):
+        if kind == "detection":
+            ends = (end_s for end, end_s in told[number + 1 :] if end in ("recovered", "unconfirmed", "detection"))
+            spans.append((at_s, next(ends, flight.ended_s)))
+    return spans
+
+
+def obstacles(flight: ShownFlight) -> list[dict[str, Any]]:
+    scene = flight.scene
+    return [] if scene is None else [_obstacle(flight, obstacle) for _, obstacle in scene.obstacles()]
+
+
+def _obstacle(flight: ShownFlight, obstacle: Obstacle) -> dict[str, Any]:
+    motion = _motion(flight, obstacle.motion)
+    if isinstance(obstacle, Pole):
+        shape = {"foot": obstacle.foot_ned_m, "axis": obstacle.axis_ned, "radius": obstacle.radius_m}
+        return {"name": obstacle.name, "kind": "pole", "height": obstacle.height_m, **shape, "motion": motion}
+    box = obstacle.box()
+    shape = {"centre": box.centre_ned_m, "axes": box.axes_ned, "sizes": box.sizes_m}
+    return {"name": obstacle.name, "kind": "box", **shape, "motion": motion}
+
+
+def _motion(flight: ShownFlight, motion: Motion | None) -> dict[str, Any] | None:
+    """By the page's own clock."""
+    if motion is None or flight.truth is None:
+        return None
+    times_s = [rounded_s(flight, flight.truth.at_us(time_s * 1e6)) for time_s in motion.times_s]
+    return {"t": times_s, "offsets": motion.offsets_ned_m}
+
+
+def surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
+    """What was believed of each surface from when until when: from each touch of it to the next."""
+    told = [
+        (rounded_s(flight, event["time_us"]), patch_of(event["data"]))
+        for event in flight.events
+        if event["kind"] == "obstacle"
+    ]
+    known = [(0.0, patch) for patch in flight.patches if patch.found_at_us < flight.started_at_us]
+    shown = []
+    for number, (since_s, patch) in enumerate([*known, *told]):
+        later = [*known, *told][number + 1 :]
+        until_s = next((at_s for at_s, one in later if patch.touches_ned_m[0] in one.touches_ned_m), None)
+        shown.append({"t": since_s, "until": until_s, "corners": _corners(flight, patch)})
+    return shown
+
+
+def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
+    """In the vehicle's local frame; a wall's in its plane, a ceiling's or a floor's at its height."""
+    origin = flight.origin_ned_m
+    if patch.is_steep:
+        corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline(patch)[:-1]]
+    else:
+        (n, e, _), (north, east, _) = patch.centre_ned_m, patch.normal_ned
+        (left_m, right_m), (low_m, high_m) = patch.assumed_along_m(), patch.assumed_heights_m()
+        around = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
+        corners = [(n - along_m * east, e + along_m * north, -height_m) for along_m, height_m in around]
+    return [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]
+
+
+def vehicle(flight: ShownFlight) -> dict[str, Any]:
+    guards = flight.config.estimate.guards
+    return {"centre": guards.centre_m, "radius": guards.radius_m, "height": guards.height_m}

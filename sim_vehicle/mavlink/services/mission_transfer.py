@@ -1,0 +1,332 @@
+"""The mission protocol on one link: who may upload or download what, lost and repeated packets, time-outs.
+
+Source: PX4's mavlink/mavlink_mission.cpp. Partial lists (MISSION_WRITE_PARTIAL_LIST, MISSION_REQUEST_PARTIAL_LIST) have
+no handler there and none here: they are not answered.
+"""
+
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import Any, TypeAlias
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
+from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore, Plan
+from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.services import mission_wire as wire
+from sim_vehicle.mavlink.services.mission_wire import MissionResult
+
+# MAVLINK_MISSION_RETRY_TIMEOUT_DEFAULT and MAVLINK_MISSION_PROTOCOL_TIMEOUT_DEFAULT.
+RETRY_US = 250_000
+TIMEOUT_US = 5_000_000
+
+_NOBODY = (0, 0)
+_NO_CLEAR, _NO_CURRENT = "WPM: IGN CLEAR CMD: Busy", "WPM: IGN WP CURR CMD: Busy"
+_DOWNLOAD_RUNS = "Mission download request ignored, already active"
+
+
+Packet: TypeAlias = dialect.MAVLink_message
+
+
+# Message ids. Items and requests for them are of the new kind or the old.
+SET_CURRENT, REQUEST_LIST, COUNT, CLEAR_ALL, ACK, REQUEST_INT, ITEM_INT = 41, 43, 44, 45, 47, 51, wire.ITEM_INT_ID
+_NEW_KIND = {wire.ITEM_ID: ITEM_INT, 40: REQUEST_INT}
+MESSAGES = (SET_CURRENT, REQUEST_LIST, COUNT, CLEAR_ALL, ACK, REQUEST_INT, ITEM_INT, *_NEW_KIND)
+
+
+class TransferState(Enum):
+    """What the link is doing."""
+
+    IDLE = auto()
+    RECEIVING = auto()
+    """A list comes in: the vehicle asks for each item."""
+    SENDING = auto()
+    """A list goes out: the peer asks for each item."""
+
+
+class MissionTransfer:
+    """Messages and the time in; answers and texts out. The lists themselves are the store's."""
+
+    def __init__(self, store: MissionStore) -> None:
+        self.state = TransferState.IDLE
+        self.texts: list[StatusText] = []
+        self._store = store
+        self._answers: list[Message] = []
+        self._now_us = 0
+        self._peer = _NOBODY
+        self._type: int = MissionType.MISSION
+        self._is_int = True
+        self._next = 0
+        self._count = 0
+        self._items: list[StoredItem] = []
+        self._marked: int | None = None
+        self._checksum = 0
+        self._sent_us: int | None = None
+        self._heard_us: int | None = None
+
+    def receive(self, message: Packet, now_us: int) -> list[Message]:
+        """Take a message that is addressed to this vehicle."""
+        self._now_us = now_us
+        _HANDLERS[_NEW_KIND.get(message.id, message.id), self.state](self, message)
+        return self._taken()
+
+    def update(self, now_us: int) -> list[Message]:
+        """Let time pass: repeats and time-outs."""
+        self._now_us = now_us
+        if self.state is not TransferState.IDLE:
+            self._wait()
+        return self._taken()
+
+    def _taken(self) -> list[Message]:
+        answers, self._answers = self._answers, []
+        return answers
+
+    # --- time ------------------------------------------------------------------------------------------------
+
+    def _wait(self) -> None:
+        now_us = self._now_us
+        is_quiet = self._sent_us is not None and now_us - self._sent_us > RETRY_US
+        if self.state is TransferState.RECEIVING and is_quiet and not self._is_over():
+            self._ask_for_next()
+        elif self.state is TransferState.SENDING and is_quiet and self._next == 0 and not self._is_over():
+            self._send_count()
+        elif self._is_over():
+            self._say("Mission sync timeout")
+            self._end_upload()
+
+    def _is_over(self) -> bool:
+        return self._heard_us is not None and self._now_us - self._heard_us > TIMEOUT_US
+
+    # --- download ----------------------------------------------------------------------------------------------
+
+    def _begin_download(self, message: Packet) -> None:
+        self.state, self._type, self._peer = TransferState.SENDING, message.mission_type, _peer(message)
+        self._heard_us = self._now_us
+        self._next, self._count = 0, len(self._store.plan(message.mission_type).items)
+        self._send_count()
+
+    def _begin_download_again(self, message: Packet) -> None:
+        """A peer that has everything, or asks for the same once more, may begin again; others wait."""
+        is_complete = self._next == len(self._store.plan(self._type).items)
+        if is_complete or (self._type == message.mission_type and _peer(message) == self._peer):
+            self._begin_download(message)
+        else:
+            self._say(_DOWNLOAD_RUNS, Severity.INFO)
+
+    def _send_count(self) -> None:
+        self._sent_us = self._now_us
+        self._answers.append(dialect.MAVLink_mission_count_message(*self._peer, self._count, self._type))
+
+    def _send_item(self, message: Packet) -> None:
+        if _peer(message) != self._peer:
+            self._say("WPM: REJ. CMD: partner id mismatch")
+            return
+        self._is_int = message.id not in _NEW_KIND
+        if message.mission_type != self._type:
+            return
+        self._heard_us = self._now_us
+        number, items = message.seq, self._store.plan(self._type).items
+        is_next = number == self._next < self._count
+        if is_next:
+            self._next += 1
+        if (is_next or number == self._next - 1) and number < len(items):
+            self._sent_us = self._now_us
+            around = (self._peer, number, self._store.current == number, self._type, self._is_int)
+            self._answers.append(wire.item_message(items[number], *around))
+            return
+        self.state = TransferState.IDLE
+        self._acknowledge(MissionResult.ERROR)
+        self._say("WPM: REJ. CMD: Req. WP was unexpected")
+
+    def _ignore_request(self, message: Packet) -> None:
+        self._is_int = message.id not in _NEW_KIND
+        if _peer(message) != self._peer:
+            self._say("WPM: REJ. CMD: partner id mismatch")
+
+    def _refuse_request(self, message: Packet) -> None:
+        self._is_int = message.id not in _NEW_KIND
+        self._say("WPM: REJ. CMD: " + ("Busy" if _peer(message) == self._peer else "partner id mismatch"))
+
+    def _end_download(self, message: Packet) -> None:
+        if _peer(message) != self._peer:
+            self._say("REJ. WP CMD: partner id mismatch")
+        elif message.mission_type == self._type:
+            self._heard_us = self._now_us
+            self.state = TransferState.IDLE
+
+    # --- upload ------------------------------------------------------------------------------------------------
+
+    def _begin_upload(self, message: Packet) -> None:
+        self._heard_us = self._now_us
+        if self._store.uploading:
+            self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+            return
+        self._peer, self._type, self._checksum = _peer(message), message.mission_type, 0
+        self._store.progress.reached = -1
+        if message.mission_type not in MOST_ITEMS:
+            self._acknowledge(MissionResult.NO_SPACE if message.count else MissionResult.ACCEPTED)
+        elif message.count > MOST_ITEMS[MissionType(message.mission_type)]:
+            self._acknowledge(MissionResult.NO_SPACE)
+        elif message.count == 0:
+            self._store.replace(MissionType(message.mission_type), Plan())
+            self._acknowledge(MissionResult.ACCEPTED)
+        else:
+            self.state, self._store.uploading = TransferState.RECEIVING, True
+            self._next, self._count, self._marked = 0, message.count, None
+            self._items = []
+            self._ask_for_next()
+
+    def _repeat_request(self, message: Packet) -> None:
+        self._heard_us = self._now_us
+        if _peer(message) != self._peer:
+            self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+        elif self._next == 0:
+            self._ask_for_next()
+        else:
+            self._say("WPM: REJ. CMD: Busy")
+            self._acknowledge(MissionResult.ERROR)
+
+    def _refuse_upload(self, message: Packet) -> None:
+        self._say("WPM: IGN MISSION_COUNT: Busy")
+        self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+
+    def _ask_for_next(self) -> None:
+        self._sent_us = self._now_us
+        request = dialect.MAVLink_mission_request_int_message
+        if not self._is_int:
+            request = dialect.MAVLink_mission_request_message
+        self._answers.append(request(*self._peer, self._next, self._type))
+
+    def _take_item(self, message: Packet) -> None:
+        if not self._is_from_partner(message):
+            return
+        self._heard_us = self._now_us
+        if message.seq != self._next:
+            return
+        item = wire.parse(message)
+        if isinstance(item, MissionResult):
+            self._say("IGN MISSION_ITEM: Invalid item")
+            self._refuse_list(item)
+            return
+        if not wire.fits(item, self._type):
+            self._refuse_list(MissionResult.ERROR)
+            return
+        self._checksum = wire.checksum(message, self._checksum)
+        self._items.append(item)
+        if message.current:
+            self._marked = message.seq
+        self._next += 1
+        if self._next < self._count:
+            self._ask_for_next()
+        else:
+            self._store_list()
+
+    def _store_list(self) -> None:
+        if self._checksum != self._store.plan(self._type).checksum:
+            plan = Plan(tuple(self._items), self._checksum)
+            self._store.replace(MissionType(self._type), plan, self._marked)
+        self._end_upload()
+        self._acknowledge(MissionResult.ACCEPTED)
+
+    def _acknowledge_again(self, message: Packet) -> None:
+        """After the last item: its sender may not have got our acknowledgement."""
+        if not self._is_from_partner(message):
+            return
+        if self._next == message.seq + 1:
+            self._acknowledge(MissionResult.ACCEPTED)
+        else:
+            self._say("IGN MISSION_ITEM: No transfer")
+            self._acknowledge(MissionResult.ERROR)
+
+    def _refuse_item(self, message: Packet) -> None:
+        if self._is_from_partner(message):
+            self._say("IGN MISSION_ITEM: Busy")
+            self._acknowledge(MissionResult.ERROR)
+
+    def _is_from_partner(self, message: Packet) -> bool:
+        self._is_int = message.id not in _NEW_KIND
+        if _peer(message) != self._peer:
+            self._say("REJ. MIS ITEM: partner id mismatch")
+            return False
+        if message.mission_type != self._type:
+            self._acknowledge(MissionResult.ERROR)
+            return False
+        return True
+
+    def _refuse_list(self, result: MissionResult) -> None:
+        self._acknowledge(result)
+        self._end_upload()
+
+    def _end_upload(self) -> None:
+        self._store.uploading = self._store.uploading and self.state is not TransferState.RECEIVING
+        self.state = TransferState.IDLE
+
+    def _answer_upload(self, message: Packet) -> None:
+        """The peer cannot send items of the other kind, or gives up."""
+        if _peer(message) != self._peer:
+            self._say("REJ. WP CMD: partner id mismatch")
+        elif message.type == MissionResult.UNSUPPORTED:
+            self._is_int = not self._is_int
+            self._ask_for_next()
+        elif message.type == MissionResult.CANCELLED:
+            self._end_upload()
+
+    # --- the rest ----------------------------------------------------------------------------------------------
+
+    def _clear(self, message: Packet) -> None:
+        self._heard_us, self._type = self._now_us, message.mission_type
+        kinds = MOST_ITEMS if message.mission_type == MissionType.ALL else [message.mission_type]
+        for kind in kinds:
+            if kind in MOST_ITEMS:
+                self._store.replace(MissionType(kind), Plan(), 0)
+        self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ACCEPTED, self._type))
+
+    def _set_current(self, message: Packet) -> None:
+        if not self._store.choose(message.seq):
+            self._say("WPM: WP CURR CMD: Not in list")
+
+    def _ignore_ack(self, message: Packet) -> None:
+        if _peer(message) != self._peer:
+            self._say("REJ. WP CMD: partner id mismatch")
+
+    def _acknowledge(self, result: MissionResult) -> None:
+        self._answers.append(dialect.MAVLink_mission_ack_message(*self._peer, result, self._type))
+
+    def _say(self, text: str, severity: Severity = Severity.CRITICAL) -> None:
+        self.texts.append(StatusText(severity, text))
+
+
+def _peer(packet: Packet) -> tuple[int, int]:
+    return packet.get_srcSystem(), packet.get_srcComponent()
+
+
+def _refused(text: str, severity: Severity = Severity.CRITICAL) -> Callable[[MissionTransfer, Any], None]:
+    return lambda transfer, message: transfer.texts.append(StatusText(severity, text))
+
+
+# The table: what a message means in each state.
+_M = MissionTransfer
+_HANDLERS: dict[tuple[int, TransferState], Callable[[Any, Any], None]] = {
+    (REQUEST_LIST, TransferState.IDLE): _M._begin_download,
+    (REQUEST_LIST, TransferState.SENDING): _M._begin_download_again,
+    (REQUEST_LIST, TransferState.RECEIVING): _refused(_DOWNLOAD_RUNS, Severity.INFO),
+    (REQUEST_INT, TransferState.IDLE): _M._ignore_request,
+    (REQUEST_INT, TransferState.SENDING): _M._send_item,
+    (REQUEST_INT, TransferState.RECEIVING): _M._refuse_request,
+    (COUNT, TransferState.IDLE): _M._begin_upload,
+    (COUNT, TransferState.SENDING): _M._refuse_upload,
+    (COUNT, TransferState.RECEIVING): _M._repeat_request,
+    (ITEM_INT, TransferState.IDLE): _M._acknowledge_again,
+    (ITEM_INT, TransferState.SENDING): _M._refuse_item,
+    (ITEM_INT, TransferState.RECEIVING): _M._take_item,
+    (ACK, TransferState.IDLE): _M._ignore_ack,
+    (ACK, TransferState.SENDING): _M._end_download,
+    (ACK, TransferState.RECEIVING): _M._answer_upload,
+    (CLEAR_ALL, TransferState.IDLE): _M._clear,
+    (CLEAR_ALL, TransferState.SENDING): _refused(_NO_CLEAR),
+    (CLEAR_ALL, TransferState.RECEIVING): _refused(_NO_CLEAR),
+    (SET_CURRENT, TransferState.IDLE): _M._set_current,
+    (SET_CURRENT, TransferState.SENDING): _refused(_NO_CURRENT),
+    (SET_CURRENT, TransferState.RECEIVING): _refused(_NO_CURRENT),
+}

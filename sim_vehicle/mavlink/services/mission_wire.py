@@ -1,0 +1,149 @@
+"""Mission items on the wire: which PX4 takes, what it keeps of them, and how they come back.
+
+Source: PX4's mavlink_mission.cpp, parse_mavlink_mission_item and format_mavlink_mission_item. An item with a place must
+be global; one without must be in MAV_FRAME_MISSION. What PX4 does not keep comes back as zero.
+"""
+
+import math
+import struct
+import zlib
+from enum import IntEnum
+from typing import TypeAlias
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
+from sim_vehicle.mavlink.encode import Message
+
+ItemPacket: TypeAlias = dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message
+"""The two differ in the fifth and sixth parameter: degrees or units themselves, or 1e-7 degrees or whole units."""
+
+ITEM_ID, ITEM_INT_ID = 39, 73
+_GLOBAL_FRAMES = (kinds.FRAME_GLOBAL, kinds.FRAME_GLOBAL_RELATIVE)
+_GLOBAL_INT_FRAMES = (kinds.FRAME_GLOBAL_INT, kinds.FRAME_GLOBAL_RELATIVE_INT)
+_INT_FRAME = dict(zip(_GLOBAL_FRAMES, _GLOBAL_INT_FRAMES, strict=True))
+_FLOAT_FRAME = dict(zip(_GLOBAL_INT_FRAMES, _GLOBAL_FRAMES, strict=True))
+# Of the first four parameters of a global item: kept as they are (k), as whether they are positive (b), as a
+# heading within 0 to 360 degrees (h), as a whole number (n), or not at all (-).
+_KEPT: dict[int, str] = {
+    kinds.WAYPOINT: "kk-h",
+    kinds.LOITER_UNLIMITED: "--kh",
+    kinds.LOITER_TIME: "kbkb",
+    kinds.LAND: "-k-h",
+    kinds.TAKEOFF: "---h",
+    kinds.LOITER_TO_ALTITUDE: "bk-b",
+    kinds.ROI: "----",
+    kinds.DO_SET_ROI: "----",
+    kinds.DO_SET_ROI_LOCATION: "----",
+    kinds.VTOL_TAKEOFF: "---h",
+    kinds.VTOL_LAND: "---h",
+    kinds.CONDITION_GATE: "----",
+    kinds.FENCE_RETURN_POINT: "----",
+    kinds.FENCE_POLYGON_INCLUSION: "n---",
+    kinds.FENCE_POLYGON_EXCLUSION: "n---",
+    kinds.FENCE_CIRCLE_INCLUSION: "k---",
+    kinds.FENCE_CIRCLE_EXCLUSION: "k---",
+    kinds.RALLY_POINT: "----",
+    kinds.ARM_DISARM: "n---",
+    kinds.DO_AUTOTUNE_ENABLE: "nn--",
+}
+_DEGREES_PER_UNIT = 1e-7
+
+
+class MissionResult(IntEnum):
+    """MAV_MISSION_RESULT, as far as PX4 uses it."""
+
+    ACCEPTED = 0
+    ERROR = 1
+    UNSUPPORTED_FRAME = 2
+    UNSUPPORTED = 3
+    NO_SPACE = 4
+    INVALID_PARAM1 = 6
+    CANCELLED = 15
+
+
+def checksum(packet: ItemPacket, before: int) -> int:
+    """PX4's CRC-32 over the items, continued from ``before`` (mavlink_mission.cpp, crc32part)."""
+    place = "ii" if packet.id == ITEM_INT_ID else "ff"
+    params = (packet.param1, packet.param2, packet.param3, packet.param4, packet.x, packet.y, packet.z)
+    raw = struct.pack(f"<BHB4f{place}f", packet.frame, packet.command, packet.autocontinue & 0xFF, *params)
+    return zlib.crc32(raw, before ^ 0xFFFFFFFF) ^ 0xFFFFFFFF
+
+
+def parse(packet: ItemPacket) -> StoredItem | MissionResult:
+    """The item as it is stored, or why it is refused."""
+    is_int = packet.id == ITEM_INT_ID
+    if packet.frame in _GLOBAL_FRAMES or (is_int and packet.frame in _GLOBAL_INT_FRAMES):
+        return _with_place(packet, _DEGREES_PER_UNIT if is_int else 1.0)
+    if packet.frame == kinds.FRAME_MISSION:
+        return _without_place(packet)
+    return MissionResult.UNSUPPORTED_FRAME
+
+
+def _with_place(packet: ItemPacket, scale: float) -> StoredItem | MissionResult:
+    kept = _KEPT.get(packet.command)
+    if kept is None:
+        return MissionResult.UNSUPPORTED
+    one, *others = (_kept(rule, value) for rule, value in zip(kept, _params(packet), strict=True))
+    if packet.command in (kinds.ROI, kinds.DO_SET_ROI):
+        one = float(_whole(packet.param1))
+        if one not in (kinds.ROI_LOCATION, kinds.ROI_NONE):
+            return MissionResult.INVALID_PARAM1
+    return _item(packet, (one, *others), packet.x * scale, packet.y * scale)
+
+
+def _without_place(packet: ItemPacket) -> StoredItem | MissionResult:
+    if packet.command not in kinds.WITHOUT_POSITION:
+        return MissionResult.UNSUPPORTED
+    of_roi = (kinds.ROI_NONE, kinds.ROI_WPNEXT, kinds.ROI_WPINDEX)
+    if packet.command in (kinds.ROI, kinds.DO_SET_ROI) and _whole(packet.param1) not in of_roi:
+        return MissionResult.INVALID_PARAM1
+    return _item(packet, _params(packet), packet.x, packet.y)
+
+
+def _params(packet: ItemPacket) -> tuple[float, ...]:
+    return packet.param1, packet.param2, packet.param3, packet.param4
+
+
+def _item(packet: ItemPacket, params: tuple[float, ...], x: float, y: float) -> StoredItem:
+    p1, p2, p3, p4 = params
+    command = kinds.DO_SET_ROI if packet.command == kinds.ROI else packet.command
+    return StoredItem(packet.frame, command, packet.autocontinue, (p1, p2, p3, p4, x, y, packet.z))
+
+
+def _kept(rule: str, value: float) -> float:
+    if rule == "k":
+        return value
+    if rule == "b":
+        return float(value > 0)
+    if rule == "h":
+        return value % 360.0 if math.isfinite(value) else math.nan
+    return float(_whole(value)) if rule == "n" else 0.0
+
+
+def _whole(value: float) -> int:
+    return int(value + 0.5) if math.isfinite(value) else -1
+
+
+def fits(item: StoredItem, kind: int) -> bool:
+    """Whether the item may be in a list of this MAV_MISSION_TYPE."""
+    if kind == MissionType.MISSION:
+        return item.command not in kinds.NOT_IN_A_MISSION
+    has_too_few_corners = item.command in kinds.FENCE_POLYGONS and item.params[0] < 3
+    return kind != MissionType.FENCE or not has_too_few_corners
+
+
+def item_message(
+    item: StoredItem, peer: tuple[int, int], number: int, is_current: bool, kind: int, is_int: bool
+) -> Message:
+    """MISSION_ITEM_INT, or MISSION_ITEM for a peer that knows no other."""
+    *params, x, y, z = item.params
+    around = (item.command, int(is_current), item.autocontinue)
+    if not is_int:
+        frame = _FLOAT_FRAME.get(item.frame, item.frame)
+        return dialect.MAVLink_mission_item_message(*peer, number, frame, *around, *params, x, y, z, kind)
+    scale = 1 if item.frame == kinds.FRAME_MISSION else 1e7
+    frame = _INT_FRAME.get(item.frame, item.frame)
+    place = (round(x * scale), round(y * scale))
+    return dialect.MAVLink_mission_item_int_message(*peer, number, frame, *around, *params, *place, z, kind)

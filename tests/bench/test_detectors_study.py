@@ -1,0 +1,111 @@
+"""`python -m bench detectors`: its verdicts on made-up rows, and from end to end, small."""
+
+import dataclasses
+
+import pandas as pd
+import pytest
+
+from bench.cases.hits import draw_case, draw_hand
+from bench.cases.mishaps import FlightCase
+from bench.fly import cruise
+from bench.fly.campaign import Campaign, Results
+from bench.fly.watching import ASKED_HZ
+from bench.main import main
+from bench.rows.tables import MET, MISSED, REPORTED, Bar, per_cent, summary_text
+from bench.studies import detectors
+from bench.studies.detector_bars import all_bars
+from bench.studies.detectors import rows
+
+pytestmark = pytest.mark.slow
+
+FOUND = {"false": 0, "blind": 0, "touches": 0, "latency_ms": 2.0, "samples_late": 0, "kind": "wall", "impulse": 1.0}
+FOUND |= {"speed_error_m_s": 0.01, "velocity_error_m_s": 0.01, "normal_error_deg": 3.0, "time_error_ms": 0.0}
+FOUND |= {"bound": True, "confidence": 1.0}
+BY = ("fused", "threshold")
+
+
+def frame(cases, results):
+    return rows(Campaign("made up", {}, cases, print), Results(dict(enumerate(results)), {}))
+
+
+def bars(count=200, hours=10.0, alarms=0, collisions=(), **changes):
+    """Perfect hits, hands and flights of either airframe; the first two hits of each kind are changed."""
+    plain = [draw_case("plain", seed, BY) for seed in range(count)]
+    beside = [draw_case(kind, seed, BY) for kind in ("link", "struck") for seed in range(4)]
+    cases = [dataclasses.replace(case, speed_m_s=2.5) for case in (*plain, *beside)]
+    hits = []
+    for case in cases:
+        ours = {**FOUND, **(changes if case.seed < 2 else {})}
+        ours = {name: value for name, value in ours.items() if value is not None}
+        told = {"possible_ms": 2.0, "detectors": {"fused": ours, "threshold": FOUND | {"latency_ms": 40.0}}}
+        if case.seed < 4:
+            told["detectors"]["threshold"] = {"false": 0, "blind": 0, "touches": 0}
+        truth = {"speed_m_s": 2.5, "off_head_on_deg": 5.0, "clipped": False}
+        hits.append({**truth, "rates": {str(rate): told for rate in ASKED_HZ}})
+    hands = [draw_hand(seed, ("fused",)) for seed in range(4)]
+    held = {"detectors": {"fused": {"collisions": list(collisions), "told_after_ms": 40.0}}}
+    quiet = {"alarms": [], "touches": 0, "blind": 0}
+    loud = quiet | {"alarms": [[1.0, "flip", "wall"]]}
+    flown = {"fused": quiet | {"alarms": loud["alarms"] * alarms}, "threshold": quiet | {"alarms": loud["alarms"] * 9}}
+    flight = {"seconds": 3600.0 * hours, "rates": {str(rate): flown for rate in ASKED_HZ}}
+    return all_bars(
+        {
+            "hits": frame(cases, hits),
+            "hands": frame(hands, [{"rates": {str(rate): held for rate in ASKED_HZ}}] * 4),
+            "flights": frame([FlightCase("calm", 0, "foldable", BY)], [flight]),
+        }
+    )
+
+
+def verdicts(found, word):
+    return {bar.verdict for bar in found if word in bar.what} - {REPORTED}
+
+
+def test_perfect_hits_hands_and_flights_meet_every_bar():
+    assert {bar.verdict for bar in bars()} == {MET, REPORTED}
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"latency_ms": None}, "0.5 to 5 m/s: detected"),
+        ({"latency_ms": None}, "struck in hover"),
+        ({"samples_late": 2}, "at the first sample that shows it"),
+        ({"speed_error_m_s": 2.0}, ": v_c"),
+        ({"collisions": ["wall"]}, "by a hand"),
+        ({"alarms": 1}, "false alarms in simulated flights"),
+    ],
+)
+def test_each_figure_has_its_bar(changes, word):
+    assert MISSED in verdicts(bars(**changes), word)
+
+
+def test_one_quiet_hour_proves_nothing():
+    assert {bar.verdict for bar in bars(hours=1.0) if "in simulated flights" in bar.what} == {REPORTED}
+
+
+def test_the_baseline_is_beaten_only_by_being_ten_times_earlier_with_less_misses_and_alarms():
+    assert verdicts(bars(), "beside threshold") == {MET}
+    assert verdicts(bars(alarms=9), "beside threshold: false alarms") == {MISSED}
+
+
+def test_a_hundred_per_cent_is_said_only_of_all():
+    assert (per_cent(1.0), per_cent(0.9999), per_cent(0.995, 2)) == ("100.0", "99.9", "99.50")
+
+
+def test_missed_bars_are_named_on_the_terminal():
+    text = summary_text([Bar("a", "1", "2", False, "3 hits"), Bar("b", "", "", None), Bar("c", "", "", True)])
+    assert text == "1 of 2 bars are met.\n  missed: a: wanted 1, measured 2 (3 hits)"
+
+
+def test_the_command_writes_tables_pictures_and_rows(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cruise, "AIRBORNE_S", 2.0)
+    monkeypatch.setattr(detectors, "THOROUGH", ("fused", "threshold"))
+    assert main(["detectors", "--hits", "4", "--hours", "0.01", "--jobs", "1", "--out", "page"]) == 0
+    text = (tmp_path / "page" / "detection.md").read_text()
+    assert "`python -m bench detectors --hits 4 --hours 0.01 --jobs 1 --out page`" in text
+    assert "## Every detector on simulated hits" in text and "bars are met" in capsys.readouterr().out
+    assert {path.name for path in (tmp_path / "page").glob("*.png")} == {"roc.png", "speed.png"}
+    table = pd.read_json(tmp_path / "page" / "detection.jsonl", lines=True)
+    assert {*table["detector"]} >= {*BY} and {*table["rate"]} == {*ASKED_HZ}

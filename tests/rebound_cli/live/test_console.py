@@ -1,0 +1,167 @@
+"""What a person sees while something flies or is compiled: on a terminal, and in a pipe."""
+
+import io
+import os
+import subprocess
+import sys
+
+import pytest
+
+from companion.report import Event, Status
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.simulation.compiling import compiling_shown
+from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
+from rebound_cli.timing import LinkRate
+from tests.rebound_cli.command import ROOT
+
+EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))
+FLYING = Status("mission", "OFFBOARD", True, (1.0, 2.0, -1.5), 2.0, "armed at 1.8 m/s^2", 4_000)
+RED = "\x1b[1;31m"
+
+
+class Screen(io.StringIO):
+    """A terminal of which every byte is kept."""
+
+    def __init__(self, is_gone=False):
+        super().__init__()
+        self.is_gone, self.tries = is_gone, 0
+
+    def isatty(self):
+        return True
+
+    def write(self, text):
+        self.tries += 1
+        if self.is_gone:
+            raise OSError(5, "Input/output error")
+        return super().write(text)
+
+
+@pytest.fixture(autouse=True)
+def colours(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+
+def test_in_a_pipe_each_event_and_now_and_then_the_state_is_one_plain_line():
+    stream = io.StringIO()
+    with Console(stream) as console:
+        console.events(EVENTS, 0)
+        console.live(lambda: FLYING, 3.0, "40.1 kB/s")
+        console.live(lambda: FLYING, 3.1, "40.1 kB/s")
+    assert stream.getvalue().splitlines() == [
+        "    1.000 s  mode        mode OFFBOARD",
+        "    2.500 s  detection   hit 1 at [3.76, 0.00]",
+        "      3.0 s  state mission  mode OFFBOARD  position +1.00 +2.00 -1.50 m, 2.00 m/s  "
+        "detector armed at 1.8 m/s^2  round trip 4 ms  link 40.1 kB/s",
+    ]
+
+
+def test_on_a_terminal_the_hit_stands_out_and_brackets_are_no_markup():
+    screen = Screen()
+    with Console(screen) as console:
+        console.live(lambda: FLYING, 3.0)
+        console.events(EVENTS, 0)
+    other, hit = (next(line for line in screen.getvalue().splitlines() if text in line) for text in ("mode ", "hit 1"))
+    assert RED in hit and "[3.76, 0.00]" in hit and RED not in other
+
+
+def test_a_terminal_that_is_gone_is_written_to_once_and_keeps_nothing_for_later():
+    screen = Screen(is_gone=True)
+    console = Console(screen)
+    for _ in range(20):
+        with pytest.raises(OSError, match="Input/output"):
+            console.print("text")
+    assert screen.tries == 1
+
+
+def test_progress_in_a_pipe_is_a_line_a_tenth():
+    stream = io.StringIO()
+    with Console(stream) as console:
+        for done in range(101):
+            console.progress("Compiling", done, 100)
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 11 and (lines[0], lines[-1]) == ("Compiling: 0 of 100", "Compiling: 100 of 100")
+
+
+def test_only_what_is_compiled_has_a_progress():
+    # Given a kernel of ours that numba has compiled for whole numbers
+    numba = pytest.importorskip("numba")
+
+    def kernel(value):
+        return value + 1
+
+    kernel.__module__ = "sim_vehicle.physics.contact"
+    kernel = numba.njit(kernel)
+    stream = io.StringIO()
+    console = Console(stream)
+    with compiling_shown(console, "Compiling"):
+        kernel(1)
+    assert stream.getvalue().splitlines()[-1].startswith("Compiling: ")
+    # When it is called again, or one is compiled that is not ours, then nothing is shown
+    stream.truncate(0)
+    stream.seek(0)
+    with compiling_shown(console, "Compiling"):
+        kernel(2)
+        numba.njit(lambda value: value - 1)(2)
+    assert stream.getvalue() == ""
+
+
+def test_without_a_place_for_compiled_kernels_there_is_a_reason_and_no_fault():
+    place = "/dev/null/cache"
+    code = "import sim_vehicle.physics.jit as jit; print(jit.NOT_KEPT); print(jit.njit(lambda: 7)())"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={**os.environ, "NUMBA_CACHE_DIR": place},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    reason, value = done.stdout.splitlines()
+    assert reason.startswith(place) and value == "7", done.stderr
+
+
+def test_kernels_are_kept_in_the_users_cache(tmp_path):
+    code = "import numba, sim_vehicle.physics.jit as jit; print(jit.NOT_KEPT, numba.config.CACHE_DIR)"
+    env = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={**env, "XDG_CACHE_HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.stdout.startswith(f"None {tmp_path}/px4-rebound/kernels-"), done.stderr
+
+
+def test_the_vehicles_progress_is_shown_by_who_waits_for_it_and_ctrl_c_ends_that(tmp_path, monkeypatch):
+    # Given a vehicle that compiles, and then is ready
+    said = "Compiling physics: 1 of 3\nCompiled code is not kept.\nCompiling physics: 3 of 3\nSimulated vehicle x\n"
+    code = f"import sys; print({said!r}, end='', flush=True); sys.stdin.read()"
+    script = tmp_path / "vehicle"
+    script.write_text(f'#!/bin/sh\nexec {sys.executable} -c "$CODE"\n')
+    script.chmod(0o755)
+    monkeypatch.setenv("CODE", code)
+    monkeypatch.setattr(sys, "executable", str(script))
+    stream = io.StringIO()
+    # When somebody waits for it, then the progress is seen
+    with VehicleProcess(tmp_path, []) as vehicle:
+        vehicle.wait_until_ready(Interrupts(), Console(stream))
+    assert stream.getvalue() == said.rpartition("Simulated")[0]
+    # And Ctrl-C before it is ready ends the wait
+    interrupts = Interrupts()
+    interrupts.reason = "stopped with Ctrl-C"
+    with pytest.raises(VehicleProcessError, match="Ctrl-C"), VehicleProcess(tmp_path, []) as vehicle:
+        vehicle.wait_until_ready(interrupts, Console(stream))
+
+
+def test_the_link_is_a_rate_and_then_a_silence():
+    heard = LinkRate()
+    assert heard.text(500_000) == ""
+    for now_us in range(1_000_000, 2_100_001, 10_000):
+        heard.take(400, now_us)
+    assert heard.text(2_100_000) == "40.4 kB/s"
+    assert heard.text(2_900_000) == "40.4 kB/s"
+    assert heard.text(4_100_000) == "silent for 2.0 s"

@@ -1,0 +1,381 @@
+"""Disks, terminals, garbage and faults beside the control path: none of them ends a flight in the air."""
+
+import gc
+import io
+import itertools
+import json
+import resource
+import sys
+import threading
+import time
+from typing import Any
+
+import pytest
+
+from companion.companion import StepResult
+from companion.mavlink.packet import message_id_of
+from companion.messages import ComputerStatus
+from companion.px4_mode import AUTO_LOITER, OFFBOARD
+from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
+from companion.shell.tlog import read_tlog
+from rebound_cli import background
+from rebound_cli import fly as command
+from rebound_cli.background import MOST_WAITING, Background
+from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import (
+    COMPUTER_EVERY_US,
+    HANDING_OVER_US,
+    Computer,
+    ConfirmAtOnce,
+    FlightFaultError,
+    Loop,
+)
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.timing import TOO_LATE_US, Timing, undisturbed
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event
+from tests.rebound_cli.live.flying import EPOCH_US, HOP_SETS, fly
+
+
+class Gone:
+    """A terminal or pipe that nobody reads any more."""
+
+    def isatty(self):
+        return False
+
+    def write(self, text):
+        raise BrokenPipeError(32, "Broken pipe")
+
+
+class Broken(ConfirmAtOnce):
+    """Works until the vehicle is in the air."""
+
+    def poll(self, companion):
+        super().poll(companion)
+        if companion.status().state == "takeoff" and companion.status().armed:
+            raise ValueError("nobody thought of this")
+
+
+class Deaf(ConfirmAtOnce):
+    """Takes the link away once the vehicle climbs."""
+
+    def __init__(self, world):
+        super().__init__()
+        self._world = world
+
+    def poll(self, companion):
+        super().poll(companion)
+        self._world.is_deaf |= companion.status().state == "takeoff" and companion.status().armed
+
+
+class Unplugged(ConfirmAtOnce):
+    """Pulls the plug for so long once the vehicle climbs, and puts it in again."""
+
+    def __init__(self, world, seconds):
+        super().__init__()
+        self._world, self._us, self._since_us = world, seconds * 1e6, None
+
+    def poll(self, companion):
+        super().poll(companion)
+        world = self._world
+        now_us, status = world.vehicle.time_boot_us, companion.status()
+        if self._since_us is None and status.state == "takeoff" and status.armed:
+            self._since_us, world.is_cut = now_us, True
+            world.told.append("connection to /dev/ttyACM0 lost, reconnecting")
+        elif world.is_cut and now_us - self._since_us >= self._us:
+            world.is_cut = False
+            world.told.append("connected again: /dev/ttyACM1")
+
+
+class Restarted(ConfirmAtOnce):
+    """Restarts the vehicle while the plan is shown; the person says yes to that one, too."""
+
+    def __init__(self, world):
+        super().__init__()
+        self._world, self._since_us = world, None
+
+    def poll(self, companion):
+        world, now_us = self._world, self._world.vehicle.time_boot_us
+        if self._since_us is None and companion.plan_is_ready():
+            self._since_us, world.is_cut = now_us, True
+        silent_us = now_us - (self._since_us or now_us)
+        world.is_cut &= silent_us < 2_000_000
+        if silent_us > 1_800_000:
+            super().poll(companion)
+
+
+class EverySecond:
+    """A computer that is the same every second."""
+
+    due_us = 0
+
+    def status(self, now_us):
+        if now_us < self.due_us:
+            return None
+        self.due_us = now_us + COMPUTER_EVERY_US
+        return ComputerStatus(now_us, 90_500, (5, 50), 61, 812, 3792, 9_000, 30_000)
+
+
+def test_the_ground_station_is_told_of_the_computer_every_second_and_a_replay_tells_the_same(tmp_path):
+    # When a mission is flown beside a computer that is watched
+    companion, _, recorder, _, problem = fly(tmp_path, computer=EverySecond())
+    # Then the vehicle's link carries its status once a second from the vehicle's first packets to the end
+    assert problem is None and companion.report().outcome == "completed"
+    sent_us = [
+        time_us for time_us, packet in read_tlog(tmp_path / run_folder.TLOG_NAME) if message_id_of(packet) == 390
+    ]
+    report = companion.report()
+    lasted_s = (report.ended_at_us - report.started_at_us) / 1e6
+    assert lasted_s - 2.5 <= len(sent_us) <= lasted_s + 1.0
+    assert all(0.9e6 < b - a < 1.2e6 for a, b in itertools.pairwise(sent_us))
+    # And the flight is decided again to the bit, with what the computer said then
+    assert_comes_again(tmp_path)
+    assert recorder.writer.loss is None
+
+
+def test_the_computer_is_read_aside_and_told_a_second_later(tmp_path):
+    # Given a computer that is asked for the first time
+    computer = Computer(tmp_path)
+    assert computer.status(5) is None
+    # When it has been read
+    computer.close()
+    # Then that is told once, when the next is due
+    assert computer.status(4 + COMPUTER_EVERY_US) is None
+    assert computer.status(5 + COMPUTER_EVERY_US).at_us == 5
+    assert computer.status(6 + COMPUTER_EVERY_US) is None
+
+
+def test_a_full_disk_ends_no_flight_and_is_told(tmp_path):
+    # Given a disk on which nothing can be written any more
+    for name in (run_folder.TLOG_NAME, run_folder.EVENTS_NAME, run_folder.INPUTS_NAME):
+        (tmp_path / name).symlink_to("/dev/full")
+    # When a mission is flown
+    companion, world, recorder, _, problem = fly(tmp_path)
+    # Then it lands, and the person and the operator read what was lost
+    assert problem is None and companion.report().outcome == "completed"
+    assert [event.text for event in recorder.events if event.kind == "lost"] == [
+        "log has gaps: No space left on device"
+    ]
+    assert any(b"Log has gaps: No space left on device" in frame for frame in world.sent)
+    assert recorder.writer.lost > 1
+
+
+def test_a_reader_that_is_gone_ends_no_flight_and_is_told_and_replayed(tmp_path):
+    companion, world, _, console, problem = fly(tmp_path, stream=Gone())
+    assert problem is None and companion.report().outcome == "completed"
+    assert any(b"Console has gaps: Broken pipe" in frame for frame in world.sent)
+    # And the program says so when the vehicle is down
+    with pytest.raises(BrokenPipeError), console:
+        pass
+    # And what was told is part of what is decided again
+    assert assert_comes_again(tmp_path).events == len(events_of(tmp_path))
+    assert "lost" in [event["kind"] for event in events_of(tmp_path)]
+
+
+@pytest.mark.parametrize(("confirm", "words"), [(lambda _: Broken(), "nobody thought"), (Deaf, "driver is gone")])
+def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, confirm, words):
+    # When something beside the control path fails in the air, for good
+    companion, world, recorder, _, problem = fly(tmp_path, confirm=confirm)
+    # Then the vehicle holds by itself, in time, and one sentence says what happened
+    failed_us = next(event.time_us for event in recorder.events if event.kind == "aborted")
+    assert companion.finished and world.now_us() - failed_us < HANDING_OVER_US
+    world.sleep(1.1)
+    assert world.custom_mode == AUTO_LOITER
+    assert words in problem and "the vehicle was handed over" in problem and "\n" not in problem
+    assert words in companion.report().reason
+    assert_comes_again(tmp_path)
+
+
+def test_a_link_that_is_back_within_a_second_is_told_and_the_flight_goes_on(tmp_path):
+    companion, world, recorder, _, _ = fly(tmp_path, confirm=lambda world: Unplugged(world, 0.6))
+    assert companion.report().outcome == "completed" and companion.report().collisions == ()
+    assert [event.text for event in recorder.events if event.kind == "link"] == [
+        "connection to /dev/ttyACM0 lost, reconnecting",
+        "connected again: /dev/ttyACM1",
+    ]
+    assert any(b"Connected again: /dev/ttyACM1" in frame for frame in world.sent)
+    assert_comes_again(tmp_path)
+
+
+def test_a_plan_that_is_made_anew_after_a_silence_is_agreed_to_twice_and_the_log_says_so(tmp_path):
+    companion, _, recorder, _, _ = fly(tmp_path, confirm=Restarted)
+    assert companion.report().outcome == "completed"
+    assert [event.kind for event in recorder.events].count("plan") == 2
+    assert (tmp_path / run_folder.INPUTS_NAME).read_text().count('"confirm"') == 2
+    assert_comes_again(tmp_path)
+
+
+def test_a_link_that_is_back_after_the_vehicle_took_care_of_itself_takes_nothing_back(tmp_path):
+    # Given a vehicle that lost its setpoints for two seconds, and PX4's failsafe acted (COM_OF_LOSS_T)
+    companion, world, recorder, _, _ = fly(tmp_path, confirm=lambda world: Unplugged(world, 2.0))
+    # Then the flight has ended in one sentence, and nobody asks for OFFBOARD again
+    assert "the link has been silent" in companion.report().reason and companion.report().collisions == ()
+    world.sleep(5.0)
+    assert world.custom_mode is not None and world.custom_mode != OFFBOARD
+    assert [event.kind for event in recorder.events].count("aborted") == 1
+
+
+@pytest.mark.realtime
+def test_in_a_real_flight_neither_a_limit_of_size_nor_a_pipe_that_closes_matters(tmp_path):
+    # Given a vehicle in the air
+    folder = tmp_path / "run"
+    process = start("fly", SQUARE, "--sim", *HOP, "--out", folder)
+    wait_for_event(folder, "armed")
+    # When its log may grow no more (SIGXFSZ, EFBIG) and its reader closes the pipe (SIGPIPE, EPIPE)
+    size = (folder / "flight.tlog").stat().st_size
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size, size))
+    process.stdout.close()
+    # Then it lands as planned; the end of the program says that something was lost
+    assert process.wait(60) == 1
+    assert "Traceback" not in process.stderr.read()
+    process.stderr.close()
+    told = {event["kind"]: event["text"] for event in events_of(folder)}
+    assert "done" in told and "lost" in told
+
+
+def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
+    # Given a disk that has stopped, and one write too many
+    done, going_on = [], threading.Event()
+    writer = Background("log")
+    writer.give(going_on.wait)
+    for number in range(MOST_WAITING + 50):
+        writer.give(done.append, number)
+    assert writer.loss == "log has gaps: writing takes too long" == writer.news()
+    assert writer.news() is None
+    # When it goes on, and one of the writes fails
+    dropped = writer.lost
+    going_on.set()
+    writer.close()
+    # Then what was kept is there in its order
+    assert dropped >= 49 and done == list(range(len(done))) and len(done) + dropped == MOST_WAITING + 50
+
+
+class Stepping:
+    """What the loop steps, for its bytes."""
+
+    armed, finished = True, False
+
+    def __init__(self, deadline_us):
+        self.received, self.deadline_us, self.notes = [], deadline_us, []
+
+    def next_deadline_us(self):
+        return self.deadline_us
+
+    def step(self, received, now_us):
+        self.received.append(received)
+        return StepResult((), (), ())
+
+    def note(self, kind, text):
+        self.notes.append((kind, text))
+
+
+class Queued:
+    """A socket in which datagrams wait; the clock stands after a stall."""
+
+    def __init__(self, datagrams, now_us):
+        self.datagrams, self._now_us = list(datagrams), now_us
+
+    def now_us(self):
+        return self._now_us
+
+    def receive(self, timeout_s):
+        return self.datagrams.pop(0) if self.datagrams else b""
+
+
+def exchanged(tmp_path, datagrams, late_us):
+    stepping: Any = Stepping(EPOCH_US)
+    queued: Any = Queued(datagrams, EPOCH_US + late_us)
+    recorder = FlightRecorder(tmp_path)
+    Loop(stepping, queued, queued, recorder, Console(sys.stderr), Interrupts()).exchange()
+    recorder.close()
+    return stepping, queued
+
+
+def test_what_comes_while_a_writer_rests_is_made_together_and_the_end_waits_for_no_rest(monkeypatch):
+    monkeypatch.setattr(background, "REST_S", 60.0)
+    writer, done, first = Background("log"), [], threading.Event()
+    # Given one that has made its first call at once, and rests
+    writer.give(first.set)
+    assert first.wait(10.0)
+    time.sleep(0.2)
+    # When more comes, then it waits for the rest's end
+    for number in range(3):
+        writer.give(done.append, number)
+    time.sleep(0.1)
+    assert done == []
+    # And is made at the end, at once
+    writer.close(10.0)
+    assert done == [0, 1, 2]
+
+
+def test_after_a_stall_all_that_has_arrived_is_one_step(tmp_path):
+    stepping, _ = exchanged(tmp_path, [b"old", b"newer", b"newest"], 3_000_000)
+    assert stepping.received == [b"oldnewernewest"]
+    assert stepping.notes == [("late", "setpoints 3000 ms late, PX4 needs two a second")]
+
+
+def test_who_sends_without_end_does_not_keep_a_step_from_being_taken(tmp_path):
+    stepping, queued = exchanged(tmp_path, [b"x"] * 1000, 0)
+    assert stepping.received == [b"x" * MOST_DATAGRAMS] and len(queued.datagrams) == 1000 - MOST_DATAGRAMS
+    assert stepping.notes == []
+
+
+def test_lateness_is_measured_and_told_each_time_it_doubles():
+    timing = Timing()
+    # Given 98 steps in time to a tenth of a millisecond, one early because something arrived, and late ones
+    for _ in range(98):
+        assert timing.stepped(EPOCH_US, EPOCH_US + 100, EPOCH_US + 300) is None
+    assert timing.stepped(EPOCH_US, EPOCH_US - 900, EPOCH_US) is None
+    assert timing.stepped(EPOCH_US, EPOCH_US + TOO_LATE_US - 1, EPOCH_US + TOO_LATE_US) is None
+    said = [
+        timing.stepped(EPOCH_US, at_us, at_us) for at_us in (EPOCH_US + round(n * TOO_LATE_US) for n in (1, 1.9, 2, 3))
+    ]
+    assert [text is not None for text in said] == [True, False, True, False]
+    summary = timing.summary()
+    assert summary["tick_lateness_ms"] == {"p50": 0.1, "p99": 950.0, "max": 1500.0}
+    assert summary["step_ms"]["p50"] == 0.2 and summary["step_ms"]["max"] == 0.9
+
+
+def test_garbage_is_collected_while_disarmed_only():
+    switch_interval_s = sys.getswitchinterval()
+    assert gc.isenabled()
+    with undisturbed() as allow_collecting:
+        assert not gc.isenabled() and gc.get_freeze_count() > 0
+        allow_collecting(True)
+        assert gc.isenabled()
+        allow_collecting(False)
+        assert not gc.isenabled() and sys.getswitchinterval() < switch_interval_s
+    assert gc.isenabled() and gc.get_freeze_count() == 0 and sys.getswitchinterval() == switch_interval_s
+
+
+def test_a_fault_around_the_flight_leaves_a_summary_and_is_raised_then(tmp_path, monkeypatch):
+    # Given a flight that a fault of the program ended
+    document = load_mission_document(SQUARE, HOP_SETS)
+    problem = FlightFaultError("Fault around the flight; the vehicle was handed over.")
+
+    def breaks(*arguments):
+        raise problem
+
+    monkeypatch.setattr(command, "fly_realtime", breaks)
+    flight = command.Flight(
+        mission_from(document), None, tmp_path, FlightRecorder(tmp_path), Console(io.StringIO()), Interrupts()
+    )
+    connection: Any = Silent()
+    flown = command._fly_connected(flight, connection, ConfirmAtOnce())
+    with pytest.raises(FlightFaultError, match="handed over"):
+        command._finish(flight, flown, False)
+    # Then what is known of it is in its folder
+    summary = json.loads((tmp_path / run_folder.SUMMARY_NAME).read_text())
+    assert summary["outcome"] == "failed" and summary["reason"] == str(problem) and connection.is_closed
+
+
+class Silent:
+    """A connection that nobody uses."""
+
+    counts = LinkCounts()
+    is_closed = False
+
+    def close(self):
+        self.is_closed = True

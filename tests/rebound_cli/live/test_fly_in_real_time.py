@@ -1,0 +1,136 @@
+"""Flights with the simulated vehicle as a process of its own, and every way they can end."""
+
+import json
+import os
+import signal
+import time
+import tomllib
+
+import pytest
+
+from companion.shell.tlog import read_tlog
+from tests.rebound_cli.command import (
+    HANGS_S,
+    HOP,
+    QUICK,
+    ROOT,
+    SQUARE,
+    WALL,
+    assert_comes_again,
+    events_of,
+    processes_naming,
+    run,
+    start,
+    wait_for_event,
+    wait_until_gone,
+)
+
+pytestmark = pytest.mark.realtime
+
+# A hit within three seconds of take-off.
+NEAR_WALL = (
+    *("--set", "items.0.takeoff.height_m=0.9", "--set", "items.1.go_to.position_ned_m=[5, 0, -0.9]"),
+    *("--set", "sim.walls.0.point_ned_m=[1.5, 0, -1.5]"),
+)
+SET_POSITION_TARGET = 84
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_a_short_flight_beside_the_simulated_vehicle(tmp_path):
+    # Given two flights at the same time
+    folders = [tmp_path / "one", tmp_path / "two"]
+    processes = [start("fly", SQUARE, "--sim", *HOP, "--json", "--out", folder) for folder in folders]
+    for process, folder in zip(processes, folders, strict=True):
+        stdout, stderr = process.communicate(timeout=60)
+        # Then neither disturbs the other, and stdout holds the summary and nothing else
+        assert process.returncode == 0, stderr
+        summary = json.loads(stdout)
+        assert summary == summary_of(folder)
+        assert summary["outcome"] == "completed" and summary["collisions"] == []
+        assert (summary["false_detections"], summary["missed_contacts"]) == (0, 0)
+        assert 0.9 < summary["realtime_factor"] < 1.1
+        assert (folder / "flight.png").stat().st_size > 10_000
+        assert (folder / "truth.npz").exists()
+        wait_until_gone(folder)
+        # And each can be decided again
+        assert_comes_again(folder)
+
+
+def test_ctrl_c_hands_the_vehicle_over_and_finishes_the_log(tmp_path):
+    # Given a vehicle in the air
+    folder = tmp_path / "run"
+    process = start("fly", WALL, "--sim", *QUICK, "--out", folder)
+    wait_for_event(folder, "armed")
+    # When the person presses Ctrl-C
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=30)
+    # Then the flight ends aborted with its reason, complete, with nothing left running
+    assert process.returncode == 1 and "Traceback" not in stderr
+    summary = summary_of(folder)
+    assert summary["outcome"] == "aborted" and "Ctrl-C" in summary["reason"]
+    assert "Ctrl-C" in stdout
+    assert any("HOLD" in event["text"].upper() or "LOITER" in event["text"] for event in events_of(folder)[-4:])
+    # And its picture and page follow, from a process that ends when both are whole
+    wait_until_gone(folder, HANGS_S)
+    assert (folder / "flight.png").exists() and (folder / "report.html").exists()
+    # And the hand-over can be decided again
+    assert_comes_again(folder)
+
+
+def test_a_flight_killed_while_it_recovers_leaves_a_log_complete_to_the_last_second(tmp_path):
+    # Given a flight that has just been hit
+    folder = tmp_path / "run"
+    process = start("fly", WALL, "--sim", *QUICK, *NEAR_WALL, "--out", folder)
+    wait_for_event(folder, "detection", timeout_s=60.0)
+    assert len(processes_naming(folder)) == 2
+    time.sleep(0.6)
+    # When it is killed without a chance to clean up
+    os.kill(process.pid, signal.SIGKILL)
+    killed_at_us = time.time_ns() // 1000
+    process.communicate(timeout=10)
+    # Then the log ends less than a second before, and the recovery setpoint is in it; the events are whole
+    packets = list(read_tlog(folder / "flight.tlog"))
+    assert killed_at_us - packets[-1][0] < 1_000_000
+    happened = {event["kind"]: event["time_us"] for event in events_of(folder)}
+    detected_at_us = happened["detection"]
+    assert any(packet[7] == SET_POSITION_TARGET and at_us >= detected_at_us for at_us, packet in packets)
+    # And the vehicle's process ends by itself, and all of it can be decided again
+    wait_until_gone(folder)
+    assert assert_comes_again(folder).is_cut
+
+
+def test_a_second_ctrl_c_ends_at_once(tmp_path):
+    # Given a vehicle that has stopped answering, so that the first Ctrl-C has to wait
+    folder = tmp_path / "run"
+    process = start("fly", WALL, "--sim", *QUICK, "--set", "companion.link.silence_s=60", "--out", folder)
+    wait_for_event(folder, "armed")
+    (vehicle,) = set(processes_naming(folder)) - {process.pid}
+    os.kill(vehicle, signal.SIGSTOP)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.5)
+    assert process.poll() is None
+    # When the person presses it again
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=5)
+    # Then the program ends at once, and says what that means
+    assert process.returncode == 130
+    assert len(stderr.strip().splitlines()) == 1 and "ended at once" in stderr
+    wait_until_gone(folder)
+
+
+def test_the_simulated_vehicle_alone_stops_when_asked(tmp_path):
+    process = start("sim", "--port", "0", "--remote", "127.0.0.1:9", "--truth", tmp_path / "truth.npz")
+    assert "foldable" in process.stdout.readline()
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(timeout=10) == 0
+    assert (tmp_path / "truth.npz").exists()
+    process.communicate()
+
+
+def test_version():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    result = run("--version")
+    assert (result.returncode, result.stdout) == (0, f"rebound {version}\n")

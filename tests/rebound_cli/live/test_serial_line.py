@@ -1,0 +1,120 @@
+"""A serial line end to end without hardware: two pseudo-terminals, a UART's speed between them, and what it loses."""
+
+import contextlib
+import json
+import time
+
+import pytest
+from pymavlink import mavutil
+
+from bench.studies.cable import Cable
+from companion.mavlink.delivery import Delivery
+from companion.shell.tlog import read_tlog
+from sim_vehicle.testing import start_vehicle
+from tests.rebound_cli.command import HOP, QUICK, SQUARE, assert_comes_again, events_of, run, start, wait_for_event
+
+pytestmark = pytest.mark.realtime
+
+
+@pytest.fixture
+def line(tmp_path):
+    """A vehicle at the end of a cable, as `line(baud, loss)`."""
+    with contextlib.ExitStack() as stack:
+
+        def laid(baud, loss):
+            cable = stack.enter_context(Cable(tmp_path / "pixhawk", baud, loss))
+            return cable, stack.enter_context(start_vehicle(links=(cable.vehicle_url,)))
+
+        yield laid
+
+
+def lost_share(folder):
+    """Of the vehicle's packets, by their numbers."""
+    delivery = Delivery()
+    for _, packet in read_tlog(folder / "flight.tlog"):
+        delivery.take(packet, (1, 1))
+    return delivery.lost / (delivery.lost + delivery.received)
+
+
+def texts(folder, kind):
+    return [event["text"] for event in events_of(folder) if event["kind"] == kind]
+
+
+def wait_for_text(folder, kind, word, count=1):
+    """The event that has it."""
+    end_s = time.monotonic() + 30.0
+    while time.monotonic() < end_s:
+        found = [event for event in events_of(folder) if event["kind"] == kind and word in event["text"]]
+        if len(found) >= count:
+            return found[-1]
+        time.sleep(0.05)
+    raise AssertionError(f"no event '{kind}' with '{word}': {events_of(folder)}")
+
+
+def test_a_guard_waits_for_its_cable_recovers_over_it_and_outlasts_that_it_is_unplugged(line, tmp_path):
+    # Given a guard that is up before its cable is plugged in, and a line that loses each tenth packet
+    cable, vehicle = line(921_600, 0.1)
+    folder = tmp_path / "run"
+    guard = start("guard", "--wait", "--connect", cable.url, "--out", folder, *QUICK)
+    try:
+        wait_for_text(folder, "link", f"Serial port {cable.name} does not exist")
+        first = cable.plug()
+        wait_for_event(folder, "standing_by")
+        # When a pilot flies, by a radio of their own
+        pilot = mavutil.mavlink_connection(vehicle.mavutil_address)
+        pilot.wait_heartbeat(timeout=10)
+        vehicle.wait_until(lambda truth: truth.may_arm, within_s=10)
+        pilot.arducopter_arm()
+        pilot.set_mode("TAKEOFF")
+        vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
+        wait_for_text(folder, "watching", "watching")
+        vehicle.hit(1.5, bearing_deg=90)
+        # Then a hit is recovered from
+        wait_for_event(folder, "given_back")
+        # And when the cable is pulled out, and put in as another device, bytes pass again within a second
+        cable.unplug()
+        wait_for_text(folder, "link", "lost, reconnecting")
+        second, plugged_us = cable.plug(), time.time_ns() // 1000
+        assert second != first
+        assert wait_for_text(folder, "link", "connected again")["time_us"] - plugged_us < 1_000_000
+        # And nothing was taken over for that; the next hit is recovered from as the first
+        assert len(texts(folder, "take_over")) == 1
+        vehicle.wait_until(lambda truth: truth.mode == "Hold", within_s=5)
+        wait_for_text(folder, "mode", "AUTO.LOITER")
+        vehicle.hit(1.5, bearing_deg=90)
+        wait_for_text(folder, "given_back", "", count=2)
+        pilot.close()
+        guard.terminate()
+        _, stderr = guard.communicate(timeout=20)
+    finally:
+        guard.kill()
+    assert guard.returncode == 0, stderr
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["reconnects"] == 1 and len(summary["collisions"]) == 2
+    assert 0.05 < lost_share(folder) < 0.2
+    assert_comes_again(folder)
+
+
+def test_a_mission_is_flown_over_a_line_that_loses_every_seventh_packet(line, tmp_path):
+    cable, _ = line(921_600, 0.15)
+    cable.plug()
+    # A busy machine keeps the cable from carrying anything for seconds, which is not what is looked at here.
+    patient = [word for key in ("", "position_") for word in ("--set", f"companion.link.{key}silence_s=10")]
+    done = run("fly", SQUARE, "--connect", cable.url, "--yes", "--out", tmp_path / "run", *HOP, *patient)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert 0.08 < lost_share(tmp_path / "run") < 0.25
+
+
+def test_a_line_that_is_too_slow_for_hits_is_told_and_nothing_is_guarded(line, tmp_path):
+    # At a radio's 57 600 baud PX4 sends some 15 samples of its IMU a second
+    cable, _ = line(57_600, 0.05)
+    cable.plug()
+    folder = tmp_path / "run"
+    guard = start("guard", "--wait", "--connect", cable.url, "--out", folder, *QUICK)
+    try:
+        told = wait_for_text(folder, "link", "not guarded by now")
+        guard.terminate()
+        guard.communicate(timeout=20)
+    finally:
+        guard.kill()
+    assert "HIGHRES_IMU arrives at" in told["text"] and texts(folder, "standing_by") == []

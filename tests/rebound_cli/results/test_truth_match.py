@@ -1,0 +1,190 @@
+"""Detections beside contacts, by the definitions of docs/reference/summary.md."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from companion.report import CollisionReport, FlightReport
+from rebound_cli.results.summary import FlightFacts, Flown, build_summary
+from rebound_cli.results.truth_match import FlightTruth, match_contacts
+from sim_vehicle.truth import Hit
+
+EPOCH_US = 1_600_000_000_000_000
+SETTLED_S = 0.5
+
+
+def hit(start_ms, end_ms=None):
+    return Hit(
+        obstacle="wall",
+        contact_at_boot_us=1e3 * start_ms,
+        ended_at_boot_us=1e3 * (end_ms if end_ms is not None else start_ms + 30),
+        contact_position_ned_m=(3.8, 0.0, -1.5),
+        impact_velocity_ned_m_s=(2.0, 0.0, 0.0),
+        normal_ned=(-1.0, 0.0, 0.0),
+        max_fold_m=0.02,
+        peak_force_n=60.0,
+        rebound_velocity_ned_m_s=(-0.3, 0.0, 0.1),
+        impulse_ned_n_s=(-2.6, 0.0, 0.1),
+        energy_before_j=2.2,
+        energy_after_j=0.06,
+    )
+
+
+def collision(sample_ms, settled_after_s=2.0, latency_us=500):
+    return CollisionReport(
+        detected_at_us=EPOCH_US + 1000 * sample_ms + latency_us,
+        sample_time_boot_us=1000 * sample_ms,
+        detector="lateral",
+        position_ned_m=(3.8, 0.0, -1.5),
+        impact_velocity_ned_m_s=(1.95, 0.0, 0.0),
+        impact_speed_m_s=1.95,
+        normal_ned=(-1.0, 0.0, 0.0),
+        peak_specific_force_m_s2=55.0,
+        recovery_setpoint_ned_m=(2.8, 0.0, -1.5),
+        settled_after_s=settled_after_s,
+        overshoot_m=0.0,
+        rebound_speed_m_s=0.3,
+    )
+
+
+def counts(collisions, hits):
+    matches = match_contacts(collisions, hits, SETTLED_S)
+    return matches.false_detections, matches.missed_contacts, matches.recontacts
+
+
+@pytest.mark.parametrize(
+    ("collisions", "hits", "expected"),
+    [
+        pytest.param([collision(10_004)], [hit(10_000)], (0, 0, 0), id="seen"),
+        pytest.param([collision(9_996)], [hit(10_000)], (1, 1, 0), id="a sample that ends before contact is false"),
+        pytest.param([collision(10_128)], [hit(10_000, 10_030)], (0, 0, 0), id="velocities just after may show it"),
+        pytest.param([collision(10_132)], [hit(10_000, 10_030)], (1, 1, 0), id="a sample long after is false"),
+        pytest.param([collision(10_004), collision(10_020)], [hit(10_000)], (1, 0, 0), id="one contact, one detection"),
+        pytest.param([], [hit(10_000)], (0, 1, 0), id="missed"),
+        pytest.param([], [hit(10_000), hit(10_500)], (0, 2, 1), id="after a missed contact the next is a recontact"),
+        pytest.param(
+            [collision(10_004, None), collision(10_504)],
+            [hit(10_000), hit(10_500)],
+            (0, 0, 1),
+            id="before recovery",
+        ),
+        pytest.param(
+            [collision(10_004, 2.0), collision(12_404)],
+            [hit(10_000), hit(12_400)],
+            (0, 0, 1),
+            id="not yet called",
+        ),
+        pytest.param(
+            [collision(10_004, 2.0), collision(12_604)],
+            [hit(10_000), hit(12_600)],
+            (0, 0, 0),
+            id="after recovery",
+        ),
+    ],
+)
+def test_what_counts(collisions, hits, expected):
+    assert counts(collisions, hits) == expected
+
+
+def report_of(*collisions):
+    return FlightReport(
+        outcome="completed",
+        reason="landed",
+        autopilot="PX4 1.15.0",
+        stream_rates_hz={"HIGHRES_IMU": 249.987},
+        collisions=collisions,
+        origin_ned_m=(0.0, 0.0, 0.0),
+        started_at_us=EPOCH_US + 1_000_000,
+        ended_at_us=EPOCH_US + 26_000_000,
+        armed_at_us=EPOCH_US + 5_000_000,
+    )
+
+
+def path_of(rows):
+    times_s, north_m, down_m = np.array(rows, dtype=float).T
+    position = np.column_stack([north_m, np.zeros(len(rows)), down_m])
+    return {"time_boot_us": 1e6 * times_s, "position_ned_m": position}
+
+
+FACTS = FlightFacts("wall", "foldable", 3, SETTLED_S)
+
+
+def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
+    # Given a flight whose path passes the setpoint at 2.8 m north by 4 cm and sinks by 3 cm before it is recovered
+    path = path_of([(9.9, 3.7, -1.6), (10.0, 3.8, -1.5), (11.0, 3.0, -1.47), (12.0, 2.76, -1.5), (12.6, 2.0, -1.0)])
+    truth = FlightTruth([hit(10_000)], path, EPOCH_US)
+    # When it is summed up
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    # Then what came after the recovery does not count, and times are seconds since the start
+    entry = summary["collisions"][0]
+    assert entry["truth"]["overshoot_m"] == pytest.approx(0.04)
+    assert entry["truth"]["height_lost_m"] == pytest.approx(0.03)
+    assert entry["truth"]["contact_at_s"] == pytest.approx(9.0)
+    assert entry["truth"]["detection_latency_ms"] == pytest.approx(4.5)
+    assert entry["truth"]["rebound_speed_m_s"] == pytest.approx(0.3)
+    assert entry["detected_at_s"] == pytest.approx(9.0045)
+    assert (summary["duration_s"], summary["realtime_factor"]) == (25.0, 50.0)
+
+
+def test_a_simulator_that_stalls_after_a_hit_moves_nothing_of_before():
+    # Given a simulator that stood still for half a second, 0.4 s after the contact
+    path = path_of([(9.9, 3.7, -1.6), (10.0, 3.8, -1.5), (11.0, 3.0, -1.47), (12.0, 2.76, -1.5)])
+    truth = FlightTruth([hit(10_000)], path, EPOCH_US + 500_000, stalls=[(10_400_000, 500_000)])
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    # Then the latency is what it was
+    assert summary["collisions"][0]["truth"]["detection_latency_ms"] == pytest.approx(4.5)
+    assert summary["collisions"][0]["truth"]["contact_at_s"] == pytest.approx(9.0)
+
+
+def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contact():
+    # Given the same path, of a vehicle that believed itself 0.3 m further north than it was when it touched
+    path = path_of([(10.0, 3.8, -1.5), (11.0, 3.0, -1.5), (12.0, 2.46, -1.5)])
+    drifted = dataclasses.replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, FlightTruth([drifted], path, EPOCH_US)), FACTS)
+    # Then its setpoint of 2.8 m was at 2.5 m, and it went 4 cm past that
+    assert summary["collisions"][0]["truth"]["overshoot_m"] == pytest.approx(0.04)
+
+
+def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
+    # Given a hit that was not recovered from when another was detected 1 s later, and a way past the setpoint then
+    path = path_of([(10.0, 3.8, -1.5), (10.9, 3.0, -1.48), (11.5, 2.5, -1.2), (12.0, 2.5, -1.2)])
+    truth = FlightTruth([hit(10_000), hit(11_000)], path, EPOCH_US)
+    # When it is summed up
+    summary = build_summary(Flown(report_of(collision(10_004, None), collision(11_004)), 0.5, truth), FACTS)
+    # Then the first hit has neither that overshoot nor that loss of height; the second has both
+    first, second = (entry["truth"] for entry in summary["collisions"])
+    assert (first["overshoot_m"], first["height_lost_m"]) == pytest.approx((0.0, 0.02))
+    assert (second["overshoot_m"], second["height_lost_m"]) == pytest.approx((0.3, 0.3))
+
+
+def test_where_it_stopped_is_measured_from_where_it_touched_in_the_frame_that_it_believed_in():
+    # Given a contact at 3.8 m of a vehicle that believed itself 0.3 m further north, and a setpoint at 2.8 m
+    drifted = dataclasses.replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
+    truth = FlightTruth([drifted], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    # Then it stopped 1.3 m off the wall, which faces south
+    assert summary["collisions"][0]["truth"]["stopped_off_m"] == pytest.approx(1.3)
+
+
+def test_the_papers_stress_analysis_is_of_the_papers_frame():
+    truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
+    flown = Flown(report_of(collision(10_004)), 0.5, truth)
+    foldable, rigid = (
+        build_summary(flown, dataclasses.replace(FACTS, airframe=name))["collisions"][0]["truth"]["factor_of_safety"]
+        for name in ("foldable", "rigid")
+    )
+    assert foldable == pytest.approx(185.0 / hit(10_000).peak_force_n, abs=1e-3) and rigid is None
+
+
+def test_a_real_vehicle_has_no_truth():
+    summary = build_summary(Flown(report_of(collision(10_004)), 25.0, None), FlightFacts("wall", None, None, 0.5))
+    unknown = ("false_detections", "missed_contacts", "recontacts", "seed", "airframe")
+    assert [summary[key] for key in unknown] == [None] * 5
+    assert summary["collisions"][0]["truth"] is None
+
+
+def test_a_flight_with_truth_and_no_contact_counts_zero_not_null():
+    truth = FlightTruth([], path_of([(10.0, 0.0, 0.0)]), EPOCH_US)
+    summary = build_summary(Flown(report_of(), 0.5, truth), FACTS)
+    assert [summary[key] for key in ("false_detections", "missed_contacts", "recontacts")] == [0, 0, 0]

@@ -1,0 +1,169 @@
+"""A ground station's side of the mission protocol, and a wire that loses, repeats and reorders packets."""
+
+import random
+from dataclasses import dataclass, field
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.mission_protocol import mission_items as commands
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.mavlink.services.mission_transfer import MissionTransfer
+from sim_vehicle.mavlink.services.mission_wire import MissionResult
+
+CLIENT, STRANGER = (245, 190), (246, 190)
+STEP_US = 4_000
+# MAVSDK asks again after half a second.
+CLIENT_RETRY_US = 500_000
+
+
+def wire_item(number, command=commands.WAYPOINT, is_int=True, kind=MissionType.MISSION, **fields):
+    """A waypoint north of home, 10 m up, in MISSION_ITEM_INT."""
+    build = dialect.MAVLink_mission_item_int_message if is_int else dialect.MAVLink_mission_item_message
+    params = fields.pop("params", (0.0, 0.0, 0.0, 0.0))
+    values = {
+        "frame": commands.FRAME_GLOBAL_RELATIVE_INT,
+        "current": int(number == 0),
+        "autocontinue": 1,
+        "x": 473_977_420 + 100 * number,
+        "y": 85_455_940,
+        "z": 10.0,
+        **fields,
+    }
+    frame, current, autocontinue, *place = values.values()
+    return sent(build(1, 1, number, frame, command, current, autocontinue, *params, *place, kind))
+
+
+def sent(message, peer=CLIENT):
+    """The message as it comes from that peer."""
+    message._header.srcSystem, message._header.srcComponent = peer
+    return message
+
+
+def request_list(kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_request_list_message(1, 1, kind), peer)
+
+
+def request_item(number, kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_request_int_message(1, 1, number, kind), peer)
+
+
+def count(items, kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_count_message(1, 1, items, kind), peer)
+
+
+def ack(result, kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_ack_message(1, 1, result, kind), peer)
+
+
+def clear_all(kind, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_clear_all_message(1, 1, kind), peer)
+
+
+def set_current(number, peer=CLIENT):
+    return sent(dialect.MAVLink_mission_set_current_message(1, 1, number), peer)
+
+
+def of_type(answers, *types):
+    return [answer for answer in answers if answer.get_type() in types]
+
+
+@dataclass
+class Wire:
+    """One direction: packets in, the same, some or more of them out, up to 40 ms later."""
+
+    random: random.Random
+    loss: float = 0.0
+    repeat: float = 0.0
+    latest_us: int = 0
+    waiting: list[tuple[int, int, object]] = field(default_factory=list)
+    count: int = 0
+
+    def put(self, message: object, now_us: int) -> None:
+        copies = 2 if self.random.random() < self.repeat else 1
+        for _ in range(copies):
+            if self.random.random() >= self.loss:
+                self.count += 1
+                self.waiting.append((now_us + self.random.randrange(self.latest_us + 1), self.count, message))
+
+    def take(self, now_us: int) -> list:
+        due = sorted(entry[:2] for entry in self.waiting if entry[0] <= now_us)
+        messages = [next(entry[2] for entry in self.waiting if entry[:2] == key) for key in due]
+        self.waiting = [entry for entry in self.waiting if entry[0] > now_us]
+        return messages
+
+
+@dataclass
+class Exchange:
+    """Client and vehicle with a wire each way, in virtual time."""
+
+    store: MissionStore = field(default_factory=MissionStore)
+    seed: int = 0
+    loss: float = 0.0
+    repeat: float = 0.0
+    latest_us: int = 0
+
+    def __post_init__(self) -> None:
+        source = random.Random(self.seed)
+        self.transfer = MissionTransfer(self.store)
+        self.there = Wire(source, self.loss, self.repeat, self.latest_us)
+        self.back = Wire(source, self.loss, self.repeat, self.latest_us)
+        self.now_us = 1_000_000
+
+    def step(self) -> list:
+        self.now_us += STEP_US
+        for message in self.there.take(self.now_us):
+            for answer in self.transfer.receive(message, self.now_us):
+                self.back.put(answer, self.now_us)
+        for answer in self.transfer.update(self.now_us):
+            self.back.put(answer, self.now_us)
+        return self.back.take(self.now_us)
+
+    def ask(self, message: object) -> list:
+        """One message and what comes back at once."""
+        self.there.put(message, self.now_us)
+        return self.step()
+
+    def upload(self, items, kind=MissionType.MISSION, within_s: float = 60.0) -> int:
+        """The result that the client gets in the end."""
+        said = count(len(items), kind)
+        self.there.put(said, self.now_us)
+        said_us = end_us = self.now_us
+        end_us += round(1e6 * within_s)
+        while self.now_us < end_us:
+            for answer in self.step():
+                if answer.get_type() == "MISSION_ACK" and answer.target_system == CLIENT[0]:
+                    return answer.type
+                if answer.get_type().startswith("MISSION_REQUEST") and answer.seq < len(items):
+                    said, said_us = items[answer.seq], self.now_us
+                    said.mission_type = kind
+                    self.there.put(said, self.now_us)
+            if self.now_us - said_us > CLIENT_RETRY_US:
+                said_us = self.now_us
+                self.there.put(said, self.now_us)
+        raise AssertionError("no acknowledgement came")
+
+    def download(self, kind=MissionType.MISSION, within_s: float = 60.0):
+        """The items that the client has in the end, in their order."""
+        said = request_list(kind)
+        self.there.put(said, self.now_us)
+        said_us, total, items = self.now_us, None, {}
+        end_us = self.now_us + round(1e6 * within_s)
+        while self.now_us < end_us:
+            for answer in self.step():
+                assert answer.get_type() != "MISSION_ACK", f"refused: {answer}"
+                if answer.get_type() == "MISSION_COUNT":
+                    total = answer.count if total is None else total
+                elif answer.get_type() == "MISSION_ITEM_INT" and answer.seq == len(items):
+                    items[answer.seq] = answer
+                else:
+                    continue
+                if len(items) == total:
+                    self.there.put(ack(MissionResult.ACCEPTED, kind), self.now_us)
+                    return [items[number] for number in range(total)]
+                said, said_us = request_item(len(items), kind), self.now_us
+                self.there.put(said, self.now_us)
+            if self.now_us - said_us > CLIENT_RETRY_US:
+                said_us = self.now_us
+                self.there.put(said, self.now_us)
+        raise AssertionError("the download did not end")

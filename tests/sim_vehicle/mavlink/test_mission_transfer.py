@@ -1,0 +1,285 @@
+"""The mission protocol: every message in every state, and lists that survive a bad link."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim_vehicle.autopilot.mission_protocol import mission_items as commands
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore
+from sim_vehicle.mavlink.services import mission_wire as wire
+from sim_vehicle.mavlink.services.mission_transfer import RETRY_US, TIMEOUT_US, TransferState
+from sim_vehicle.mavlink.services.mission_wire import MissionResult
+from tests.sim_vehicle.mavlink import mission_client as client
+from tests.sim_vehicle.mavlink.mission_client import CLIENT, STEP_US, STRANGER, Exchange, of_type, sent, wire_item
+
+MISSION = MissionType.MISSION
+SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(3, commands.LAND)]
+
+
+def receiving(count: int = 3) -> Exchange:
+    exchange = Exchange()
+    exchange.ask(client.count(count, MISSION))
+    assert exchange.transfer.state is TransferState.RECEIVING
+    return exchange
+
+
+def sending() -> Exchange:
+    exchange = Exchange()
+    assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
+    exchange.ask(client.request_list(MISSION))
+    assert exchange.transfer.state is TransferState.SENDING
+    return exchange
+
+
+def said(exchange: Exchange) -> str:
+    return exchange.transfer.texts[-1].text
+
+
+def test_an_uploaded_list_comes_back_as_it_went():
+    exchange = Exchange()
+    assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
+    back = exchange.download()
+    assert [(item.seq, item.command) for item in back] == [(0, 22), (1, 16), (2, 16), (3, 21)]
+    assert [item.x for item in back] == [wire_item(n).x for n in range(4)]
+    assert [item.current for item in back] == [1, 0, 0, 0]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    loss=st.floats(0.0, 0.4),
+    repeat=st.floats(0.0, 0.4),
+    latest_us=st.sampled_from([0, 12_000, 40_000]),
+    count=st.integers(1, 8),
+)
+def test_lists_survive_loss_repetition_and_reordering(seed, loss, repeat, latest_us, count):
+    # Given a link of up to 40 % loss, on which packets come twice and out of order
+    exchange = Exchange(seed=seed, loss=loss, repeat=repeat, latest_us=latest_us)
+    items = [wire_item(number) for number in range(count)]
+    # When a client uploads, however often it takes
+    results = []
+    while MissionResult.ACCEPTED not in results:
+        results.append(exchange.upload(items, within_s=120.0))
+        assert len(results) < 200
+        # No client begins anew while packets of its last attempt are on their way
+        for _ in range(25):
+            exchange.step()
+    # Then the vehicle holds exactly that list, never parts of it
+    stored = exchange.store.mission.items
+    assert [round(1e7 * item.latitude_deg) for item in stored] == [item.x for item in items]
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), loss=st.floats(0.0, 0.3), count=st.integers(1, 8))
+def test_downloads_survive_loss(seed, loss, count):
+    store = MissionStore()
+    assert Exchange(store).upload([wire_item(number) for number in range(count)]) == MissionResult.ACCEPTED
+    exchange = Exchange(store, seed=seed, loss=loss)
+    assert [item.seq for item in exchange.download()] == list(range(count))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.data())
+def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
+    exchange = Exchange()
+    exchange.upload(SQUARE)
+    before = exchange.store.mission
+    peers, kinds = st.sampled_from([CLIENT, STRANGER]), st.sampled_from([0, 1, 2, 7])
+    for _ in range(data.draw(st.integers(1, 12))):
+        peer, kind, number = data.draw(peers), data.draw(kinds), data.draw(st.integers(0, 5))
+        message = data.draw(
+            st.sampled_from(
+                [
+                    client.request_list(kind, peer),
+                    client.request_item(number, kind, peer),
+                    client.count(number + 1, kind, peer),
+                    sent(wire_item(number, kind=kind), peer),
+                    client.ack(number, kind, peer),
+                    client.set_current(number, peer),
+                ]
+            )
+        )
+        exchange.ask(message)
+    plan = exchange.store.mission
+    assert plan == before or len(plan.items) == len({item.latitude_deg for item in plan.items})
+    # And once everybody is silent, it is free again
+    exchange.now_us += TIMEOUT_US + RETRY_US
+    exchange.step()
+    exchange.step()
+    assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
+
+
+@pytest.mark.parametrize(
+    ("item", "result"),
+    [
+        (wire_item(0, frame=1), MissionResult.UNSUPPORTED_FRAME),
+        (wire_item(0, frame=commands.FRAME_GLOBAL_INT, is_int=False), MissionResult.UNSUPPORTED_FRAME),
+        (wire_item(0, command=82), MissionResult.UNSUPPORTED),
+        (wire_item(0, commands.DO_JUMP), MissionResult.UNSUPPORTED),
+        (wire_item(0, commands.WAYPOINT, frame=commands.FRAME_MISSION), MissionResult.UNSUPPORTED),
+        (wire_item(0, commands.DO_SET_ROI, params=(1.0, 0.0, 0.0, 0.0)), MissionResult.INVALID_PARAM1),
+        (wire_item(0, commands.RALLY_POINT), MissionResult.ERROR),
+        (wire_item(0, commands.FENCE_CIRCLE_INCLUSION), MissionResult.ERROR),
+    ],
+)
+def test_items_that_px4_refuses(item, result):
+    exchange = Exchange()
+    assert exchange.upload([item]) == result
+    assert exchange.store.mission.items == () and exchange.transfer.state is TransferState.IDLE
+
+
+@pytest.mark.parametrize(
+    ("sent", "stored"),
+    [
+        (wire_item(0, params=(5.0, 2.0, 3.0, -90.0)), (5.0, 2.0, 0.0, 270.0)),
+        (wire_item(0, commands.LOITER_TIME, params=(5.0, 2.0, 3.0, 4.0)), (5.0, 1.0, 3.0, 1.0)),
+        (wire_item(0, commands.LAND, params=(1.0, 0.0, 3.0, 10.0)), (0.0, 0.0, 0.0, 10.0)),
+        (
+            wire_item(0, commands.DO_JUMP, frame=commands.FRAME_MISSION, params=(2.0, 3.0, 0.0, 0.0)),
+            (2.0, 3.0, 0.0, 0.0),
+        ),
+    ],
+)
+def test_what_px4_keeps_of_an_items_parameters(sent, stored):
+    exchange = Exchange()
+    assert exchange.upload([sent]) == MissionResult.ACCEPTED
+    assert exchange.store.mission.items[0].params[:4] == pytest.approx(stored)
+
+
+def test_a_heading_that_is_not_given_stays_so():
+    exchange = Exchange()
+    exchange.upload([wire_item(0, params=(0.0, 0.0, 0.0, math.nan))])
+    assert exchange.store.mission.items[0].yaw_rad is None
+
+
+@pytest.mark.parametrize("kind", list(MOST_ITEMS))
+def test_more_items_than_there_is_room_for(kind):
+    exchange = Exchange()
+    ack = exchange.ask(client.count(MOST_ITEMS[kind] + 1, kind))[0]
+    assert (ack.type, ack.mission_type) == (MissionResult.NO_SPACE, kind)
+
+
+def test_a_count_of_nothing_clears_and_so_does_clear_all():
+    for message in (client.count(0, MISSION), client.clear_all(MISSION), client.clear_all(255)):
+        exchange = Exchange()
+        exchange.upload(SQUARE)
+        changes = exchange.store.mission_changes
+        acks = of_type(exchange.ask(message), "MISSION_ACK")
+        assert [ack.type for ack in acks] == [MissionResult.ACCEPTED]
+        assert exchange.store.mission.items == () and exchange.store.mission_changes > changes
+
+
+def test_the_same_list_again_changes_nothing():
+    # As PX4 does, by its checksum: the mission that is flown goes on
+    exchange = Exchange()
+    exchange.upload(SQUARE)
+    changes = exchange.store.mission_changes
+    assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
+    assert exchange.store.mission_changes == changes
+
+
+def test_a_polygon_needs_three_corners():
+    exchange = Exchange()
+    corners = [wire_item(n, commands.FENCE_POLYGON_INCLUSION, params=(2.0, 0, 0, 0)) for n in range(2)]
+    assert exchange.upload(corners, MissionType.FENCE) == MissionResult.ERROR
+    corners = [wire_item(n, commands.FENCE_POLYGON_INCLUSION, params=(3.0, 0, 0, 0)) for n in range(3)]
+    assert exchange.upload(corners, MissionType.FENCE) == MissionResult.ACCEPTED
+    assert len(exchange.store.fence.items) == 3
+
+
+def test_a_lost_request_is_repeated_after_a_quarter_of_a_second():
+    exchange = receiving()
+    times = []
+    while len(times) < 2:
+        times += [exchange.now_us for _ in of_type(exchange.step(), "MISSION_REQUEST_INT")]
+    assert times[1] - times[0] == pytest.approx(RETRY_US, abs=2 * STEP_US)
+
+
+@pytest.mark.parametrize("begin", [receiving, sending])
+def test_silence_ends_a_transfer_after_five_seconds(begin):
+    exchange = begin()
+    if begin is sending:
+        exchange.ask(client.request_item(0, MISSION))
+    start_us = exchange.now_us
+    while exchange.transfer.state is not TransferState.IDLE:
+        exchange.step()
+    assert exchange.now_us - start_us == pytest.approx(TIMEOUT_US, abs=2 * STEP_US)
+    assert said(exchange) == "Mission sync timeout"
+    assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
+
+
+def test_the_last_acknowledgement_is_given_again():
+    exchange = Exchange()
+    exchange.upload(SQUARE)
+    acks = exchange.ask(sent(SQUARE[3]))
+    assert MissionResult.ACCEPTED in [ack.type for ack in of_type(acks, "MISSION_ACK")]
+    exchange.ask(sent(SQUARE[1]))
+    assert said(exchange) == "IGN MISSION_ITEM: No transfer"
+
+
+def test_a_peer_that_wants_the_old_kind_of_item_gets_it():
+    # Given an upload to which the client answers that it does not know MISSION_REQUEST_INT
+    exchange = receiving(1)
+    asked = exchange.ask(client.ack(MissionResult.UNSUPPORTED, MISSION))
+    assert [answer.get_type() for answer in asked] == ["MISSION_REQUEST"]
+    old = wire_item(0, frame=commands.FRAME_GLOBAL_RELATIVE, x=47.397742, y=8.545594, is_int=False)
+    exchange.ask(sent(old))
+    assert exchange.store.mission.items[0].latitude_deg == pytest.approx(47.397742)
+
+
+def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
+    exchange = Exchange()
+    exchange.upload(SQUARE)
+    exchange.ask(client.count(2, MISSION))
+    exchange.ask(client.ack(MissionResult.CANCELLED, MISSION))
+    assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
+    assert len(exchange.store.mission.items) == 4
+
+
+@pytest.mark.parametrize(
+    ("begin", "message", "text"),
+    [
+        (receiving, client.request_list(MISSION), "Mission download request ignored, already active"),
+        (receiving, client.request_item(0, MISSION), "WPM: REJ. CMD: Busy"),
+        (receiving, client.request_item(0, MISSION, STRANGER), "WPM: REJ. CMD: partner id mismatch"),
+        (receiving, sent(wire_item(0), STRANGER), "REJ. MIS ITEM: partner id mismatch"),
+        (receiving, client.clear_all(MISSION), "WPM: IGN CLEAR CMD: Busy"),
+        (receiving, client.set_current(0), "WPM: IGN WP CURR CMD: Busy"),
+        (receiving, client.ack(0, MISSION, STRANGER), "REJ. WP CMD: partner id mismatch"),
+        (sending, client.count(2, MISSION), "WPM: IGN MISSION_COUNT: Busy"),
+        (sending, sent(SQUARE[0]), "IGN MISSION_ITEM: Busy"),
+        (sending, client.request_list(MISSION, STRANGER), "Mission download request ignored, already active"),
+        (sending, client.request_item(3, MISSION), "WPM: REJ. CMD: Req. WP was unexpected"),
+        (sending, client.clear_all(MISSION), "WPM: IGN CLEAR CMD: Busy"),
+        (sending, client.set_current(0), "WPM: IGN WP CURR CMD: Busy"),
+        (Exchange, client.set_current(9), "WPM: WP CURR CMD: Not in list"),
+    ],
+)
+def test_what_is_turned_down_and_in_which_words(begin, message, text):
+    exchange = begin()
+    exchange.ask(message)
+    assert said(exchange) == text
+
+
+def test_only_one_link_receives_at_a_time():
+    first = receiving()
+    second = Exchange(first.store)
+    ack = second.ask(client.count(2, MISSION, STRANGER))[0]
+    assert ack.type == MissionResult.ERROR
+    # And the other link still gets its list
+    assert first.upload([wire_item(0), wire_item(1), wire_item(2)]) == MissionResult.ACCEPTED
+
+
+def test_the_checksum_is_px4s():
+    # Given PX4's CRC-32 (reflected 0xEDB88320, no inversion before or after) over one byte-packed item
+    item = wire_item(0, z=0.0, x=0, y=0)
+    raw = bytes([6, 16, 0, 1]) + bytes(28)
+    crc = 0
+    for byte in raw:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ 0xEDB88320 * (crc & 1)
+    assert wire.checksum(item, 0) == crc
