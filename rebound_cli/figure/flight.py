@@ -38,7 +38,8 @@ _START, _DETECTION = "time since the start [s]", "time from the detection [ms]"
 def draw_flight(flight: ShownFlight, path: Path) -> None:
     """Write the picture of a flight that is over, with the truth where there is one."""
     assert flight.summary is not None, "a flight that is over has one"
-    picture, count = _Picture(flight), len(flight.summary["collisions"])
+    # What the companion summed up, and what its detector found: a hit has both.
+    picture, count = _Picture(flight), min(len(flight.summary["collisions"]), len(flight.hits))
     figure = Figure(figsize=(18 if count else 13, 9.5), layout="constrained")  # without pyplot: no global state
     if count:
         picture.draw_hit(figure.subplots(2, 3))
