@@ -51,7 +51,7 @@ class StreamControl(Protocol):
     def announce_interval(self, message_id: int) -> None:
         """Send MESSAGE_INTERVAL with what was asked for."""
 
-    def send_now(self, message_id: int) -> bool:
+    def send_now(self, message_id: int, index: int = 0) -> bool:
         """Send one message at once; False for an unknown one and for one that has nothing new."""
 
 
@@ -116,7 +116,7 @@ def _request_message(command: Command, streams: StreamControl) -> Result:
     if message_id == MESSAGE_INTERVAL_ID:
         streams.announce_interval(_whole(command.param2))
         return Result.ACCEPTED
-    return _sent(streams.send_now(message_id))
+    return _sent(streams.send_now(message_id, _whole(command.param2, unset=0)))
 
 
 def _sent(was_sent: bool) -> Result:

@@ -194,7 +194,7 @@ def test_a_vehicle_that_comes_to_grief_says_so(monkeypatch: pytest.MonkeyPatch) 
     def broken() -> None:
         raise RuntimeError("bent")
 
-    monkeypatch.setattr(vehicle._bench, "advance", broken)
+    monkeypatch.setattr(vehicle._bench, "step", broken)
     with pytest.raises(VehicleEnded, match="came to grief: RuntimeError\\('bent'\\)"):
         while True:
             vehicle.pause()
