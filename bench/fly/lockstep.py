@@ -70,7 +70,12 @@ def flown_with_log(mission: Mission, scene: Scene, airframe: Airframe) -> tuple[
 def fly(mission: Mission, scene: Scene, airframe: Airframe) -> JudgedFlight:
     """The same, for a judge."""
     with tempfile.TemporaryDirectory() as name:
-        flown, _, events = flown_in(Path(name), mission, scene, airframe)
+        return fly_in(Path(name), mission, scene, airframe)
+
+
+def fly_in(folder: Path, mission: Mission, scene: Scene, airframe: Airframe) -> JudgedFlight:
+    """The same in a folder that stays: a copy of the process that goes on by itself must not remove it."""
+    flown, _, events = flown_in(folder, mission, scene, airframe)
     assert flown.truth is not None, "a lockstep flight has its truth"
     return judged_flight(mission, flown.report, events, flown.truth, scene, airframe)
 

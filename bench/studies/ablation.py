@@ -5,6 +5,7 @@ Hits, hands and flights are of drawn vehicles; with `--data` there are recorded 
 
 import math
 import statistics
+import tempfile
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from bench.cases.mishaps import FAMILIES, FlightCase
 from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
-from bench.fly.lockstep import JudgedFlight, fly
+from bench.fly.lockstep import JudgedFlight, fly_in
 from bench.fly.recorded import HealthyCase, InjectedCase
 from bench.fly.watching import FLOWN_WITH
 from bench.fly.wire import JITTERY
@@ -90,10 +91,10 @@ def work_out(case: tuple[MissionCase, tuple[str, ...]]) -> Json:
     mission, names = case
     drawn = random_mission(mission)
     rules = [rule for rule in RULES if rule.name in names]
-    with switched(rules) as copies:
+    with tempfile.TemporaryDirectory() as folder, switched(rules) as copies:
         flight: JudgedFlight | None = None
         try:
-            flight = fly(*flyable(mission, drawn))
+            flight = fly_in(Path(folder), *flyable(mission, drawn))
         finally:
             copies.leave(lambda: {"failure": "the companion failed"} if flight is None else verdict(flight))
         return {"with": verdict(flight), "without": copies.found}

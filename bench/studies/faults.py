@@ -80,9 +80,8 @@ def faults_table(found: Mapping[str, Sequence[Json]]) -> str:
 
 
 def _files(results: Sequence[Json]) -> tuple[str, str]:
-    return _counted(
-        result["outcome"] for result in results
-    ), f"{max(one['seconds'] for one in results):.1f} s of processor"
+    longest_s = max(result["seconds"] for result in results)
+    return _counted(result["outcome"] for result in results), f"{longest_s:.1f} s of processor time"
 
 
 def _flights(results: Sequence[Json]) -> tuple[str, str]:

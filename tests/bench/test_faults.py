@@ -170,8 +170,8 @@ def test_a_judge_names_each_kind_of_loss() -> None:
 def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_says_that_something_can() -> None:
     # Given an accelerometer that is off in the second of a hit
     hidden = FLOWN["accelerometer zero"]
-    faults = [hidden, replace(hidden, name="told", expected=replace(hidden.expected, blinds=False))]
-    told, untold = branched(42, faults).values()
+    shown = replace(hidden, expected=replace(hidden.expected, blinds=False))
+    told, untold = (branched(42, [fault])[hidden.name] for fault in (hidden, shown))
     assert told["unseen"] and told["complaints"] == []
     assert not untold["unseen"] and any(text.startswith(("fell: ", "tumbled: ")) for text in untold["complaints"])
 
