@@ -6,7 +6,8 @@ from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
 from companion.reflex.config import EstimateConfig
 from tests.companion.fake_vehicle import LAND as LAND_MODE
-from tests.companion.fake_vehicle import LOITER, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
+from tests.flying import Flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
 INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
@@ -22,7 +23,7 @@ def items_flown(f: Flight) -> list[int]:
 
 
 def speeds_m_s(f: Flight) -> list[float]:
-    return [hit.impact_speed_m_s for hit in f.companion.report().collisions]
+    return [hit.impact_speed_m_s for hit in f.report.collisions]
 
 
 def strike(f: Flight) -> None:
@@ -51,7 +52,7 @@ def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     assert speeds_m_s(f) == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
     assert "at 49% of the speed" in f.event("item", 2).text
     assert "hit 3 of at most 3; after the recovery: return" in f.event("policy").text
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "completed" and "not flown from item 2 on" in report.reason
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.3)
 
@@ -62,7 +63,7 @@ def test_a_hit_while_it_recovers_makes_the_next_try_no_slower():
     f.run_for(0.4)
     strike(f)
     f.run_to("mission")
-    assert len(f.companion.report().collisions) == 2
+    assert len(f.report.collisions) == 2
     assert "at 50% of the speed" in f.event("item", 1).text
 
 
@@ -78,7 +79,7 @@ def test_an_items_own_policy_counts_its_own_hits():
     f = at_wall(INTO_WALL, {**INTO_WALL, "on_collision": own}, ASIDE, on_collision={"then": "continue", "max_hits": 9})
     f.run_to_end()
     assert items_flown(f) == [2, 3]
-    assert f.companion.report().reason.endswith("not flown from item 3 on")
+    assert f.report.reason.endswith("not flown from item 3 on")
 
 
 def test_after_a_hit_home_and_down():
@@ -96,7 +97,7 @@ def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
     assert f.state == "recovering"
     f.run_to("returning")
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 def test_a_way_home_that_is_blocked_ends_where_it_is():
@@ -115,7 +116,7 @@ def test_a_second_hit_during_the_hold_does_not_skip_another_item():
     strike(f)
     f.run_to_end()
     assert items_flown(f) == [2, 3, 4]
-    assert len(f.companion.report().collisions) == 2
+    assert len(f.report.collisions) == 2
 
 
 @pytest.mark.parametrize("abort", [{"on_collision": {"max_hits": 1, "after_max_hits": "abort"}}, {"hard": 1.5}])
@@ -126,7 +127,7 @@ def test_giving_up_hands_the_vehicle_over_once_it_has_settled(abort):
     assert "recovered" in f.kinds()
     f.run_to_end()
     assert f.vehicle.mode == LOITER
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "aborted"
     assert "of at most 1" in report.reason or "hit_above_m_s = 1.5" in report.reason
 
@@ -143,7 +144,7 @@ def test_a_landing_is_not_put_off_for_more_hits_than_the_limit():
     f.run_for(0.1)
     assert f.state == "landing" and f.vehicle.mode == LAND_MODE
     f.run_to_end()
-    assert len(f.companion.report().collisions) == 1
+    assert len(f.report.collisions) == 1
 
 
 def test_a_recovery_keeps_off_what_is_known_behind_it():
@@ -155,7 +156,7 @@ def test_a_recovery_keeps_off_what_is_known_behind_it():
         f = flight(FakeVehicle(wall_north_m=0.6), items=[TAKEOFF, slowly, LAND], obstacles={"known": known})
         f.run_to("recovering")
         f.run_until(lambda f=f: "recovered" in f.kinds())
-        norths.append(f.companion.report().collisions[0].recovery_setpoint_ned_m[0])
+        norths.append(f.report.collisions[0].recovery_setpoint_ned_m[0])
     middle_m = 0.5 * (0.6 - 0.2 + EstimateConfig().reach_m)
     assert norths[0] < middle_m - 0.04
     assert norths[1] == pytest.approx(middle_m, abs=0.02)
@@ -164,7 +165,7 @@ def test_a_recovery_keeps_off_what_is_known_behind_it():
 def test_a_softer_hit_than_the_limit_is_no_reason_to_give_up():
     f = at_wall(INTO_WALL, abort_when={"hit_above_m_s": 2.5})
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 # --- detour: the wall of these flights has no end, the fence leaves 4.2 m of it
@@ -180,7 +181,7 @@ def in_room(*items, **changes) -> Flight:
 def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
     f = in_room(INTO_WALL, on_collision=ROUND)
     f.run_to_end(200)
-    report = f.companion.report()
+    report = f.report
     assert report.unreachable == ("2",) and len(report.collisions) <= 4
     assert "no way round what is known; then: land" in f.event("unreachable").text
     told = status_text(f.event("unreachable"), "test", 3)
@@ -198,7 +199,7 @@ def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
 def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
     f = in_room(INTO_WALL, ASIDE, on_collision=ROUND, obstacles={"on_unreachable": then})
     f.run_to_end(200)
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == ends
     assert ("return" in f.kinds()) is (then == "return")
     assert (3 in items_flown(f)) is (then == "continue")
@@ -227,7 +228,7 @@ def test_a_wall_known_beforehand_is_not_touched():
     known = [{"touches_ned_m": [[3.2, -1.9, -1.5], [3.2, 1.9, -1.5]], "normal_ned": [-1, 0, 0]}]
     f = in_room(INTO_WALL, on_collision=ROUND, obstacles={"known": known})
     f.run_to_end(60)
-    report = f.companion.report()
+    report = f.report
     assert report.collisions == () and report.unreachable == ("2",)
 
 
@@ -240,7 +241,7 @@ def test_a_way_home_that_is_cut_off_ends_where_it_is():
     f.run_until(lambda: f.vehicle.position[0] > 1.8)
     f.companion.core.flight.patches = ObstaclesConfig(known=known).patches()
     f.run_to_end(60)
-    assert f.companion.report().unreachable == ("home",)
+    assert f.report.unreachable == ("home",)
     assert f.vehicle.position[0] == pytest.approx(2.0, abs=0.3)
 
 

@@ -8,7 +8,8 @@ from pymavlink.dialects.v20 import development as mav
 
 from companion.flight.plan import mission_lines
 from companion.mission.model import Mission
-from tests.companion.fake_vehicle import EPOCH_US, LOITER, OFFBOARD, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import LOITER, OFFBOARD, FakeVehicle, flight
+from tests.flying import EPOCH_US, Flight
 
 INTO_WALL = [
     {"takeoff": {"height_m": 1.5}},
@@ -33,7 +34,7 @@ def test_a_mission_without_a_hit_completes():
     f = flight()
     f.run_to_end()
 
-    report = f.companion.report()
+    report = f.report
     assert (report.outcome, report.autopilot, report.collisions) == ("completed", "PX4 1.15.0", ())
     assert report.stream_rates_hz["HIGHRES_IMU"] == pytest.approx(250, rel=0.01)
     assert report.stream_rates_hz["LOCAL_POSITION_NED"] == pytest.approx(50, rel=0.01)
@@ -47,7 +48,7 @@ def test_coordinates_are_relative_to_the_arming_position():
     f = flight(FakeVehicle(start_ned_m=(10.0, -4.0, 0.5)))
     f.run_to("landing")
 
-    assert f.companion.report().origin_ned_m == pytest.approx((10.0, -4.0, 0.5), abs=1e-3)
+    assert f.report.origin_ned_m == pytest.approx((10.0, -4.0, 0.5), abs=1e-3)
     assert f.vehicle.position == pytest.approx([10.0, -2.0, -1.0], abs=0.25)
     last = f.vehicle.setpoints[-1][1]
     assert last.yaw == pytest.approx(math.pi / 2)
@@ -140,7 +141,7 @@ def test_the_collision_report_tells_what_happened():
     f = at_wall(companion={"flight": {"speeding_up_m_s2": 2.0}})
     f.run_to_end()
 
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "completed"
     (hit,) = report.collisions
     assert hit.detector == "fused"
@@ -181,7 +182,7 @@ def test_then_continue_goes_on_at_once():
     f.run_until(lambda: f.state != "recovering")
     assert f.state == "mission"
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 def test_then_land_lands_where_it_recovered():
@@ -190,10 +191,8 @@ def test_then_land_lands_where_it_recovered():
     f.run_until(lambda: f.state != "recovering")
     assert f.state == "landing"
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-    assert f.vehicle.position[0] == pytest.approx(
-        f.companion.report().collisions[0].recovery_setpoint_ned_m[0], abs=0.2
-    )
+    assert f.report.outcome == "completed"
+    assert f.vehicle.position[0] == pytest.approx(f.report.collisions[0].recovery_setpoint_ned_m[0], abs=0.2)
 
 
 def strike(f: Flight, x_m_s2: float, y_m_s2: float, samples: int = 3) -> None:
@@ -211,7 +210,7 @@ def test_a_second_hit_is_a_new_collision_with_a_new_setpoint(state):
 
     strike(f, 0.0, 12.0)
 
-    first, second = f.companion.report().collisions
+    first, second = f.report.collisions
     assert f.state == "recovering"
     assert second.normal_ned == pytest.approx((0.0, 1.0, 0.0), abs=0.01)
     assert second.sample_time_boot_us > first.sample_time_boot_us
@@ -220,7 +219,7 @@ def test_a_second_hit_is_a_new_collision_with_a_new_setpoint(state):
     m = f.vehicle.setpoints[-1][1]
     assert (m.x, m.y) == pytest.approx(second.recovery_setpoint_ned_m[:2], abs=1e-4)
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 @pytest.mark.parametrize(("state", "keeps_clear"), [("recovering", True), ("holding", False)])
@@ -232,7 +231,7 @@ def test_a_second_hit_while_recovering_does_not_lead_back_to_the_first_wall(stat
 
     strike(f, 0.0, 12.0)
 
-    first, second = f.companion.report().collisions
+    first, second = f.report.collisions
     alone_m = second.position_ned_m[0] - 0.5 * second.impact_velocity_ned_m_s[0]
     if keeps_clear:
         assert alone_m > first.recovery_setpoint_ned_m[0] + 0.1
@@ -248,7 +247,7 @@ def test_v_c_of_a_second_hit_knows_nothing_from_before_the_first():
     going_north = f.vehicle.velocity[0]
     assert going_north < -0.2
     strike(f, 12.0, 0.0)
-    second = f.companion.report().collisions[1]
+    second = f.report.collisions[1]
     assert second.impact_velocity_ned_m_s[0] == pytest.approx(going_north, abs=0.25)
 
 
@@ -257,10 +256,10 @@ def test_a_hit_on_a_hovering_vehicle_is_detected():
     f.run_to("mission")
     f.run_for(1.0)
     strike(f, -12.0, 0.0)
-    (hit,) = f.companion.report().collisions
+    (hit,) = f.report.collisions
     assert hit.impact_speed_m_s < 0.1
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 @pytest.mark.parametrize("state", ["takeoff", "landing"])
@@ -271,7 +270,7 @@ def test_takeoff_and_landing_shake_without_a_detection(state):
     assert f.companion.status().detector == "off (below 0.5 m)"
     strike(f, 15.0, 15.0)
     f.run_to_end()
-    assert f.companion.report().collisions == ()
+    assert f.report.collisions == ()
 
 
 @pytest.mark.parametrize(("then", "first_item"), [("hold", 2), ("retry", 1)])
@@ -282,10 +281,10 @@ def test_a_hit_in_the_climb_is_recovered_from(then, first_item):
     assert f.state == "takeoff"
     strike(f, 12.0, 0.0)
     assert f.state == "recovering"
-    (hit,) = f.companion.report().collisions
+    (hit,) = f.report.collisions
     assert hit.recovery_setpoint_ned_m[2] == pytest.approx(f.vehicle.position[2], abs=0.2)
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
     assert [e.data["number"] for e in f.events if e.kind == "item"] == list(range(first_item, 4))
 
 
@@ -296,7 +295,7 @@ def test_below_the_minimum_height_nothing_is_detected():
     f.run_for(0.5)
     assert f.companion.status().detector == "off (below 0.5 m)"
     strike(f, 15.0, 0.0)
-    assert f.companion.report().collisions == ()
+    assert f.report.collisions == ()
 
 
 @pytest.mark.parametrize("after_s", [0.05, 0.2])
@@ -308,9 +307,9 @@ def test_a_second_hit_in_the_descent_does_not_forget_what_the_first_has_asked_fo
     strike(f, 12.0, 0.0)
     f.run_for(after_s)
     strike(f, 25.0, 0.0)
-    assert len(f.companion.report().collisions) == 2
+    assert len(f.report.collisions) == 2
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
@@ -322,10 +321,10 @@ def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
     f.run_until(lambda: f.vehicle.position[2] > -0.4)
     assert f.state in ("mission", "holding")
     strike(f, 12.0, 0.0)
-    (hit,) = f.companion.report().collisions
+    (hit,) = f.report.collisions
     assert hit.position_ned_m[2] > -0.5
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 def test_a_vehicle_that_drags_itself_along_the_ground_is_not_hit_by_it():
@@ -336,7 +335,7 @@ def test_a_vehicle_that_drags_itself_along_the_ground_is_not_hit_by_it():
     f.run_for(0.05)
     assert f.companion.status().detector == "off (below 0.1 m)"
     strike(f, 12.0, 0.0)
-    assert f.companion.report().collisions == ()
+    assert f.report.collisions == ()
 
 
 def test_the_detector_says_armed_in_flight():
@@ -353,7 +352,7 @@ def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
     f.run_to("holding", 3.0)
     assert "not settled" in f.event("recovered").text
     f.run_to_end()
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "completed"
     assert report.collisions[0].settled_after_s is None
 
@@ -361,13 +360,13 @@ def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
 def test_the_recovery_stays_inside_the_fence():
     f = at_wall(recovery={"law": "paper", "gamma": [5.0, 0.5]}, fence={"radius_m": 6, "max_height_m": 3})
     f.run_to("recovering")
-    assert f.companion.report().collisions[0].recovery_setpoint_ned_m[0] == pytest.approx(-6.0, abs=0.01)
+    assert f.report.collisions[0].recovery_setpoint_ned_m[0] == pytest.approx(-6.0, abs=0.01)
 
 
 def test_an_item_that_cannot_be_reached_ends_in_the_vehicles_own_hold():
     f = at_wall(companion={"min_detection_height_m": 100.0, "flight": {"arrival_timeout_s": 3.0}})
     f.run_to_end()
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "aborted"
     assert "not arrived" in report.reason
     assert f.vehicle.mode == LOITER
@@ -389,7 +388,7 @@ def test_imu_packets_that_come_late_or_twice_are_not_new_samples():
     f.run_for(0.5)
     old = mav.MAVLink_highres_imu_message(f.vehicle.time_us - 8000, 15.0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F)
     f.companion.step(bytes(old.pack(mav.MAVLink(None, 1, 1))), f.now_us)
-    assert f.companion.report().collisions == ()
+    assert f.report.collisions == ()
 
 
 def test_packets_that_arrive_in_batches_tell_the_same_of_a_hit():
@@ -403,7 +402,7 @@ def test_packets_that_arrive_in_batches_tell_the_same_of_a_hit():
         if batched.vehicle.ticks % 5 == 0:
             result = batched.companion.step(waiting, batched.now_us)
             waiting, batched.pending = b"", b"".join(result.sent_frames)
-    ours, theirs = (f.companion.report().collisions[0] for f in (single, batched))
+    ours, theirs = (f.report.collisions[0] for f in (single, batched))
     assert theirs.peak_specific_force_m_s2 == pytest.approx(ours.peak_specific_force_m_s2, rel=0.1)
     assert theirs.impact_speed_m_s == pytest.approx(ours.impact_speed_m_s, rel=0.02)
 
@@ -437,8 +436,8 @@ def test_the_origin_is_where_the_vehicle_is_when_it_arms():
     f = flight()
     f.run_to("takeoff")
     f.vehicle.position = [0.3, 0.0, 0.0]  # pushed while the setpoints were already streaming
-    f.run_until(lambda: f.companion.report().origin_ned_m is not None)
-    assert f.companion.report().origin_ned_m == pytest.approx((0.3, 0.0, 0.0), abs=1e-3)
+    f.run_until(lambda: f.report.origin_ned_m is not None)
+    assert f.report.origin_ned_m == pytest.approx((0.3, 0.0, 0.0), abs=1e-3)
 
 
 def test_received_frames_are_all_the_bytes_in_order():

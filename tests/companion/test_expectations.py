@@ -6,7 +6,8 @@ from typing import Any
 from companion.flight.context import Expectation
 from companion.flight.expectations import review
 from companion.mission.items import ExpectItem
-from tests.companion.fake_vehicle import FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.flying import Flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
 INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
@@ -51,7 +52,7 @@ AFTER_IT = [
 def test_each_expectation_is_met_or_not_and_the_flight_goes_on():
     before, after = ([{"expect": wish} for wish, _, _ in wishes] for wishes in (BEFORE_THE_HIT, AFTER_IT))
     f = flown(*before, INTO_WALL, *after)
-    report = f.companion.report()
+    report = f.report
     for result, (wish, met, detail) in zip(report.expectations, [*BEFORE_THE_HIT, *AFTER_IT], strict=True):
         assert result.met is met, (wish, result)
         assert detail in result.detail, (wish, result)
@@ -62,7 +63,7 @@ def test_each_expectation_is_met_or_not_and_the_flight_goes_on():
 
 def test_a_flight_whose_expectations_are_all_met_is_completed():
     f = flown({"expect": {"collision": {"within_s": 5}}}, INTO_WALL, {"expect": {"collisions": {"exactly": 1}}})
-    assert (f.companion.report().outcome, f.companion.report().reason) == ("completed", "landed and disarmed")
+    assert (f.report.outcome, f.report.reason) == ("completed", "landed and disarmed")
 
 
 def test_what_was_expected_of_a_flight_that_ended_early_is_told_too():
@@ -71,14 +72,14 @@ def test_what_was_expected_of_a_flight_that_ended_early_is_told_too():
     f.run_for(1.0)
     f.companion.stop("Ctrl-C")
     f.run_to_end()
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "aborted" and report.reason == "Ctrl-C"
     assert [result.met for result in report.expectations] == [True]
 
 
 def test_the_first_of_several_failures_is_the_reason():
     f = flown({"expect": {"no_collision": {}}}, INTO_WALL, {"expect": {"collisions": {"exactly": 0}}})
-    assert f.companion.report().reason.endswith(", and 1 more")
+    assert f.report.reason.endswith(", and 1 more")
 
 
 def test_a_hit_that_is_heard_of_late_came_late():

@@ -47,10 +47,8 @@ def test_one_gyroscope_that_is_not_a_number_before_a_hit_costs_one_sample():
     attacked(f, [attacker.packet(mav.MAVLINK_MSG_ID_HIGHRES_IMU, "xgyro", float("nan"))])
     for _ in range(500):
         attacked(f, [])
-    assert [collision.impact_speed_m_s for collision in f.companion.report().collisions] == pytest.approx(
-        [2.0], abs=0.2
-    )
-    assert f.companion.report().refused_messages == {"HIGHRES_IMU": 1}
+    assert [collision.impact_speed_m_s for collision in f.report.collisions] == pytest.approx([2.0], abs=0.2)
+    assert f.report.refused_messages == {"HIGHRES_IMU": 1}
     assert "implausible" not in f.kinds(), "one packet is a matter for the count"
 
 
@@ -60,10 +58,10 @@ def test_gyroscopes_that_are_never_a_number_are_no_hits_but_told_and_end_the_mis
     attacker = Attacker(f.vehicle, 1)
     for _ in range(3000):
         attacked(f, [attacker.packet(mav.MAVLINK_MSG_ID_HIGHRES_IMU, name, float("nan")) for name in GYROSCOPES])
-    assert f.companion.report().collisions == ()
+    assert f.report.collisions == ()
     assert "HIGHRES_IMU is not accepted: specific force" in f.event("implausible").text
     assert f.kinds().count("implausible") == 1
-    assert "blind" in f.companion.report().reason
+    assert "blind" in f.report.reason
 
 
 def test_an_accelerometer_that_reads_zero_for_a_second_is_no_hit():
@@ -75,7 +73,7 @@ def test_an_accelerometer_that_reads_zero_for_a_second_is_no_hit():
     f.vehicle.no_imu = False
     for _ in range(250):
         attacked(f, [])
-    assert f.state == "mission" and f.companion.report().collisions == ()
+    assert f.state == "mission" and f.report.collisions == ()
     assert "the accelerometer reads zero on all axes" in f.event("implausible").text
 
 
@@ -93,7 +91,7 @@ def test_one_number_beyond_all_physics_is_passed_over(message_id, field, value):
     attacked(f, [Attacker(f.vehicle, 1).packet(message_id, field, value)])
     for _ in range(100):
         attacked(f, [])
-    assert f.state == "mission" and f.companion.report().collisions == ()
+    assert f.state == "mission" and f.report.collisions == ()
 
 
 INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}

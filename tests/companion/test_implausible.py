@@ -199,7 +199,7 @@ def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
         noise = [chance[(number + axis) % 4] for axis in range(3)]
         off = mav.MAVLink_highres_imu_message(f.vehicle.time_us, *noise, *[0.0] * 10, 0x3F)
         attacked(f, [bytes(off.pack(attacker._tx))])
-    assert f.state == "mission" and f.companion.report().collisions == ()
+    assert f.state == "mission" and f.report.collisions == ()
     assert "the accelerometer reads zero on all axes" in f.event("implausible").text
 
 
@@ -284,7 +284,7 @@ def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
     while f.state == "recovering" and f.now_us - began_us < 2 * timeout_us:
         f.vehicle.push_m_s2 = (-60.0, 0.0)
         f.run_for(0.3)
-    assert len(f.companion.report().collisions) > 10
+    assert len(f.report.collisions) > 10
     assert f.now_us - began_us == pytest.approx(timeout_us, abs=1_000_000)
     f.run_for(0.1)
     assert f.vehicle.mode != LOITER

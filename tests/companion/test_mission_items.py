@@ -8,7 +8,8 @@ from pydantic import ValidationError
 
 from companion.mission.items import program
 from companion.mission.model import Mission
-from tests.companion.fake_vehicle import LOITER, Flight, flight
+from tests.companion.fake_vehicle import LOITER, flight
+from tests.flying import Flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
 
@@ -37,7 +38,7 @@ def setpoints_in(f: Flight, name: str) -> list:
 def test_a_path_is_flown_through_all_its_points():
     points = [[2, 2, -1.5], [6, -1, -1.5], [9, 1, -2.0]]
     f = flown({"path": {"points_ned_m": points, "speed_m_s": 1.0, "yaw_deg": "along"}})
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
     asked = setpoints_in(f, "path")
     for point in points:
         assert min(math.dist((m.x, m.y, m.z), point) for m in asked) < 0.02
@@ -49,7 +50,7 @@ def test_a_path_is_flown_through_all_its_points():
 
 def test_an_orbit_keeps_its_distance_and_looks_at_the_centre():
     f = flown({"orbit": {"centre_ned_m": [2, 0, -1.5], "radius_m": 1.5, "turns": 1.25, "speed_m_s": 1.0}})
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
     asked = setpoints_in(f, "orbit")
     on_circle = [m for m in asked if abs(math.hypot(m.x - 2, m.y) - 1.5) < 1e-3]
     assert len(on_circle) * 0.02 == pytest.approx(1.25 * math.tau * 1.5, rel=0.2), "at 1 m/s"
@@ -109,7 +110,7 @@ def test_repeats_may_stand_in_repeats_and_too_many_steps_are_refused():
 def test_waiting_until_a_time_after_arming():
     f = flown({"wait_for": {"flight_time_s": 9.0}})
     waited_until = next(event.time_us for event in f.events if event.kind == "item" and event.data["name"] == "land")
-    assert (waited_until - f.companion.report().armed_at_us) / 1e6 == pytest.approx(9.0, abs=0.01)
+    assert (waited_until - f.report.armed_at_us) / 1e6 == pytest.approx(9.0, abs=0.01)
 
 
 def test_waiting_for_a_file():
@@ -145,7 +146,7 @@ def test_an_item_that_takes_too_long(on_timeout, mode, outcome):
     wait = {"wait_for": {"file": "never"}, "timeout_s": 2.0, "on_timeout": on_timeout}
     f = flight(items=[TAKEOFF, wait, {"go_to": {"position_ned_m": [3, 0, -1.5]}}, LAND])
     f.run_to_end()
-    assert f.companion.report().outcome == outcome
+    assert f.report.outcome == outcome
     assert "not done within 2 s" in f.event("timeout").text
     assert f.vehicle.position[0] == pytest.approx(0.0, abs=0.05)
     assert mode is None or f.vehicle.mode == mode
@@ -154,7 +155,7 @@ def test_an_item_that_takes_too_long(on_timeout, mode, outcome):
 def test_an_item_that_takes_too_long_can_be_passed_over():
     wait = {"wait_for": {"file": "never"}, "timeout_s": 2.0, "on_timeout": "continue"}
     f = flown(wait, {"go_to": {"position_ned_m": [1, 0, -1.5]}})
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
     assert item_times_s(f)[0] == pytest.approx(2.0, abs=0.02)
     assert f.vehicle.position[0] == pytest.approx(1.0, abs=0.2)
 
@@ -165,7 +166,7 @@ def test_a_mission_can_end_with_the_way_home():
     f.run_to("landing")
     assert f.vehicle.position == pytest.approx([0.0, 0.0, -2.5], abs=0.4)
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 def test_the_way_home_stays_below_the_fences_top():

@@ -13,7 +13,8 @@ from companion.motion.motors import WINDOW_US, Damage, MotorWatch
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, flight, mission
+from tests.companion.fake_vehicle import FakeVehicle, flight, mission
+from tests.flying import EPOCH_US
 
 SAMPLE_US = 100_000
 HOVER, NOISE = 500.0, 0.01

@@ -9,7 +9,8 @@ from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
 from companion.report import Event
-from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.flying import EPOCH_US, Flight
 
 INTO_WALL = [
     {"takeoff": {"height_m": 1.5}},
@@ -56,7 +57,7 @@ def test_the_operator_reads_hit_recovery_and_outcome():
     f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
     f.run_to_end()
     texts = [message.text for _, message in sent(f, "STATUSTEXT")]
-    hit, collision = next(text for text in texts if text.startswith("Hit")), f.companion.report().collisions[0]
+    hit, collision = next(text for text in texts if text.startswith("Hit")), f.report.collisions[0]
     assert hit.startswith(f"Hit 1: at {collision.impact_speed_m_s:.2f} m/s going north, ")
     recovered = next(text for text in texts if text.startswith("Recovered"))
     assert recovered.startswith(f"Recovered in {collision.settled_after_s:.2f} s, ") and recovered.endswith("too far")
@@ -103,7 +104,7 @@ def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_t
     assert hits == sorted(hits) and hits[-1] == 1.0
     v_c = [m for _, m in sent(f, "DEBUG_VECT") if m.name == "rb_v_c"]
     assert v_c[0].x == pytest.approx(2.0, abs=0.1)
-    assert phases[-1][0] <= f.companion.report().ended_at_us
+    assert phases[-1][0] <= f.report.ended_at_us
 
 
 def warning(text):

@@ -4,7 +4,8 @@ import pytest
 from pydantic import ValidationError
 
 from companion.mission.model import Mission, steps_to_fly
-from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.flying import EPOCH_US, Flight
 
 ITEMS = [
     {"takeoff": {"height_m": 1.5}},
@@ -36,7 +37,7 @@ def test_while_the_vehicle_was_not_restarted_its_first_arming_position_counts():
     f = resumed(4, 5_000_000)
     f.run_to("landing")
     assert "the first flight's arming position" in f.event("resume").text
-    assert f.companion.report().origin_ned_m == (10.0, 5.0, 0.0)
+    assert f.report.origin_ned_m == (10.0, 5.0, 0.0)
     climbed = next(m for _, m in f.vehicle.setpoints if m.z < -1.49)
     assert (climbed.x, climbed.y) == pytest.approx((12.0, 5.0), abs=1e-3), "straight up from where it stands"
     assert f.vehicle.position == pytest.approx([13.0, 5.0, -1.5], abs=0.3)
@@ -72,7 +73,7 @@ def test_the_hits_of_before_count_for_what_the_mission_expects():
     f = flight(FakeVehicle(start_ned_m=(12.0, 5.0, 0.0), time_us=605_000_000), items=items, resume=resume)
     f.run_to_end()
     assert f.event("expect").data["met"] is True
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
 
 
 def test_the_person_is_told_before():

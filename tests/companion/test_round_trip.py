@@ -10,7 +10,8 @@ from companion.link.round_trip import MOST_US, RoundTrip
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
 from companion.report import RoundTripReport
 from rebound_cli.live.console import state_fields
-from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.flying import EPOCH_US, Flight
 
 TICK_US = 4_000
 
@@ -111,8 +112,8 @@ def test_a_flight_tells_its_round_trip_in_the_plan_the_live_line_and_the_report(
     f.run_to("mission")
     assert ("round trip", "20 ms") in state_fields(f.companion.status(), 1.0)
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-    assert f.companion.report().round_trip == RoundTripReport(20_000, 20_000, 0)
+    assert f.report.outcome == "completed"
+    assert f.report.round_trip == RoundTripReport(20_000, 20_000, 0)
     assert "round_trip" not in f.kinds()
 
 
@@ -122,7 +123,7 @@ def test_a_vehicle_that_is_too_far_away_is_not_armed():
     # When it is to be flown
     f.run_to_end()
     # Then it is refused with the figure, before anything was asked of it
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "failed"
     assert report.reason.startswith("the round trip to the vehicle takes 400 ms and at most 100 ms are allowed")
     assert set(f.vehicle.counts) <= {511, 512} and f.vehicle.setpoints == []
@@ -135,7 +136,7 @@ def test_a_round_trip_that_grows_while_the_plan_is_read_is_a_reason_not_to_begin
     f.run_for(6.0)
     f.companion.confirm_plan()
     f.run_to_end()
-    assert f.companion.report().reason.startswith("the round trip to the vehicle takes 400 ms")
+    assert f.report.reason.startswith("the round trip to the vehicle takes 400 ms")
     assert f.vehicle.setpoints == []
 
 
@@ -144,7 +145,7 @@ def test_a_round_trip_that_grows_in_flight_is_told_once_and_the_flight_goes_on()
     f.run_to("mission")
     f.vehicle.round_trip_us = 400_000
     f.run_to_end()
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "completed"
     assert f.kinds().count("round_trip") == 1
     assert f.event("round_trip").data["round_trip_us"] == 400_000
@@ -158,6 +159,6 @@ def test_a_vehicle_that_answers_no_timesync_is_told_of_in_the_plan_and_may_be_fl
     assert "round trip unknown: TIMESYNC is not answered" in f.companion.plan_text()
     f.companion.confirm_plan()
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-    assert f.companion.report().round_trip == RoundTripReport()
+    assert f.report.outcome == "completed"
+    assert f.report.round_trip == RoundTripReport()
     assert "round trip" not in dict(state_fields(f.companion.status(), 1.0))

@@ -17,8 +17,8 @@ REACH_M = 0.2
         (Wall(3.0, -0.5, -20.0), 1.0, "rigid", 2),
     ],
 )
-def test_a_slanted_wall_is_passed_and_no_remembered_part_of_it_touched(tmp_path, wall, speed_m_s, airframe, seed):
-    detour = fly_detour(tmp_path, wall, speed_m_s, airframe, seed)
+def test_a_slanted_wall_is_passed_and_no_remembered_part_of_it_touched(wall, speed_m_s, airframe, seed):
+    detour = fly_detour(wall, speed_m_s, airframe, seed)
     assert detour.report.outcome == "completed" and detour.report.unreachable == ()
     assert detour.nearest_to_goal_m < 0.5
     assert 2 <= len(detour.report.collisions) <= 7
