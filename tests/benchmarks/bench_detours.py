@@ -9,7 +9,7 @@ import random
 import statistics
 import sys
 
-from tests.missions.detours import Wall, fly_detour
+from tests.benchmarks.detours import Wall, fly_detour
 
 SEED = 1
 REACH_M = 0.2

@@ -59,13 +59,6 @@ def test_a_disarmed_vehicle_ends_the_flight(state):
     assert_silent_from_now(f)
 
 
-def test_the_pilot_choosing_land_is_still_the_pilot():
-    f = flying_in("mission")
-    f.vehicle.pilot_takes(LAND)
-    f.run_to("aborted", 0.2)
-    assert "pilot" in f.report.reason
-
-
 def test_without_current_mode_the_heartbeat_tells_the_pilot():
     f = flying_in("mission", no_current_mode=True)
     f.vehicle.pilot_takes(POSCTL)

@@ -101,23 +101,6 @@ def pushed(pushes, every_us=4_000, yaw_rate=0.0):
     return contact
 
 
-def test_the_impulse_is_the_sum_of_the_loud_samples():
-    contact = pushed([(-20.0, True), (-40.0, True), (-1.0, False), (-10.0, True), (-5.0, False)])
-    assert contact.impulse_ned_m_s == pytest.approx((-0.28, 0.0, 0.0))
-    assert contact.peak_m_s2 == pytest.approx(40.0)
-
-
-def test_of_the_time_before_the_first_sample_its_own_window_counts():
-    # Given a stream of 50 Hz whose windows are 5 ms, and a contact that one of them shows
-    contact = pushed([(-20.0, True), (0.0, False)], every_us=20_000)
-    # Then the impulse is what was seen, and no more than a lower bound
-    assert contact.impulse_ned_m_s == pytest.approx((-0.1, 0.0, 0.0)) and contact.has_gap
-
-
-def test_a_push_that_rises_and_falls_within_the_range_was_measured_whole():
-    assert pushed([(-10.0, True), (-25.0, True), (-30.0, True), (-22.0, True), (-8.0, True)]).is_fully_measured
-
-
 def test_the_first_window_tells_when_the_contact_began():
     """A quarter of the second window's mean: three quarters of it (5 ms) were still free."""
     contact = pushed([(-10.0, True), (-40.0, True)])

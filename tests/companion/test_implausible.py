@@ -21,7 +21,7 @@ from companion.motion.strapdown import Strapdown, VelocityFix
 from companion.reflex.confirmation import Hypothesis
 from companion.reflex.stream_health import SampleGate
 from tests.companion.fake_vehicle import LOITER, flight
-from tests.companion.hostile import Attacker, attacked, flight_in
+from tests.companion.hostile import attacked, flight_in
 
 STILL = (0.0, 0.0, 0.0)
 IMU_MS = 4
@@ -189,18 +189,6 @@ def test_a_velocity_that_jumps_is_no_hit_where_the_places_do_not_follow(speed_m_
     for at_ms in range(800, 1160, 20):
         history.add(LocalPosition(at_ms * 1000, (max(0.0, speed_m_s * (at_ms - 1000) * 1e-3), 0.0, 0.0), STILL))
     assert Hypothesis(1_000_000, 950_000, 3.0, (1.0, 0.0, 0.0)).is_rejected((), history, 0.03) is stays
-
-
-def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
-    f = flight_in("mission")
-    f.vehicle.no_imu = True
-    attacker, chance = Attacker(f.vehicle, 1), (0.02, -0.03, 0.01, -0.02)
-    for number in range(300):
-        noise = [chance[(number + axis) % 4] for axis in range(3)]
-        off = mav.MAVLink_highres_imu_message(f.vehicle.time_us, *noise, *[0.0] * 10, 0x3F)
-        attacked(f, [bytes(off.pack(attacker._tx))])
-    assert f.state == "mission" and f.report.collisions == ()
-    assert "the accelerometer reads zero on all axes" in f.event("implausible").text
 
 
 @pytest.mark.parametrize(("height_m", "state"), [(1.5, "recovering"), (0.3, "mission")])

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as mav
 
 from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
-from companion.messages import DebugVector, NamedValue, Severity, StatusText
+from companion.messages import Severity, StatusText
 from companion.report import Event
 from tests.companion.fake_vehicle import FakeVehicle, flight
 from tests.flying import EPOCH_US, Flight
@@ -38,19 +38,6 @@ def test_a_text_of_any_length_arrives_whole(length):
     if length > 50:
         assert len(messages[-1].text) < 50, "only a shorter part ends the text"
     assert {message.severity for message in messages} == {4}
-
-
-def test_two_long_texts_have_different_numbers():
-    encoder = Encoder()
-    first, second = (decoded(encoder.packets(StatusText(Severity.INFO, "x" * 60)))[0].id for _ in range(2))
-    assert 0 < first < second
-
-
-def test_numbers_and_vectors():
-    (value,) = decoded(Encoder().packets(NamedValue(1_500_000, "rb_thresh", 4.25)))
-    assert (value.name, value.value, value.time_boot_ms) == ("rb_thresh", 4.25, 1500)
-    (vector,) = decoded(Encoder().packets(DebugVector(1_500_000, "rb_v_c", (2.0, -1.0, 0.5))))
-    assert (vector.name, vector.x, vector.y, vector.z, vector.time_usec) == ("rb_v_c", 2.0, -1.0, 0.5, 1_500_000)
 
 
 def test_the_operator_reads_hit_recovery_and_outcome():
@@ -146,21 +133,6 @@ def test_of_each_subject_one_text_a_second_is_sent_and_none_twice(told, sent):
 def test_what_a_pilot_may_have_to_act_on_warns_and_what_goes_as_planned_does_not(kind, severity):
     text = status_text(Event(EPOCH_US, kind, "something is so", {}), "test", 0)
     assert text == (None if severity is None else StatusText(Severity(severity), "Something is so"))
-
-
-def test_the_companion_is_an_onboard_controller_of_the_vehicles_system_and_no_autopilot():
-    # As QGroundControl and PX4 tell one from a vehicle: MAV_TYPE 18, MAV_AUTOPILOT 8, component 191
-    f = flight(FakeVehicle(system_id=7))
-    f.run_to("mission")
-    beats = [message for _, message in f.vehicle.heartbeats][2:]
-    assert beats and {(one.type, one.autopilot, one.base_mode) for one in beats} == {(18, 8, 0)}
-    assert {(one.get_srcSystem(), one.get_srcComponent()) for one in beats} == {(7, 191)}
-    assert [one.system_status for one in beats][-1] == 4, "active"
-
-
-def test_a_flood_of_texts_is_one_a_second():
-    flood = [(tenth, "implausible", f"message {tenth} refused") for tenth in range(40)]
-    assert [tenth for tenth, _ in spoken(flood)] == [0, 10, 20, 30]
 
 
 def test_at_the_end_nothing_waits_any_more():

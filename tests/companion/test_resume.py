@@ -52,13 +52,6 @@ def test_after_a_restart_the_new_arming_position_counts():
     assert f.vehicle.position == pytest.approx([15.0, 5.0, -1.5], abs=0.3)
 
 
-def test_a_flight_of_the_future_tells_nothing_of_the_vehicle():
-    """The companion's clock was set back: no time has passed in which the vehicle's clock could have gone on."""
-    f = resumed(4, 1_605_000_000, armed_at_us=EPOCH_US + 1_000_000_000)
-    f.run_until(lambda: "resume" in f.kinds())
-    assert "the vehicle was restarted" in f.event("resume").text
-
-
 def test_an_interrupted_flight_says_where_to_go_on_and_a_resumed_one_too():
     f = resumed(4, 5_000_000)
     f.run_until(lambda: [e.data["step"] for e in f.events if e.kind == "item"][-1:] == [5])
@@ -74,12 +67,6 @@ def test_the_hits_of_before_count_for_what_the_mission_expects():
     f.run_to_end()
     assert f.event("expect").data["met"] is True
     assert f.report.outcome == "completed"
-
-
-def test_the_person_is_told_before():
-    f = resumed(5, 5_000_000, confirmed=False)
-    f.run_until(f.companion.plan_is_ready)
-    assert "Resumes    at item 4.1 (2 of 2)" in f.companion.plan_text()
 
 
 def test_a_step_that_there_is_not():

@@ -339,6 +339,47 @@ def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told():
     assert any("COM_OF_LOSS_T is 3 s" in text for text in air.told("unattended"))
 
 
+# --- a slow link: 200 ms each way
+
+
+def far(**when) -> dict:
+    return {"kind": "wire", "delay_s": 0.2, **when}
+
+
+def test_a_guard_does_not_begin_at_the_end_of_a_slow_link():
+    air = Air(faults=[far(at_s=0)])
+    air.run_until(lambda: air.guard.finished, 30.0)
+    assert air.guard.outcome.startswith("the round trip to the vehicle takes 404 ms and at most 100 ms are allowed")
+
+
+def test_a_guard_tells_of_a_link_that_became_slow_and_watches_on():
+    air = Air(faults=[far(at_s=18)])
+    air.take_off()
+    assert air.time_s < 18.0 and air.told("round_trip") == []
+    air.run_until(lambda: air.told("round_trip") != [], 25.0)
+    air.run_for(3.0)
+    assert air.state is State.WATCHING
+    assert air.told("round_trip") == ["round trip 404 ms: hits are answered late"]
+    assert air.guard.round_trip().summary()["worst"] == pytest.approx(404.0)
+
+
+def test_a_guard_on_the_ground_does_not_go_in_while_the_link_is_slow():
+    # Given a guard that stands by, and a link that became slow
+    air = Air(faults=[far(between_s=[8, 26])])
+    air.run_to(State.STANDING_BY, 8.0)
+    air.run_until(lambda: air.time_s > 14.0, 20.0)
+    # When the vehicle takes off
+    for command in ((400, 1), (22,)):
+        air.command(*command)
+        air.run_for(3.0)
+    # Then the guard says why it stands by, and watches when the link is quick again
+    air.run_for(5.0)
+    assert air.state is State.STANDING_BY
+    assert air.told("standing_by")[-1] == "standing by: the round trip to the vehicle takes too long"
+    air.run_to(State.WATCHING, 40.0)
+    assert air.time_s > 26.0
+
+
 # --- a vehicle that is restarted by its own reboot, on the ground
 
 
