@@ -248,15 +248,6 @@ def test_a_vehicle_that_restarts_while_its_streams_are_measured_is_measured_agai
     assert f.report.outcome == "completed" and f.kinds().count("streams") == 1
 
 
-def test_a_lost_position_hands_over_though_the_link_lives():
-    f = flight()
-    f.run_to("mission")
-    f.vehicle.no_positions = True
-    f.run_to_end(3.0)
-    assert "LOCAL_POSITION_NED" in f.report.reason
-    assert f.vehicle.mode == LOITER
-
-
 def test_a_blind_detector_says_so_and_so_does_one_that_sees_again():
     f = flight()
     f.run_to("mission")

@@ -261,6 +261,8 @@ def test_a_clock_that_jumps_is_no_silence_of_the_positions():
     # And positions that do not come end it, as ever
     f.vehicle.no_positions = True
     f.run_to("aborted", 1.2)
+    f.run_to_end(2.0)
+    assert f.vehicle.mode == LOITER
     assert "no LOCAL_POSITION_NED for 1.0 s, though the link is alive" in " ".join(f.texts())
 
 
