@@ -91,8 +91,7 @@ def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
     f.run_to("returning")
     f.run_to("landing")
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.6)
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_way_home_that_is_blocked_ends_where_it_is():

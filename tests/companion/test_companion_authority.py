@@ -73,8 +73,7 @@ def test_own_requests_are_not_taken_for_a_pilot_even_when_confirmed_late():
     """The vehicle obeys the second request only; until then it stays in the old mode."""
     vehicle = FakeVehicle(obey=lambda command, count: command != 176 or count % 2 == 0)
     f = flight(vehicle)
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_warning_status_while_still_in_offboard_is_not_a_loss_of_control():
@@ -183,8 +182,7 @@ def test_ctrl_c_before_the_flight_asks_nothing_of_the_vehicle(state):
     f = flight(confirmed=False)
     f.run_to(state)
     f.companion.stop("Ctrl-C")
-    f.run_to_end(0.1)
-    assert f.report.outcome == "aborted"
+    assert f.run_to_end(0.1).outcome == "aborted"
     assert not [m for _, m in f.vehicle.commands if m.command in (176, 400)]
 
 

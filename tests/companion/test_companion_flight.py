@@ -155,8 +155,7 @@ def test_a_second_hit_is_a_new_collision_with_a_new_setpoint(state):
     f.step()
     m = f.vehicle.setpoints[-1][1]
     assert (m.x, m.y) == pytest.approx(second.recovery_setpoint_ned_m[:2], abs=1e-4)
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 @pytest.mark.parametrize(("state", "keeps_clear"), [("recovering", True), ("holding", False)])
@@ -198,8 +197,7 @@ def test_a_hit_in_the_climb_is_recovered_from(then, first_item):
     assert f.state == "recovering"
     (hit,) = f.report.collisions
     assert hit.recovery_setpoint_ned_m[2] == pytest.approx(f.vehicle.position[2], abs=0.2)
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
     assert [e.data["number"] for e in f.events if e.kind == "item"] == list(range(first_item, 4))
 
 
@@ -213,8 +211,7 @@ def test_a_second_hit_in_the_descent_does_not_forget_what_the_first_has_asked_fo
     f.run_for(after_s)
     strike(f, 25.0, 0.0)
     assert len(f.report.collisions) == 2
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
@@ -228,8 +225,7 @@ def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
     strike(f, 12.0, 0.0)
     (hit,) = f.report.collisions
     assert hit.position_ned_m[2] > -0.5
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_vehicle_that_drags_itself_along_the_ground_is_not_hit_by_it():

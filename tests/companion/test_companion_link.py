@@ -79,8 +79,7 @@ def test_a_flight_that_waits_outlasts_a_vehicle_that_is_missing_restarts_and_has
     f.vehicle.silent = False
     f.run_for(3.0)
     f.companion.confirm_plan()
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_flight_that_waits_does_not_take_a_vehicle_back_after_a_silence_in_the_air():
@@ -139,8 +138,7 @@ def test_refused_and_unanswered_stream_requests_do_not_stop_a_vehicle_that_strea
 
 def test_lost_answers_and_lost_commands_are_repeated():
     f = flight(FakeVehicle(ack=lambda c, n: [] if n % 2 else [0], obey=lambda c, n: n % 2 == 0))
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
     confirmations = [m.confirmation for _, m in f.vehicle.commands if m.command == 400]
     assert confirmations == [0, 1]
 
@@ -149,8 +147,7 @@ def test_px4s_double_answer_to_the_mode_is_believed_only_when_the_mode_is_seen()
     f = flight(
         FakeVehicle(ack=lambda c, n: [0, 1] if c == 176 and n == 1 else [0], obey=lambda c, n: c != 176 or n > 1)
     )
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
     assert f.vehicle.counts[176] >= 2
 
 
@@ -190,8 +187,7 @@ def test_silence_while_the_vehicle_lands_does_not_stop_its_landing():
     f = flight()
     f.run_until(lambda: "landing" in f.kinds())
     f.vehicle.silent = True
-    f.run_to_end(3.0)
-    assert f.report.outcome == "aborted"
+    assert f.run_to_end(3.0).outcome == "aborted"
     assert f.vehicle.mode == LAND
 
 
@@ -199,8 +195,7 @@ def test_silence_before_the_flight_fails():
     f = flight(confirmed=False)
     f.run_to("ready")
     f.vehicle.silent = True
-    f.run_to_end(11.0)
-    assert f.report.outcome == "failed"
+    assert f.run_to_end(11.0).outcome == "failed"
     assert "silent" in f.report.reason
 
 
@@ -232,8 +227,7 @@ def test_a_vehicle_that_restarts_while_the_plan_is_read_has_it_made_and_agreed_t
     assert f.event("link").text == "the vehicle was silent: its streams are asked for again"
     # And it is flown when they have
     f.companion.confirm_plan()
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_vehicle_that_restarts_while_its_streams_are_measured_is_measured_again():
@@ -258,8 +252,7 @@ def test_a_blind_detector_says_so_and_so_does_one_that_sees_again():
     f.vehicle.no_imu = False
     f.run_for(0.2)
     assert "sees again" in f.event("link", 1).text
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_our_heartbeat_goes_out_every_second_from_the_first_step_to_the_last():

@@ -85,8 +85,7 @@ def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
     f.run_until(f.companion.plan_is_ready)
     commands = len(f.vehicle.commands)
     monkeypatch.setattr(monitor, "advance", breaks)
-    f.run_to_end(1.0)
-    assert f.report.outcome == "failed"
+    assert f.run_to_end(1.0).outcome == "failed"
     assert len(f.vehicle.commands) == commands and f.vehicle.setpoints == []
 
 

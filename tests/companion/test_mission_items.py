@@ -163,8 +163,7 @@ def test_a_mission_can_end_with_the_way_home_below_the_fences_top(max_height_m):
     height_m = min(2.5, max_height_m)
     assert f.vehicle.position == pytest.approx([0.0, 0.0, -height_m], abs=0.4)
     assert min(message.z for _, message in f.vehicle.setpoints) == pytest.approx(-height_m)
-    f.run_to_end()
-    assert f.report.outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 @pytest.mark.parametrize(
