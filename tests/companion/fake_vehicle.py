@@ -23,12 +23,14 @@ copyreg.pickle(struct.Struct, lambda layout: (struct.Struct, (layout.format,)))
 
 OFFBOARD, LOITER, LAND, POSCTL = 6 << 16, 4 << 16 | 3 << 24, 4 << 16 | 6 << 24, 3 << 16
 
+TAKEOFF, LANDING = {"takeoff": {"height_m": 1.5}}, {"land": {}}
+INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
 SQUARE_ITEMS = [
-    {"takeoff": {"height_m": 1.5}},
+    TAKEOFF,
     {"go_to": {"position_ned_m": [3, 0, -1.5], "speed_m_s": 2.0}},
     {"hold": {"duration_s": 0.5}},
     {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0, "yaw_deg": 90}},
-    {"land": {}},
+    LANDING,
 ]
 
 
@@ -245,13 +247,6 @@ class FakeVehicle:
             self.landed = 2
 
 
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"land": {}},
-]
-
-
 def flying_in(state: str, no_current_mode: bool = False, **changes: Any) -> Flight:
     """A flight in the middle of the given state, airborne; of a mission that meets a wall 3 m north."""
     return _flying_in(state, no_current_mode, **changes).copy()
@@ -259,7 +254,8 @@ def flying_in(state: str, no_current_mode: bool = False, **changes: Any) -> Flig
 
 @cache
 def _flying_in(state: str, no_current_mode: bool, **changes: Any) -> Flight:
-    f = flight(FakeVehicle(wall_north_m=3.0, no_current_mode=no_current_mode), items=INTO_WALL, **changes)
+    f = at_wall(INTO_WALL, **changes)
+    f.vehicle.no_current_mode = no_current_mode
     if state == "takeoff":
         f.run_until(lambda: f.vehicle.landed == 2)
     elif state == "landing":
@@ -276,3 +272,8 @@ def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes
     if confirmed:
         companion.confirm_plan()
     return Flight(companion, vehicle or FakeVehicle())
+
+
+def at_wall(*items: Any, **changes: Any) -> Flight:
+    """Up, through these items, and down; a wall stands 3 m north."""
+    return flight(FakeVehicle(wall_north_m=3.0), items=[TAKEOFF, *items, LANDING], **changes)

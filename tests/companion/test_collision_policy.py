@@ -5,17 +5,10 @@ import pytest
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
 from companion.reflex.config import EstimateConfig
-from tests.companion.fake_vehicle import LAND as LAND_MODE
-from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
+from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight
 from tests.flying import Flight
 
-TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
-INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
 ASIDE = {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0}}
-
-
-def at_wall(*items, **changes) -> Flight:
-    return flight(FakeVehicle(wall_north_m=3.0), items=[TAKEOFF, *items, LAND], **changes)
 
 
 def items_flown(f: Flight) -> list[int]:
@@ -117,7 +110,7 @@ def test_giving_up_hands_the_vehicle_over_once_it_has_settled(abort):
 
 
 def test_a_landing_is_not_put_off_for_more_hits_than_the_limit():
-    f = flight(FakeVehicle(), items=[{"takeoff": {"height_m": 4}}, LAND], on_collision={"max_hits": 1})
+    f = flight(FakeVehicle(), items=[{"takeoff": {"height_m": 4}}, LANDING], on_collision={"max_hits": 1})
     f.run_to("landing")
     f.run_for(0.5)
     strike(f)
@@ -126,7 +119,7 @@ def test_a_landing_is_not_put_off_for_more_hits_than_the_limit():
     f.run_for(1.5)
     strike(f)
     f.run_for(0.1)
-    assert f.state == "landing" and f.vehicle.mode == LAND_MODE
+    assert f.state == "landing" and f.vehicle.mode == LAND
     f.run_to_end()
     assert len(f.report.collisions) == 1
 
@@ -137,7 +130,7 @@ def test_a_recovery_keeps_off_what_is_known_behind_it():
     behind = {"touches_ned_m": [[-0.2, -1, -1.5], [-0.2, 1, -1.5]], "normal_ned": [1, 0, 0], "normal_error_deg": 5}
     norths = []
     for known in ([], [behind]):
-        f = flight(FakeVehicle(wall_north_m=0.6), items=[TAKEOFF, slowly, LAND], obstacles={"known": known})
+        f = flight(FakeVehicle(wall_north_m=0.6), items=[TAKEOFF, slowly, LANDING], obstacles={"known": known})
         f.run_to("recovering")
         f.run_until(lambda f=f: "recovered" in f.kinds())
         norths.append(f.report.collisions[0].recovery_setpoint_ned_m[0])

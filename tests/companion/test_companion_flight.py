@@ -6,26 +6,15 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
+from tests.companion import fake_vehicle
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, LOITER, TAKEOFF, FakeVehicle, flight
 from tests.flying import Flight
 
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"go_to": {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}},
-    {"land": {}},
-]
-
-
-PAPER = {"law": "paper", "gamma": 0.5}
+AND_BACK = {"go_to": {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}}
 
 
 def at_wall(**changes) -> Flight:
-    return flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL, **{"recovery": PAPER, **changes})
-
-
-def times_of(f: Flight, kind: str) -> list[int]:
-    return [event.time_us for event in f.events if event.kind == kind]
+    return fake_vehicle.at_wall(INTO_WALL, AND_BACK, **{"recovery": {"law": "paper", "gamma": 0.5}, **changes})
 
 
 def test_a_mission_without_a_hit_completes():
@@ -189,7 +178,7 @@ def test_takeoff_and_landing_shake_without_a_detection(state):
 
 @pytest.mark.parametrize(("then", "first_item"), [("hold", 2), ("retry", 1)])
 def test_a_hit_in_the_climb_is_recovered_from(then, first_item):
-    items = [{"takeoff": {"height_m": 4}}, {"go_to": {"position_ned_m": [2, 0, -4]}}, {"land": {}}]
+    items = [{"takeoff": {"height_m": 4}}, {"go_to": {"position_ned_m": [2, 0, -4]}}, LANDING]
     f = flight(items=items, on_collision={"then": then, "hold_s": 0.5})
     f.run_until(lambda: f.vehicle.position[2] < -1.5)
     assert f.state == "takeoff"
@@ -204,7 +193,7 @@ def test_a_hit_in_the_climb_is_recovered_from(then, first_item):
 @pytest.mark.parametrize("after_s", [0.05, 0.2])
 def test_a_second_hit_in_the_descent_does_not_forget_what_the_first_has_asked_for(after_s):
     """Given the order out of the land mode on its way, when it is hit again: the mode that comes is no pilot's."""
-    f = flight(items=[{"takeoff": {"height_m": 4}}, {"land": {}}])
+    f = flight(items=[{"takeoff": {"height_m": 4}}, LANDING])
     f.run_to("landing")
     f.run_until(lambda: f.vehicle.position[2] > -3.0)
     strike(f, 12.0, 0.0)
@@ -217,7 +206,7 @@ def test_a_second_hit_in_the_descent_does_not_forget_what_the_first_has_asked_fo
 def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
     """A hit that threw the vehicle down, or an item that leads low, takes no hit that follows."""
     down = {"go_to": {"position_ned_m": [0, 0, -0.35]}}
-    low = [{"takeoff": {"height_m": 1.5}}, down, {"hold": {"duration_s": 3}}, {"land": {}}]
+    low = [TAKEOFF, down, {"hold": {"duration_s": 3}}, LANDING]
     f = flight(items=low)
     f.run_to("mission")
     f.run_until(lambda: f.vehicle.position[2] > -0.4)
@@ -229,7 +218,7 @@ def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
 
 
 def test_a_vehicle_that_drags_itself_along_the_ground_is_not_hit_by_it():
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 5}}, {"land": {}}])
+    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
     f.run_to("mission")
     f.run_for(0.5)
     f.vehicle.position[2] = -0.05
@@ -292,7 +281,7 @@ def test_packets_that_arrive_in_batches_tell_the_same_of_a_hit():
 
 
 def test_headings_turn_the_shorter_way_at_a_limited_rate():
-    items = [{"takeoff": {"height_m": 1.5}}, {"land": {}}]
+    items = [TAKEOFF, LANDING]
     turn = {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}
     items[1:1] = [{"go_to": {**turn, "yaw_deg": 170}}, {"go_to": {**turn, "yaw_deg": -170}}]
     f = flight(items=items)
@@ -307,7 +296,7 @@ def test_headings_turn_the_shorter_way_at_a_limited_rate():
 
 def test_a_hit_in_the_middle_of_a_turn_stops_the_turn():
     turn = {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0, "yaw_deg": 90}
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"go_to": turn}, {"land": {}}])
+    f = flight(items=[TAKEOFF, {"go_to": turn}, LANDING])
     f.run_to("mission")
     f.run_for(1.0)
     f.vehicle.yaw_rad = math.radians(45)

@@ -5,7 +5,7 @@ import random
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.companion.fake_vehicle import INTO_WALL, at_wall
 from tests.companion.hostile import HEARD, STATES, Attacker, attacked, flight_in
 
 # These say in whose hands the vehicle is: forged, they end most flights before anything else is tried.
@@ -41,7 +41,7 @@ def test_every_field_of_every_message_alone_broken_in_a_recovery_changes_no_setp
 
 
 def test_one_gyroscope_that_is_not_a_number_before_a_hit_costs_one_sample():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=[{"takeoff": {"height_m": 1.5}}, INTO_WALL, {"land": {}}])
+    f = at_wall(INTO_WALL)
     f.run_until(lambda: f.vehicle.position[0] > 3.0 - 0.032 * 2.0)
     attacker = Attacker(f.vehicle, 1)
     attacked(f, [attacker.packet(mav.MAVLINK_MSG_ID_HIGHRES_IMU, "xgyro", float("nan"))])
@@ -62,6 +62,3 @@ def test_gyroscopes_that_are_never_a_number_are_no_hits_but_told_and_end_the_mis
     assert "HIGHRES_IMU is not accepted: specific force" in f.event("implausible").text
     assert f.kinds().count("implausible") == 1
     assert "blind" in f.report.reason
-
-
-INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}

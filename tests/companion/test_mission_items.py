@@ -8,15 +8,13 @@ from pydantic import ValidationError
 
 from companion.mission.items import program
 from companion.mission.model import Mission
-from tests.companion.fake_vehicle import LOITER, flight
+from tests.companion.fake_vehicle import LANDING, LOITER, TAKEOFF, flight
 from tests.flying import Flight
-
-TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
 
 
 def flown(*items, vehicle=None, **changes) -> Flight:
     """The flight over, completed or not."""
-    f = flight(vehicle, items=[TAKEOFF, *items, LAND], **changes)
+    f = flight(vehicle, items=[TAKEOFF, *items, LANDING], **changes)
     f.run_to_end()
     return f
 
@@ -98,13 +96,13 @@ def test_what_is_repeated_is_flown_as_often_as_asked_and_told_by_lap():
 def test_repeats_may_stand_in_repeats_and_too_many_steps_are_refused():
     inner = {"repeat": {"times": 3, "items": [{"hold": {"duration_s": 1}}]}}
     mission = Mission.model_validate(
-        {"name": "t", "items": [TAKEOFF, {"repeat": {"times": 2, "items": [inner]}}, LAND]}
+        {"name": "t", "items": [TAKEOFF, {"repeat": {"times": 2, "items": [inner]}}, LANDING]}
     )
     steps = program(mission.items)
     assert len(steps) == 8 and steps[4].label == "2.1.1 (2 of 2) (1 of 3)"
     with pytest.raises(ValidationError, match="more than 10000 steps"):
         items = [inner | {"repeat": inner["repeat"] | {"times": 1000}}]
-        Mission.model_validate({"name": "t", "items": [TAKEOFF, {"repeat": {"times": 1000, "items": items}}, LAND]})
+        Mission.model_validate({"name": "t", "items": [TAKEOFF, {"repeat": {"times": 1000, "items": items}}, LANDING]})
 
 
 def test_waiting_until_a_time_after_arming():
@@ -114,7 +112,7 @@ def test_waiting_until_a_time_after_arming():
 
 
 def test_waiting_for_a_file():
-    f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LAND])
+    f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LANDING])
     f.run_to("mission")
     f.run_for(5.0)
     assert f.companion.file_awaited == "go" and f.state == "mission"
@@ -131,7 +129,7 @@ def test_waiting_until_steady():
 
 
 def test_whoever_is_pushed_is_not_steady():
-    f = flight(items=[TAKEOFF, {"wait_for": {"steady": {"for_s": 1.0}}}, LAND])
+    f = flight(items=[TAKEOFF, {"wait_for": {"steady": {"for_s": 1.0}}}, LANDING])
     f.run_until(lambda: f.state == "mission" and abs(f.vehicle.velocity[2]) < 0.05)
     f.run_for(0.8)
     assert f.state == "mission"
@@ -185,11 +183,11 @@ def test_a_mission_can_end_with_the_way_home_below_the_fences_top(max_height_m):
 )
 def test_items_that_cannot_be_flown(items, words):
     with pytest.raises(ValidationError, match=words):
-        Mission.model_validate({"name": "t", "limits": {"max_speed_m_s": 5}, "items": [TAKEOFF, *items, LAND]})
+        Mission.model_validate({"name": "t", "limits": {"max_speed_m_s": 5}, "items": [TAKEOFF, *items, LANDING]})
 
 
 def test_a_way_that_leaves_a_room_on_its_way_is_refused():
     room = {"polygon_ne_m": [[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]]}
     there = [{"go_to": {"position_ned_m": [5, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 5, -1.5]}}]
     with pytest.raises(ValidationError, match=r"item 3 \(go_to\) leaves fence.polygon_ne_m at \[4.00, 1.00\]"):
-        Mission.model_validate({"name": "t", "items": [TAKEOFF, *there, LAND], "fence": room})
+        Mission.model_validate({"name": "t", "items": [TAKEOFF, *there, LANDING], "fence": room})

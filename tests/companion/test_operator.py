@@ -9,14 +9,8 @@ from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
 from companion.report import Event
-from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight
 from tests.flying import EPOCH_US, Flight
-
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"land": {}},
-]
 
 
 def decoded(packets) -> list:
@@ -41,7 +35,7 @@ def test_a_text_of_any_length_arrives_whole(length):
 
 
 def test_the_operator_reads_hit_recovery_and_outcome():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f = at_wall(INTO_WALL)
     f.run_to_end()
     texts = [message.text for _, message in sent(f, "STATUSTEXT")]
     hit, collision = next(text for text in texts if text.startswith("Hit")), f.report.collisions[0]
@@ -53,7 +47,7 @@ def test_the_operator_reads_hit_recovery_and_outcome():
 
 
 def test_the_hits_text_leaves_with_the_recovery_setpoint():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f = at_wall(INTO_WALL)
     f.run_until(lambda: "detection" in f.kinds())
     at_us = f.event("detection").time_us
     assert [m.text[:5] for t, m in sent(f, "STATUSTEXT") if t == at_us] == ["Hit 1"]
@@ -62,7 +56,7 @@ def test_the_hits_text_leaves_with_the_recovery_setpoint():
 
 
 def test_a_vehicle_hit_while_it_hovers_is_pushed():
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 5}}, {"land": {}}])
+    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
     f.run_to("mission")
     f.run_for(1.0)
     f.vehicle.push_m_s2 = (0.0, -12.0)
@@ -80,7 +74,7 @@ def test_an_early_end_is_told_with_its_reason():
 
 
 def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_the_end():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f = at_wall(INTO_WALL)
     f.run_to_end()
     f.run_for(2.0)
     phases = [(t, m.value) for t, m in sent(f, "NAMED_VALUE_FLOAT") if m.name == "rb_phase"]
@@ -140,7 +134,7 @@ def test_at_the_end_nothing_waits_any_more():
 
 
 def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_end_at_once():
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 9}}, {"land": {}}])
+    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 9}}, LANDING])
     f.run_to("mission")
     for text in ("first", "second"):
         f.companion.note("late", text)
