@@ -65,7 +65,7 @@ f = flight(FakeVehicle(wall_north_m=3.0), items=[
     {"takeoff": {"height_m": 1.5}}, {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}, {"land": {}}])
 f.run_to("holding")
 f.run_to_end()
-assert len(f.companion.report().collisions) == 1 and f.companion.report().outcome == "completed"
+assert len(f.report.collisions) == 1 and f.report.outcome == "completed"
 """
     done = alone(code, tmp_path)
     assert done.returncode == 0, done.stderr

@@ -6,15 +6,10 @@ from collections.abc import AsyncGenerator, Awaitable, Callable
 
 import mavsdk.asyncio.plugins.offboard as offboard_types
 import mavsdk.plugins.action as action_types
-import mavsdk.plugins.geofence as fence_types
-import mavsdk.plugins.mission as mission_types
 import pytest
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, System
 from mavsdk.asyncio.plugins.action import ActionAsync
-from mavsdk.asyncio.plugins.geofence import GeofenceAsync
 from mavsdk.asyncio.plugins.info import InfoAsync
-from mavsdk.asyncio.plugins.manual_control import ManualControlAsync
-from mavsdk.asyncio.plugins.mission import MissionAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
@@ -174,49 +169,3 @@ def test_offboard_by_position_velocity_body_attitude_and_rates():
         await land(system)
 
     flown(scenario)
-
-
-def test_missions_fences_and_sticks():
-    async def scenario(system: System) -> None:
-        mission, telemetry, fence = MissionAsync(system), TelemetryAsync(system), GeofenceAsync(system)
-        place = await first(telemetry.subscribe_position())
-        items = [
-            mission_types.MissionItem(
-                *(place.latitude_deg + north * 9e-6, place.longitude_deg, 4.0, 4.0, True, math.nan, math.nan),
-                mission_types.MissionItem.CameraAction.NONE,
-                *(math.nan, math.nan, 0.5, math.nan, math.nan),
-                mission_types.MissionItem.VehicleAction.NONE,
-            )
-            for north in (5.0, 10.0)
-        ]
-        await mission.set_return_to_launch_after_mission(False)
-        await mission.upload_mission(mission_types.MissionPlan(items))
-        assert len((await mission.download_mission()).mission_items) == 2
-        corners = [
-            fence_types.Point(place.latitude_deg + north, place.longitude_deg + east)
-            for north, east in ((-1e-3, -1e-3), (1e-3, -1e-3), (1e-3, 1e-3), (-1e-3, 1e-3))
-        ]
-        polygon = fence_types.Polygon(corners, fence_types.FenceType.INCLUSION)
-        await fence.upload_geofence(fence_types.GeofenceData([polygon], []))
-        await ActionAsync(system).arm()
-        await mission.start_mission()
-        await first(mission.subscribe_mission_progress(), lambda at: at.current == at.total, 60.0)
-        await land(system)
-        await mission.clear_mission()
-        await fence.clear_geofence()
-        sticks = ManualControlAsync(system)
-
-        async def hold_centred() -> None:
-            while True:
-                await sticks.set_manual_control_input(0.0, 0.0, 0.5, 0.0)
-                await asyncio.sleep(0.05)
-
-        holding = asyncio.create_task(hold_centred())
-        await asyncio.sleep(0.5)
-        await take_off(system)
-        await sticks.start_position_control()
-        await first(telemetry.subscribe_flight_mode(), lambda mode: int(mode) == POSITION)
-        await land(system)
-        holding.cancel()
-
-    flown(scenario, 200.0)

@@ -1,6 +1,5 @@
 """pymavlink's own helpers on the simulated vehicle: heartbeat, modes, arming, parameters, its log reader."""
 
-import math
 import os
 import time
 
@@ -83,20 +82,3 @@ def test_a_log_of_it_is_read_back(vehicle, tmp_path):
     while (message := log.recv_match()) is not None:
         kinds.add(message.get_type())
     assert {"ATTITUDE", "LOCAL_POSITION_NED"} <= kinds and "BAD_DATA" not in kinds
-
-
-def test_a_mission_goes_up_and_comes_down_again(vehicle):
-    vehicle.wait_heartbeat(timeout=5)
-    points = [(22, 47.397742, 8.545594, 5.0), (16, 47.39785, 8.545594, 5.0), (21, 47.39785, 8.545594, 0.0)]
-    vehicle.mav.mission_count_send(1, 1, len(points), 0)
-    for _ in points:
-        request = vehicle.recv_match(type=["MISSION_REQUEST_INT", "MISSION_REQUEST"], blocking=True, timeout=3)
-        command, latitude, longitude, height_m = points[request.seq]
-        vehicle.mav.mission_item_int_send(
-            *(1, 1, request.seq, 6, command, 0, 1, 0, 0, 0, math.nan),
-            *(round(latitude * 1e7), round(longitude * 1e7), height_m),
-            0,
-        )
-    assert vehicle.recv_match(type="MISSION_ACK", blocking=True, timeout=3).type == 0
-    vehicle.waypoint_request_list_send()
-    assert vehicle.recv_match(type="MISSION_COUNT", blocking=True, timeout=3).count == len(points)

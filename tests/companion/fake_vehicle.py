@@ -4,7 +4,6 @@ It shares no code with the product. What it does on request can be spoiled in th
 spoil it: silence, refusals, lost answers, a pilot, a failsafe.
 """
 
-import copy
 import copyreg
 import math
 import struct
@@ -17,21 +16,21 @@ from pymavlink.dialects.v20 import development as mav
 
 from companion.companion import Companion
 from companion.mission.model import Mission
-from companion.report import Event
+from tests.flying import INTERVAL_US, Flight
 
 # A layout of bytes knows no copying, and is made anew.
 copyreg.pickle(struct.Struct, lambda layout: (struct.Struct, (layout.format,)))
 
 OFFBOARD, LOITER, LAND, POSCTL = 6 << 16, 4 << 16 | 3 << 24, 4 << 16 | 6 << 24, 3 << 16
-INTERVAL_US = 4_000
-EPOCH_US = 1_600_000_000_000_000
 
+TAKEOFF, LANDING = {"takeoff": {"height_m": 1.5}}, {"land": {}}
+INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
 SQUARE_ITEMS = [
-    {"takeoff": {"height_m": 1.5}},
+    TAKEOFF,
     {"go_to": {"position_ned_m": [3, 0, -1.5], "speed_m_s": 2.0}},
     {"hold": {"duration_s": 0.5}},
     {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0, "yaw_deg": 90}},
-    {"land": {}},
+    LANDING,
 ]
 
 
@@ -248,74 +247,6 @@ class FakeVehicle:
             self.landed = 2
 
 
-@dataclass
-class Flight:
-    """Companion and fake vehicle joined in memory, on virtual time."""
-
-    companion: Companion
-    vehicle: FakeVehicle
-    now_us: int = EPOCH_US
-    pending: bytes = b""
-    events: list[Event] = field(default_factory=list)
-    sent: list[tuple[int, bytes]] = field(default_factory=list)
-
-    def step(self) -> list[Event]:
-        self.now_us += INTERVAL_US
-        result = self.companion.step(self.vehicle.step(self.pending), self.now_us)
-        self.pending = b"".join(result.sent_frames)
-        self.sent += [(self.now_us, frame) for frame in result.sent_frames]
-        self.events += result.events
-        return list(result.events)
-
-    def copy(self) -> "Flight":
-        """Goes on as this one would; what both have done so far is flown once. What was said stays as it is."""
-        v = self.vehicle
-        said = [*self.events, *self.sent, *v.setpoints, *v.commands, *v.heartbeats, *v.timesyncs]
-        return copy.deepcopy(self, {id(one): one for one in said})
-
-    def run_until(self, condition: Callable[[], bool], limit_s: float = 60.0) -> None:
-        """Step until the condition holds; the test fails when it does not within virtual `limit_s`."""
-        for _ in range(math.ceil(limit_s * 1e6 / INTERVAL_US)):
-            if condition():
-                return
-            self.step()
-        raise AssertionError(f"not within {limit_s} s; state {self.state}, events: {self.texts()}")
-
-    def run_for(self, seconds: float) -> None:
-        for _ in range(round(seconds * 1e6 / INTERVAL_US)):
-            self.step()
-
-    def run_to(self, state: str, limit_s: float = 60.0) -> None:
-        self.run_until(lambda: self.state == state, limit_s)
-
-    def run_to_end(self, limit_s: float = 120.0) -> None:
-        self.run_until(lambda: self.companion.finished, limit_s)
-
-    @property
-    def state(self) -> str:
-        return self.companion.status().state
-
-    def kinds(self) -> list[str]:
-        return [event.kind for event in self.events]
-
-    def texts(self) -> list[str]:
-        return [f"{event.kind}: {event.text}" for event in self.events]
-
-    def event(self, kind: str, index: int = 0) -> Event:
-        return [event for event in self.events if event.kind == kind][index]
-
-    def setpoints_since(self, time_us: int) -> list:
-        """Setpoint packets sent after `now_us` = time_us."""
-        return [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == 84]
-
-
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"land": {}},
-]
-
-
 def flying_in(state: str, no_current_mode: bool = False, **changes: Any) -> Flight:
     """A flight in the middle of the given state, airborne; of a mission that meets a wall 3 m north."""
     return _flying_in(state, no_current_mode, **changes).copy()
@@ -323,7 +254,8 @@ def flying_in(state: str, no_current_mode: bool = False, **changes: Any) -> Flig
 
 @cache
 def _flying_in(state: str, no_current_mode: bool, **changes: Any) -> Flight:
-    f = flight(FakeVehicle(wall_north_m=3.0, no_current_mode=no_current_mode), items=INTO_WALL, **changes)
+    f = at_wall(INTO_WALL, **changes)
+    f.vehicle.no_current_mode = no_current_mode
     if state == "takeoff":
         f.run_until(lambda: f.vehicle.landed == 2)
     elif state == "landing":
@@ -340,3 +272,8 @@ def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes
     if confirmed:
         companion.confirm_plan()
     return Flight(companion, vehicle or FakeVehicle())
+
+
+def at_wall(*items: Any, **changes: Any) -> Flight:
+    """Up, through these items, and down; a wall stands 3 m north."""
+    return flight(FakeVehicle(wall_north_m=3.0), items=[TAKEOFF, *items, LANDING], **changes)

@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.packets import outside
 from companion.mavlink.readers import READERS
-from tests.companion.fake_vehicle import INTERVAL_US, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.flying import INTERVAL_US, Flight
 
 HEARD = sorted(READERS)
 # The states of a flight, and a mission that passes them all: into a wall, home and down.

@@ -6,12 +6,13 @@ import pickle
 import pytest
 
 from bench.detectors.config import BaselineConfig
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
+from companion.messages import Attitude, ImuSample, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
 from companion.reflex.config import StreamHealthConfig
 from companion.reflex.detector import Phase, Situation
 from companion.reflex.monitor import advance, start_monitor
 from companion.reflex.stream_health import StreamHealth
+from tests.companion.watching import Watch
 
 INTERVAL_US = 4_000
 WANTED = Situation()
@@ -119,15 +120,6 @@ def test_after_a_silence_the_samples_of_a_second_at_the_least_rate_prove_the_rat
     assert imu_every(monitor, every_us, 3_000_000, 6_000_000) == [seeing_us]
 
 
-def test_a_slow_stream_stays_blind_and_is_seen_again_a_quarter_of_a_second_after_it_is_fast():
-    monitor = start_monitor(lateral(), 0)
-    fly(monitor, 1_000_000)
-    (blind_us,) = imu_every(monitor, 100_000, 1_000_000, 5_000_000)
-    assert blind_us <= 2_000_000
-    (seeing_us,) = imu_every(monitor, 20_000, 5_000_000, 8_000_000)
-    assert seeing_us <= 250_000
-
-
 def test_a_stream_at_the_least_rate_is_not_told_blind_between_its_samples():
     # Given samples every 50 ms, each up to 8 ms late
     arrivals = {50_000 * number + (0, 8_000, 4_000)[number % 3] for number in range(1, 180)}
@@ -152,25 +144,17 @@ def test_samples_that_a_link_held_back_and_delivers_at_once_prove_no_rate():
 
 def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_is_blind():
     # Given a level vehicle that flies north; no attitude comes from 4 s on, and at 4.4 s it leans to gain 1.8 m/s
-    monitor, impacts, texts = start_monitor(CompanionConfig(), 0), [], []
     from_us, until_us, speeding_up_m_s2 = 4_400_000, 5_000_000, 3.0
-    for t in range(INTERVAL_US, 6_000_000, INTERVAL_US):
-        led_s, leans = max(0, min(t, until_us) - from_us) * 1e-6, from_us < t <= until_us
-        # No estimate stands still to the last digit.
-        north_m_s = 1.0 + 0.001 * math.sin(1e-5 * t) + speeding_up_m_s2 * led_s
-        place = (1e-6 * t + 0.5 * speeding_up_m_s2 * led_s**2, 0.0, -1.5)
-        thrust = -math.hypot(9.80665, speeding_up_m_s2 if leans else 0.0)
-        samples: list[Sample] = [ImuSample(t, (0.0, 0.0, thrust), (0.0, 0.0, 0.0))]
-        if t % 32_000 == 0:
-            samples += [Odometry(t, place, (north_m_s, 0.0, 0.0), 0), LocalPosition(t, place, (north_m_s, 0.0, 0.0))]
-        if not 4_000_000 < t <= until_us:
-            samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
-        seen = advance(monitor, samples, WANTED, t)
-        impacts += seen.impacts
-        texts += [notice.text for notice in seen.notices if notice.kind == "link"]
+    thrust = 9.80665 - math.hypot(9.80665, speeding_up_m_s2)
+    watch = Watch().fly(
+        6_000_000,
+        push=lambda t: (0.0, 0.0, thrust if from_us < t <= until_us else 0.0),
+        velocity=lambda t: (1.0 + speeding_up_m_s2 * max(0, min(t, until_us) - from_us) * 1e-6, 0.0, 0.0),
+        attitude=lambda t: None if 4_000_000 < t <= until_us else (1.0, 0.0, 0.0, 0.0),
+    )
     # Then a velocity that no force explains is no hit, and it is told
-    assert impacts == []
-    assert texts == ["detector blind: no ATTITUDE_QUATERNION for 250 ms", "the detector sees again"]
+    assert watch.impacts == []
+    assert watch.texts("link") == ["detector blind: no ATTITUDE_QUATERNION for 250 ms", "the detector sees again"]
 
 
 def test_a_watch_that_is_not_wanted_is_off_not_blind():

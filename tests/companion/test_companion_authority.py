@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, POSCTL, FakeVehicle, Flight, flight, flying_in
+from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, POSCTL, FakeVehicle, flight, flying_in
+from tests.flying import Flight
 
 IN_THE_AIR = ["takeoff", "mission", "recovering", "holding", "landing"]
 ON_SETPOINTS = ["takeoff", "mission", "recovering", "holding"]
@@ -24,7 +25,7 @@ def test_a_pilots_mode_change_ends_the_flight_and_the_setpoints_at_once(state):
     f.vehicle.pilot_takes(POSCTL)
     f.run_to("aborted", 2.0 if state == "landing" else 0.2)
 
-    report = f.companion.report()
+    report = f.report
     assert f.companion.finished
     assert report.outcome == "aborted"
     assert "pilot" in report.reason
@@ -42,7 +43,7 @@ def test_a_failsafe_is_called_a_failsafe_and_not_fought(state, seen_in):
     # HEARTBEAT alone tells it once a second, and tells it twice before it counts
     f.run_to("aborted", 3.7 if state == "landing" else 2.1)
 
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "aborted"
     assert "failsafe" in report.reason
     assert "pilot" not in report.reason
@@ -54,15 +55,8 @@ def test_a_disarmed_vehicle_ends_the_flight(state):
     f = flying_in(state)
     f.vehicle.armed = False
     f.run_to("aborted", 2.1)
-    assert "disarmed" in f.companion.report().reason
+    assert "disarmed" in f.report.reason
     assert_silent_from_now(f)
-
-
-def test_the_pilot_choosing_land_is_still_the_pilot():
-    f = flying_in("mission")
-    f.vehicle.pilot_takes(LAND)
-    f.run_to("aborted", 0.2)
-    assert "pilot" in f.companion.report().reason
 
 
 def test_without_current_mode_the_heartbeat_tells_the_pilot():
@@ -72,15 +66,14 @@ def test_without_current_mode_the_heartbeat_tells_the_pilot():
     since = f.now_us
     f.run_to("aborted", 1.1)
     assert f.setpoints_since(since) == [], "none from the first report on"
-    assert "pilot" in f.companion.report().reason
+    assert "pilot" in f.report.reason
 
 
 def test_own_requests_are_not_taken_for_a_pilot_even_when_confirmed_late():
     """The vehicle obeys the second request only; until then it stays in the old mode."""
     vehicle = FakeVehicle(obey=lambda command, count: command != 176 or count % 2 == 0)
     f = flight(vehicle)
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_warning_status_while_still_in_offboard_is_not_a_loss_of_control():
@@ -110,7 +103,7 @@ def test_ctrl_c_hands_the_vehicle_over_as_the_mission_says(state, on_interrupt, 
     f.companion.stop("Ctrl-C")
     f.run_to_end(2.0)
 
-    report = f.companion.report()
+    report = f.report
     assert f.vehicle.mode == mode
     assert f.vehicle.armed
     assert (report.outcome, report.reason) == ("aborted", "Ctrl-C")
@@ -149,7 +142,7 @@ def test_a_vehicle_that_refuses_to_hold_is_asked_to_land():
     f.run_to_end(8.0)
     assert f.vehicle.mode == LAND
     assert [e for e in f.events if "asking it to land" in e.text]
-    assert f.companion.report().outcome == "aborted"
+    assert f.report.outcome == "aborted"
 
 
 def test_a_pilot_who_takes_over_during_the_hand_over_keeps_the_vehicle():
@@ -173,7 +166,7 @@ def test_ctrl_c_while_arming_on_the_ground_disarms():
     f.run_to_end(5.0)
     assert not f.vehicle.armed
     assert f.vehicle.mode == LOITER
-    assert f.companion.report().outcome == "aborted"
+    assert f.report.outcome == "aborted"
 
 
 def test_a_vehicle_that_flies_already_is_not_kept_from_the_hand_over_by_a_refused_disarm():
@@ -189,8 +182,7 @@ def test_ctrl_c_before_the_flight_asks_nothing_of_the_vehicle(state):
     f = flight(confirmed=False)
     f.run_to(state)
     f.companion.stop("Ctrl-C")
-    f.run_to_end(0.1)
-    assert f.companion.report().outcome == "aborted"
+    assert f.run_to_end(0.1).outcome == "aborted"
     assert not [m for _, m in f.vehicle.commands if m.command in (176, 400)]
 
 
@@ -200,4 +192,4 @@ def test_a_second_ctrl_c_changes_nothing():
     f.step()
     f.companion.stop("Ctrl-C again")
     f.run_to_end(2.0)
-    assert f.companion.report().reason == "Ctrl-C"
+    assert f.report.reason == "Ctrl-C"

@@ -21,12 +21,14 @@ from companion.messages import (
     CommandAck,
     CommandResult,
     CurrentMode,
+    DebugVector,
     EstimatorStatus,
     ExtendedState,
     Heartbeat,
     ImuSample,
     LandedState,
     LocalPosition,
+    NamedValue,
     Odometry,
     OnboardHeartbeat,
     Parameter,
@@ -113,10 +115,15 @@ CASES = [
 UNUSED = mav.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0, 0, 0)
 
 
-# Nothing is made of these: body velocity without its attitude, a thrust that is not given.
+# Nothing is made of these: body velocity without its attitude, a thrust that is not given, answers to others, values
+# that are not measured.
 NOT_TAKEN = [
     mav.MAVLink_odometry_message(5, 1, 12, 1, 2, 3, [1, 0, 0, 0], 1, 1, 1, 0, 0, 0, [0] * 21, [0] * 21, 7),
     mav.MAVLink_attitude_target_message(5000, 64, (1, 0, 0, 0), 0, 0, 0, 0.75),
+    mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190),
+    mav.MAVLink_highres_imu_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x38),
+    mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 101, 0, 0, 0, 0, 0, 0),
+    mav.MAVLink_param_value_message(b"MPC_XY_P", math.nan, mav.MAV_PARAM_TYPE_REAL32, 1, 0),
 ]
 
 
@@ -215,16 +222,6 @@ def test_only_heartbeats_are_heard_before_the_vehicle_is_known_and_only_the_vehi
     assert decoder.feed(packed(HEARTBEAT[0], 1, 190))[0][1] is None
 
 
-def test_answers_to_others_and_unmeasured_values_are_not_samples():
-    for message in (
-        mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190),
-        mav.MAVLink_highres_imu_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x38),
-        mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 101, 0, 0, 0, 0, 0, 0),
-        mav.MAVLink_param_value_message(b"MPC_XY_P", math.nan, mav.MAV_PARAM_TYPE_REAL32, 1, 0),
-    ):
-        assert listening_decoder().feed(packed(message))[0][1] is None
-
-
 # All three axes at the end of the widest range among PX4's drivers: 40 g and 4000 deg/s.
 FORCE, RATE = math.sqrt(3.0) * 40 * 9.80665, math.sqrt(3.0) * math.radians(4000)
 # Message, the fields that must be finite and bounded, and the largest value that PX4 can mean by them.
@@ -260,20 +257,16 @@ def test_a_value_that_no_vehicle_can_have_is_refused_and_the_greatest_it_can_hav
 
 
 @pytest.mark.parametrize("field", ["q1", "q2", "q3", "q4"])
-@pytest.mark.parametrize("value", [*BROKEN, 1e20, 2.0, 0.0])
-def test_what_is_no_rotation_is_refused(field, value):
-    message = copy.copy(measured("ATTITUDE_QUATERNION"))
-    setattr(message, field, value)
-    assert isinstance(listening_decoder().feed(packed(message))[0][1], Refused)
-
-
-def test_the_square_of_a_rotations_length_is_one_to_a_thousandth():
-    message = copy.copy(measured("ATTITUDE_QUATERNION"))
-    message.q2 = message.q3 = message.q4 = 0.0
-    for square, is_believed in ((1.0009, True), (0.9991, True), (1.0011, False), (0.9989, False)):
-        message.q1 = math.sqrt(square)
+def test_what_is_no_rotation_is_refused_and_one_to_a_thousandth_of_its_squared_length_is_not(field):
+    for value, is_believed in (
+        *((value, False) for value in (*BROKEN, 1e20, 2.0, 0.0)),
+        *((math.sqrt(square), 0.999 < square < 1.001) for square in (1.0009, 0.9991, 1.0011, 0.9989)),
+    ):
+        message = copy.copy(measured("ATTITUDE_QUATERNION"))
+        message.q1 = message.q2 = message.q3 = message.q4 = 0.0
+        setattr(message, field, value)
         sample = listening_decoder().feed(packed(message))[0][1]
-        assert isinstance(sample, Refused) is not is_believed, square
+        assert isinstance(sample, Refused) is not is_believed, value
 
 
 @pytest.mark.parametrize(("force_m_s2", "is_off"), [(0.0, True), (0.75, True), (-0.75, True), (0.82, False)])
@@ -369,17 +362,13 @@ def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
             assert value == (tuple(found) if isinstance(found := getattr(heard, name), list) else found), name
 
 
-def test_a_setpoint_that_leans_only_asks_for_the_acceleration_alone():
+@pytest.mark.parametrize(("is_height_free", "mask"), [(False, 0x81B), (True, 0x81F)])
+def test_a_setpoint_that_leans_only_asks_for_the_acceleration_alone(is_height_free, mask):
     lean = (0.5, -0.5, 0.25)
-    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, acceleration_only=True))
-    assert m.type_mask == 0x81B
-    assert all(math.isnan(value) for value in (m.x, m.y, m.vx, m.vy))
-    assert (m.z, m.vz, m.afx, m.afy, m.afz, m.yaw) == (-3.0, 0.5, *lean, 1.0)
-    m = sent(
-        PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, acceleration_only=True, is_height_free=True)
-    )
-    assert m.type_mask == 0x81F
-    assert all(math.isnan(value) for value in (m.x, m.y, m.z, m.vx, m.vy)) and m.vz == 0.5
+    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, True, is_height_free))
+    assert m.type_mask == mask
+    assert all(math.isnan(value) for value in (m.x, m.y, m.vx, m.vy)) and math.isnan(m.z) is is_height_free
+    assert (m.vz, m.afx, m.afy, m.afz, m.yaw) == (0.5, *lean, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -401,24 +390,26 @@ def test_commands_carry_their_parameters_and_zeros(command, number, parameters):
     assert (m.param4, m.param5, m.param6, m.param7) == (0, 0, 0, 0)
 
 
-def test_the_companion_is_an_onboard_computer_of_the_vehicles_system():
-    m = sent(OnboardHeartbeat(True))
-    assert (m.get_srcSystem(), m.get_srcComponent(), m.type, m.autopilot) == (7, 191, 18, 8)
-
-
-def test_time_replies_echo_the_vehicles_time():
-    m = sent(TimeSyncReply(777, 12345))
-    assert (m.ts1, m.tc1) == (777, 12345)
-
-
-def test_our_own_time_request_is_told_from_an_answer():
-    m = sent(TimeSyncAsk(12345))
-    assert (m.ts1, m.tc1) == (12345, 0)
-
-
-def test_a_parameter_is_asked_for_by_name():
-    m = sent(ReadParameter("COM_OF_LOSS_T"))
-    assert (m.target_system, m.target_component, m.param_id, m.param_index) == (7, 1, "COM_OF_LOSS_T", -1)
+@pytest.mark.parametrize(
+    ("outgoing", "fields"),
+    [
+        (OnboardHeartbeat(True), {"type": 18, "autopilot": 8}),
+        (TimeSyncReply(777, 12345), {"ts1": 777, "tc1": 12345}),
+        # Our own question is told from an answer by its zero
+        (TimeSyncAsk(12345), {"ts1": 12345, "tc1": 0}),
+        (ReadParameter("COM_OF_LOSS_T"), {"target_system": 7, "param_id": "COM_OF_LOSS_T", "param_index": -1}),
+        (NamedValue(1_500_000, "rb_thresh", 4.25), {"name": "rb_thresh", "value": 4.25, "time_boot_ms": 1500}),
+        (
+            DebugVector(1_500_000, "rb_v_c", (2.0, -1.0, 0.5)),
+            {"name": "rb_v_c", "x": 2.0, "y": -1.0, "z": 0.5, "time_usec": 1_500_000},
+        ),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_what_is_sent_is_an_onboard_computers_of_the_vehicles_system(outgoing, fields):
+    m = sent(outgoing)
+    assert (m.get_srcSystem(), m.get_srcComponent()) == (7, 191)
+    assert {name: getattr(m, name) for name in fields} == fields
 
 
 @pytest.mark.parametrize(("value", "kind"), [(0.5, 9), (4, 6), (-1, 6)])

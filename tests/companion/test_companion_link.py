@@ -5,7 +5,8 @@ import itertools
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from tests.companion.fake_vehicle import EPOCH_US, LAND, LOITER, FakeVehicle, flight
+from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
+from tests.flying import EPOCH_US
 
 SET_MESSAGE_INTERVAL = 511
 
@@ -13,10 +14,9 @@ SET_MESSAGE_INTERVAL = 511
 def failed(vehicle: FakeVehicle, limit_s: float = 40.0, **changes):
     f = flight(vehicle, **changes)
     f.run_to_end(limit_s)
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "failed"
     assert f.state == "aborted"
-    assert not vehicle.armed
     return f, report
 
 
@@ -49,16 +49,9 @@ def test_heartbeats_of_other_components_are_not_a_vehicle():
     ],
 )
 def test_vehicles_that_cannot_be_flown_are_refused_with_the_reason(vehicle, word):
-    _, report = failed_keeping_arms(vehicle)
+    _, report = failed(vehicle)
     assert word in report.reason
     assert [m for _, m in vehicle.commands if m.command in (176, 400)] == []
-
-
-def failed_keeping_arms(vehicle):
-    f = flight(vehicle)
-    f.run_to_end(40.0)
-    assert f.companion.report().outcome == "failed"
-    return f, f.companion.report()
 
 
 WAITS = {"link": {"wait": True, "heartbeat_wait_s": 1.0}, "streams": {"window_s": 0.5}}
@@ -86,8 +79,7 @@ def test_a_flight_that_waits_outlasts_a_vehicle_that_is_missing_restarts_and_has
     f.vehicle.silent = False
     f.run_for(3.0)
     f.companion.confirm_plan()
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_flight_that_waits_does_not_take_a_vehicle_back_after_a_silence_in_the_air():
@@ -101,7 +93,7 @@ def test_a_flight_that_waits_does_not_take_a_vehicle_back_after_a_silence_in_the
     before = len(f.vehicle.commands)
     f.run_for(5.0)
     # Then the flight has ended, as without --wait, and nothing is commanded any more
-    assert f.companion.report().outcome == "aborted"
+    assert f.report.outcome == "aborted"
     assert len(f.vehicle.commands) == before
 
 
@@ -112,8 +104,8 @@ def test_a_vehicle_armed_by_someone_else_while_the_plan_is_read_is_not_taken():
     f.run_for(1.1)
     f.companion.confirm_plan()
     f.run_to_end(0.1)
-    assert "armed already" in f.companion.report().reason
-    assert f.companion.report().outcome == "failed"
+    assert "armed already" in f.report.reason
+    assert f.report.outcome == "failed"
 
 
 def test_of_two_vehicles_on_a_link_the_first_is_taken():
@@ -124,12 +116,6 @@ def test_of_two_vehicles_on_a_link_the_first_is_taken():
     f.companion.step(other, f.now_us + 4000)
     assert f.companion.status().vehicle_mode == "AUTO.LOITER"
     assert not f.companion.status().armed
-
-
-def test_the_least_imu_rate_is_the_configurations():
-    f = flight(FakeVehicle(imu_every=8), companion={"streams": {"min_highres_imu_hz": 25.0}})
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
 
 
 def test_streams_are_asked_for_at_the_stated_rates_and_those_that_the_detector_uses():
@@ -144,7 +130,7 @@ def test_refused_and_unanswered_stream_requests_do_not_stop_a_vehicle_that_strea
     f = flight(FakeVehicle(ack=lambda command, count: [] if command == 512 else [4] if command == 511 else [0]))
     f.vehicle.obey = lambda command, count: command != 512
     f.run_to_end()
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "completed"
     assert report.autopilot == "PX4", "the version is optional"
     assert [e.text for e in f.events if e.kind == "command" and "FAILED" in e.text]
@@ -152,8 +138,7 @@ def test_refused_and_unanswered_stream_requests_do_not_stop_a_vehicle_that_strea
 
 def test_lost_answers_and_lost_commands_are_repeated():
     f = flight(FakeVehicle(ack=lambda c, n: [] if n % 2 else [0], obey=lambda c, n: n % 2 == 0))
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
     confirmations = [m.confirmation for _, m in f.vehicle.commands if m.command == 400]
     assert confirmations == [0, 1]
 
@@ -162,24 +147,20 @@ def test_px4s_double_answer_to_the_mode_is_believed_only_when_the_mode_is_seen()
     f = flight(
         FakeVehicle(ack=lambda c, n: [0, 1] if c == 176 and n == 1 else [0], obey=lambda c, n: c != 176 or n > 1)
     )
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
     assert f.vehicle.counts[176] >= 2
 
 
-def test_arming_refused_to_the_end_fails_with_the_vehicles_answer():
-    f, report = failed(
-        FakeVehicle(ack=lambda c, n: [1] if c == 400 else [0], obey=lambda c, n: c != 400),
-    )
-    assert "not armed" in report.reason
-    assert "TEMPORARILY_REJECTED" in report.reason
-    assert f.vehicle.mode == LOITER, "left in its own hold, not in OFFBOARD"
-
-
-def test_offboard_refused_fails():
-    _, report = failed(FakeVehicle(ack=lambda c, n: [2] if c == 176 else [0], obey=lambda c, n: c != 176))
-    assert "no OFFBOARD" in report.reason
-    assert "DENIED" in report.reason
+@pytest.mark.parametrize(
+    ("asked", "answer", "words"),
+    [(400, 1, ("not armed", "TEMPORARILY_REJECTED")), (176, 2, ("no OFFBOARD", "DENIED"))],
+    ids=["arming", "offboard"],
+)
+def test_what_is_refused_to_the_end_fails_with_the_vehicles_answer(asked, answer, words):
+    vehicle = FakeVehicle(ack=lambda c, n: [answer if c == asked else 0], obey=lambda c, n: c != asked)
+    f, report = failed(vehicle)
+    assert all(word in report.reason for word in words)
+    assert not vehicle.armed and f.vehicle.mode == LOITER, "left in its own hold, not in OFFBOARD"
 
 
 @pytest.mark.parametrize(("on_interrupt", "mode"), [("hold", LOITER), ("land", LAND)])
@@ -194,30 +175,19 @@ def test_a_silent_link_hands_over_all_the_same_and_is_reported(on_interrupt, mod
 
     assert f.now_us - silent_at == pytest.approx(1_500_000, abs=50_000)
     f.run_to_end(5.0)
-    assert "silent for 1.5 s" in f.companion.report().reason
-    assert f.companion.report().outcome == "aborted"
+    assert "silent for 1.5 s" in f.report.reason
+    assert f.report.outcome == "aborted"
     assert f.vehicle.mode == mode, "the request went out though nothing came in"
     since = f.now_us
     f.run_for(3.0)
     assert f.setpoints_since(since) == []
 
 
-def test_a_short_silence_is_survived():
-    f = flight()
-    f.run_to("mission")
-    f.vehicle.silent = True
-    f.run_for(0.9)
-    f.vehicle.silent = False
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-
-
 def test_silence_while_the_vehicle_lands_does_not_stop_its_landing():
     f = flight()
     f.run_until(lambda: "landing" in f.kinds())
     f.vehicle.silent = True
-    f.run_to_end(3.0)
-    assert f.companion.report().outcome == "aborted"
+    assert f.run_to_end(3.0).outcome == "aborted"
     assert f.vehicle.mode == LAND
 
 
@@ -225,9 +195,8 @@ def test_silence_before_the_flight_fails():
     f = flight(confirmed=False)
     f.run_to("ready")
     f.vehicle.silent = True
-    f.run_to_end(11.0)
-    assert f.companion.report().outcome == "failed"
-    assert "silent" in f.companion.report().reason
+    assert f.run_to_end(11.0).outcome == "failed"
+    assert "silent" in f.report.reason
 
 
 def requests(f):
@@ -258,8 +227,7 @@ def test_a_vehicle_that_restarts_while_the_plan_is_read_has_it_made_and_agreed_t
     assert f.event("link").text == "the vehicle was silent: its streams are asked for again"
     # And it is flown when they have
     f.companion.confirm_plan()
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_a_vehicle_that_restarts_while_its_streams_are_measured_is_measured_again():
@@ -271,16 +239,7 @@ def test_a_vehicle_that_restarts_while_its_streams_are_measured_is_measured_agai
     assert f.state == "connect"
     f.vehicle.time_us, f.vehicle.silent = 0, False
     f.run_to_end()
-    assert f.companion.report().outcome == "completed" and f.kinds().count("streams") == 1
-
-
-def test_a_lost_position_hands_over_though_the_link_lives():
-    f = flight()
-    f.run_to("mission")
-    f.vehicle.no_positions = True
-    f.run_to_end(3.0)
-    assert "LOCAL_POSITION_NED" in f.companion.report().reason
-    assert f.vehicle.mode == LOITER
+    assert f.report.outcome == "completed" and f.kinds().count("streams") == 1
 
 
 def test_a_blind_detector_says_so_and_so_does_one_that_sees_again():
@@ -293,8 +252,7 @@ def test_a_blind_detector_says_so_and_so_does_one_that_sees_again():
     f.vehicle.no_imu = False
     f.run_for(0.2)
     assert "sees again" in f.event("link", 1).text
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
+    assert f.run_to_end().outcome == "completed"
 
 
 def test_our_heartbeat_goes_out_every_second_from_the_first_step_to_the_last():
@@ -306,14 +264,6 @@ def test_our_heartbeat_goes_out_every_second_from_the_first_step_to_the_last():
     assert set(gaps) == {1_000_000}
     m = f.vehicle.heartbeats[0][1]
     assert (m.type, m.get_srcComponent()) == (18, 191)
-
-
-def test_the_companion_belongs_to_the_vehicles_system():
-    f = flight(FakeVehicle(system_id=42))
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-    assert f.vehicle.heartbeats[-1][1].get_srcSystem() == 42
-    assert {m.target_system for _, m in f.vehicle.commands} == {42}
 
 
 def test_the_vehicles_time_requests_are_answered():
@@ -331,7 +281,7 @@ def test_a_vehicle_that_never_disarms_is_reported_and_left_alone():
     f.run_until(lambda: "landing" in f.kinds())
     f.vehicle.meet_ground = lambda: None
     f.run_to_end(130.0)
-    assert "not disarmed" in f.companion.report().reason
+    assert "not disarmed" in f.report.reason
     assert f.vehicle.mode == LAND
 
 

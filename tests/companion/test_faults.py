@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import development as mav
 from companion.flight.context import Target
 from companion.flight.progress import FlyItems
 from companion.reflex import monitor
-from tests.companion.fake_vehicle import LOITER, Flight, flight
+from tests.companion.fake_vehicle import LOITER, flight
+from tests.flying import Flight
 
 
 class SumError(Exception):
@@ -34,7 +35,7 @@ def test_whatever_breaks_in_the_air_the_vehicle_is_handed_over(monkeypatch, plac
     monkeypatch.setattr(place, name, breaks)
     f.run_to_end(3.0)
 
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "failed"
     assert "SumError in breaks: the sum is not the sum" in report.reason
     assert f.vehicle.mode == LOITER and f.vehicle.armed
@@ -66,7 +67,7 @@ def test_what_breaks_on_the_way_out_hands_the_vehicle_over_by_setpoints_that_are
     f.companion.core.flight.report(f.now_us, "policy", "something to tell")
     f.run_to_end(3.0)
 
-    assert f.companion.report().outcome == "failed"
+    assert f.report.outcome == "failed"
     assert f.vehicle.mode == LOITER and f.vehicle.armed
     for _, frame in f.setpoints_since(broken_at_us):
         message = mav.MAVLink(None).decode(bytearray(frame))
@@ -84,8 +85,7 @@ def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
     f.run_until(f.companion.plan_is_ready)
     commands = len(f.vehicle.commands)
     monkeypatch.setattr(monitor, "advance", breaks)
-    f.run_to_end(1.0)
-    assert f.companion.report().outcome == "failed"
+    assert f.run_to_end(1.0).outcome == "failed"
     assert len(f.vehicle.commands) == commands and f.vehicle.setpoints == []
 
 

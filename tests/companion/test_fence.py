@@ -16,11 +16,6 @@ ROUND = Fence(radius_m=5)
 COORDINATE = st.floats(-12, 12)
 
 
-def test_a_fence_for_someone_who_gives_none():
-    assert (Fence().radius_m, Fence().max_height_m, Fence().polygon_ne_m) == (15.0, 6.0, None)
-    assert ROOM.radius_m is None
-
-
 @pytest.mark.parametrize(
     ("place", "inside"), [((5, 0), True), ((0, 5), True), ((5, 5), False), ((7, 0), False), ((2.1, 1.1), False)]
 )

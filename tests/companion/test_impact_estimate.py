@@ -5,13 +5,12 @@ import random
 
 import pytest
 
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
-from companion.mission.config import CompanionConfig
+from companion.messages import Attitude, ImuSample, LocalPosition, Odometry
 from companion.reflex.config import EstimateConfig
 from companion.reflex.contact_force import ContactForce
-from companion.reflex.detector import Impact, ImpactKind, Situation
+from companion.reflex.detector import Impact, ImpactKind
 from companion.reflex.impact import ImpactEstimator
-from companion.reflex.monitor import advance, start_monitor
+from tests.companion.watching import Watch
 
 CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000
@@ -101,23 +100,6 @@ def pushed(pushes, every_us=4_000, yaw_rate=0.0):
     return contact
 
 
-def test_the_impulse_is_the_sum_of_the_loud_samples():
-    contact = pushed([(-20.0, True), (-40.0, True), (-1.0, False), (-10.0, True), (-5.0, False)])
-    assert contact.impulse_ned_m_s == pytest.approx((-0.28, 0.0, 0.0))
-    assert contact.peak_m_s2 == pytest.approx(40.0)
-
-
-def test_of_the_time_before_the_first_sample_its_own_window_counts():
-    # Given a stream of 50 Hz whose windows are 5 ms, and a contact that one of them shows
-    contact = pushed([(-20.0, True), (0.0, False)], every_us=20_000)
-    # Then the impulse is what was seen, and no more than a lower bound
-    assert contact.impulse_ned_m_s == pytest.approx((-0.1, 0.0, 0.0)) and contact.has_gap
-
-
-def test_a_push_that_rises_and_falls_within_the_range_was_measured_whole():
-    assert pushed([(-10.0, True), (-25.0, True), (-30.0, True), (-22.0, True), (-8.0, True)]).is_fully_measured
-
-
 def test_the_first_window_tells_when_the_contact_began():
     """A quarter of the second window's mean: three quarters of it (5 ms) were still free."""
     contact = pushed([(-10.0, True), (-40.0, True)])
@@ -148,19 +130,18 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
 
 def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():
     """North at 1.5 m/s, a wall stops the vehicle with 30 m/s^2 for 50 ms."""
-    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
-    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
-    finished, hit_us = [], 3_002_000
-    for t in range(4_000, 4_400_000, 4_000):
-        inside = max(0, min(t, hit_us + 50_000) - max(t - 4_000, hit_us)) / 4_000
-        speed = 1.5 - 30.0 * 1e-6 * max(0, min(t - hit_us, 50_000))
-        samples: list[Sample] = [ImuSample(t, (-30.0 * inside, 0.0, -9.81), (0.0, 0.0, 0.0))]
-        if t % 32_000 == 0:
-            samples.append(Odometry(t, (0.0, 0.0, -3.0), (speed, 0.0, 0.0), 0))
-            samples.append(LocalPosition(t, (1.5 * t * 1e-6, 0.0, -3.0), (speed, 0.0, 0.0)))
-            samples.append(Attitude(t, LEVEL))
-        finished += advance(monitor, samples, situation, t).finished
-    (final,) = finished
+    hit_us = 3_002_000
+
+    def pushed_us(t):
+        return max(0, min(t - hit_us, 50_000))
+
+    watch = Watch().fly(
+        4_400_000,
+        push=lambda t: (-30.0 * (pushed_us(t) - pushed_us(t - 4_000)) / 4_000, 0.0, 0.0),
+        velocity=lambda t: (1.5 - 30e-6 * pushed_us(t), 0.0, 0.0),
+        place=lambda t: (1.5e-6 * t, 0.0, -3.0),
+    )
+    (final,) = watch.finished
     assert final.impact.kind is ImpactKind.WALL
     assert abs(final.time_boot_us - hit_us) < 2_000
     assert final.velocity_ned_m_s == pytest.approx((1.5, 0.0, 0.0), abs=0.03)

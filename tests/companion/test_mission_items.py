@@ -8,14 +8,13 @@ from pydantic import ValidationError
 
 from companion.mission.items import program
 from companion.mission.model import Mission
-from tests.companion.fake_vehicle import LOITER, Flight, flight
-
-TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
+from tests.companion.fake_vehicle import LANDING, LOITER, TAKEOFF, flight
+from tests.flying import Flight
 
 
 def flown(*items, vehicle=None, **changes) -> Flight:
     """The flight over, completed or not."""
-    f = flight(vehicle, items=[TAKEOFF, *items, LAND], **changes)
+    f = flight(vehicle, items=[TAKEOFF, *items, LANDING], **changes)
     f.run_to_end()
     return f
 
@@ -37,7 +36,7 @@ def setpoints_in(f: Flight, name: str) -> list:
 def test_a_path_is_flown_through_all_its_points():
     points = [[2, 2, -1.5], [6, -1, -1.5], [9, 1, -2.0]]
     f = flown({"path": {"points_ned_m": points, "speed_m_s": 1.0, "yaw_deg": "along"}})
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
     asked = setpoints_in(f, "path")
     for point in points:
         assert min(math.dist((m.x, m.y, m.z), point) for m in asked) < 0.02
@@ -49,7 +48,7 @@ def test_a_path_is_flown_through_all_its_points():
 
 def test_an_orbit_keeps_its_distance_and_looks_at_the_centre():
     f = flown({"orbit": {"centre_ned_m": [2, 0, -1.5], "radius_m": 1.5, "turns": 1.25, "speed_m_s": 1.0}})
-    assert f.companion.report().outcome == "completed"
+    assert f.report.outcome == "completed"
     asked = setpoints_in(f, "orbit")
     on_circle = [m for m in asked if abs(math.hypot(m.x - 2, m.y) - 1.5) < 1e-3]
     assert len(on_circle) * 0.02 == pytest.approx(1.25 * math.tau * 1.5, rel=0.2), "at 1 m/s"
@@ -97,23 +96,23 @@ def test_what_is_repeated_is_flown_as_often_as_asked_and_told_by_lap():
 def test_repeats_may_stand_in_repeats_and_too_many_steps_are_refused():
     inner = {"repeat": {"times": 3, "items": [{"hold": {"duration_s": 1}}]}}
     mission = Mission.model_validate(
-        {"name": "t", "items": [TAKEOFF, {"repeat": {"times": 2, "items": [inner]}}, LAND]}
+        {"name": "t", "items": [TAKEOFF, {"repeat": {"times": 2, "items": [inner]}}, LANDING]}
     )
     steps = program(mission.items)
     assert len(steps) == 8 and steps[4].label == "2.1.1 (2 of 2) (1 of 3)"
     with pytest.raises(ValidationError, match="more than 10000 steps"):
         items = [inner | {"repeat": inner["repeat"] | {"times": 1000}}]
-        Mission.model_validate({"name": "t", "items": [TAKEOFF, {"repeat": {"times": 1000, "items": items}}, LAND]})
+        Mission.model_validate({"name": "t", "items": [TAKEOFF, {"repeat": {"times": 1000, "items": items}}, LANDING]})
 
 
 def test_waiting_until_a_time_after_arming():
     f = flown({"wait_for": {"flight_time_s": 9.0}})
     waited_until = next(event.time_us for event in f.events if event.kind == "item" and event.data["name"] == "land")
-    assert (waited_until - f.companion.report().armed_at_us) / 1e6 == pytest.approx(9.0, abs=0.01)
+    assert (waited_until - f.report.armed_at_us) / 1e6 == pytest.approx(9.0, abs=0.01)
 
 
 def test_waiting_for_a_file():
-    f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LAND])
+    f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LANDING])
     f.run_to("mission")
     f.run_for(5.0)
     assert f.companion.file_awaited == "go" and f.state == "mission"
@@ -130,7 +129,7 @@ def test_waiting_until_steady():
 
 
 def test_whoever_is_pushed_is_not_steady():
-    f = flight(items=[TAKEOFF, {"wait_for": {"steady": {"for_s": 1.0}}}, LAND])
+    f = flight(items=[TAKEOFF, {"wait_for": {"steady": {"for_s": 1.0}}}, LANDING])
     f.run_until(lambda: f.state == "mission" and abs(f.vehicle.velocity[2]) < 0.05)
     f.run_for(0.8)
     assert f.state == "mission"
@@ -140,38 +139,29 @@ def test_whoever_is_pushed_is_not_steady():
     f.run_to("landing", 3.0)
 
 
-@pytest.mark.parametrize(("on_timeout", "mode", "outcome"), [("abort", LOITER, "aborted"), ("land", None, "completed")])
-def test_an_item_that_takes_too_long(on_timeout, mode, outcome):
+@pytest.mark.parametrize(
+    ("on_timeout", "mode", "outcome", "north_m"),
+    [("abort", LOITER, "aborted", 0.0), ("land", None, "completed", 0.0), ("continue", None, "completed", 1.0)],
+)
+def test_an_item_that_takes_too_long(on_timeout, mode, outcome, north_m):
     wait = {"wait_for": {"file": "never"}, "timeout_s": 2.0, "on_timeout": on_timeout}
-    f = flight(items=[TAKEOFF, wait, {"go_to": {"position_ned_m": [3, 0, -1.5]}}, LAND])
-    f.run_to_end()
-    assert f.companion.report().outcome == outcome
-    assert "not done within 2 s" in f.event("timeout").text
-    assert f.vehicle.position[0] == pytest.approx(0.0, abs=0.05)
+    f = flown(wait, {"go_to": {"position_ned_m": [1, 0, -1.5]}})
+    assert f.report.outcome == outcome and "not done within 2 s" in f.event("timeout").text
+    assert (f.event("timeout").time_us - f.event("item").time_us) / 1e6 == pytest.approx(2.0, abs=0.02)
+    assert f.vehicle.position[0] == pytest.approx(north_m, abs=0.2)
     assert mode is None or f.vehicle.mode == mode
 
 
-def test_an_item_that_takes_too_long_can_be_passed_over():
-    wait = {"wait_for": {"file": "never"}, "timeout_s": 2.0, "on_timeout": "continue"}
-    f = flown(wait, {"go_to": {"position_ned_m": [1, 0, -1.5]}})
-    assert f.companion.report().outcome == "completed"
-    assert item_times_s(f)[0] == pytest.approx(2.0, abs=0.02)
-    assert f.vehicle.position[0] == pytest.approx(1.0, abs=0.2)
-
-
-def test_a_mission_can_end_with_the_way_home():
-    f = flight(items=[TAKEOFF, {"go_to": {"position_ned_m": [2, 2, -1.5]}}, {"return": {"height_m": 2.5}}])
+@pytest.mark.parametrize("max_height_m", [6.0, 2.0])
+def test_a_mission_can_end_with_the_way_home_below_the_fences_top(max_height_m):
+    items = [TAKEOFF, {"go_to": {"position_ned_m": [2, 2, -1.5]}}, {"return": {"height_m": 2.5}}]
+    f = flight(items=items, fence={"max_height_m": max_height_m})
     f.run_to("returning")
     f.run_to("landing")
-    assert f.vehicle.position == pytest.approx([0.0, 0.0, -2.5], abs=0.4)
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-
-
-def test_the_way_home_stays_below_the_fences_top():
-    f = flight(items=[TAKEOFF, {"return": {"height_m": 5}}], fence={"max_height_m": 2})
-    f.run_to("landing")
-    assert min(message.z for _, message in f.vehicle.setpoints) == pytest.approx(-2.0)
+    height_m = min(2.5, max_height_m)
+    assert f.vehicle.position == pytest.approx([0.0, 0.0, -height_m], abs=0.4)
+    assert min(message.z for _, message in f.vehicle.setpoints) == pytest.approx(-height_m)
+    assert f.run_to_end().outcome == "completed"
 
 
 @pytest.mark.parametrize(
@@ -193,11 +183,11 @@ def test_the_way_home_stays_below_the_fences_top():
 )
 def test_items_that_cannot_be_flown(items, words):
     with pytest.raises(ValidationError, match=words):
-        Mission.model_validate({"name": "t", "limits": {"max_speed_m_s": 5}, "items": [TAKEOFF, *items, LAND]})
+        Mission.model_validate({"name": "t", "limits": {"max_speed_m_s": 5}, "items": [TAKEOFF, *items, LANDING]})
 
 
 def test_a_way_that_leaves_a_room_on_its_way_is_refused():
     room = {"polygon_ne_m": [[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]]}
     there = [{"go_to": {"position_ned_m": [5, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 5, -1.5]}}]
     with pytest.raises(ValidationError, match=r"item 3 \(go_to\) leaves fence.polygon_ne_m at \[4.00, 1.00\]"):
-        Mission.model_validate({"name": "t", "items": [TAKEOFF, *there, LAND], "fence": room})
+        Mission.model_validate({"name": "t", "items": [TAKEOFF, *there, LANDING], "fence": room})

@@ -48,14 +48,6 @@ def test_the_documented_mission_is_accepted():
     assert mission.sim == GOOD["sim"]
 
 
-def test_the_least_mission_has_defaults_for_the_rest():
-    mission = Mission.model_validate({"name": "up", "items": [{"takeoff": {"height_m": 1}}, {"land": None}]})
-    assert mission.on_collision.then == "hold"
-    assert mission.recovery.gamma_per_axis == (0.5, 0.5)
-    assert mission.companion.detector == "fused"
-    assert mission.companion.fused.side_threshold_m_s2 == 1.75
-
-
 @pytest.mark.parametrize(
     ("path", "value", "words", "place"),
     [

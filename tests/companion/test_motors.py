@@ -4,16 +4,11 @@ import random
 
 import pytest
 
-from companion.companion import Companion
-from companion.flight.damage import note_motors
 from companion.flight.plan import mission_lines
-from companion.messages import LandedState, MotorOutputs
-from companion.mission.model import Mission
-from companion.motion.motors import WINDOW_US, Damage, MotorWatch
-from sim_vehicle.airframe import load_built_in
-from sim_vehicle.scene import Scene
-from sim_vehicle.vehicle import SimulatedVehicle
-from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, flight, mission
+from companion.motion.motors import Damage, MotorWatch
+from tests.companion.fake_vehicle import FakeVehicle, flight, mission
+from tests.flying import Flight
+from tests.simulated import simulated, wall
 
 SAMPLE_US = 100_000
 HOVER, NOISE = 500.0, 0.01
@@ -106,42 +101,6 @@ def test_a_recovery_says_nothing_and_what_came_before_it_counts_anew():
     assert len(flown.fly(20.0, True, HURT)) == 1
 
 
-def test_each_flight_of_a_vehicle_begins_anew_and_only_quadrotors_in_the_air_are_looked_at():
-    f = flight(FakeVehicle())
-    f.run_to("mission")
-    context = f.companion.core.flight
-    context.vehicle.landed = LandedState.IN_AIR
-
-    def watched(seconds):
-        for number in range(round(seconds * 1e6 / WINDOW_US) * 10):
-            note_motors(context, [MotorOutputs((1500.0,) * 4)], f.now_us + number * SAMPLE_US)
-        return len(context.motors._before)
-
-    assert watched(5.0) > 0
-    context.vehicle.landed = LandedState.ON_GROUND
-    before = len(context.motors._before)
-    assert watched(5.0) == before
-    context.vehicle.armed = False
-    note_motors(context, [], f.now_us)
-    assert not context.motors._before
-
-
-def test_a_vehicle_that_did_not_come_to_rest_hangs_or_lies_and_its_motors_say_nothing():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=[INTO_WALL[0], INTO_WALL[2], INTO_WALL[4]])
-    f.run_until(lambda: "recovered" in f.kinds())
-    context = f.companion.core.flight
-    context.vehicle.landed = LandedState.IN_AIR
-
-    def moments_after():
-        for number in range(50):
-            note_motors(context, [MotorOutputs((1500.0,) * 4)], f.now_us + number * SAMPLE_US)
-        return len(context.motors._after)
-
-    assert moments_after() > 5
-    context.collisions[-1].settled_after_s = None
-    assert moments_after() == 0
-
-
 @pytest.mark.parametrize(("policy", "state"), [("tell", "mission"), ("land", "landing"), ("return", "returning")])
 def test_a_mission_says_what_follows(policy, state):
     f = flight(FakeVehicle(), on_damage=policy)
@@ -154,7 +113,6 @@ def test_a_mission_says_what_follows(policy, state):
     assert len(lines) == (policy != "tell")
 
 
-WALL = {"point_ned_m": [4, 0, -1.5], "normal_ned": [-1, 0, 0], "width_m": 6, "height_m": 3}
 INTO_WALL = [
     {"takeoff": {"height_m": 1.5}},
     {"hold": {"duration_s": 3}},
@@ -164,35 +122,26 @@ INTO_WALL = [
 ]
 
 
-def flown_into_a_wall(airframe, faults=(), **changes):
-    scene = Scene.model_validate({"walls": [WALL], "faults": list(faults)})
-    vehicle = SimulatedVehicle(load_built_in(airframe), scene, 1, keeps_path=False)
-    wanted = {"name": "wall", "items": INTO_WALL, "companion": {"streams": {"window_s": 0.5}}, **changes}
-    companion, events, sent = Companion(Mission.model_validate(wanted)), [], b""
-    companion.confirm_plan()
-    while not companion.finished:
-        result = companion.step(b"".join(vehicle.step(sent)), EPOCH_US + vehicle.time_boot_us)
-        events += result.events
-        sent = b"".join(result.sent_frames)
-    return events
-
-
-def hits(events):
-    return [event.data["sample_time_boot_us"] / 1e6 for event in events if event.kind == "detection"]
+def flown_into_a_wall(*faults, airframe, **keys) -> Flight:
+    sim = {"walls": [wall(4.0)], "faults": faults, "airframe": airframe}
+    flight = simulated(INTO_WALL, companion={"streams": {"window_s": 0.5}}, sim=sim, **keys)
+    flight.run_to_end()
+    return flight
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("airframe", ["foldable", "rigid"])
 def test_each_motor_that_a_hit_hurts_is_named_and_none_that_it_does_not(airframe):
     # Given a hit that hurts nothing
-    healthy = flown_into_a_wall(airframe)
-    (hit_s,) = hits(healthy)
-    assert [event for event in healthy if event.kind == "damage"] == []
+    healthy = flown_into_a_wall(airframe=airframe)
+    assert healthy.told("damage") == [] and healthy.kinds().count("detection") == 1
+    hit_s = healthy.event("detection").data["sample_time_boot_us"] / 1e6
     # When it costs a propeller a twentieth of its blades, or a motor a fifth of its thrust
     for motor, share in enumerate((0.86, 0.8, 0.86, 0.8)):
         hurt = {"kind": "motor_failure", "motor": motor, "thrust_share": share, "at_s": hit_s + 0.01}
-        events = flown_into_a_wall(airframe, [hurt], on_damage="land")
+        flight = flown_into_a_wall(hurt, airframe=airframe, on_damage="land")
         # Then that one is named, and the vehicle lands
-        (told,) = [event for event in events if event.kind == "damage"]
+        assert flight.kinds().count("damage") == 1
+        told = flight.event("damage")
         assert told.data["motor"] == motor + 1 and told.data["harder"] > 0.1
         assert told.text.endswith("; then: land")

@@ -13,7 +13,7 @@ from companion.memory.patch import (
     remembered,
     touch_of,
 )
-from companion.memory.stored import KnownPatch, ObstacleFile, as_data, describe, file_data
+from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
 from companion.reflex.normal import Normal
 
 CLEARANCE_M = 0.55
@@ -141,8 +141,3 @@ def test_a_patch_comes_back_from_a_file_as_it_was():
         assert patch.assumed_along_m() == pytest.approx(before.assumed_along_m(), abs=1e-3)
         # and a second time to the last digit
         assert as_data(KnownPatch.model_validate(as_data(patch)).patch()) == as_data(patch)
-
-
-def test_a_patch_in_words():
-    (patch,) = remembered((), [wall_touch(0.0)], CLEARANCE_M)
-    assert describe(patch) == "surface facing 180 deg at [4.00, 0.00, -1.50], touched once, assumed 1.0 m wide"

@@ -3,8 +3,9 @@
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from tests.companion.fake_vehicle import INTERVAL_US, LOITER, OFFBOARD, POSCTL, FakeVehicle, Flight, flight, flying_in
+from tests.companion.fake_vehicle import LOITER, OFFBOARD, POSCTL, FakeVehicle, flight, flying_in
 from tests.companion.test_companion_authority import ON_SETPOINTS, assert_silent_from_now
+from tests.flying import INTERVAL_US, Flight
 
 SET_MODE = 176
 

@@ -7,15 +7,10 @@ from pymavlink.dialects.v20 import development as mav
 
 from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
-from companion.messages import DebugVector, NamedValue, Severity, StatusText
+from companion.messages import Severity, StatusText
 from companion.report import Event
-from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
-
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"land": {}},
-]
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight
+from tests.flying import EPOCH_US, Flight
 
 
 def decoded(packets) -> list:
@@ -39,24 +34,11 @@ def test_a_text_of_any_length_arrives_whole(length):
     assert {message.severity for message in messages} == {4}
 
 
-def test_two_long_texts_have_different_numbers():
-    encoder = Encoder()
-    first, second = (decoded(encoder.packets(StatusText(Severity.INFO, "x" * 60)))[0].id for _ in range(2))
-    assert 0 < first < second
-
-
-def test_numbers_and_vectors():
-    (value,) = decoded(Encoder().packets(NamedValue(1_500_000, "rb_thresh", 4.25)))
-    assert (value.name, value.value, value.time_boot_ms) == ("rb_thresh", 4.25, 1500)
-    (vector,) = decoded(Encoder().packets(DebugVector(1_500_000, "rb_v_c", (2.0, -1.0, 0.5))))
-    assert (vector.name, vector.x, vector.y, vector.z, vector.time_usec) == ("rb_v_c", 2.0, -1.0, 0.5, 1_500_000)
-
-
 def test_the_operator_reads_hit_recovery_and_outcome():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f = at_wall(INTO_WALL)
     f.run_to_end()
     texts = [message.text for _, message in sent(f, "STATUSTEXT")]
-    hit, collision = next(text for text in texts if text.startswith("Hit")), f.companion.report().collisions[0]
+    hit, collision = next(text for text in texts if text.startswith("Hit")), f.report.collisions[0]
     assert hit.startswith(f"Hit 1: at {collision.impact_speed_m_s:.2f} m/s going north, ")
     recovered = next(text for text in texts if text.startswith("Recovered"))
     assert recovered.startswith(f"Recovered in {collision.settled_after_s:.2f} s, ") and recovered.endswith("too far")
@@ -65,7 +47,7 @@ def test_the_operator_reads_hit_recovery_and_outcome():
 
 
 def test_the_hits_text_leaves_with_the_recovery_setpoint():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f = at_wall(INTO_WALL)
     f.run_until(lambda: "detection" in f.kinds())
     at_us = f.event("detection").time_us
     assert [m.text[:5] for t, m in sent(f, "STATUSTEXT") if t == at_us] == ["Hit 1"]
@@ -74,7 +56,7 @@ def test_the_hits_text_leaves_with_the_recovery_setpoint():
 
 
 def test_a_vehicle_hit_while_it_hovers_is_pushed():
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 5}}, {"land": {}}])
+    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
     f.run_to("mission")
     f.run_for(1.0)
     f.vehicle.push_m_s2 = (0.0, -12.0)
@@ -92,7 +74,7 @@ def test_an_early_end_is_told_with_its_reason():
 
 
 def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_the_end():
-    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f = at_wall(INTO_WALL)
     f.run_to_end()
     f.run_for(2.0)
     phases = [(t, m.value) for t, m in sent(f, "NAMED_VALUE_FLOAT") if m.name == "rb_phase"]
@@ -103,7 +85,7 @@ def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_t
     assert hits == sorted(hits) and hits[-1] == 1.0
     v_c = [m for _, m in sent(f, "DEBUG_VECT") if m.name == "rb_v_c"]
     assert v_c[0].x == pytest.approx(2.0, abs=0.1)
-    assert phases[-1][0] <= f.companion.report().ended_at_us
+    assert phases[-1][0] <= f.report.ended_at_us
 
 
 def warning(text):
@@ -147,27 +129,12 @@ def test_what_a_pilot_may_have_to_act_on_warns_and_what_goes_as_planned_does_not
     assert text == (None if severity is None else StatusText(Severity(severity), "Something is so"))
 
 
-def test_the_companion_is_an_onboard_controller_of_the_vehicles_system_and_no_autopilot():
-    # As QGroundControl and PX4 tell one from a vehicle: MAV_TYPE 18, MAV_AUTOPILOT 8, component 191
-    f = flight(FakeVehicle(system_id=7))
-    f.run_to("mission")
-    beats = [message for _, message in f.vehicle.heartbeats][2:]
-    assert beats and {(one.type, one.autopilot, one.base_mode) for one in beats} == {(18, 8, 0)}
-    assert {(one.get_srcSystem(), one.get_srcComponent()) for one in beats} == {(7, 191)}
-    assert [one.system_status for one in beats][-1] == 4, "active"
-
-
-def test_a_flood_of_texts_is_one_a_second():
-    flood = [(tenth, "implausible", f"message {tenth} refused") for tenth in range(40)]
-    assert [tenth for tenth, _ in spoken(flood)] == [0, 10, 20, 30]
-
-
 def test_at_the_end_nothing_waits_any_more():
     assert spoken([(0, "hit", "A"), (3, "hit", "B")], ends_at=5) == [(0, "A"), (5, "B")]
 
 
 def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_end_at_once():
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 9}}, {"land": {}}])
+    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 9}}, LANDING])
     f.run_to("mission")
     for text in ("first", "second"):
         f.companion.note("late", text)

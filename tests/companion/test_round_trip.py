@@ -1,7 +1,6 @@
 """The round trip to the vehicle by TIMESYNC: asked, matched with what was asked, judged before a flight and in it."""
 
 import itertools
-import random
 
 import pytest
 from pymavlink.dialects.v20 import development as mav
@@ -10,7 +9,8 @@ from companion.link.round_trip import MOST_US, RoundTrip
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
 from companion.report import RoundTripReport
 from rebound_cli.live.console import state_fields
-from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.flying import EPOCH_US, Flight
 
 TICK_US = 4_000
 
@@ -59,16 +59,6 @@ def test_two_late_answers_of_five_leave_the_present_value_and_three_change_it():
     assert (trip.present_us, trip.median_us) == (900_000, 2_000)
 
 
-def test_answers_in_any_order_are_matched_with_their_own_questions():
-    trip, order = RoundTrip(), random.Random(1)
-    questions = asked_over(trip, 1.0)
-    order.shuffle(questions)
-    now_us = EPOCH_US + 2_000_000
-    for question in questions:
-        trip.update(TimeSyncAnswer(question.companion_time_ns, 7), now_us)
-    assert trip.report() == RoundTripReport(1_500_000, 2_000_000, 0)
-
-
 def test_questions_that_nobody_answers_are_forgotten_in_the_end():
     trip = RoundTrip()
     questions = asked_over(trip, 60.0)
@@ -103,40 +93,42 @@ def texts(f: Flight) -> list[str]:
     return [message.text for message in messages if message.get_type() == "STATUSTEXT"]
 
 
-def test_a_flight_tells_its_round_trip_in_the_plan_the_live_line_and_the_report():
-    f = flight(FakeVehicle(round_trip_us=20_000), confirmed=False)
+@pytest.mark.parametrize(
+    ("vehicle", "in_the_plan", "in_the_line", "report"),
+    [
+        (FakeVehicle(round_trip_us=20_000), "round trip 20.0 ms", "20 ms", RoundTripReport(20_000, 20_000, 0)),
+        # One that answers no TIMESYNC may be flown
+        (FakeVehicle(does_answer_time=False), "round trip unknown: TIMESYNC is not answered", None, RoundTripReport()),
+    ],
+    ids=["answers", "does not"],
+)
+def test_a_flight_tells_its_round_trip_in_the_plan_the_live_line_and_the_report(
+    vehicle, in_the_plan, in_the_line, report
+):
+    f = flight(vehicle, confirmed=False)
     f.run_to("ready")
-    assert "round trip 20.0 ms" in f.companion.plan_text()
+    assert in_the_plan in f.companion.plan_text()
     f.companion.confirm_plan()
     f.run_to("mission")
-    assert ("round trip", "20 ms") in state_fields(f.companion.status(), 1.0)
+    assert dict(state_fields(f.companion.status(), 1.0)).get("round trip") == in_the_line
     f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-    assert f.companion.report().round_trip == RoundTripReport(20_000, 20_000, 0)
+    assert (f.report.outcome, f.report.round_trip) == ("completed", report)
     assert "round_trip" not in f.kinds()
 
 
-def test_a_vehicle_that_is_too_far_away_is_not_armed():
-    # Given 200 ms each way
-    f = flight(FakeVehicle(round_trip_us=400_000))
-    # When it is to be flown
-    f.run_to_end()
-    # Then it is refused with the figure, before anything was asked of it
-    report = f.companion.report()
-    assert report.outcome == "failed"
-    assert report.reason.startswith("the round trip to the vehicle takes 400 ms and at most 100 ms are allowed")
+@pytest.mark.parametrize("grows", [False, True])
+def test_a_vehicle_that_is_too_far_away_is_not_armed_though_its_plan_was_agreed_to(grows):
+    # Given 200 ms each way, from the beginning or while the plan is read
+    f = flight(FakeVehicle(round_trip_us=0 if grows else 400_000), confirmed=not grows)
+    if grows:
+        f.run_to("ready")
+        f.vehicle.round_trip_us = 400_000
+        f.run_for(6.0)
+        f.companion.confirm_plan()
+    # When it is to be flown, then it is refused with the figure, before anything was asked of it
+    assert f.run_to_end().outcome == "failed"
+    assert f.report.reason.startswith("the round trip to the vehicle takes 400 ms and at most 100 ms are allowed")
     assert set(f.vehicle.counts) <= {511, 512} and f.vehicle.setpoints == []
-
-
-def test_a_round_trip_that_grows_while_the_plan_is_read_is_a_reason_not_to_begin():
-    f = flight(confirmed=False)
-    f.run_to("ready")
-    f.vehicle.round_trip_us = 400_000
-    f.run_for(6.0)
-    f.companion.confirm_plan()
-    f.run_to_end()
-    assert f.companion.report().reason.startswith("the round trip to the vehicle takes 400 ms")
-    assert f.vehicle.setpoints == []
 
 
 def test_a_round_trip_that_grows_in_flight_is_told_once_and_the_flight_goes_on():
@@ -144,20 +136,9 @@ def test_a_round_trip_that_grows_in_flight_is_told_once_and_the_flight_goes_on()
     f.run_to("mission")
     f.vehicle.round_trip_us = 400_000
     f.run_to_end()
-    report = f.companion.report()
+    report = f.report
     assert report.outcome == "completed"
     assert f.kinds().count("round_trip") == 1
     assert f.event("round_trip").data["round_trip_us"] == 400_000
     assert texts(f).count("Round trip 400 ms: hits are answered late") == 1
     assert report.round_trip.worst_us == 400_000
-
-
-def test_a_vehicle_that_answers_no_timesync_is_told_of_in_the_plan_and_may_be_flown():
-    f = flight(FakeVehicle(does_answer_time=False), confirmed=False)
-    f.run_to("ready")
-    assert "round trip unknown: TIMESYNC is not answered" in f.companion.plan_text()
-    f.companion.confirm_plan()
-    f.run_to_end()
-    assert f.companion.report().outcome == "completed"
-    assert f.companion.report().round_trip == RoundTripReport()
-    assert "round trip" not in dict(state_fields(f.companion.status(), 1.0))

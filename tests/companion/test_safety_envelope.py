@@ -222,7 +222,7 @@ def test_a_condition_of_the_mission_ends_it(condition, happens, words):
     f = in_mission(vehicle=FakeVehicle(battery_percent=80), abort_when=condition, on_interrupt=on_interrupt)
     happens(f.vehicle)
     f.run_to("aborted", 6.0)
-    assert words in f.companion.report().reason
+    assert words in f.report.reason
     f.run_to_end()
     assert f.vehicle.mode == mode
 
@@ -242,13 +242,13 @@ def test_one_position_outside_the_fence_ends_no_flight_and_two_do():
     # When two come in a row
     f.run_until(lambda: f.vehicle.ticks % 5 == 1)
     attacked(f, [far(1), far(2)])
-    assert f.state == "aborted" and "outside the fence" in f.companion.report().reason
+    assert f.state == "aborted" and "outside the fence" in f.report.reason
 
 
 def test_a_battery_that_is_low_or_unknown_is_no_battery_to_start_with():
     for percent, words in ((20, "battery at 20 %"), (None, "the vehicle says none")):
         f = flight(FakeVehicle(battery_percent=percent), abort_when={"battery_below_percent": 30})
         f.run_to("aborted")
-        assert f.companion.report().outcome == "failed" and words in f.companion.report().reason
+        assert f.report.outcome == "failed" and words in f.report.reason
     f = flight(FakeVehicle(battery_percent=None))
     f.run_to("mission")

@@ -13,6 +13,7 @@ from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, Lin
 ZIGZAG = [(0.0, 0.0, -2.0), (2.0, 1.0, -2.0), (4.0, -1.0, -2.5), (6.0, 0.0, -3.0)]
 CIRCLE = CircleProfile((3.0, 0.0, -2.0), 2.0, math.pi, 1.5 * math.tau, 2.0, 2.0)
 WAYS = {
+    "line": LineProfile((0.0, 0.0, -2.0), (0.4, -0.3, -1.5), 2.0, 1.5),
     "curve": CurveProfile(ZIGZAG, 2.0, 2.0),
     "hairpin": CurveProfile([(0.0, 0.0, -2.0), (5.0, 0.0, -2.0), (5.0, 0.4, -2.0), (0.0, 0.4, -2.0)], 3.0, 2.0),
     "straight curve": CurveProfile([(0.0, 0.0, -2.0), (1.0, 0.0, -2.0), (5.0, 0.0, -2.0)], 2.0, 2.0),
@@ -84,8 +85,9 @@ def test_a_curve_that_turns_back_on_itself_all_but_stops_there():
 def test_points_on_one_another_are_one_point():
     trajectory = CurveProfile([(0.0, 0.0, -1.0), (0.0, 0.0, -1.0), (2.0, 0.0, -1.0)], 1.0, 1.0)
     assert trajectory.distance_m == pytest.approx(2.0)
-    nowhere = CurveProfile([(1.0, 0.0, -1.0), (1.0, 0.0, -1.0)], 1.0, 1.0)
-    assert (nowhere.duration_s, nowhere.at(0.0)[0]) == (0.0, (1.0, 0.0, -1.0))
+    place, still = (1.0, 0.0, -1.0), (0.0, 0.0, 0.0)
+    for nowhere in (CurveProfile([place, place], 1.0, 1.0), LineProfile(place, place, 1.0, 1.0)):
+        assert (nowhere.duration_s, nowhere.at(0.0)) == (0.0, (place, still, still))
 
 
 def test_clockwise_is_seen_from_above():

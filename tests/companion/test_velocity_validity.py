@@ -4,73 +4,47 @@ import math
 
 import pytest
 
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
-from companion.mission.config import CompanionConfig
-from companion.reflex.detector import Situation
-from companion.reflex.monitor import advance, start_monitor
 from companion.reflex.validity import VelocityValidity
-
-STILL = (0.0, 0.0, 0.0)
-LEVEL = (1.0, 0.0, 0.0, 0.0)
+from tests.companion.watching import STILL, Watch
 
 
 @pytest.mark.parametrize("push_m_s2", [-60.0, -12.0])
 def test_a_push_across_the_way_gives_way_a_little_to_where_the_vehicle_came_from(push_m_s2):
-    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
-    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
-    impacts = []
-    for t_us in range(4_000, 2_100_000, 4_000):
-        push = push_m_s2 if t_us == 2_000_000 else 0.0
-        samples: list[Sample] = [ImuSample(t_us, (0.0, push, -9.81), STILL)]
-        if t_us % 32_000 == 0:
-            samples.append(Odometry(t_us, STILL, (2.0, 0.0, 0.0), 0))
-            samples.append(LocalPosition(t_us, STILL, (2.0, 0.0, 0.0)))
-            samples.append(Attitude(t_us, LEVEL, STILL))
-        impacts += advance(monitor, samples, situation, t_us).impacts
-    (impact,) = impacts
-    for estimate in (impact, monitor.estimator.estimate):
+    watch = Watch().fly(
+        2_100_000,
+        push=lambda t: (0.0, push_m_s2 if t == 2_000_000 else 0.0, 0.0),
+        velocity=lambda t: (2.0, 0.0, 0.0),
+    )
+    (impact,) = watch.impacts
+    for estimate in (impact, watch.monitor.estimator.estimate):
         n, e, _ = estimate.normal.direction_ned
         assert math.degrees(math.atan2(-n, -e)) == pytest.approx(19.0, abs=2.0)
 
 
-def after_a_hit(
-    seconds,
-    peak_m_s2,
-    lasts,
-    error_m_s,
-    stop_m_s2=0.0,
-    first_m_s2=0.0,
-    again_m_s2=0.0,
-    other_guard_m_s2=0.0,
-    speed=0.0,
-):
+def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, speed=0.0, **more_m_s2):
     """Flying north, or still; a push at 2.0 s; then velocities that are off by what `error_m_s` of the time says.
 
-    With `stop_m_s2` the push's last sample is that much harder: arms that meet their stop; with `first_m_s2` its first.
-    `again_m_s2` is what a touch at 2.12 s shows for 40 ms, `other_guard_m_s2` what one sample shows at 2.04 s.
+    `more_m_s2`: what else pushes: the push's `first` sample, its last where arms meet their `stop`, one sample of the
+    `other_guard` at 2.04 s, or a touch `again` at 2.12 s, for 40 ms.
     """
-    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
-    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
-    impacts, told, trusted = [], [], []
-    for t_us in range(4_000, round(seconds * 1e6), 4_000):
-        push = -peak_m_s2 if 2_000_000 <= t_us < 2_000_000 + 4_000 * lasts else 0.0
-        push -= stop_m_s2 if t_us == 2_000_000 + 4_000 * (lasts - 1) else 0.0
-        push -= first_m_s2 if t_us == 2_000_000 else 0.0
-        push -= again_m_s2 if 2_120_000 <= t_us < 2_160_000 else 0.0
-        push -= other_guard_m_s2 if t_us == 2_040_000 else 0.0
-        speed += 0.004 * push
-        samples: list[Sample] = [ImuSample(t_us, (push, 0.0, -9.80665), STILL)]
-        if t_us % 32_000 == 0:
-            error = error_m_s(t_us * 1e-6 - 2.0) if t_us > 2_000_000 else 0.0
-            # A hair's breadth of noise: velocities that stand still to the last digit are no estimate.
-            velocity = (speed + error + 1e-3 * (t_us // 32_000 % 2), 0.0, 0.0)
-            samples += [Odometry(t_us, STILL, velocity, 0), LocalPosition(t_us, STILL, velocity)]
-            samples.append(Attitude(t_us, LEVEL, STILL))
-        seen = advance(monitor, samples, situation, t_us)
-        impacts += seen.impacts
-        told += [(t_us, notice.text) for notice in seen.notices if notice.kind == "estimate"]
-        trusted.append(monitor.estimator.validity.is_valid)
-    return impacts, told, trusted
+    until_us = 2_000_000 + 4_000 * lasts
+    spans_us = {"first": (2_000_000, 2_004_000), "stop": (until_us - 4_000, until_us)}
+    spans_us |= {"other_guard": (2_040_000, 2_044_000), "again": (2_120_000, 2_160_000)}
+    pushes = [(peak_m_s2, 2_000_000, until_us), *((more_m_s2[name], *spans_us[name]) for name in more_m_s2)]
+    north_m_s, trusted, watch = {0: speed}, [], Watch()
+
+    def push(t):
+        pushed_m_s2 = -sum(size for size, from_us, to_us in pushes if from_us <= t < to_us)
+        north_m_s[t] = north_m_s[t - 4_000] + 0.004 * pushed_m_s2
+        return pushed_m_s2, 0.0, 0.0
+
+    def velocity(t):
+        return north_m_s[t] + (error_m_s(t * 1e-6 - 2.0) if t > 2_000_000 else 0.0), 0.0, 0.0
+
+    watch.fly(
+        round(seconds * 1e6), push, velocity, look=lambda t: trusted.append(watch.monitor.estimator.validity.is_valid)
+    )
+    return watch.impacts, [(t, text) for t, kind, text in watch.told if kind == "estimate"], trusted
 
 
 def swing(since_s):
@@ -79,20 +53,28 @@ def swing(since_s):
     return 3.0 * math.exp(-2.6 * late_s) * (math.cos(3.6 * late_s) + 0.73 * math.sin(3.6 * late_s))
 
 
-def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit():
-    impacts, told, trusted = after_a_hit(7.0, 120.0, 3, swing)
-    assert len(impacts) == 1
-    assert [text for _, text in told] == [
-        "velocity not valid: part of the hit was not measured",
-        "velocity valid again",
-    ]
-    assert told[1][0] == pytest.approx(6_500_000, abs=50_000)
-    assert trusted[-1]
+IN_DOUBT, AGAIN = "velocity not valid: part of the hit was not measured", "velocity valid again"
 
 
-def test_nor_is_it_one_where_the_vehicle_flew_into_what_it_hit():
-    impacts, _, _ = after_a_hit(7.0, 120.0, 3, swing, speed=2.0)
-    assert len(impacts) == 1
+@pytest.mark.parametrize(
+    ("peak_m_s2", "lasts", "more"),
+    [
+        (120.0, 3, {}),
+        (120.0, 3, {"speed": 2.0}),
+        # Arms that meet their stop late in a hit: springs push for six samples, and the seventh clips
+        (30.0, 7, {"stop": 90.0}),
+        # A stiff hit of a millisecond, whose means stay far below the range, and which rings
+        (3.0, 4, {"first": 23.0}),
+        # A push measured whole, and the other guard that swings in 30 ms later and clips
+        (20.0, 4, {"other_guard": 90.0}),
+    ],
+    ids=["hovering", "into a wall", "stops", "stiff", "other guard"],
+)
+def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit(peak_m_s2, lasts, more):
+    impacts, told, trusted = after_a_hit(7.0, peak_m_s2, lasts, swing, **more)
+    assert len(impacts) == 1 and trusted[-1]
+    assert [text for _, text in told] == [IN_DOUBT, AGAIN]
+    assert told[1][0] == pytest.approx(6_500_000, abs=150_000)
 
 
 @pytest.mark.parametrize(("jump_m_s", "later_s", "hits"), [(1.0, 1.5, 2), (0.3, 3.0, 2), (0.3, 0.6, 1)])
@@ -104,16 +86,10 @@ def test_a_hit_that_only_the_velocity_shows_is_found_while_another_is_corrected(
 
 def test_a_hit_does_not_hide_the_next_one_as_noise():
     """Given a steady flight, when contacts between the samples jump by 1.5 m/s, and by 0.5 m/s six seconds later."""
-    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
-    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
-    found_us = []
-    for t_us in range(4_000, 10_000_000, 4_000):
-        speed = 2.0 - 1.5 * (t_us >= 3_000_000) + 0.5 * (t_us >= 9_000_000)
-        samples: list[Sample] = [ImuSample(t_us, (0.0, 0.0, -9.80665), STILL)]
-        if t_us % 32_000 == 0:
-            samples.append(Odometry(t_us, STILL, (speed + 1e-3 * (t_us // 32_000 % 2), 0.0, 0.0), 0))
-            samples.append(Attitude(t_us, LEVEL, STILL))
-        found_us += [t_us for _ in advance(monitor, samples, situation, t_us).impacts]
+    watch = Watch().fly(
+        10_000_000, velocity=lambda t: (2.0 - 1.5 * (t >= 3_000_000) + 0.5 * (t >= 9_000_000), 0.0, 0.0)
+    )
+    found_us = [impact.impact.sample_time_boot_us for impact in watch.impacts]
     assert found_us == pytest.approx([3_000_000, 9_000_000], abs=40_000)
 
 
@@ -135,35 +111,12 @@ def test_how_far_a_correction_may_jump():
     assert correction_m_s(4_000_000) < 0.1
 
 
-def test_arms_that_meet_their_stop_late_in_a_hit_leave_the_velocity_in_doubt_all_the_same():
-    """Given springs that push for six samples, when the seventh clips, then what follows is no second hit."""
-    impacts, told, trusted = after_a_hit(7.0, 30.0, 7, swing, stop_m_s2=90.0)
-    assert len(impacts) == 1
-    assert told[0][1] == "velocity not valid: part of the hit was not measured"
-    assert trusted[-1]
-
-
-def test_a_stiff_hit_whose_means_stay_far_below_the_range_is_no_second_hit():
-    """Given a hit of a millisecond that shows as 26 m/s^2 and rings, when the velocity swings back, nothing is told."""
-    impacts, told, trusted = after_a_hit(7.0, 3.0, 4, swing, first_m_s2=23.0)
-    assert len(impacts) == 1
-    assert told[0][1] == "velocity not valid: part of the hit was not measured"
-    assert trusted[-1]
-
-
 def test_a_whole_touch_does_not_clear_the_velocity_of_the_hit_before_it():
     """Given a clipped hit, when something pushes it within the range, its velocity is still not believed."""
-    impacts, _, trusted = after_a_hit(7.0, 120.0, 3, swing, again_m_s2=12.0)
+    impacts, _, trusted = after_a_hit(7.0, 120.0, 3, swing, again=12.0)
     assert len(impacts) == 2
     assert not any(trusted[round(2.2 / 0.004) : round(2.6 / 0.004)])
     assert trusted[-1]
-
-
-def test_what_clips_after_the_push_has_paused_leaves_the_velocity_in_doubt():
-    """Given a push measured whole, when the other guard swings in 30 ms later and clips, then it is not believed."""
-    impacts, told, _ = after_a_hit(7.0, 20.0, 4, swing, other_guard_m_s2=90.0)
-    assert len(impacts) == 1
-    assert told[0][1] == "velocity not valid: part of the hit was not measured"
 
 
 def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
@@ -175,22 +128,24 @@ def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
 @pytest.mark.parametrize(("turns", "leans_m_s2"), [(False, 9.80665 * math.tan(math.radians(4.0))), (True, 0.0)])
 def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2):
     """Told to be level, a vehicle whose filter says nose up by 4 degrees too much leans forward by as much."""
+    rate_rad_s, watch = math.radians(20.0), Watch()
+    strapdown = watch.monitor.estimator.strapdown
+
+    def up_rad(t):
+        return rate_rad_s * 1e-6 * (min(max(t, 2_140_000), 2_340_000) - 2_140_000)
+
+    def leans(t):
+        assert t >= 2_140_000 or strapdown.level_acceleration_m_s2 == STILL
+
     # Given a clipped hit at 2.0 s, from 0.14 s after which the nose is told to come up at 20 degrees a second
-    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
-    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
-    rate_rad_s, up_rad = math.radians(20.0), 0.0
-    for t_us in range(4_000, 2_500_000, 4_000):
-        comes_up = 2_140_000 < t_us <= 2_340_000
-        up_rad += 0.004 * rate_rad_s * comes_up
-        push = -120.0 if 2_000_000 <= t_us < 2_012_000 else 0.0
+    watch.fly(
+        2_500_000,
+        push=lambda t: (-120.0 if 2_000_000 <= t < 2_012_000 else 0.0, 0.0, 0.0),
         # When the gyroscopes show that turn, or nothing of it
-        rates = (0.0, rate_rad_s if comes_up and turns else 0.0, 0.0)
-        samples: list[Sample] = [ImuSample(t_us, (push, 0.0, -9.80665), rates)]
-        if t_us % 20_000 == 0:
-            samples.append(Attitude(t_us, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), rates))
-        advance(monitor, samples, situation, t_us)
-        if t_us < 2_140_000:
-            assert monitor.estimator.strapdown.level_acceleration_m_s2 == STILL
+        rates=lambda t: (0.0, rate_rad_s if turns and 2_140_000 < t <= 2_340_000 else 0.0, 0.0),
+        attitude=lambda t: (math.cos(0.5 * up_rad(t)), 0.0, math.sin(0.5 * up_rad(t)), 0.0),
+        look=leans,
+    )
     # Then it is the filter's in the one case and the vehicle's in the other
-    assert not monitor.estimator.validity.is_valid
-    assert monitor.estimator.strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
+    assert not watch.monitor.estimator.validity.is_valid
+    assert strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)

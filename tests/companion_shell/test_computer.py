@@ -105,9 +105,6 @@ def test_the_message_has_what_is_known_and_says_of_the_rest_that_it_is_unused():
 
 
 @pytest.mark.parametrize(("temperature", "sent"), [(None, 127), (-20, -20), (150, 126), (-300, -128)])
-def test_a_temperature_fits_its_byte_and_none_is_unused(temperature, sent):
-    assert decoded(ComputerStatus(0, 0, (), temperature, 0, 0, 0, 0)).temperature_board == sent
-
-
-def test_of_more_than_eight_cores_the_first_eight_are_told():
-    assert decoded(ComputerStatus(0, 0, tuple(range(12)), None, 0, 0, 0, 0)).cpu_cores == list(range(8))
+def test_of_more_than_eight_cores_the_first_are_told_and_a_temperature_fits_its_byte(temperature, sent):
+    message = decoded(ComputerStatus(0, 0, tuple(range(12)), temperature, 0, 0, 0, 0))
+    assert (message.cpu_cores, message.temperature_board) == (list(range(8)), sent)

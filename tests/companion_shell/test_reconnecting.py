@@ -6,14 +6,13 @@ import pty
 import socket
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from companion.errors import ConnectionSetupError
 from companion.shell import streams
 from companion.shell.addresses import open_connection
-from companion.shell.streams import RETRY_S, StreamConnection
+from companion.shell.streams import RETRY_S
 
 LOCAL = "127.0.0.1"
 # A test that fails waits so long; one that passes takes an attempt or two. A busy machine keeps a thread for seconds.
@@ -268,26 +267,3 @@ def test_a_host_that_acknowledges_nothing_is_given_up_within_a_second_and_no_pac
     with socket.socket(fileno=os.dup(client._stream._port.fileno())) as same:
         assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 1000
         assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
-
-
-def test_whoever_is_gone_is_asked_for_five_times_in_the_second_after_which_px4_leaves_offboard():
-    # Given an other end that answers no attempt
-    waits_s: list[float] = []
-
-    class Patience:
-        def is_set(self):
-            return len(waits_s) == 5
-
-        def wait(self, timeout_s):
-            waits_s.append(timeout_s)
-
-    def nobody():
-        raise OSError(errno.ECONNREFUSED, "refused")
-
-    stream: Any = object()
-    connection = StreamConnection(stream, nobody)
-    connection._closed = Patience()
-    # When it is looked for again
-    connection._reopen(None)
-    # Then five attempts take no longer than COM_OF_LOSS_T, and keep no processor busy
-    assert sum(waits_s) <= 1.0 and min(waits_s) >= 0.05

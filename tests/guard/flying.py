@@ -1,11 +1,18 @@
-"""A guard, somebody else who commands, and a simulated vehicle, joined by bytes on virtual time."""
+"""A guard, somebody else who commands, and a simulated vehicle, joined on virtual time.
 
+`GuardedFlight`: the guard on one link, a pilot or a program on another. `AttachedFlight`: the guard on the program's
+own connection, through which both send names and fields, as by MAVSDK.
+"""
+
+import json
 import math
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from companion.guard.attached import AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.guard.states import State
@@ -15,107 +22,64 @@ from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
+from tests.flying import EPOCH_US, VirtualTime
+from tests.simulated import wall
 
-EPOCH_US = 1_600_000_000_000_000
 SET_MODE, ARM, TAKEOFF = 176, 400, 22
-WALL = {"point_ned_m": [4, 0, -1.5], "normal_ned": [-1, 0, 0], "width_m": 20, "height_m": 20}
-POSITION_ONLY, VELOCITY_ONLY = 0xDF8, 0xDC7
+# From the wall's face to the centre of a vehicle that touches it with guards unfolded: 0.24 m.
+FACE_NORTH_M = 4.0
+VELOCITY_ONLY = 0xDC7
 MANUAL_POSITION, OFFBOARD, HOLD, MISSION, LAND = (3, 0), (6, 0), (4, 3), (4, 4), (4, 6)
+# MAVSDK's Offboard repeats its last setpoint every 50 ms, for ever; in whole intervals of 4 ms.
+REPEATED_EVERY_S = 0.052
 
 
-class Air:
-    """The guard on one link, the pilot or the program on another; `on_wire` sees all that reaches the vehicle."""
+class Commanded(VirtualTime):
+    """A vehicle that somebody commands before a wall, and a guard; `on_wire` has all that reaches the vehicle."""
 
-    def __init__(
-        self,
-        config: GuardConfig | None = None,
-        scene: dict[str, Any] | None = None,
-        parameters: dict[str, float] | None = None,
-        airframe: str = "foldable",
-    ) -> None:
-        built = Scene.model_validate({"walls": [WALL], **(scene or {})})
+    guard: Any
+    vehicle: SimulatedVehicle
+
+    def __init__(self, airframe: str, parameters: dict[str, float] | None, **scene: Any) -> None:
+        built = Scene.model_validate({"walls": [wall(FACE_NORTH_M, height_m=20)], **scene})
         self.vehicle = SimulatedVehicle(load_built_in(airframe), built, 1, parameters=parameters)
-        self.guard = Guard(config or GuardConfig())
-        self._guard_link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
-        self._other_link = self.vehicle.add_link(LinkOptions(LinkKind.NORMAL))
-        self._other = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
-        self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
-        self._guards_bytes = self._others_bytes = b""
-        self.each_step: list[Callable[[], None]] = []
-        self.others_last: dict[str, Any] = {}
         self.events: list[Event] = []
         self.on_wire: list[tuple[float, str, Any]] = []
-        self.keep_guard_silent = False
-        self._next_beat_s = 0.0
+        self.does_beat = True
+        self._repeated: list[Callable[[], None]] = []
+        self.every(1.0, self._beat)
 
     @property
     def time_s(self) -> float:
         return 1e-6 * self.vehicle.time_boot_us
 
     @property
+    def now_us(self) -> int:
+        return EPOCH_US + self.vehicle.time_boot_us
+
+    @property
     def state(self) -> State:
         return State.CONNECTING if self.guard.core is None else self.guard.core.machine.state
 
+    @abstractmethod
     def send(self, message: Any) -> None:
-        self._others_bytes += message.pack(self._other)
-        self._other.seq = (self._other.seq + 1) % 256
+        """The other's message goes with the next step."""
+
+    def _beat(self) -> None:
+        if self.does_beat:
+            self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
 
     def command(self, number: int, *params: float) -> None:
         unset = math.nan if number == TAKEOFF else 0.0
         self.send(dialect.MAVLink_command_long_message(1, 1, number, 0, *params, *[unset] * (7 - len(params))))
 
-    def mode(self, main_and_sub: tuple[int, int]) -> None:
+    def set_mode(self, main_and_sub: tuple[int, int]) -> None:
         self.command(SET_MODE, 1, *main_and_sub)
 
-    def sticks(self, forward: float = 0.0, right: float = 0.0) -> None:
-        pitch, roll = round(1000 * forward), round(1000 * right)
-        self.send(dialect.MAVLink_manual_control_message(1, pitch, roll, 500, 0, 0))
-
     def velocity(self, north: float, east: float = 0.0, down: float = 0.0) -> None:
-        fields = (0.0, 0.0, 0.0, north, east, down, 0.0, 0.0, 0.0, 0.0, 0.0)
-        self.send(dialect.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, VELOCITY_ONLY, *fields))
-
-    def step(self) -> None:
-        if self.time_s >= self._next_beat_s:
-            self._next_beat_s = self.time_s + 1.0
-            self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-        for action in self.each_step:
-            action()
-        self._note("guard", self._guards_bytes)
-        self._note("other", self._others_bytes)
-        self._guard_link.push(self._guards_bytes)
-        self._other_link.push(self._others_bytes)
-        self._others_bytes = b""
-        self.vehicle.advance()
-        for packet in self._other_link.take():
-            message = self._reader.decode(bytearray(packet))
-            self.others_last[message.get_type()] = message
-        result = self.guard.step(b"".join(self._guard_link.take()), EPOCH_US + self.vehicle.time_boot_us)
-        self._guards_bytes = b"" if self.keep_guard_silent else b"".join(result.sent_frames)
-        self.events += result.events
-
-    def guard_hears(self, forged: bytes) -> list[Event]:
-        """Somebody sends this in the vehicle's name."""
-        result = self.guard.step(forged, EPOCH_US + self.vehicle.time_boot_us)
-        self._guards_bytes += b"".join(result.sent_frames)
-        self.events += result.events
-        return list(result.events)
-
-    def _note(self, sender: str, sent: bytes) -> None:
-        for message in self._parser.parse_buffer(bytearray(sent)) or [] if sent else []:
-            self.on_wire.append((self.time_s, sender, message))
-
-    def run(self, seconds: float) -> None:
-        for _ in range(round(seconds * 250)):
-            self.step()
-
-    def until(self, condition: Callable[[], bool], at_most_s: float) -> float:
-        """Seconds until the condition holds."""
-        start_s = self.time_s
-        while not condition():
-            assert self.time_s - start_s < at_most_s, (f"not within {at_most_s} s", self.state, self.told())
-            self.step()
-        return self.time_s - start_s
+        values = (0.0, 0.0, 0.0, north, east, down, *[0.0] * 5)
+        boot_ms = round(1e3 * self.time_s)
+        self.send(dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, VELOCITY_ONLY, *values))
 
     def every(self, seconds: float, action: Callable[[], None]) -> Callable[[], None]:
         """Do it from now on, again and again; the action returned ends it."""
@@ -126,36 +90,179 @@ class Air:
                 due_s[0] = self.time_s + seconds
                 action()
 
-        self.each_step.append(act)
-        return lambda: self.each_step.remove(act)
+        self._repeated.append(act)
+        return lambda: self._repeated.remove(act)
 
-    def told(self, kind: str | None = None) -> list[str]:
-        return [event.text for event in self.events if kind in (None, event.kind)]
+    def step(self) -> None:
+        for action in tuple(self._repeated):
+            action()
+        self._exchange()
 
-    def event(self, kind: str) -> Event:
-        return next(event for event in self.events if event.kind == kind)
-
-    def setpoints(self, sender: str, since_s: float = 0.0) -> list[tuple[float, Any]]:
-        kind = "SET_POSITION_TARGET_LOCAL_NED"
-        return [(at, m) for at, who, m in self.on_wire if who == sender and m.get_type() == kind and at >= since_s]
-
-    def vehicle_mode(self) -> str:
-        return self.guard.status().vehicle_mode
-
-    def position(self) -> tuple[float, float, float]:
-        position = self.guard.status().position_ned_m
-        assert position is not None
-        return position
+    @abstractmethod
+    def _exchange(self) -> None: ...
 
     def take_off(self) -> None:
         """By the other's commands: up to PX4's take-off height and hold."""
-        self.until(lambda: self.state is State.STANDING_BY, 10.0)
-        self.until(lambda: self.others_last.get("HEARTBEAT") is not None and self._is_ready(), 20.0)
+        self.run_to(State.STANDING_BY, 10.0)
+        self.run_for(2.0)
         self.command(ARM, 1)
-        self.run(0.5)
+        self.run_for(0.5)
         self.command(TAKEOFF)
-        self.until(lambda: self.state is State.WATCHING, 20.0)
-        self.until(lambda: self.vehicle_mode() == "AUTO.LOITER", 20.0)
+        self.run_to(State.WATCHING, 20.0)
+        self.run_for(3.0)
 
-    def _is_ready(self) -> bool:
-        return bool(self.others_last["HEARTBEAT"].system_status == 3)
+    def sent_by(self, sender: str, name: str = "", since_s: float = 0.0, until_s: float = math.inf) -> list[Any]:
+        """Messages on the wire whose name contains that, in that time."""
+        return [
+            message
+            for at_s, who, message in self.on_wire
+            if who == sender and name in message.get_type() and since_s <= at_s < until_s
+        ]
+
+    def setpoints(self, sender: str, since_s: float = 0.0, until_s: float = math.inf) -> list[Any]:
+        return self.sent_by(sender, "SET_POSITION_TARGET", since_s, until_s)
+
+    def event_s(self, kind: str) -> float:
+        return 1e-6 * (self.event(kind).time_us - EPOCH_US)
+
+
+class GuardedFlight(Commanded):
+    """The guard on one link, the pilot or the program on another; `others_last` is what that one has heard."""
+
+    def __init__(
+        self,
+        config: GuardConfig | None = None,
+        parameters: dict[str, float] | None = None,
+        airframe: str = "foldable",
+        **scene: Any,
+    ) -> None:
+        super().__init__(airframe, parameters, **scene)
+        self.guard = Guard(config or GuardConfig())
+        self._guard_link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
+        self._other_link = self.vehicle.add_link(LinkOptions(LinkKind.NORMAL))
+        self._other = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
+        self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
+        self._guards_bytes = self._others_bytes = b""
+        self.others_last: dict[str, Any] = {}
+
+    def send(self, message: Any) -> None:
+        self._others_bytes += message.pack(self._other)
+        self._other.seq = (self._other.seq + 1) % 256
+
+    def sticks(self, forward: float) -> None:
+        self.send(dialect.MAVLink_manual_control_message(1, round(1000 * forward), 0, 500, 0, 0))
+
+    def pilot(self) -> list[float]:
+        """Sticks twenty times a second; the list's only number is the forward one."""
+        forward = [0.0]
+        self.every(0.05, lambda: self.sticks(forward[0]))
+        return forward
+
+    def flown_by_sticks(self) -> list[float]:
+        """In the air and in position mode."""
+        stick = self.pilot()
+        self.take_off()
+        self.run_until(lambda: self.mode == "AUTO.LOITER", 20.0)
+        self.set_mode(MANUAL_POSITION)
+        self.run_until(lambda: self.mode == "POSCTL", 2.0)
+        return stick
+
+    def pushed_into_the_wall(self, recovers: bool = True) -> list[float]:
+        """By sticks, until the guard takes over; then they are let go, and it recovers."""
+        stick = self.flown_by_sticks()
+        stick[0] = 0.3
+        self.run_until(lambda: self.state in (State.TAKING_OVER, State.RECOVERING), 20.0)
+        stick[0] = 0.0
+        if recovers:
+            self.run_to(State.RECOVERING, 1.0)
+        return stick
+
+    def _exchange(self) -> None:
+        for sender, sent in (("guard", self._guards_bytes), ("other", self._others_bytes)):
+            messages = self._parser.parse_buffer(bytearray(sent)) if sent else []
+            self.on_wire += [(self.time_s, sender, message) for message in messages or []]
+        self._guard_link.push(self._guards_bytes)
+        self._other_link.push(self._others_bytes)
+        self._others_bytes = b""
+        self.vehicle.advance()
+        for packet in self._other_link.take():
+            message = self._reader.decode(bytearray(packet))
+            self.others_last[message.get_type()] = message
+        self._guards_bytes = b""
+        self.guard_hears(b"".join(self._guard_link.take()))
+
+    def guard_hears(self, received: bytes) -> list[Event]:
+        """Alone, what somebody sends in the vehicle's name."""
+        result = self.guard.step(received, self.now_us)
+        self._guards_bytes += b"".join(result.sent_frames)
+        self.events += result.events
+        return list(result.events)
+
+    @property
+    def mode(self) -> str:
+        return str(self.guard.status().vehicle_mode)
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        return self.guard.status().position_ned_m
+
+
+class AttachedFlight(Commanded):
+    """What the program sends goes through the guard's gate, as MAVSDK's does; `sender` is "guard" or "program"."""
+
+    def __init__(self, config: GuardConfig | None = None, airframe: str = "foldable") -> None:
+        super().__init__(airframe, None)
+        self.guard = AttachedGuard(config or GuardConfig(), 1, EPOCH_US)
+        self._mavlink, self._parser = dialect.MAVLink(None, 245, 190), dialect.MAVLink(None)
+        self.outgoing: list[tuple[str, str, dict[str, Any]]] = []
+
+    @property
+    def mode(self) -> int | None:
+        return self.guard.core.flight.vehicle.custom_mode
+
+    def send(self, message: Any) -> None:
+        self.outgoing.append(("program", message.get_type(), fields_of(message)))
+
+    def fly_by(self, north_m_s: float, east_m_s: float = 0.0) -> Callable[[], None]:
+        """That velocity in OFFBOARD; what is returned ends the setpoints."""
+        ends = self.every(REPEATED_EVERY_S, lambda: self.velocity(north_m_s, east_m_s))
+        self.run_for(0.3)
+        self.set_mode(OFFBOARD)
+        return ends
+
+    def fly_into_the_wall(self, speed_m_s: float = 1.5) -> None:
+        """Take off, OFFBOARD, north until the guard holds."""
+        self.take_off()
+        self.fly_by(speed_m_s)
+        self.run_until(lambda: self.guard.core.machine.holds, 20.0)
+
+    def _exchange(self) -> None:
+        self.take(self.guard.step((), self.now_us))
+        packets, self.outgoing, outgoing = b"", [], self.outgoing
+        for sender, name, fields in outgoing:
+            if self.guard.lets_pass(name, fields, self.now_us):
+                message = message_of(name, fields)
+                self.on_wire.append((self.time_s, sender, message))
+                packets += message.pack(self._mavlink)
+        for packet in self.vehicle.step(packets):
+            self.hear(self._parser.decode(bytearray(packet)), self.now_us)
+
+    def hear(self, message: Any, now_us: int) -> None:
+        self.take(self.guard.hear(message.get_type(), (1, 1), fields_of(message), now_us))
+
+    def take(self, step: AttachedStep) -> None:
+        self.outgoing += [("guard", name, json.loads(json.dumps(dict(fields)))) for name, fields in step.sent]
+        self.events += step.events
+
+
+def fields_of(message: Any) -> dict[str, Any]:
+    """As libmav has them, by way of JSON: NaN is null, text is text, an array is a list."""
+    values = {name: getattr(message, name) for name in message.fieldnames}
+    is_unset = {name: isinstance(value, float) and not math.isfinite(value) for name, value in values.items()}
+    return json.loads(json.dumps({name: None if is_unset[name] else value for name, value in values.items()}))
+
+
+def message_of(name: str, fields: dict[str, Any]) -> Any:
+    kind = getattr(dialect, f"MAVLink_{name.lower()}_message")
+    values = [math.nan if fields[field] is None else fields[field] for field in kind.fieldnames]
+    return kind(*[value.encode() if isinstance(value, str) else value for value in values])

@@ -1,101 +1,121 @@
 """The guard on a program's own connection: none of the program's setpoints reaches the vehicle while it holds."""
 
-import pytest
+import json
+from typing import Any
 
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.core import POLL_INTERVAL_US
 from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
 from companion.guard.holding import is_foreign
 from companion.guard.states import State
+from companion.mavlink.decode import Decoder
+from companion.mavlink.readers import GUARD_READERS, sample_from
 from companion.messages import PositionTarget, Refused
-from companion.px4_mode import AUTO_LOITER, OFFBOARD
-from tests.guard.attached_air import REPEATED_EVERY_S, AttachedAir
+from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD
+from companion.shell import mavsdk_guard
+from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+from tests.guard.flying import HOLD, REPEATED_EVERY_S, SET_MODE, AttachedFlight, fields_of, message_of
+
+STALL_S = 1.6  # more than the silence after which the guard lets go (link.silence_s)
+
+
+def holding(config: GuardConfig | None = None) -> AttachedFlight:
+    air = AttachedFlight(config)
+    air.fly_into_the_wall()
+    return air
 
 
 @pytest.fixture(scope="module")
-def air() -> AttachedAir:
-    air = AttachedAir()
-    air.fly_into_the_wall()
-    air.until(lambda: air.state is State.WATCHING, 10.0)
-    air.run(2.0)
+def air() -> AttachedFlight:
+    air = holding()
+    air.run_to(State.WATCHING, 10.0)
+    air.run_for(2.0)
     return air
 
 
 def test_not_one_of_the_programs_setpoints_reaches_the_vehicle_while_the_guard_holds(air):
-    held_s = (air.event_s("take_over"), air.event_s("given_back"))
-    assert held_s[1] - held_s[0] > 0.5
-    assert air.setpoints("program", held_s[0] + 0.004, held_s[1] + 0.004) == []
+    taken_s, back_s = (air.event_s("take_over"), air.event_s("given_back"))
+    assert back_s - taken_s > 0.5
+    assert air.setpoints("program", taken_s + 0.004, back_s + 0.004) == []
     # it went on sending all the while, and was heard before and after
-    expected = (held_s[1] - held_s[0]) / REPEATED_EVERY_S
-    assert air.guard.kept_out == pytest.approx(expected, abs=2)
-    assert len(air.setpoints("program", held_s[0] - 1.0, held_s[0])) == pytest.approx(20, abs=1)
-    assert len(air.setpoints("program", held_s[1] + 0.1, held_s[1] + 1.1)) == pytest.approx(20, abs=1)
+    assert air.guard.kept_out == pytest.approx((back_s - taken_s) / REPEATED_EVERY_S, abs=2)
+    assert len(air.setpoints("program", taken_s - 1.0, taken_s)) == pytest.approx(20, abs=1)
+    assert len(air.setpoints("program", back_s + 0.1, back_s + 1.1)) == pytest.approx(20, abs=1)
+    # it is given back to hold, where the program's setpoints mean nothing
+    assert air.mode == AUTO_LOITER and air.kinds().count("detection") == 1
 
 
 def test_the_guards_own_setpoints_carry_the_vehicle_meanwhile_from_the_hit_on(air):
-    taken_s = air.event_s("take_over")
-    own = air.setpoints("guard", taken_s, air.event_s("given_back"))
-    assert len(own) == pytest.approx(50 * (air.event_s("given_back") - taken_s), abs=3)
-    first_s = next(at for at, who, name, _ in air.on_wire if who == "guard" and at >= taken_s)
-    assert first_s - taken_s <= 0.004
-    assert own[-1]["x"] < 3.7
+    taken_s, back_s = (air.event_s("take_over"), air.event_s("given_back"))
+    own = air.setpoints("guard", taken_s, back_s)
+    assert len(own) == pytest.approx(50 * (back_s - taken_s), abs=3)
+    assert air.sent_by("guard", "", taken_s, taken_s + 0.005) != []
+    assert own[-1].x < 3.7
 
 
 def test_in_the_programs_own_offboard_nothing_is_streamed_beforehand_and_nothing_needs_confirming(air):
     taken_s = air.event_s("take_over")
     assert air.setpoints("guard", taken_s - 1.0, taken_s) == []
-    assert [
-        name for at, who, name, _ in air.on_wire if who == "guard" and abs(at - taken_s) < 0.1 and "LONG" in name
-    ] == []
-    assert next(event for event in air.events if event.kind == "confirmed").data["after_ms"] == 0.0
-
-
-def test_it_is_given_back_to_hold_where_the_programs_setpoints_mean_nothing(air):
-    assert air.mode == AUTO_LOITER
-    assert len([event for event in air.events if event.kind == "detection"]) == 1
+    assert air.sent_by("guard", "LONG", taken_s - 0.1, taken_s + 0.1) == []
+    assert air.event("confirmed").data["after_ms"] == 0.0
 
 
 def test_the_programs_own_heartbeats_and_time_questions_have_none_of_the_guards_beside_them(air):
-    sent = {name for _, who, name, _ in air.on_wire if who == "guard"}
+    sent = {message.get_type() for message in air.sent_by("guard")}
     assert "COMMAND_LONG" in sent and not sent & {"HEARTBEAT", "TIMESYNC"}
 
 
 def test_given_back_to_the_program_its_setpoints_count_again_until_the_hits_allowed_are_used_up():
-    air = AttachedAir(GuardConfig(then="previous", max_hits=2))
-    air.fly_into_the_wall()
-    air.until(lambda: air.state is State.WATCHING, 10.0)
+    air = holding(GuardConfig(then="previous", max_hits=2))
+    air.run_to(State.WATCHING, 10.0)
     assert air.mode == OFFBOARD
     given_back_s = air.time_s
-    air.until(lambda: air.guard.core.machine.holds, 10.0)
+    air.run_until(lambda: air.guard.core.machine.holds, 10.0)
     assert len(air.setpoints("program", given_back_s, air.time_s)) > 5
-    air.until(lambda: air.state is State.WATCHING, 10.0)
+    air.run_to(State.WATCHING, 10.0)
     assert air.mode == AUTO_LOITER
 
 
 def test_a_program_that_commands_a_mode_while_the_guard_holds_has_its_way():
-    air = AttachedAir()
-    air.fly_into_the_wall()
-    air.run(0.2)
-    air.set_mode(4, 3)
-    air.until(lambda: air.state is State.STOOD_DOWN, 1.0)
+    air = holding()
+    air.run_for(0.2)
+    air.set_mode(HOLD)
+    air.run_to(State.STOOD_DOWN, 1.0)
     assert air.mode == AUTO_LOITER
 
 
-def test_the_guard_makes_way_for_a_programs_setpoints_before_its_offboard():
-    """Both streams together would have the vehicle stop and go in the first tenth of a second."""
-    air = AttachedAir()
-    air.until(lambda: air.state is State.STANDING_BY, 10.0)
-    air.run(2.0)
-    air.command(400, 1)
-    air.run(0.5)
-    air.command(22)
-    air.until(lambda: air.state is State.WATCHING, 20.0)
-    air.run(2.0)
+def test_the_guard_makes_way_for_a_programs_setpoints_before_its_offboard_and_after_they_end():
+    """Both streams together would have the vehicle stop and go; the guard's alone would keep it in the OFFBOARD of a
+    program that has died."""
+    air = AttachedFlight()
+    air.take_off()
     assert len(air.setpoints("guard", air.time_s - 1.0)) == pytest.approx(10, abs=1)
-    air.set_velocity((0.0, 0.0, 0.0))
-    air.run(0.1)
     began_s = air.time_s
-    air.run(1.0)
-    assert air.setpoints("guard", began_s) == []
+    ends = air.fly_by(0.0, 0.2)
+    air.run_until(lambda: air.mode == OFFBOARD, 1.0)
+    air.run_for(0.5)
+    assert air.state is State.WATCHING
+    ends()
+    air.run_until(lambda: air.mode != OFFBOARD, 3.0)
+    assert air.setpoints("guard", began_s + 0.1) == []
+
+
+def test_a_stiff_hit_after_which_the_guard_leans_is_recovered_from_in_peace():
+    air = AttachedFlight(airframe="rigid")
+    air.fly_into_the_wall(2.5)
+    air.run_to(State.WATCHING, 10.0)
+    assert "recovered" in air.kinds() and "crossed" not in air.kinds()
+    assert any(setpoint.x != setpoint.x for setpoint in air.setpoints("guard", air.event_s("take_over")))
+    assert air.setpoints("program", air.event_s("take_over") + 0.004, air.event_s("given_back")) == []
+
+
+# --- the gate
 
 
 def test_the_gate_knows_its_own_by_content_and_each_but_once():
@@ -108,16 +128,20 @@ def test_the_gate_knows_its_own_by_content_and_each_but_once():
     assert not gate.is_own(own)
 
 
+def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_or_for_a_lean_of_late():
+    guard = AttachedFlight().guard.core.flight
+    there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
+    guard.sent_ned_m.append((1_000_000, (1.1, 0.0, -2.0)))
+    assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]
+    guard.sent_ned_m.append((1_100_000, None))
+    assert [is_foreign(guard, echo, 1_200_000) for echo in (there, elsewhere, no_place)] == [False, True, False]
+    assert is_foreign(guard, no_place, 1_600_000)
+
+
+# --- names and fields
+
+
 def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
-    from pymavlink.dialects.v20 import development as dialect
-
-    from companion.mavlink.decode import Decoder
-    from companion.mavlink.readers import GUARD_READERS, sample_from
-    from sim_vehicle.airframe import load_built_in
-    from sim_vehicle.scene import Scene
-    from sim_vehicle.vehicle import SimulatedVehicle
-    from tests.guard.attached_air import fields_of
-
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
     decoder, parser = Decoder(GUARD_READERS), dialect.MAVLink(None)
     decoder.listen_to(1, 1)
@@ -133,8 +157,6 @@ def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
 
 
 def test_fields_of_another_dialect_make_no_sample_and_no_error():
-    from companion.mavlink.readers import sample_from
-
     assert sample_from("HIGHRES_IMU", (1, 1), {"message_id": 105}) is None
     assert sample_from("HEARTBEAT", (1, 1), {"type": None, "custom_mode": None}) is None
     assert sample_from("NO_SUCH_MESSAGE", (1, 1), {}) is None
@@ -142,21 +164,116 @@ def test_fields_of_another_dialect_make_no_sample_and_no_error():
     assert isinstance(sample_from("HIGHRES_IMU", (1, 1), {**imu, "fields_updated": 63}), Refused)
 
 
-def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_or_for_a_lean_of_late():
-    guard = AttachedAir().guard.core.flight
-    there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
-    guard.sent_ned_m.append((1_000_000, (1.1, 0.0, -2.0)))
-    assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]
-    guard.sent_ned_m.append((1_100_000, None))
-    assert [is_foreign(guard, echo, 1_200_000) for echo in (there, elsewhere, no_place)] == [False, True, False]
-    assert is_foreign(guard, no_place, 1_600_000)
+# --- when the process stalls, or something around the guard fails
 
 
-def test_a_stiff_hit_after_which_the_guard_leans_is_recovered_from_in_peace():
-    air = AttachedAir(airframe="rigid")
-    air.fly_into_the_wall(2.5)
-    air.until(lambda: air.state is State.WATCHING, 10.0)
-    kinds = [event.kind for event in air.events]
-    assert "recovered" in kinds and "crossed" not in kinds
-    assert any(fields["x"] is None for fields in air.setpoints("guard", air.event_s("take_over")))
-    assert air.setpoints("program", air.event_s("take_over") + 0.004, air.event_s("given_back")) == []
+def test_after_a_stall_all_that_has_arrived_is_heard_before_silence_is_judged():
+    # Given a guard that holds, and a stall in which the pilot takes the vehicle to the land mode
+    air = holding()
+    land, packets = dialect.MAVLink_command_long_message(1, 1, SET_MODE, 0, 1, 4, 6, 0, 0, 0, 0), []
+    for number in range(round(STALL_S * 250)):
+        packets += air.vehicle.step(land.pack(dialect.MAVLink(None, 255, 190)) if number == 100 else b"")
+    since, reader = len(air.events), dialect.MAVLink(None)
+    air.outgoing.clear()
+    # When the guard's own thread wakes first, and what arrived is heard one message after the other
+    air.take(air.guard.step((), air.now_us))
+    assert air.guard.next_deadline_us() == air.now_us + POLL_INTERVAL_US, "its thread waits meanwhile"
+    for number, packet in enumerate(packets):
+        air.hear(reader.decode(bytearray(packet)), air.now_us + number * POLL_INTERVAL_US // len(packets))
+    # Then nothing has been judged or sent by what was old; then the guard stands down for the pilot, not for a silence
+    assert len(air.events) == since and air.outgoing == []
+    air.run_for(0.3)
+    assert air.state is State.STOOD_DOWN and air.mode == AUTO_LAND
+    assert len(air.told("let_go")) == 1 and "took over in AUTO.LAND" in air.told("let_go")[0]
+
+
+class Linked:
+    """MAVSDK's connection, joined to a simulated vehicle."""
+
+    system_id = 1
+
+    def __init__(self, *_: object):
+        self.sent: list[tuple[str, Any]] = []
+
+    def send(self, name, fields):
+        self.sent.append((name, json.loads(json.dumps(dict(fields)))))
+
+
+class Clocked:
+    def __init__(self, air):
+        self._air = air
+
+    def now_us(self):
+        return self._air.now_us
+
+
+class Joined:
+    """A `CollisionGuard` that holds, without its threads: the test takes its turns, on virtual time."""
+
+    def __init__(self, monkeypatch):
+        self.air = holding()
+        monkeypatch.setattr(mavsdk_guard, "MavsdkLink", Linked)
+        monkeypatch.setattr(mavsdk_guard, "Clock", lambda: Clocked(self.air))
+        monkeypatch.setattr(mavsdk_guard, "TRIED_AGAIN_S", 0.0)
+        self.guard = CollisionGuard(None, None)
+        self.guard._guard = self.air.guard
+        self.link: Any = self.guard._link
+        self._mavlink, self._parser = dialect.MAVLink(None, 245, 190), dialect.MAVLink(None)
+
+    def step(self):
+        """One interval of the vehicle's; whether there is to be another turn."""
+        goes_on = self.guard._turn()
+        sent, self.link.sent = self.link.sent, []
+        packets = b"".join([message_of(name, fields).pack(self._mavlink) for name, fields in sent])
+        for packet in self.air.vehicle.step(packets):
+            message = self._parser.decode(bytearray(packet))
+            name, fields = message.get_type(), json.dumps(fields_of(message)).encode()
+            assert self.guard._incoming(name, (1, 1), fields)
+        return goes_on
+
+    def lets_a_setpoint_pass(self):
+        return self.guard._outgoing("SET_POSITION_TARGET_LOCAL_NED", (245, 190), b"{}")
+
+    def until_over(self, at_most_us: int) -> int:
+        """How long it took, in microseconds."""
+        start_us = self.air.now_us
+        while self.step():
+            assert self.air.now_us - start_us < at_most_us
+        return self.air.now_us - start_us
+
+
+def fails(*_):
+    raise ValueError("nobody thought of this")
+
+
+@pytest.mark.parametrize("broken", ["step", "hear"])
+def test_a_fault_on_either_thread_gives_the_vehicle_back(monkeypatch, broken):
+    # Given a guard that holds, and a step that fails once
+    joined = Joined(monkeypatch)
+    works, calls = getattr(joined.air.guard, broken), []
+
+    def fails_once(*arguments):
+        calls.append(arguments)
+        return fails() if len(calls) == 1 else works(*arguments)
+
+    monkeypatch.setattr(joined.air.guard, broken, fails_once)
+    # When it goes on
+    joined.until_over(GIVING_BACK_US)
+    # Then the vehicle holds by itself, it is told why, and the program's setpoints pass again
+    assert joined.air.mode == AUTO_LOITER and joined.lets_a_setpoint_pass()
+    assert any("nobody thought of this" in event.text for event in joined.guard.events)
+
+
+def test_a_fault_in_the_gate_lets_no_setpoint_pass_while_the_guard_holds(monkeypatch):
+    joined = Joined(monkeypatch)
+    monkeypatch.setattr(joined.air.guard, "lets_pass", fails)
+    assert not joined.lets_a_setpoint_pass()
+    joined.until_over(GIVING_BACK_US)
+    assert joined.air.mode == AUTO_LOITER and joined.lets_a_setpoint_pass()
+
+
+def test_a_fault_that_stays_ends_the_guard_in_time(monkeypatch):
+    monkeypatch.setattr(mavsdk_guard, "GIVING_BACK_US", 1_000_000)
+    joined = Joined(monkeypatch)
+    monkeypatch.setattr(joined.air.guard, "step", fails)
+    assert joined.until_over(1_100_000) >= 1_000_000

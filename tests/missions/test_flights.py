@@ -1,82 +1,73 @@
 """The missions that ship, flown in lockstep: each does what its file says."""
 
+import functools
 import math
 
 import numpy as np
 import pytest
 
-from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.truth_match import match_contacts
-from rebound_cli.simulation.lockstep import fly_mission_lockstep
-from tests.missions.test_missions import CONTACT_REACH_M, NAMES, WITHOUT_OBSTACLES, load
+from tests.missions.test_missions import CONTACT_REACH_M, NAMES, WITHOUT_OBSTACLES
+from tests.simulated import SimulatedFlight, simulated
 
 pytestmark = [pytest.mark.flight, pytest.mark.slow]
 
 
-@pytest.fixture(scope="module")
-def fly(tmp_path_factory):
-    """Flies a mission once and remembers the flight."""
-    flown = {}
-
-    def flight_of(name):
-        if name not in flown:
-            mission, world = load(name)
-            recorder = FlightRecorder(tmp_path_factory.mktemp(name))
-            flown[name], _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
-            recorder.close()
-        return flown[name]
-
-    return flight_of
+@functools.cache
+def fly(name: str) -> SimulatedFlight:
+    """Once, to its end."""
+    flight = simulated(name)
+    flight.run_to_end(600.0)
+    return flight
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_mission_ends_as_its_file_says(fly, name):
+def test_each_mission_ends_as_its_file_says(name):
     flown = fly(name)
     assert flown.report.outcome == "completed", flown.report.reason
     assert [wish.text for wish in flown.report.expectations if not wish.met] == []
-    matches = match_contacts(flown.report.collisions, flown.truth.hits, 0.5)
+    matches = match_contacts(flown.report.collisions, flown.hits, 0.5)
     assert (matches.false_detections, matches.missed_contacts) == (0, 0)
-    assert (len(flown.truth.hits) == 0) is (name in WITHOUT_OBSTACLES)
+    assert (len(flown.hits) == 0) is (name in WITHOUT_OBSTACLES)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in WITHOUT_OBSTACLES])
-def test_each_recovery_leads_away_from_what_was_hit(fly, name):
+def test_each_recovery_leads_away_from_what_was_hit(name):
     flown = fly(name)
     # the recovery setpoint leads away from the wall that was hit
-    collision, hit = flown.report.collisions[0], flown.truth.hits[0]
+    collision, hit = flown.report.collisions[0], flown.hits[0]
     away = np.subtract(collision.recovery_setpoint_ned_m, hit.contact_position_ned_m)
     assert away @ np.array(hit.normal_ned) > (0.3 if name != "hover" else -0.05)
 
 
-def test_the_square_hits_nothing_and_detects_nothing(fly):
+def test_the_square_hits_nothing_and_detects_nothing():
     flown = fly("square")
     assert flown.report.collisions == ()
     # all four corners were passed within the acceptance radius of 0.2 m and the landing is at the start
-    path = flown.truth.series["position_ned_m"]
+    path = flown.series["position_ned_m"]
     for north_m, east_m in ((4, 0), (4, 4), (0, 4), (0, 0)):
         distance_m = np.hypot(path[:, 0] - north_m, path[:, 1] - east_m)
         assert distance_m.min() < 0.25
     assert np.hypot(*path[-1, :2]) < 0.4
 
 
-def test_the_wall_missions_come_home(fly):
+def test_the_wall_missions_come_home():
     for name in ("wall", "corner", "oblique", "knock", "corridor", "patrol", "home", "windy", "acceptance"):
-        assert np.hypot(*fly(name).truth.series["position_ned_m"][-1, :2]) < 0.5
+        assert np.hypot(*fly(name).series["position_ned_m"][-1, :2]) < 0.5
 
 
-def test_the_corner_is_left_on_both_axes(fly):
+def test_the_corner_is_left_on_both_axes():
     flown = fly("corner")
-    collision, hit = flown.report.collisions[0], flown.truth.hits[0]
+    collision, hit = flown.report.collisions[0], flown.hits[0]
     back_m = np.subtract(hit.contact_position_ned_m, collision.recovery_setpoint_ned_m)[:2]
     assert back_m.min() > 0.05 and np.hypot(*back_m) > 0.35
 
 
-def test_the_papers_scenario_is_met(fly):
+def test_the_papers_scenario_is_met():
     # Given the flight of the paper's sample scenario
     flown = fly("paper")
-    hit = flown.truth.hits[0]
-    series = flown.truth.series
+    hit = flown.hits[0]
+    series = flown.series
     guard_north_m = series["position_ned_m"][:, 0] + CONTACT_REACH_M
     before = series["time_boot_us"] < hit.contact_at_boot_us
     crossing = np.flatnonzero(before & (guard_north_m < 0.0))[-1]
@@ -91,20 +82,20 @@ def test_the_papers_scenario_is_met(fly):
 
 
 def heights_m(flown):
-    return -flown.truth.series["position_ned_m"][:, 2]
+    return -flown.series["position_ned_m"][:, 2]
 
 
-def test_the_slalom_is_swept_through_without_stopping(fly):
+def test_the_slalom_is_swept_through_without_stopping():
     flown = fly("path")
-    path, speed = flown.truth.series["position_ned_m"], np.linalg.norm(flown.truth.series["velocity_ned_m_s"], axis=1)
+    path, speed = flown.series["position_ned_m"], np.linalg.norm(flown.series["velocity_ned_m_s"], axis=1)
     for point in ([2, 1.5, -2], [4, -1.5, -2], [6, 1.5, -2.5], [6, -2.5, -3]):
         distance_m = np.linalg.norm(path - point, axis=1)
         assert distance_m.min() < 0.4
         assert speed[distance_m.argmin()] > 0.5
 
 
-def test_the_orbit_keeps_its_distance_and_turns_both_ways(fly):
-    series = fly("orbit").truth.series
+def test_the_orbit_keeps_its_distance_and_turns_both_ways():
+    series = fly("orbit").series
     offset = series["position_ned_m"][:, :2] - np.array([4.0, 0.0])
     distance_m = np.hypot(*offset.T)
     # until the way home leads across the middle
@@ -115,7 +106,7 @@ def test_the_orbit_keeps_its_distance_and_turns_both_ways(fly):
     assert angle.max() - angle[-1] == pytest.approx(np.pi, abs=0.6)
 
 
-def test_the_door_is_tried_three_times_each_slower(fly):
+def test_the_door_is_tried_three_times_each_slower():
     flown = fly("knock")
     speeds = [hit.impact_speed_m_s for hit in flown.report.collisions]
     assert len(speeds) == 3 and speeds == sorted(speeds, reverse=True)
@@ -124,64 +115,64 @@ def test_the_door_is_tried_three_times_each_slower(fly):
     assert flown.report.reason.endswith("not flown from item 2 on")
 
 
-def test_the_corridor_is_left_by_both_walls(fly):
+def test_the_corridor_is_left_by_both_walls():
     first, second = fly("corridor").report.collisions
     assert first.normal_ned[1] < -0.9 and second.normal_ned[1] > 0.9
 
 
-def test_where_the_wall_was_touched_is_where_it_stands(fly):
+def test_where_the_wall_was_touched_is_where_it_stands():
     """Two touches 2 m apart give the wall's angle, 10 degrees."""
     first, second = (np.array(hit.position_ned_m) for hit in fly("touch").report.collisions)
     north_m, east_m, _ = second - first
     assert np.degrees(np.arctan2(north_m, east_m)) == pytest.approx(10.0, abs=3.0)
 
 
-def test_the_way_home_leads_above_what_was_hit(fly):
+def test_the_way_home_leads_above_what_was_hit():
     flown = fly("home")
-    after = flown.truth.series["time_boot_us"] > flown.truth.hits[0].contact_at_boot_us
+    after = flown.series["time_boot_us"] > flown.hits[0].contact_at_boot_us
     assert heights_m(flown)[after].max() == pytest.approx(3.0, abs=0.3)
     assert heights_m(flown)[~after].max() < 1.8
 
 
-def test_the_rooms_fence_holds_the_vehicle_inside(fly):
-    path = fly("room").truth.series["position_ned_m"]
+def test_the_rooms_fence_holds_the_vehicle_inside():
+    path = fly("room").series["position_ned_m"]
     assert path[:, 0].min() > -1.9 and path[:, 0].max() < 4.1
     assert path[:, 1].min() > -2.3 and path[:, 1].max() < 2.7
 
 
-def test_the_wall_is_found_by_touch_and_no_place_of_it_touched_twice(fly):
+def test_the_wall_is_found_by_touch_and_no_place_of_it_touched_twice():
     """The first two touches show so much of the wall that the way round is free, there and back."""
     flown = fly("detour")
-    assert 2 <= len(flown.truth.hits) <= 3
+    assert 2 <= len(flown.hits) <= 3
     (patch,) = flown.report.obstacles
-    assert patch.hits == len(flown.truth.hits) and patch.normal_ned == pytest.approx((-1, 0, 0), abs=0.05)
-    touched = [(hit.contact_position_ned_m[1], hit.contact_position_ned_m[2]) for hit in flown.truth.hits]
+    assert patch.hits == len(flown.hits) and patch.normal_ned == pytest.approx((-1, 0, 0), abs=0.05)
+    touched = [(hit.contact_position_ned_m[1], hit.contact_position_ned_m[2]) for hit in flown.hits]
     assert all(math.dist(a, b) > 0.5 for number, a in enumerate(touched) for b in touched[:number])
     # 3 m stand there, from 1.1 m west to 1.9 m east
     for place in patch.touches_ned_m:
         assert place[0] == pytest.approx(4.0, abs=0.2) and -1.3 < place[1] < 2.1
-    path = flown.truth.series["position_ned_m"]
+    path = flown.series["position_ned_m"]
     assert np.hypot(*(path[:, :2] - [7, 0.6]).T).min() < 0.5, "the goal was reached"
     assert np.hypot(*path[-1, :2]) < 0.5
 
 
-def test_a_goal_behind_a_closed_wall_is_given_up_on(fly):
+def test_a_goal_behind_a_closed_wall_is_given_up_on():
     flown = fly("blocked")
     assert flown.report.unreachable == ("4",) and "not flown from item 4 on" in flown.report.reason
-    assert len(flown.truth.hits) <= 4
-    path = flown.truth.series["position_ned_m"]
+    assert len(flown.hits) <= 4
+    path = flown.series["position_ned_m"]
     assert path[:, 0].max() < 3.5 and np.hypot(*path[-1, :2]) < 0.5
 
 
-def test_the_mast_is_hit_in_the_first_round_and_flown_round_in_the_second(fly):
+def test_the_mast_is_hit_in_the_first_round_and_flown_round_in_the_second():
     flown = fly("patrol")
-    series, (hit,) = flown.truth.series, flown.truth.hits
+    series, (hit,) = flown.series, flown.hits
     after = series["time_boot_us"] > hit.contact_at_boot_us + 20_000_000
     beyond = series["position_ned_m"][after][:, 0] > 3.5
     assert beyond.any(), "the second round's first corner is reached"
 
 
-def test_the_cart_pushes_the_hovering_vehicle_out_of_its_way(fly):
-    hit = fly("hover").truth.hits[0]
+def test_the_cart_pushes_the_hovering_vehicle_out_of_its_way():
+    hit = fly("hover").hits[0]
     assert np.linalg.norm(hit.impact_velocity_ned_m_s) < 0.3
-    assert fly("hover").truth.series["position_ned_m"][-1, 0] > 0.3
+    assert fly("hover").series["position_ned_m"][-1, 0] > 0.3

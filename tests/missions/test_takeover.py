@@ -6,11 +6,12 @@ import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, POSCTL
-from tests.missions.test_confirming import Air, in_a_child
+from tests.flying import Flight, in_a_child
+from tests.missions.test_confirming import ITEMS
+from tests.simulated import simulated, wall
 
 pytestmark = pytest.mark.flight
 
-WALL = "sim.walls=[{point_ned_m: [3, 0, 0], normal_ned: [-1, 0, 0], width_m: 20, height_m: 20}]"
 GROUND_STATION = mav.MAVLink(None, srcSystem=255, srcComponent=190)
 # CURRENT_MODE comes twice a second, as from PX4; the vehicle takes an interval to obey, and the packet one to arrive.
 REPORTED_WITHIN = 125 + 2
@@ -19,32 +20,37 @@ WATCHED = REPORTED_WITHIN + 125
 SET_MODE, ARM = 176, 400
 
 
-def messages_in(packets: bytes) -> list[Any]:
-    return mav.MAVLink(None).parse_buffer(bytearray(packets)) or []
-
-
 def flies(message: Any) -> bool:
     """A setpoint, or a command that asks for a mode or for motors."""
     is_command = message.get_type() == "COMMAND_LONG" and message.command in (SET_MODE, ARM)
     return is_command or message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"
 
 
-def taken_over(air: Air, mode: int) -> dict[str, Any]:
+def taken_over(air: Flight, mode: int) -> dict[str, Any]:
     """After how many intervals the vehicle reported the pilot's mode, and what the companion sent from then on."""
     fields = (1, 1, SET_MODE, 0, 1.0, float(mode >> 16 & 0xFF), float(mode >> 24), 0, 0, 0, 0)
     asks = bytes(mav.MAVLink_command_long_message(*fields).pack(GROUND_STATION))
     sticks = bytes(mav.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0).pack(GROUND_STATION))
-    reported, sent = None, []
+    reported, sent, reader, step = None, [], mav.MAVLink(None), air.vehicle.step
+    heard: list[int | None] = []
+
+    def listened(received: bytes) -> list[bytes]:
+        packets = step(received)
+        heard[:] = [getattr(reader.decode(bytearray(packet)), "custom_mode", None) for packet in packets]
+        return packets
+
+    air.vehicle.step = listened
     for interval in range(WATCHED):
-        air.step(pilots=sticks + (asks if interval == 0 else b""))
-        if reported is None and mode in [getattr(message, "custom_mode", None) for message in messages_in(air.heard)]:
+        air.step(others=sticks + (asks if interval == 0 else b""))
+        if reported is None and mode in heard:
             reported = interval
         if reported is not None:
-            sent += [message.get_type() for message in messages_in(air.pending) if flies(message)]
+            messages = mav.MAVLink(None).parse_buffer(bytearray(air.pending)) or []
+            sent += [message.get_type() for message in messages if flies(message)]
     return {"reported": reported, "sent": sent, "state": air.state, "mode": air.companion.status().vehicle_mode}
 
 
-def recovers_on(air: Air) -> bool:
+def recovers_on(air: Flight) -> bool:
     """Whether it still recovers when a mode that is chosen now is reported: until then nobody can know of it."""
     for _ in range(REPORTED_WITHIN):
         air.step()
@@ -63,8 +69,8 @@ def recovers_on(air: Air) -> bool:
 )
 def test_a_pilots_mode_at_any_instant_of_a_recovery_is_followed_by_no_setpoint(mode, name, every, also):
     # Given a vehicle that recovers from a hit on a wall
-    air = Air((WALL,))
-    air.run_until(lambda: air.state == "recovering")
+    air = simulated(ITEMS, on_collision={"then": "continue", "max_hits": 2}, sim={"walls": [wall(3.0)]})
+    air.run_to("recovering")
     tried = 0
     while in_a_child(lambda: recovers_on(air)):
         # When the pilot chooses a mode at this instant

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 from shapely import Point
 
@@ -10,11 +9,7 @@ from companion.memory.patch import Patch
 from companion.memory.stored import KnownPatch
 from companion.memory.surroundings import core
 from companion.report import FlightReport
-from rebound_cli.inputs import mission_from, world_from
-from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.results.run_folder import FlightRecorder
-from rebound_cli.simulation.lockstep import fly_mission_lockstep
-from tests.missions.test_missions import FOLDER, load_document
+from tests.simulated import SimulatedFlight, simulated
 
 GOAL_NED_M = (7.0, 0.0, -1.5)
 
@@ -41,8 +36,7 @@ class Detour:
     nearest_to_goal_m: float
 
 
-def fly_detour(folder: Path, wall: Wall, speed_m_s: float, airframe: str, seed: int) -> Detour:
-    document = load_document(FOLDER / "detour.yaml")
+def fly_detour(wall: Wall, speed_m_s: float, airframe: str, seed: int) -> Detour:
     yaw_rad = math.radians(wall.yaw_deg)
     screen = {
         "name": "screen",
@@ -51,32 +45,31 @@ def fly_detour(folder: Path, wall: Wall, speed_m_s: float, airframe: str, seed: 
         "width_m": wall.width_m,
         "height_m": 3,
     }
-    document.data |= {
-        "items": [
-            {"takeoff": {"height_m": 1.5}},
-            {"go_to": {"position_ned_m": list(GOAL_NED_M), "speed_m_s": speed_m_s}},
-            {"return": {}},
-        ],
-        "on_collision": {"then": "detour", "max_hits": 12},
+    items = [
+        {"takeoff": {"height_m": 1.5}},
+        {"go_to": {"position_ned_m": list(GOAL_NED_M), "speed_m_s": speed_m_s}},
+        {"return": {}},
+    ]
+    flight = simulated(
+        "detour",
+        items=items,
+        on_collision={"then": "detour", "max_hits": 12},
         # too low to fly over it
-        "fence": {"radius_m": 10, "max_height_m": 2.5},
-        "sim": {"airframe": airframe, "seed": seed, "walls": [screen]},
-    }
-    recorder, world = FlightRecorder(folder), world_from(document)
-    flown, _ = fly_mission_lockstep(mission_from(document, world), world, recorder, Interrupts())
-    recorder.close()
-    path = flown.truth.series["position_ned_m"]
+        fence={"radius_m": 10, "max_height_m": 2.5},
+        sim={"airframe": airframe, "seed": seed, "walls": [screen]},
+    )
+    report = flight.run_to_end(600.0)
+    path = flight.series["position_ned_m"]
     nearest_m = min(math.dist(place, GOAL_NED_M) for place in path[::50].tolist())
-    off_known_m, while_recovering = _beside_known(flown.report, recorder)
-    return Detour(flown.report, off_known_m, while_recovering, nearest_m)
+    return Detour(report, *_beside_known(flight), nearest_m)
 
 
-def _beside_known(report: FlightReport, recorder: FlightRecorder) -> tuple[list[float], int]:
+def _beside_known(flight: SimulatedFlight) -> tuple[list[float], int]:
     """By the timeline: each hit on a way beside what had been remembered when it came, and how many others."""
     known: list[Patch] = []
     found, others, is_recovering = [], 0, False
-    north_m, east_m, _ = report.origin_ned_m
-    for event in recorder.events:
+    north_m, east_m, _ = flight.report.origin_ned_m
+    for event in flight.events:
         if event.kind == "obstacle":
             known.append(KnownPatch.model_validate(event.data).patch())
         elif event.kind == "recovered":

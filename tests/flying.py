@@ -1,0 +1,130 @@
+"""The one harness: who flies or guards, and a vehicle, joined by bytes on virtual time.
+
+`Flight` joins a companion with a scripted vehicle (`tests.companion.fake_vehicle`) or the simulated one
+(`tests.simulated`). `tests.guard.flying` joins a guard, somebody else who commands, and the simulated vehicle.
+"""
+
+import copy
+import json
+import math
+import os
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from companion.companion import Companion
+from companion.report import Event, FlightReport
+
+INTERVAL_US = 4_000
+EPOCH_US = 1_600_000_000_000_000
+SETPOINT_ID = 84
+
+
+class VirtualTime(ABC):
+    """Goes on by intervals of the vehicle's, until something is so; and what has been told meanwhile."""
+
+    events: list[Event]
+
+    @property
+    @abstractmethod
+    def state(self) -> Any: ...
+
+    @abstractmethod
+    def step(self) -> Any:
+        """One interval: what was sent in the last one arrives, and is answered."""
+
+    def run_until(self, condition: Callable[[], bool], limit_s: float = 60.0) -> float:
+        """Step until the condition holds; how long it took, in seconds. Fails when it does not within `limit_s`."""
+        for count in range(math.ceil(limit_s * 1e6 / INTERVAL_US)):
+            if condition():
+                return count * INTERVAL_US * 1e-6
+            self.step()
+        raise AssertionError(f"not within {limit_s} s; state {self.state}, events: {self.texts()}")
+
+    def run_for(self, seconds: float) -> None:
+        for _ in range(round(seconds * 1e6 / INTERVAL_US)):
+            self.step()
+
+    def run_to(self, state: Any, limit_s: float = 60.0) -> float:
+        return self.run_until(lambda: self.state == state, limit_s)
+
+    def kinds(self) -> list[str]:
+        return [event.kind for event in self.events]
+
+    def texts(self) -> list[str]:
+        return [f"{event.kind}: {event.text}" for event in self.events]
+
+    def told(self, kind: str) -> list[str]:
+        return [event.text for event in self.events if event.kind == kind]
+
+    def event(self, kind: str, index: int = 0) -> Event:
+        return [event for event in self.events if event.kind == kind][index]
+
+
+@dataclass
+class Flight(VirtualTime):
+    """A companion and a vehicle; what the one sends arrives at the other an interval later."""
+
+    companion: Companion
+    vehicle: Any
+    now_us: int = EPOCH_US
+    pending: bytes = b""
+    events: list[Event] = field(default_factory=list)
+    sent: list[tuple[int, bytes]] = field(default_factory=list)
+
+    def step(self, forged: bytes = b"", others: bytes = b"") -> list[Event]:
+        """`forged` reaches the companion before the vehicle's packets, `others` the vehicle after the companion's."""
+        self.now_us += INTERVAL_US
+        packets = self.vehicle.step(self.pending + others)
+        return self.hear(forged + (packets if isinstance(packets, bytes) else b"".join(packets)))
+
+    def hear(self, received: bytes) -> list[Event]:
+        """The companion's half of a step: the vehicle stands still."""
+        result = self.companion.step(received, self.now_us)
+        self.pending = b"".join(result.sent_frames)
+        self.sent += [(self.now_us, frame) for frame in result.sent_frames]
+        self.events += result.events
+        return list(result.events)
+
+    def copy(self) -> "Flight":
+        """Goes on as this one would, on a scripted vehicle; what both have done so far is flown once, and shared."""
+        v = self.vehicle
+        said = [*self.events, *self.sent, *v.setpoints, *v.commands, *v.heartbeats, *v.timesyncs]
+        return copy.deepcopy(self, {id(one): one for one in said})
+
+    def run_to_end(self, limit_s: float = 120.0) -> FlightReport:
+        self.run_until(lambda: self.companion.finished, limit_s)
+        return self.report
+
+    @property
+    def state(self) -> str:
+        return self.companion.status().state
+
+    @property
+    def report(self) -> FlightReport:
+        return self.companion.report()
+
+    def setpoints_since(self, time_us: int) -> list[tuple[int, bytes]]:
+        """Setpoint packets sent after `now_us` = time_us."""
+        return [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == SETPOINT_ID]
+
+
+def in_a_child(work: Callable[[], Any]) -> Any:
+    """What becomes of this instant, in a copy of the process: a simulated vehicle cannot be copied alone."""
+    reads, writes = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reads)
+        try:
+            found = work()
+        except BaseException:
+            found = {"error": traceback.format_exc()}
+        os.write(writes, json.dumps(found).encode())
+        os._exit(0)
+    os.close(writes)
+    with os.fdopen(reads) as pipe:
+        text = pipe.read()
+    os.waitpid(child, 0)
+    return json.loads(text)
