@@ -32,6 +32,8 @@ MODES = {"ALTCTL": (2, 0), "POSCTL": (3, 0), "AUTO.RTL": (4, 5), "AUTO.LAND": (4
 MODES |= {"STABILIZED": (7, 0)}
 CONFIDENCE = 0.95
 GRAVITY_M_S2 = 9.81
+# More than any drawn vehicle's thrust, with a hover at a third of it, and drag.
+STRONGEST_M_S2 = 45.0
 # A ground station's sticks come at 25 to 50 Hz, its heartbeat once a second.
 STICKS_S, BEAT_S = 0.02, 1.0
 # The middle of the throttle's way from 0 to 1000, and the other sticks' from -1000 to 1000.
@@ -65,13 +67,13 @@ class GuardedFlight:
 
     def __post_init__(self) -> None:
         self._link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
-        self._station = self.vehicle.add_link(LinkOptions(LinkKind.GROUND))
+        self._station = self.vehicle.add_link(LinkOptions(LinkKind.NORMAL))
         self._link.introduce()
         self._body, self._depth_m = self.vehicle.state.body, self.vehicle.state.depth_m
         self._impact: Impact | None = None
         self._sent, self._sticks_s, self._beat_s = 0, 0.0, 0.0
         self._before = np.zeros(3)
-        self._looks_for_ground = False
+        self.looks_for_ground = False
 
     @property
     def time_s(self) -> float:
@@ -99,7 +101,7 @@ class GuardedFlight:
 
     def watch_for_ground(self) -> None:
         """From now on a touch of the ground counts: the vehicle is off it."""
-        self._looks_for_ground, self.touched_us = True, None
+        self.looks_for_ground, self.touched_us = True, None
 
     def ask(self, command: int, *params: float) -> None:
         """By a ground station."""
@@ -129,23 +131,23 @@ class GuardedFlight:
         self._station.take()
         result = self.watcher.step(b"".join(self._link.take()), EPOCH_US + self.vehicle.time_boot_us)
         self._link.push(b"".join(result.sent_frames))
-        if self._looks_for_ground:
+        if self.looks_for_ground:
             self._note_ground()
         self._note_impact()
 
     def _note_ground(self) -> None:
-        now_us, depth_m = self.vehicle.time_boot_us, float(self._depth_m.max())
-        if depth_m > 0.0:
+        """A contact with a stiff frame may begin and end within an interval: its force shows it then."""
+        now_us = self.vehicle.time_boot_us
+        change = (self._body[3:6] - self._before) / (1e-6 * self.vehicle.interval_us)
+        change[2] -= GRAVITY_M_S2
+        force_m_s2 = float(np.linalg.norm(change))
+        if float(self._depth_m.max()) > 0.0 or force_m_s2 > STRONGEST_M_S2:
             self.last_touch_us = now_us
             if self.touched_us is None:
                 self.touched_us, self.hardest_m_s2 = now_us, 0.0
                 self.tilt_at_touch_deg, self.sink_at_touch_m_s = self.tilt_deg, float(self._before[2])
-        if self.touched_us is not None:
-            change = (self._body[3:6] - self._before) / (1e-6 * self.vehicle.interval_us)
-            change[2] -= GRAVITY_M_S2
-            force_m_s2 = float(np.linalg.norm(change))
-            if force_m_s2 > self.hardest_m_s2:
-                self.hardest_m_s2, self.hardest_us = force_m_s2, now_us
+        if self.touched_us is not None and force_m_s2 > self.hardest_m_s2:
+            self.hardest_m_s2, self.hardest_us = force_m_s2, now_us
 
     def _note_impact(self) -> None:
         core = self.watcher.core

@@ -12,6 +12,7 @@ from bench.faults.arguments import add_faults
 from bench.hand_flown import add_hand
 from bench.hits_report.arguments import add_hits
 from bench.kills.arguments import add_kills
+from bench.landings import add_landings
 from bench.paper.arguments import add_paper
 from bench.pictures.arguments import add_pictures
 from bench.soak.arguments import add_soak
@@ -37,6 +38,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_ablation(commands)
     add_hits(commands)
     add_hand(commands)
+    add_landings(commands)
     add_kills(commands)
     add_faults(commands)
     add_speed(commands)
