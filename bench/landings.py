@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from bench.guarded import IMU_HZ, GuardedFlight, Row, add_flights, rows_of
+from bench.guarded import IMU_HZ, Row, add_flights, rows_of
 from bench.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
 from rebound_cli.arguments import Commands, count, runs
 
@@ -48,7 +48,7 @@ def fly_to_the_ground(case: GroundCase) -> Row:
     """What was reported, and what it should have been."""
     flown = flown_to_the_ground(case)
     flight = flown.flight
-    outcome, wrong = judged(case, flight)
+    outcome, wrong = judged(case.is_fall, flight.touched_us, flight.hardest_us, flight.reported)
     touched_us, hardest_us = flight.touched_us, flight.hardest_us
     return {
         "seed": case.seed,
@@ -69,17 +69,17 @@ def fly_to_the_ground(case: GroundCase) -> Row:
     }
 
 
-def judged(case: GroundCase, flight: GuardedFlight) -> tuple[str, str]:
+def judged(is_fall: bool, touched_us: int | None, hardest_us: int | None, reported: Sequence[Row]) -> tuple[str, str]:
     """What the ground was reported as, first; and what is wrong with all that was reported, "" where nothing is."""
-    if flight.touched_us is None or flight.hardest_us is None:
+    if touched_us is None or hardest_us is None:
         return "not there", "the ground was not reached"
-    touched_s, hardest_s = 1e-6 * flight.touched_us, 1e-6 * flight.hardest_us
-    before = [one["kind"] for one in flight.reported if one["sample_s"] < touched_s - 1e-3]
-    after = [one for one in flight.reported if one["sample_s"] >= touched_s - 1e-3]
+    touched_s, hardest_s = 1e-6 * touched_us, 1e-6 * hardest_us
+    before = [one["kind"] for one in reported if one["sample_s"] < touched_s - 1e-3]
+    after = [one for one in reported if one["sample_s"] >= touched_s - 1e-3]
     first = after[0]["kind"] if after else "nothing"
     if before:
         return first, f"{before[0]} before the touch"
-    if not case.is_fall:
+    if not is_fall:
         false = [one["kind"] for one in after if one["kind"] not in NO_COLLISION]
         return first, f"{false[0]} in a landing" if false else ""
     if first != CRASH:

@@ -1,7 +1,6 @@
 """The ways to the ground: that they are flown as stated, and that each verdict is right."""
 
 import math
-from types import SimpleNamespace
 
 import pytest
 
@@ -10,17 +9,17 @@ from bench.landings import draw_case, fly_to_the_ground, judged, table
 from bench.ways_down import FALLS, FALLS_FROM_M, GROUNDS, LANDINGS, GroundCase
 
 TOUCHED_S = 5.0
-LANDED, FALLEN = GroundCase(1, 250, "POSCTL", "soft"), GroundCase(1, 250, "one motor", "hard")
+LANDED, FALLEN = False, True
 
 
-def flight_of(*reported, hardest_s=TOUCHED_S + 0.05):
-    """With impacts of these kinds, so many seconds after the touch."""
+def verdict_on(is_fall, reported):
+    """On impacts of these kinds, so many seconds after the touch; the hardest moment is 0.05 s after it."""
     rows = [{"kind": kind, "sample_s": TOUCHED_S + after_s} for kind, after_s in reported]
-    return SimpleNamespace(touched_us=1e6 * TOUCHED_S, hardest_us=1e6 * hardest_s, reported=rows)
+    return judged(is_fall, round(1e6 * TOUCHED_S), round(1e6 * TOUCHED_S) + 50_000, rows)
 
 
 @pytest.mark.parametrize(
-    ("case", "reported", "outcome", "wrong"),
+    ("is_fall", "reported", "outcome", "wrong"),
     [
         (LANDED, [], "nothing", ""),
         (LANDED, [("landing", 0.01)], "landing", ""),
@@ -34,13 +33,12 @@ def flight_of(*reported, hardest_s=TOUCHED_S + 0.05):
         (FALLEN, [("ceiling", -0.2), ("crash", 0.01)], "crash", "ceiling before the touch"),
     ],
 )
-def test_a_way_to_the_ground_is_judged_by_all_that_was_reported(case, reported, outcome, wrong):
-    assert judged(case, flight_of(*reported)) == (outcome, wrong)
+def test_a_way_to_the_ground_is_judged_by_all_that_was_reported(is_fall, reported, outcome, wrong):
+    assert verdict_on(is_fall, reported) == (outcome, wrong)
 
 
 def test_a_flight_that_never_touches_the_ground_shows_nothing():
-    flight = SimpleNamespace(touched_us=None, hardest_us=None, reported=[])
-    assert judged(LANDED, flight) == ("not there", "the ground was not reached")
+    assert judged(False, None, None, []) == ("not there", "the ground was not reached")
 
 
 @pytest.mark.parametrize("ways", [LANDINGS, FALLS])
