@@ -21,7 +21,7 @@ from bench.guarded import (
     rows_of,
 )
 from bench.hand_pilot import Pilot, wishes
-from bench.stick_logs import logs_with_sticks
+from bench.stick_logs import LoggedSticks, logs_with_sticks
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
 from rebound_cli.arguments import Commands, count, runs
@@ -40,12 +40,12 @@ THRUST_LEFT = 0.95
 
 @dataclass(frozen=True, slots=True)
 class HandCase:
-    """One flight; everything that is not here is drawn from the seed. Without a log the sticks are drawn, too."""
+    """One flight; everything that is not here is drawn from the seed. Sticks that are not logged are drawn, too."""
 
     seed: int
     imu_hz: int
     mode: str
-    log: Path | None = None
+    logged: LoggedSticks | None = None
 
 
 def add_hand(commands: Commands) -> None:
@@ -57,7 +57,7 @@ def add_hand(commands: Commands) -> None:
     )
     hand.add_argument("--flights", type=count, default=300, metavar="N", help="at each IMU rate (default 300)")
     hand.add_argument(
-        "--logs", type=Path, metavar="FOLDER", help="sticks of the logs in it (.bin, .log) in every second flight"
+        "--logs", type=Path, metavar="FOLDER", help="sticks of the real logs in it in every second flight"
     )
     add_flights(hand, Path("build/hand.jsonl"))
     hand.set_defaults(run=runs("bench.hand_flown:run_hand"))
@@ -65,11 +65,11 @@ def add_hand(commands: Commands) -> None:
 
 def run_hand(options: Namespace) -> int:
     """0 when nothing was reported in the air, else 1."""
-    logs: list[Path | None] = [] if options.logs is None else [*logs_with_sticks(options.logs)]
+    logs = [] if options.logs is None else logs_with_sticks(options.logs, options.flights)
     cases = []
     for seed in range(options.first_seed, options.first_seed + options.flights):
-        log = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
-        cases += [HandCase(seed, imu_hz, HAND_MODES[seed % len(HAND_MODES)], log) for imu_hz in IMU_HZ]
+        logged = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
+        cases += [HandCase(seed, imu_hz, HAND_MODES[seed % len(HAND_MODES)], logged) for imu_hz in IMU_HZ]
     rows = rows_of(fly_by_hand, cases, options.jobs, options.out, "flights by hand")
     print("\n".join(table(rows)))
     return 1 if any(_in_the_air(row) for row in rows) else 0
@@ -90,15 +90,14 @@ def fly_by_hand(case: HandCase) -> Row:
     config = {"modes": (*DEFAULT_MODES, "STABILIZED", "ACRO"), "companion": settings}
     guard = Guard(GuardConfig.model_validate(config))
     flight = GuardedFlight(vehicle, guard)
-    pilot = Pilot(flight, airframe, parameters, wishes(case.log, rng), case.mode)
-    tilts = pilot.fly(guard)
+    tilts = Pilot(flight, airframe, parameters, wishes(case.logged, rng), case.mode, guard).fly()
     return {
         "seed": case.seed,
         "imu_hz": case.imu_hz,
         "airframe": airframe.name,
         "mode": case.mode,
         "air": air,
-        "sticks": "drawn" if case.log is None else case.log.name,
+        "sticks": "drawn" if case.logged is None else case.logged.log,
         "flown_s": round(len(tilts) * STICKS_S, 1),
         "watched_s": round(flight.watched_s, 1),
         "tilt_deg": [round(float(np.percentile(tilts, at)), 1) for at in (50, 90, 100)] if tilts else [],

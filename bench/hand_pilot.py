@@ -2,18 +2,17 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
 from bench.guarded import STICKS_S, GuardedFlight, Sticks, limited
-from bench.stick_logs import Floats, sticks_of
+from bench.stick_logs import Floats, LoggedSticks
 from companion.guard.guard import Guard
 from companion.guard.states import State
 from sim_vehicle.airframe import Airframe
 
 FLOWN_S = 60.0
-ARM_FROM_S, BEGIN_WITHIN_S = 6.0, 40.0
+ARM_FROM_S, ASK_AGAIN_S, BEGIN_WITHIN_S = 6.0, 0.5, 40.0
 # Vigorous flight begins at the first height, and stays between the other two and within a radius.
 BEGUN_M, LOWEST_M, HIGHEST_M, RADIUS_M = 12.0, 8.0, 40.0, 80.0
 # A stroke of the sticks lasts from a flick to a turn; a hand is never quite still (Ornstein-Uhlenbeck).
@@ -33,8 +32,9 @@ class Pilot:
         parameters: dict[str, float],
         wished: Iterator[Sticks],
         mode: str,
+        guard: Guard,
     ) -> None:
-        self._flight, self._wished, self._mode = flight, wished, mode
+        self._flight, self._wished, self._mode, self._guard = flight, wished, mode, guard
         self._body = flight.vehicle.state.body
         self._hover, self._climb_m_s = airframe.hover_fraction, airframe.control.climb_max_m_s
         self._tilt_rad = math.radians(parameters["MPC_MAN_TILT_MAX"])
@@ -42,32 +42,36 @@ class Pilot:
         self._speed_m_s = parameters["MPC_VEL_MANUAL"]
         self._chosen = "STABILIZED" if mode == "ACRO" else mode
         self._next = self._idle
+        self._ask_mode_s, self._arm_s, self._end_s = 0.0, ARM_FROM_S, BEGIN_WITHIN_S
+        self._tilts_deg: list[float] = []
 
-    def fly(self, guard: Guard) -> list[float]:
+    def fly(self) -> list[float]:
         """The tilts (deg) of the vigorous part, one every STICKS_S."""
-        flight, tilts = self._flight, []
-        mode_due_s = arm_due_s = look_due_s = 0.0
-        end_s = BEGIN_WITHIN_S
-        while flight.time_s < end_s:
-            flight.fly_sticks(lambda: self._next())
-            if flight.time_s >= mode_due_s and flight.mode != self._chosen:
-                flight.ask_mode(self._chosen)
-                mode_due_s = flight.time_s + 0.5
-            if guard.status().armed is False and flight.time_s >= max(arm_due_s, ARM_FROM_S):
-                flight.arm()
-                arm_due_s = flight.time_s + 1.0
-            elif self._next == self._idle and guard.status().armed:
-                self._next = self._rise
-            if self._next == self._rise and flight.height_m > BEGUN_M:
-                self._next, self._chosen, end_s = self._vigorous, self._mode, flight.time_s + FLOWN_S
-                flight.watch_for_ground()
-            if guard.core is not None and guard.core.machine.state is State.STOOD_DOWN:
-                guard.core.is_enabled = True
-            flight.step()
-            if self._next == self._vigorous and flight.time_s >= look_due_s:
-                tilts.append(flight.tilt_deg)
-                look_due_s = flight.time_s + STICKS_S
-        return tilts
+        while self._flight.time_s < self._end_s:
+            self._flight.fly_sticks(self._decide)
+            self._flight.step()
+        return self._tilts_deg
+
+    def _decide(self) -> Sticks:
+        """What to ask for, and where the sticks are."""
+        flight, status, now_s = self._flight, self._guard.status(), self._flight.time_s
+        if status.vehicle_mode != self._chosen and now_s >= self._ask_mode_s:
+            flight.ask_mode(self._chosen)
+            self._ask_mode_s = now_s + ASK_AGAIN_S
+        if not status.armed and now_s >= self._arm_s:
+            flight.arm()
+            self._arm_s = now_s + ASK_AGAIN_S
+        if self._next == self._idle and status.armed:
+            self._next = self._rise
+        if self._next == self._rise and flight.height_m > BEGUN_M:
+            self._next, self._chosen, self._end_s = self._vigorous, self._mode, now_s + FLOWN_S
+            flight.watch_for_ground()
+        if self._next == self._vigorous:
+            self._tilts_deg.append(flight.tilt_deg)
+        core = self._guard.core
+        if core is not None and core.machine.state is State.STOOD_DOWN:
+            core.is_enabled = True  # moving sticks take the vehicle back, and the next impact counts, too
+        return self._next()
 
     def _idle(self) -> Sticks:
         return Sticks(throttle=-1.0)
@@ -122,12 +126,11 @@ class Pilot:
         return cos * north + sin * east, cos * east - sin * north
 
 
-def wishes(log: Path | None, rng: np.random.Generator) -> Iterator[Sticks]:
+def wishes(logged: LoggedSticks | None, rng: np.random.Generator) -> Iterator[Sticks]:
     """Deflections, one every STICKS_S, without an end."""
-    if log is None:
+    if logged is None:
         return _drawn(rng)
-    rows = sticks_of(log)
-    return _again(rows[int(rng.integers(len(rows))) :], rows)
+    return _again(logged.rows[int(rng.integers(len(logged.rows))) :], logged.rows)
 
 
 def _again(first: Floats, rows: Floats) -> Iterator[Sticks]:

@@ -1,23 +1,23 @@
-"""Sticks as people moved them, out of ArduPilot's logs (RCIN); pymavlink reads the files."""
+"""Sticks as people moved them in real flights, out of their logs."""
 
-import struct
-from functools import lru_cache
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pymavlink import DFReader
 
 from bench.guarded import STICKS_S
 from companion.errors import ReboundError
+from companion.messages import Sticks as StickSample
+from rebound_cli.logs.log import LogError
+from rebound_cli.logs.reader import read_log
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
-READERS = {".bin": DFReader.DFReader_binary, ".log": DFReader.DFReader_text}
-# Of a radio's pulses, in microseconds.
-CENTRE_US, HALF_US = 1500.0, 500.0
+SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
 # The throttle of a vehicle in the air is above this.
-FLIES_US = 1250.0
+FLIES = -0.5
 # At 5 Hz, as in PX4's own logs, a flick of the stick is not there any more.
 LEAST_HZ = 8.0
 # Sticks that nobody moves, and flights of a moment, fly nothing hard.
@@ -28,31 +28,38 @@ class StickLogError(ReboundError):
     """A folder of logs without sticks."""
 
 
-def logs_with_sticks(folder: Path) -> list[Path]:
+@dataclass(frozen=True, slots=True)
+class LoggedSticks:
+    """Roll, pitch, throttle from its middle in the air, yaw: from -1 to 1, one row every STICKS_S."""
+
+    log: str
+    rows: Floats
+
+
+def logs_with_sticks(folder: Path, most: int) -> list[LoggedSticks]:
     """In the order of their names. Raises StickLogError where there is none."""
-    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in READERS)
-    found = [path for path in files if len(sticks_of(path)) > 0]
+    found = [logged for _, logged in zip(range(most), _found(folder), strict=False)]
     if not found:
-        raise StickLogError(
-            f"{folder}: no log in it has moving sticks; give a folder of ArduPilot's .bin or .log files."
-        )
+        raise StickLogError(f"{folder}: no log in it has moving sticks; give a folder of ArduPilot's logs.")
     return found
 
 
-@lru_cache(maxsize=4)
-def sticks_of(path: Path) -> Floats:
-    """Roll, pitch, throttle from its middle in the air, yaw: from -1 to 1, one row every STICKS_S; no row for none."""
+def _found(folder: Path) -> Iterator[LoggedSticks]:
+    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES):
+        try:
+            heard = read_log(path).heard
+        except (LogError, OSError):
+            continue  # damaged, or of something else
+        sticks = [(1e-6 * at.at_us, *at.sample.deflections) for at in heard if isinstance(at.sample, StickSample)]
+        rows = moved(np.array(sticks, dtype=np.float64).reshape(-1, 5))
+        if len(rows) > 0:
+            yield LoggedSticks(path.name, rows)
+
+
+def moved(table: Floats) -> Floats:
+    """The flight's part of seconds, pitch, roll, throttle and yaw, as LoggedSticks has it; no row where nobody flew."""
     nothing = np.empty((0, 4))
-    try:
-        log = READERS[path.suffix.lower()](str(path))
-        rows = []
-        while (message := log.recv_match(type=["RCIN"])) is not None:
-            rows.append((message._timestamp, message.C1, message.C2, message.C3, message.C4))
-    except (OSError, ValueError, IndexError, KeyError, AttributeError, TypeError, struct.error):
-        return nothing  # damaged, or no log of that kind
-    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
-    table = table[np.flatnonzero(np.diff(table[:, 0], prepend=-np.inf) > 0.0)]
-    flies = np.flatnonzero(table[:, 3] > FLIES_US)
+    flies = np.flatnonzero(table[:, 3] > FLIES)
     if len(flies) < 2:
         return nothing
     table = table[flies[0] : flies[-1] + 1]
@@ -60,7 +67,6 @@ def sticks_of(path: Path) -> Floats:
     if lasts_s < LEAST_S or len(table) < LEAST_HZ * lasts_s:
         return nothing
     grid_s = np.arange(table[0, 0], table[-1, 0], STICKS_S)
-    table[:, 3] += CENTRE_US - np.median(table[:, 3])
-    sticks = np.stack([np.interp(grid_s, table[:, 0], table[:, channel]) for channel in range(1, 5)], axis=1)
-    sticks = np.clip((sticks - CENTRE_US) / HALF_US, -1.0, 1.0)
+    pitch, roll, throttle, yaw = (np.interp(grid_s, table[:, 0], column) for column in table[:, 1:].T)
+    sticks = np.clip(np.stack([roll, pitch, throttle - np.median(throttle), yaw], axis=1), -1.0, 1.0)
     return sticks if float(sticks[:, :2].std()) > MOVED else nothing

@@ -9,48 +9,51 @@ import pytest
 from bench.guarded import STICKS_S, at_most_an_hour
 from bench.hand_flown import HandCase, agile, fly_by_hand, table
 from bench.hand_pilot import wishes
-from bench.stick_logs import StickLogError, logs_with_sticks, sticks_of
+from bench.stick_logs import StickLogError, logs_with_sticks, moved
 from sim_vehicle.airframe import load_built_in
 
-FORMATS = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 135, 40, RCIN, Qhhhh, TimeUS,C1,C2,C3,C4\n"
+
+def table_of(flown, hz=10):
+    """Seconds, pitch, roll, throttle, yaw."""
+    return np.array([(place / hz, *four) for place, four in enumerate(flown)])
 
 
-def log_of(pulses_us, file, hz=10):
-    rows = [f"RCIN, {round(1e6 * place / hz)}, {', '.join(map(str, four))}" for place, four in enumerate(pulses_us)]
-    file.write_text(FORMATS + "\n".join(rows) + "\n")
-    return file
-
-
-def test_sticks_of_a_log_are_what_its_pulses_say_while_it_flies(tmp_path):
-    # Given a throttle that rises to 1700 us for 30 s, and roll that goes from stop to stop meanwhile
-    ground, air = [(1500, 1500, 1000, 1500)] * 50, []
-    for place in range(300):
-        air.append((1000 if place % 20 < 10 else 2000, 1500, 1700, 1750))
-    file = log_of([*ground, *air, *ground], tmp_path / "flight.log")
-    # When its sticks are read
-    sticks = sticks_of(file)
-    # Then they are those of the flight alone, at the pilot's own rate, with the hovering throttle in the middle
+def test_logged_sticks_are_those_of_the_flight_at_the_pilots_own_rate():
+    # Given a throttle that is up for 30 s, and roll that goes from stop to stop meanwhile
+    ground = [(0.0, 0.0, -1.0, 0.0)] * 50
+    air = [(0.0, -1.0 if place % 20 < 10 else 1.0, 0.4, 0.5) for place in range(300)]
+    # When the flight's sticks are taken
+    sticks = moved(table_of([*ground, *air, *ground]))
+    # Then they are those of the flight alone, with the hovering throttle in the middle
     assert len(sticks) * STICKS_S == pytest.approx(29.9, abs=0.05)
     assert sticks[:, 0].min() == -1.0 and sticks[:, 0].max() == 1.0
     assert np.all(sticks[:, 1] == 0.0) and np.all(sticks[:, 2] == 0.0) and np.all(sticks[:, 3] == 0.5)
     # and between two of its samples a stick is on its way
     assert len(np.unique(sticks[:, 0])) > 2
-    assert logs_with_sticks(tmp_path) == [file]
 
 
-@pytest.mark.parametrize("case", ["still", "short", "slow", "damaged"])
-def test_a_log_that_flies_nothing_hard_is_none(case, tmp_path):
-    # Given sticks that nobody moves, or for a moment, or at 5 Hz; or something else with that name
-    moving = [(1000 + 1000 * (place % 2), 1500, 1600, 1500) for place in range(300)]
-    file = tmp_path / "flight.log"
-    if case == "damaged":
-        (tmp_path / "flight.bin").write_bytes(b"no log at all" * 99)
-    else:
-        pulses_us = {"still": [(1500, 1500, 1600, 1500)] * 300, "short": moving[:100], "slow": moving}[case]
-        log_of(pulses_us, file, hz=5 if case == "slow" else 10)
-    # When a folder is searched for sticks, then it says that there are none
+MOVING = [(0.0, -1.0 + 2.0 * (place % 2), 0.2, 0.0) for place in range(300)]
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        pytest.param(table_of([(0.0, 0.0, 0.2, 0.0)] * 300), id="nobody moves them"),
+        pytest.param(table_of(MOVING[:100]), id="for a moment"),
+        pytest.param(table_of(MOVING, hz=5), id="at 5 Hz"),
+        pytest.param(np.empty((0, 5)), id="none"),
+    ],
+)
+def test_sticks_that_fly_nothing_hard_are_none(table):
+    assert len(moved(table)) == 0
+
+
+def test_a_folder_without_sticks_is_said_to_be_one(tmp_path):
+    # Given something else with a log's name
+    (tmp_path / "flight.bin").write_bytes(b"no log at all" * 99)
+    # When it is searched for sticks, then one sentence says that there are none
     with pytest.raises(StickLogError, match="no log in it has moving sticks"):
-        logs_with_sticks(tmp_path)
+        logs_with_sticks(tmp_path, most=5)
 
 
 def test_drawn_sticks_reach_every_stop_and_never_pass_one():
