@@ -118,7 +118,7 @@ class GuardedFlight:
         """Send the sticks where they are due."""
         if self.time_s < self._sticks_s:
             return
-        self._sticks_s, now = self.time_s + STICKS_S, sticks()
+        self._sticks_s, now = self._sticks_s + STICKS_S, sticks()
         x, y, r = (round(FULL_STICK * limited(stick)) for stick in (now.pitch, now.roll, now.yaw))
         self._push("MANUAL_CONTROL", target=1, x=x, y=y, z=round(HALF_THROTTLE * (1.0 + limited(now.throttle))), r=r)
 

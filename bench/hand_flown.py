@@ -30,10 +30,12 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 
 HAND_MODES = ("POSCTL", "ALTCTL", "STABILIZED", "ACRO")
-AIR = ("calm", "gusts", "turbulence")
+AIR = ("calm", "gusts", "turbulence", "vibration")
 # Limits as a pilot of a racer sets them. PX4's own: 35 deg, 3 m/s^2, 8 m/s^3, 100 deg/s.
 TILT_DEG, ACRO_DEG_S, JERK_M_S3, ACCELERATION_M_S2 = (30.0, 45.0), (200.0, 720.0), (30.0, 200.0), (6.0, 12.0)
 SPEED_M_S, CLIMB_M_S, SINK_M_S, YAW_DEG_S = (5.0, 12.0), (2.0, 5.0), (1.5, 4.0), (90.0, 200.0)
+# Half of the vehicles know where they are by a filter, the others with errors that are drawn.
+FILTER_SHARE = 0.5
 # Of the greatest thrust, at the steepest tilt: the rest turns the vehicle.
 THRUST_LEFT = 0.95
 
@@ -96,6 +98,7 @@ def fly_by_hand(case: HandCase) -> Row:
         "imu_hz": case.imu_hz,
         "airframe": airframe.name,
         "mode": case.mode,
+        "estimate": airframe.estimate.kind,
         "air": air,
         "sticks": "drawn" if case.logged is None else case.logged.log,
         "flown_s": round(len(tilts) * STICKS_S, 1),
@@ -127,7 +130,21 @@ def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[
         # A full deflection is none of the gestures that arm and disarm.
         "MAN_ARM_GESTURE": 0,
     }
-    return airframe.model_copy(update={"control": airframe.control.model_copy(update=control)}), parameters
+    update = {"control": airframe.control.model_copy(update=control)}
+    return airframe.model_copy(update=update | (by_filter(airframe) if rng.random() < FILTER_SHARE else {})), parameters
+
+
+def by_filter(airframe: Airframe) -> dict[str, object]:
+    """The estimate of a filter that motion capture aids: optical flow does not see such flights."""
+    sensors = airframe.sensors
+    lost = {
+        name: getattr(sensors, name).model_copy(update={"fitted": False}) for name in ("optical_flow", "range_finder")
+    }
+    capture = sensors.motion_capture.model_copy(update={"fitted": True})
+    return {
+        "estimate": airframe.estimate.model_copy(update={"kind": "ekf"}),
+        "sensors": sensors.model_copy(update={**lost, "motion_capture": capture}),
+    }
 
 
 # --- the table
@@ -157,6 +174,8 @@ def _groups(rows: Sequence[Row]) -> Iterator[tuple[str, list[Row]]]:
         yield f"{imu_hz} Hz", [row for row in rows if row["imu_hz"] == imu_hz]
     for mode in HAND_MODES:
         yield mode, [row for row in rows if row["mode"] == mode]
+    for air in AIR:
+        yield air, [row for row in rows if row["air"] == air]
     yield "sticks of logs", [row for row in rows if row["sticks"] != "drawn"]
 
 
