@@ -18,6 +18,7 @@ BEGUN_M, LOWEST_M, HIGHEST_M, RADIUS_M = 12.0, 8.0, 40.0, 80.0
 # A stroke of the sticks lasts from a flick to a turn; a hand is never quite still (Ornstein-Uhlenbeck).
 STROKE_S, HAND_MEMORY_S, HAND_SHAKE = (0.15, 1.5), 0.3, 0.12
 STROKES, STROKE_SHARES = ("full", "part", "reversed", "released"), (0.35, 0.25, 0.25, 0.15)
+MINUTES_LOOKED_AT = 5
 # How a pilot holds the tilt by rates, and the climb by the throttle.
 ANGLE_P_PER_S, CLIMB_P_PER_S = 7.0, 2.0
 
@@ -127,10 +128,16 @@ class Pilot:
 
 
 def wishes(logged: LoggedSticks | None, rng: np.random.Generator) -> Iterator[Sticks]:
-    """Deflections, one every STICKS_S, without an end."""
+    """Deflections, one every STICKS_S, without an end: drawn, or a log's from the liveliest of some minutes on."""
     if logged is None:
         return _drawn(rng)
-    return _again(logged.rows[int(rng.integers(len(logged.rows))) :], logged.rows)
+    rows, lasts = logged.rows, round(FLOWN_S / STICKS_S)
+    starts = rng.integers(max(len(rows) - lasts, 1), size=MINUTES_LOOKED_AT).tolist()
+    start = max(starts, key=lambda at: float(rows[at : at + lasts, :2].std()))
+    # Most pilots of logs are careful; the shape of their strokes is a hand's whatever their size.
+    most = float(np.abs(rows[start : start + lasts, :2]).max())
+    stretched = np.clip(rows * np.array([1.0 / most, 1.0 / most, 1.0, 1.0]), -1.0, 1.0)
+    return _again(stretched[start:], stretched)
 
 
 def _again(first: Floats, rows: Floats) -> Iterator[Sticks]:

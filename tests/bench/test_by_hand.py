@@ -9,7 +9,7 @@ import pytest
 from bench.guarded import STICKS_S, at_most_an_hour
 from bench.hand_flown import HandCase, agile, fly_by_hand, table
 from bench.hand_pilot import wishes
-from bench.stick_logs import StickLogError, logs_with_sticks, moved
+from bench.stick_logs import LoggedSticks, StickLogError, logs_with_sticks, moved
 from sim_vehicle.airframe import load_built_in
 
 
@@ -64,6 +64,18 @@ def test_drawn_sticks_reach_every_stop_and_never_pass_one():
     # Then each stick was at both stops, none beyond, and the same seed flies the same
     assert np.all(values.max(axis=0) == 1.0) and np.all(values.min(axis=0) == -1.0)
     assert first == second
+
+
+def test_logged_sticks_are_stretched_to_the_stops():
+    # Given sticks of a careful pilot, of which one moves more than the other
+    waves = np.sin(np.arange(5000) / 20.0)
+    rows = np.stack([0.2 * waves, 0.1 * waves, 0.0 * waves, 0.3 * waves], axis=1)
+    # When a minute of them is flown
+    flown = list(itertools.islice(wishes(LoggedSticks("a log", rows), np.random.default_rng(1)), 3000))
+    # Then the one that moves more reaches its stops, the other half of the way, and yaw is as it was
+    assert max(one.roll for one in flown) == pytest.approx(1.0, abs=0.01)
+    assert max(one.pitch for one in flown) == pytest.approx(0.5, abs=0.01)
+    assert max(one.yaw for one in flown) == pytest.approx(0.3, abs=0.01)
 
 
 def test_no_vehicle_is_asked_for_more_tilt_than_carries_its_weight():
