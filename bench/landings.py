@@ -79,11 +79,14 @@ def judged(is_fall: bool, touched_us: int | None, hardest_us: int | None, report
     first = after[0]["kind"] if after else "nothing"
     if before:
         return first, f"{before[0]} before the touch"
+    allowed = (*NO_COLLISION, CRASH) if is_fall and first == CRASH else NO_COLLISION
+    false = [one["kind"] for one in after if one["kind"] not in allowed]
     if not is_fall:
-        false = [one["kind"] for one in after if one["kind"] not in NO_COLLISION]
         return first, f"{false[0]} in a landing" if false else ""
     if first != CRASH:
         return first, f"{first} in a crash"
+    if false:
+        return first, f"{false[0]} after the crash"
     late_s = after[0]["sample_s"] - hardest_s
     return first, f"{late_s:.2f} s late" if late_s > CRASH_WITHIN_S else ""
 
