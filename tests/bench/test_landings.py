@@ -78,3 +78,10 @@ def test_falls_meet_the_ground_as_fast_as_their_height_says_and_at_any_tilt():
     # and what loses one motor first is tipped, by up to more than a right angle
     assert max(row["tilt_deg"] for row in rows if row["way"] == FALLS[0]) < 20.0
     assert max(row["tilt_deg"] for row in rows if row["way"] == FALLS[1]) > 60.0
+
+
+@pytest.mark.slow
+def test_the_same_case_is_the_same_flight():
+    # Given a fall of which motors and moment are drawn, when it is flown twice, then the rows are the same
+    case = GroundCase(4, 100, "one motor", "soft")
+    assert fly_to_the_ground(case) == fly_to_the_ground(case)
