@@ -37,6 +37,8 @@ def build_parser() -> ArgumentParser:
     _add_ablation(commands)
     _add_flights(commands)
     _add_hits(commands)
+    _add_hand(commands)
+    _add_landings(commands)
     _add_faults(commands)
     _add_service(commands)
     _add_manual(commands)
@@ -245,6 +247,41 @@ def _add_hits(commands: Commands) -> None:
     _add_out(hits, "hits")
     gone = {"growth": "each row says what its hit cost"}
     hits.set_defaults(run=runs("bench.studies.hits:run_hits"), gone=gone)
+
+
+def _add_hand(commands: Commands) -> None:
+    hand = commands.add_parser(
+        "hand",
+        help="fly drawn vehicles hard by hand, with nothing to run into, and count what is reported",
+        description="Full deflections, reversals and 30 to 45 degrees of tilt, in gusts, in the modes of the sticks; "
+        "one minute a flight. 0 impacts may be reported.",
+    )
+    hand.add_argument("--flights", type=count, default=300, metavar="N", help="at each IMU rate (default 300)")
+    text = "sticks of the real logs in it in every second flight"
+    hand.add_argument("--logs", type=Path, metavar="FOLDER", help=text)
+    _add_rows(hand, Path("build/hand.jsonl"))
+    hand.set_defaults(run=runs("bench.studies.hand:run_hand"))
+
+
+def _add_landings(commands: Commands) -> None:
+    landings = commands.add_parser(
+        "landings",
+        help="land and drop drawn vehicles, and write what is reported of the ground",
+        description="Landings by AUTO.LAND, RTL, a mission and sticks at 0.2 to 2 m/s on soft and hard ground: none is "
+        "a collision. Falls from 1 to 3 m at any tilt: each is a crash.",
+    )
+    landings.add_argument("--landings", type=count, default=500, metavar="N", help="default 500")
+    landings.add_argument("--falls", type=count, default=200, metavar="N", help="default 200")
+    _add_rows(landings, Path("build/landings.jsonl"))
+    landings.set_defaults(run=runs("bench.studies.landings:run_landings"))
+
+
+def _add_rows(parser: ArgumentParser, out: Path) -> None:
+    """Of a study whose rows are single flights."""
+    _add_seed(parser)
+    parser.add_argument("--jobs", type=count, default=1, help="processes (default 1)")
+    text = "a JSON line a flight (default: %(default)s)"
+    parser.add_argument("--out", type=Path, default=out, metavar="FILE", help=text)
 
 
 def _add_faults(commands: Commands) -> None:

@@ -1,0 +1,165 @@
+"""`bench hand`: drawn vehicles flown hard by sticks, with nothing to run into; every impact reported is false."""
+
+import math
+from argparse import Namespace
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.cases.hand_pilot import Pilot, wishes
+from bench.cases.mishaps import FAMILIES
+from bench.cases.stick_logs import LoggedSticks, logs_with_sticks
+from bench.cases.vehicles import AIRFRAMES, vehicle_of
+from bench.fly.watched import (
+    IMU_HZ,
+    STICKS_S,
+    GuardedFlight,
+    Row,
+    at_most_an_hour,
+    rows_of,
+)
+from companion.guard.config import DEFAULT_MODES, GuardConfig
+from companion.guard.guard import Guard
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+
+HAND_MODES = ("POSCTL", "ALTCTL", "STABILIZED", "ACRO")
+AIR = ("calm", "gusts", "turbulence", "vibration")
+# Limits as a pilot of a racer sets them. PX4's own: 35 deg, 3 m/s^2, 8 m/s^3, 100 deg/s.
+TILT_DEG, ACRO_DEG_S, JERK_M_S3, ACCELERATION_M_S2 = (30.0, 45.0), (200.0, 720.0), (30.0, 200.0), (6.0, 12.0)
+SPEED_M_S, CLIMB_M_S, SINK_M_S, YAW_DEG_S = (5.0, 12.0), (2.0, 5.0), (1.5, 4.0), (90.0, 200.0)
+# Half of the vehicles know where they are by a filter, the others with errors that are drawn.
+FILTER_SHARE = 0.5
+# Of the greatest thrust, at the steepest tilt: the rest turns the vehicle.
+THRUST_LEFT = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class HandCase:
+    """One flight; everything that is not here is drawn from the seed. Sticks that are not logged are drawn, too."""
+
+    seed: int
+    imu_hz: int
+    mode: str
+    logged: LoggedSticks | None = None
+
+
+def run_hand(options: Namespace) -> int:
+    """0 when nothing was reported in the air, else 1."""
+    logs = [] if options.logs is None else logs_with_sticks(options.logs, options.flights)
+    cases = []
+    for seed in range(options.first_seed, options.first_seed + options.flights):
+        logged = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
+        cases += [HandCase(seed, imu_hz, HAND_MODES[seed % len(HAND_MODES)], logged) for imu_hz in IMU_HZ]
+    rows = rows_of(fly_by_hand, cases, options.jobs, options.out, "flights by hand")
+    print("\n".join(table(rows)))
+    return 1 if any(_in_the_air(row) for row in rows) else 0
+
+
+# --- the vehicle
+
+
+def fly_by_hand(case: HandCase) -> Row:
+    """Take-off by hand, a minute of vigorous flight, and all that was reported in it."""
+    rng = np.random.default_rng([case.seed, 11])
+    built = vehicle_of(AIRFRAMES[case.seed // 4 % 2], case.seed)
+    airframe, parameters = agile(built.airframe, rng)
+    air = str(rng.choice(AIR))
+    scene = Scene.model_validate({"faults": FAMILIES[air](rng).faults})
+    vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
+    settings = {**built.settings, "streams": {"highres_imu_hz": float(case.imu_hz)}}
+    config = {"modes": (*DEFAULT_MODES, "STABILIZED", "ACRO"), "companion": settings}
+    guard = Guard(GuardConfig.model_validate(config))
+    flight = GuardedFlight(vehicle, guard)
+    tilts = Pilot(flight, airframe, parameters, wishes(case.logged, rng), case.mode, guard).fly()
+    return {
+        "seed": case.seed,
+        "imu_hz": case.imu_hz,
+        "airframe": airframe.name,
+        "mode": case.mode,
+        "estimate": airframe.estimate.kind,
+        "air": air,
+        "sticks": "drawn" if case.logged is None else case.logged.log,
+        "flown_s": round(len(tilts) * STICKS_S, 1),
+        "watched_s": round(flight.watched_s, 1),
+        "tilt_deg": [round(float(np.percentile(tilts, at)), 1) for at in (50, 90, 100)] if tilts else [],
+        "touched": flight.touched_us is not None,
+        "reported": flight.reported,
+    }
+
+
+def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[str, float]]:
+    """The drawn vehicle with the limits of somebody who flies hard, and its parameters."""
+    steepest_deg = math.degrees(math.acos(min(airframe.hover_fraction / THRUST_LEFT, 1.0)))
+    tilt_deg = min(float(rng.uniform(*TILT_DEG)), steepest_deg)
+    climb, sink = float(rng.uniform(*CLIMB_M_S)), float(rng.uniform(*SINK_M_S))
+    control = {"tilt_max_rad": math.radians(tilt_deg), "climb_max_m_s": climb, "descent_max_m_s": sink}
+    acro_deg_s = float(rng.uniform(*ACRO_DEG_S))
+    parameters = {
+        "MPC_MAN_TILT_MAX": tilt_deg,
+        "MPC_MAN_Y_MAX": float(rng.uniform(*YAW_DEG_S)),
+        "MPC_VEL_MANUAL": float(rng.uniform(*SPEED_M_S)),
+        "MPC_ACC_HOR": float(rng.uniform(*ACCELERATION_M_S2)),
+        "MPC_JERK_MAX": float(rng.uniform(*JERK_M_S3)),
+        "MPC_ACC_UP_MAX": 10.0,
+        "MPC_ACC_DOWN_MAX": 10.0,
+        "MC_ACRO_R_MAX": acro_deg_s,
+        "MC_ACRO_P_MAX": acro_deg_s,
+        "MC_ACRO_Y_MAX": float(rng.uniform(*YAW_DEG_S)),
+        # A full deflection is none of the gestures that arm and disarm.
+        "MAN_ARM_GESTURE": 0,
+    }
+    update = {"control": airframe.control.model_copy(update=control)}
+    return airframe.model_copy(update=update | (by_filter(airframe) if rng.random() < FILTER_SHARE else {})), parameters
+
+
+def by_filter(airframe: Airframe) -> dict[str, object]:
+    """The estimate of a filter that motion capture aids: optical flow does not see such flights."""
+    sensors = airframe.sensors
+    lost = {
+        name: getattr(sensors, name).model_copy(update={"fitted": False}) for name in ("optical_flow", "range_finder")
+    }
+    capture = sensors.motion_capture.model_copy(update={"fitted": True})
+    return {
+        "estimate": airframe.estimate.model_copy(update={"kind": "ekf"}),
+        "sensors": sensors.model_copy(update={**lost, "motion_capture": capture}),
+    }
+
+
+# --- the table
+
+
+def table(rows: Sequence[Row]) -> Iterator[str]:
+    """By IMU rate and by mode what was reported in the air, then every report. The bar: 0."""
+    names = f"{'':<16}{'flights':>8}{'watched, h':>12}{'reported':>10}{'an hour, at most':>18}"
+    yield f"{names}{'tilt, median, 90 %':>20}  as"
+    for name, chosen in _groups(rows):
+        hours = sum(row["watched_s"] for row in chosen) / 3600.0
+        kinds = Counter(one["kind"] for row in chosen for one in _in_the_air(row))
+        false, tilts = sum(kinds.values()), np.array([row["tilt_deg"][:2] for row in chosen if row["tilt_deg"]])
+        tilt = "/".join(f"{value:.0f}" for value in np.median(tilts, axis=0)) if len(tilts) else "-"
+        as_what = ", ".join(f"{kind} {number}" for kind, number in kinds.most_common())
+        most = at_most_an_hour(false, hours)
+        yield f"{name:<16}{len(chosen):>8}{hours:>12.2f}{false:>10}{most:>18.2f}{tilt:>20}  {as_what}"
+    touched = sum(row["touched"] for row in rows)
+    yield f"{touched} flights touched the ground; reports from then on do not count. Bar: 0 reported."
+    for row in rows:
+        for one in _in_the_air(row):
+            yield f"seed {row['seed']}, {row['imu_hz']} Hz, {row['mode']}, {row['air']}, {row['sticks']}: {one}"
+
+
+def _groups(rows: Sequence[Row]) -> Iterator[tuple[str, list[Row]]]:
+    for imu_hz in IMU_HZ:
+        yield f"{imu_hz} Hz", [row for row in rows if row["imu_hz"] == imu_hz]
+    for mode in HAND_MODES:
+        yield mode, [row for row in rows if row["mode"] == mode]
+    for air in AIR:
+        yield air, [row for row in rows if row["air"] == air]
+    yield "sticks of logs", [row for row in rows if row["sticks"] != "drawn"]
+
+
+def _in_the_air(row: Row) -> list[Row]:
+    return [one for one in row["reported"] if one["since_touch_s"] is None]

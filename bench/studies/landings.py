@@ -1,0 +1,100 @@
+"""`bench landings`: drawn vehicles land in every way and fall at any tilt; what is reported of the ground."""
+
+from argparse import Namespace
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from bench.cases.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
+from bench.fly.watched import IMU_HZ, Row, rows_of
+
+CRASH, NO_COLLISION = "crash", ("landing", "contact")
+# A crash is reported within this time of its greatest deceleration.
+CRASH_WITHIN_S = 0.2
+
+
+def run_landings(options: Namespace) -> int:
+    """0 when every landing and every fall was reported for what it was, else 1."""
+    first = options.first_seed
+    cases = [draw_case(seed, LANDINGS) for seed in range(first, first + options.landings)]
+    cases += [draw_case(seed, FALLS) for seed in range(first, first + options.falls)]
+    rows = rows_of(fly_to_the_ground, cases, options.jobs, options.out, "ways to the ground")
+    print("\n".join(table(rows)))
+    return 1 if any(row["wrong"] for row in rows) else 0
+
+
+def draw_case(seed: int, ways: Sequence[str]) -> GroundCase:
+    """Ways, rates and grounds in turn."""
+    turn = seed // len(ways)
+    ground = tuple(GROUNDS)[turn // len(IMU_HZ) % len(GROUNDS)]
+    return GroundCase(seed, IMU_HZ[turn % len(IMU_HZ)], ways[seed % len(ways)], ground)
+
+
+def fly_to_the_ground(case: GroundCase) -> Row:
+    """What was reported, and what it should have been."""
+    flown = flown_to_the_ground(case)
+    flight = flown.flight
+    outcome, wrong = judged(case.is_fall, flight.touched_us, flight.hardest_us, flight.reported)
+    touched_us, hardest_us = flight.touched_us, flight.hardest_us
+    return {
+        "seed": case.seed,
+        "imu_hz": case.imu_hz,
+        "airframe": flown.airframe,
+        "way": case.way,
+        "ground": case.ground,
+        "height_error_m": round(flown.height_error_m, 2),
+        "asked_m_s": round(flown.sink_m_s, 2),
+        "touched_s": None if touched_us is None else round(1e-6 * touched_us, 3),
+        "sink_m_s": round(flight.sink_at_touch_m_s, 2),
+        "tilt_deg": round(flight.tilt_at_touch_deg, 1),
+        "hardest_m_s2": round(flight.hardest_m_s2, 1),
+        "hardest_s": None if hardest_us is None else round(1e-6 * hardest_us, 3),
+        "outcome": outcome,
+        "wrong": wrong,
+        "reported": flight.reported,
+    }
+
+
+def judged(is_fall: bool, touched_us: int | None, hardest_us: int | None, reported: Sequence[Row]) -> tuple[str, str]:
+    """What the ground was reported as, first; and what is wrong with all that was reported, "" where nothing is."""
+    if touched_us is None or hardest_us is None:
+        return "not there", "the ground was not reached"
+    touched_s, hardest_s = 1e-6 * touched_us, 1e-6 * hardest_us
+    before = [one["kind"] for one in reported if one["sample_s"] < touched_s - 1e-3]
+    after = [one for one in reported if one["sample_s"] >= touched_s - 1e-3]
+    first = after[0]["kind"] if after else "nothing"
+    if before:
+        return first, f"{before[0]} before the touch"
+    allowed = (*NO_COLLISION, CRASH) if is_fall and first == CRASH else NO_COLLISION
+    false = [one["kind"] for one in after if one["kind"] not in allowed]
+    if not is_fall:
+        return first, f"{false[0]} in a landing" if false else ""
+    if first != CRASH:
+        return first, f"{first} in a crash"
+    if false:
+        return first, f"{false[0]} after the crash"
+    late_s = after[0]["sample_s"] - hardest_s
+    return first, f"{late_s:.2f} s late" if late_s > CRASH_WITHIN_S else ""
+
+
+# --- the table
+
+
+def table(rows: Sequence[Row]) -> Iterator[str]:
+    """By way and by rate how the ground was reported, then every flight of which something is wrong."""
+    yield f"{'':<16}{'flights':>8}{'wrong':>7}  the ground reported first as"
+    for name, is_fall in (("landings", False), ("falls", True)):
+        chosen = [row for row in rows if (row["way"] in FALLS) is is_fall]
+        yield _line(name, chosen)
+        for key in ("way", "imu_hz", "ground"):
+            for value in dict.fromkeys(row[key] for row in chosen):
+                yield _line(f"  {value}", [row for row in chosen if row[key] == value])
+    yield "Bars: 0 landings reported as a collision; every fall reported as a crash within 0.2 s of the hardest moment."
+    for row in rows:
+        if row["wrong"]:
+            yield str(row)
+
+
+def _line(name: str, rows: Sequence[Row]) -> str:
+    outcomes = Counter(row["outcome"] for row in rows).most_common()
+    wrong = sum(bool(row["wrong"]) for row in rows)
+    return f"{name:<16}{len(rows):>8}{wrong:>7}  " + ", ".join(f"{outcome} {number}" for outcome, number in outcomes)
