@@ -9,6 +9,7 @@ from bench.campaign_report.arguments import add_campaign
 from bench.corpus.arguments import add_corpus
 from bench.detectors_report.arguments import add_detectors
 from bench.faults.arguments import add_faults
+from bench.flights import add_flights
 from bench.hits_report.arguments import add_hits
 from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
@@ -34,6 +35,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_campaign(commands)
     add_corpus(commands)
     add_ablation(commands)
+    add_flights(commands)
     add_hits(commands)
     add_kills(commands)
     add_faults(commands)

@@ -181,4 +181,5 @@ class Companion(Stepped[FlightCore]):
             refused_messages=dict(flight.refusals.counts),
             unconfirmed=flight.unconfirmed,
             round_trip=flight.round_trip.report(),
+            promise=core.monitor.promise,
         )

@@ -19,7 +19,7 @@ from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.states import FINAL_STATES, State
-from companion.flight.vehicle_update import landed, note_height, too_low, update_vehicle
+from companion.flight.vehicle_update import landed, note_height, situation_of, update_vehicle
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, Sample, Vector3
@@ -145,15 +145,12 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     def situation(self) -> Situation:
         """The detector's situation. The setpoints of others are not known."""
-        flight = self.flight
-        target = flight.target if self.machine.holds else None
-        return Situation(
-            # Contact with the ground looks like a hit, before take-off and in a descent.
-            off_reason=self._off_state or too_low(flight, self._goes_down),
-            armed=flight.vehicle.armed,
-            landed_state=landed(flight, self._goes_down) if self.machine.holds else flight.vehicle.landed,
-            height_m=flight.height_m,
-            descent_commanded=self._goes_down,
+        situation = situation_of(self.flight, self._off_state, self._goes_down)
+        if not self.machine.holds:
+            return situation
+        target = self.flight.target
+        return situation._replace(
+            landed_state=landed(self.flight, self._goes_down),
             setpoint_position_ned_m=None if target is None else target.position_ned_m,
         )
 

@@ -141,6 +141,7 @@ class PositionTarget(Sample):
     """POSITION_TARGET_LOCAL_NED: the setpoint of the vehicle's position control; None where there is none."""
 
     position_ned_m: Vector3 | None
+    velocity_down_m_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

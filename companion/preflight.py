@@ -19,7 +19,7 @@ from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
-from companion.reflex.config import HELD_S
+from companion.reflex.config import EXCESS, HELD_S
 
 # The streams need a second to settle at their new rates; what comes then counts.
 SETTLING_US = 1_000_000
@@ -501,7 +501,9 @@ def _sight(survey: Survey) -> Iterator[PreflightItem]:
     folding = f"arms that fold: from {threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
     stiff = f"stiff frames: {100 * seen:.0f} % of 1 ms contacts fall into a sample"
     remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
-    yield _judged("smallest hit", f"{folding}; {stiff}", (seen <= 0.9, DOUBTFUL, remedy))
+    per_h = 3600.0 * rate_hz * math.exp(-0.5 * (EXCESS * survey.config.fused.noise_factor) ** 2)
+    noise = f"at most {per_h:.2g} false alarms an hour by Gaussian vibration"
+    yield _judged("smallest hit", f"{folding}; {stiff}; {noise}", (seen <= 0.9, DOUBTFUL, remedy))
 
 
 class Preflight:

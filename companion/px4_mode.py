@@ -4,6 +4,12 @@ OFFBOARD = 6 << 16
 POSCTL = 3 << 16
 AUTO_LOITER = 4 << 16 | 3 << 24
 AUTO_LAND = 4 << 16 | 6 << 24
+AUTO_PRECLAND = 4 << 16 | 9 << 24
+# MANUAL, ACRO, STABILIZED, RATTITUDE: the sticks ask for an attitude or for rates and for the thrust, and position
+# control is off (commander/ModeUtil/control_mode.cpp).
+_BY_HAND_ALONE = (1, 5, 7, 8)
+# ALTCTL, POSCTL: the sticks ask for velocities.
+_BY_VELOCITY = (2, 3)
 
 _MAIN_NAMES = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 4: "AUTO", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED"}
 _AUTO_NAMES = {
@@ -16,6 +22,16 @@ _AUTO_NAMES = {
     8: "FOLLOW",
     9: "PRECLAND",
 }
+
+
+def by_hand_alone(custom_mode: int) -> bool:
+    """Whether the pilot's hand has the thrust."""
+    return custom_mode >> 16 & 0xFF in _BY_HAND_ALONE
+
+
+def by_sticks(custom_mode: int) -> bool:
+    """Whether the pilot's sticks fly it by velocities."""
+    return custom_mode >> 16 & 0xFF in _BY_VELOCITY
 
 
 def mode_name(custom_mode: int) -> str:

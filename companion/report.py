@@ -6,6 +6,7 @@ from typing import Literal, TypeAlias
 
 from companion.memory.patch import Patch
 from companion.messages import Vector3
+from companion.reflex.promise import Promise
 
 JsonValue: TypeAlias = "bool | int | float | str | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
 
@@ -96,7 +97,7 @@ class FlightReport:
     coordinates. `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits,
     in mission coordinates. `unreachable` are the labels of items, or "home", to which that left no way.
     `refused_messages` counts the vehicle's messages that were not accepted, by name. `unconfirmed` counts the hits that
-    were none: one sample showed them, and nothing else.
+    were none: one sample showed them, and nothing else. `promise` is the detector's, when it was last armed.
     """
 
     outcome: Outcome
@@ -114,3 +115,4 @@ class FlightReport:
     refused_messages: Mapping[str, int] = field(default_factory=dict)
     unconfirmed: int = 0
     round_trip: RoundTripReport = RoundTripReport()
+    promise: Promise | None = None

@@ -339,15 +339,17 @@ def add_plan(commands: Commands) -> None:
 
 
 def add_replay(commands: Commands) -> None:
-    text = "The detector over a .ulg, a .tlog or a run's folder; see docs/how-to/recorded-flights.md."
+    text = "The detector over a .ulg, .bin, .log or .tlog, or a run's folder; see docs/how-to/recorded-flights.md."
     replay = _command(commands, "replay", "replaying:run_replay", "look for collisions in a recorded flight", text)
-    _option(replay, "log", "a .ulg, a .tlog or a run's folder", "LOG", type=Path)
+    _option(replay, "log", "a .ulg, .bin, .log or .tlog, or a run's folder", "LOG", type=Path)
     _option(replay, "--detector", "another detector than the mission's, or than the default", "NAME")
     text = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
     _option(replay, "--rate", text, "HZ", type=rate_hz)
     _add_companion(replay)
     _add_set(replay, "change a setting, e.g. companion.fused.side_threshold_m_s2=6")
     _option(replay, "--expect", "exit 1 unless there are exactly so many collisions", "none|N", type=_expected)
+    text = "watch whoever flies, in every mode; default: only where `rebound guard` would take over"
+    _option(replay, "--any-mode", text, action="store_true")
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
     text = "PX4's own log of a run: write a copy of it with the run's events, hits and setpoints"
@@ -359,7 +361,8 @@ def add_replay(commands: Commands) -> None:
 def add_tune(commands: Commands) -> None:
     text = "Noise floor, margins, the smallest hit that would be seen, settings; see docs/how-to/recorded-flights.md."
     tune = _command(commands, "tune", "tune.command:run_tune", "settings for a vehicle from its healthy flights", text)
-    _option(tune, "logs", "flights without a collision: .ulg, .tlog or runs' folders", "LOG", type=Path, nargs="+")
+    text = "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders"
+    _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
     _option(tune, "--airframe", "whose arms hit the wall (default: both foldable and rigid)", "NAME|FILE")
     _option(tune, "--companion", "settings to begin with (default: the defaults)", "FILE")

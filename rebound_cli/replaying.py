@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from companion.errors import ConfigurationError
+from companion.guard.config import GuardConfig
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.logs.log import LogError
@@ -46,8 +47,8 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     if options.log.is_dir() and folder is None:
         raise LogError(f"{options.log}: no {TLOG_NAME} in this folder; give a run's folder or a file.")
     # Options under which a flight is no longer the one that was flown.
-    changing = ("detector", "rate", "companion", "set")
-    changed = [f"--{name}" for name in changing if getattr(options, name) not in (None, [])]
+    changing = ("detector", "rate", "companion", "set", "any_mode")
+    changed = [f"--{name.replace('_', '-')}" for name in changing if getattr(options, name) not in (None, [], False)]
     if folder is not None and not changed:
         recording = read_recording(folder)
         now, then = versions(), recording.versions
@@ -63,7 +64,8 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
         settings = settings_file(folder)
     config = companion_settings(settings, options.set, options.detector)
     log = read_log(options.log if folder is None else folder / TLOG_NAME)
-    replay = replay_log(log, config, options.rate, listener.listen)
+    modes = None if options.any_mode else GuardConfig().modes
+    replay = replay_log(log, config, options.rate, listener.listen, modes)
     return replay, partial(replayed_flight, replay, config, listener)
 
 

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from bench.detectors.watching import configuration
 from companion.errors import ReboundError
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vector3
+from companion.mission.config import CompanionConfig
 from companion.motion.rotation import body_to_ned
 from rebound_cli.logs.log import Log, LoggedSample, Told
 from rebound_cli.logs.reader import read_log
@@ -228,14 +229,14 @@ def _axes(first: Floats, roll_rad: float) -> Floats:
 @lru_cache(maxsize=8)
 def _moments(path: Path) -> list[int]:
     """Times at which the vehicle was up and not on its way to the ground, away from take-off and landing."""
-    log, known = _read(path), Circumstances()
+    log, known = _read(path), Circumstances(CompanionConfig())
     free: list[tuple[int, bool]] = []
+    before = known.situation
     for item in log.heard:
-        known.wait(item.at_us)
-        before = known.situation
-        known.hear(item)
+        known.hear((item.sample,), item.at_us)
         now = known.situation
-        if now is not before:
+        if now != before:
+            before = now
             flies = now.landed_state is not LandedState.ON_GROUND and now.armed is not False
             free.append((item.at_us, flies and not now.descent_commanded))
     return [at_us for at_us in _steadily(free) if at_us - log.heard[0].at_us > 1e6 * SLICE_BEFORE_S]

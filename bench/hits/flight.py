@@ -23,7 +23,6 @@ from bench.detectors.hits import (
 )
 from bench.detectors.scoring import FOUND_WITHIN_US
 from bench.detectors.vehicles import AIRFRAMES, BenchVehicle
-from bench.random_missions.contacts import SEEN_AFTER_US
 from bench.random_missions.crashes import tilts_deg
 from bench.recoveries.hits import returns
 from bench.speed.parse import parse_us
@@ -31,7 +30,7 @@ from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.report import CollisionReport
-from rebound_cli.results.truth_match import FlightTruth
+from rebound_cli.results.truth_match import LATE_SAMPLE_US, FlightTruth
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
@@ -204,5 +203,5 @@ def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us
 
 def _tells_of(hit: Hit, collision: CollisionReport) -> bool:
     """While the contact lasts, or as soon after its first touch as the detectors' bench calls it found."""
-    until_us = max(hit.ended_at_boot_us + SEEN_AFTER_US, hit.contact_at_boot_us + FOUND_WITHIN_US)
+    until_us = max(hit.ended_at_boot_us + LATE_SAMPLE_US, hit.contact_at_boot_us + FOUND_WITHIN_US)
     return hit.contact_at_boot_us <= collision.sample_time_boot_us <= until_us

@@ -11,13 +11,11 @@ from bench.random_missions.crashes import heights_m
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.phases import MissionPhase, phases_of
 from companion.report import CollisionReport
+from rebound_cli.results.truth_match import LATE_SAMPLE_US
 from sim_vehicle.truth import Hit
 
 Floats = npt.NDArray[np.float64]
 
-# A detection belongs to a contact if its sample lies in it or at most so long after: the aftermath, two velocities of
-# the slowest stream, shows a contact that fell between the samples.
-SEEN_AFTER_US = 100_000
 # A guard that bounces, before the companion has told of the first touch or while nobody has noticed it: one hit.
 FOLLOWS_WITHIN_US = 250_000
 # A fall at 5 m/s comes so far from one row of the path to the next.
@@ -91,7 +89,7 @@ def _seen_as(hit: Hit, collisions: Sequence[CollisionReport]) -> int | None:
 
 
 def _covers(hit: Hit, collision: CollisionReport) -> bool:
-    return hit.contact_at_boot_us <= collision.sample_time_boot_us <= hit.ended_at_boot_us + SEEN_AFTER_US
+    return hit.contact_at_boot_us <= collision.sample_time_boot_us <= hit.ended_at_boot_us + LATE_SAMPLE_US
 
 
 def without_contact(flight: JudgedFlight) -> list[CollisionReport]:
@@ -100,7 +98,7 @@ def without_contact(flight: JudgedFlight) -> list[CollisionReport]:
 
     def meets_ground(collision: CollisionReport) -> bool:
         at_us = collision.sample_time_boot_us
-        return bool(on_ground[(time_us >= at_us - SEEN_AFTER_US) & (time_us <= at_us)].any())
+        return bool(on_ground[(time_us >= at_us - LATE_SAMPLE_US) & (time_us <= at_us)].any())
 
     found = [c for c in flight.report.collisions if not any(_covers(hit, c) for hit in flight.truth.hits)]
     return [collision for collision in found if not meets_ground(collision)]

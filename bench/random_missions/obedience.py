@@ -27,9 +27,8 @@ class _Course:
     due: str | None = None
     """What the latest hit's policy says follows the recovery, or the mission of a goal out of reach."""
     held: bool = False
-    was_due: str | None = None
     was_held: bool = False
-    """Both before the latest hit."""
+    """Before the latest hit."""
     complaints: list[str] = field(default_factory=list)
 
     def policy(self) -> tuple[OnCollision, int]:
@@ -67,12 +66,17 @@ class _Course:
         """A detection that nothing confirms is no hit: the flight goes on where it was."""
         self.hits -= 1
         self.hits_of_step -= 1
-        self.held = self.was_held
-        on_way = "return" if self.going_home else "continue" if self.index == 0 else "retry"
-        self.due = "land" if self.is_landing else self.was_due or ("hold" if self.held else on_way)
+        if self.is_landing:
+            self.due = "land"
+        elif self.going_home:
+            self.due = "return"
+        elif self.was_held:
+            self.due = "hold"
+        else:
+            self.due = "continue" if self.index == 0 else "retry"
 
     def _hit(self) -> None:
-        self.was_due, self.was_held = self.due, self.held
+        self.was_held = self.held
         self.hits += 1
         self.hits_of_step += 1
         self.held = False

@@ -61,6 +61,7 @@ MEANINGS = {
     "takeoff": "Setpoints are sent ahead of the take-off.",
     "timeout": "An item took longer than its `timeout_s`.",
     "unattended": "What PX4 flies if the companion dies, with the vehicle's COM_OF_LOSS_T.",
+    "crash": "The vehicle met the ground tilted by more than 45 degrees, or faster than a landing may.",
     "unconfirmed": "A detection was not confirmed. The flight goes on where it was.",
     "unreachable": "Known obstacles leave no way to a goal.",
     "watching": "The guard watches, or stops watching.",

@@ -24,6 +24,8 @@ FLIGHT = {
     "refused_messages": "Messages with a value that is not finite or not possible, counted by name.",
     "refused_packets": "With `--signing-key`: packets that were refused, counted by reason.",
     "unconfirmed": "Detections that were not confirmed. They are no `collisions`.",
+    "promise": "What the detector promised by this vehicle's own noise: the smallest hit that it sees, as a force in "
+    "one sample and as a velocity jump, and its false alarms an hour by Gaussian noise; null if it was never armed.",
     "false_detections": "Detections that no contact explains; null on a real vehicle.",
     "missed_contacts": "Contacts that were not detected; null on a real vehicle.",
     "recontacts": "Contacts before the last collision was recovered from; null on a real vehicle.",

@@ -194,6 +194,10 @@ class FlightContext:
         latest, origin = self.vehicle.history.latest(), self.origin_ned_m
         return None if latest is None or origin is None else origin[2] - latest.position_ned_m[2]
 
+    def note_touchdown(self) -> None:
+        """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""
+        self.has_climbed = False
+
     def on_trajectory(
         self, place_ned_m: Vector3, yaw_rad: float | None, velocity_ned_m_s: Vector3, acceleration_ned_m_s2: Vector3
     ) -> Target:

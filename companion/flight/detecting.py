@@ -1,13 +1,15 @@
 """Runs the collision monitor in a flight: reports its notices, returns its collisions."""
 
+import math
 from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, Sample
 from companion.motion.config import KEPT_US
+from companion.motion.rotation import tilt_rad
 from companion.motion.strapdown import Strapdown
 from companion.reflex import monitor
-from companion.reflex.detector import Situation
+from companion.reflex.detector import ImpactKind, Situation
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor
 
@@ -30,10 +32,23 @@ def collisions(
             kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
             text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
             flight.report(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
-    found = [estimate for estimate in result.impacts if estimate.impact.is_collision]
+            if estimate.impact.kind is ImpactKind.LANDING:
+                flight.note_touchdown()
+        elif estimate.impact.kind is ImpactKind.CRASH:
+            _report_crash(flight, estimate, collision_monitor.estimator.strapdown, now_us)
+    # A crash is told where no hit is looked for, too.
+    is_watched = situation.off_reason is None
+    found = [estimate for estimate in result.impacts if estimate.impact.is_collision and is_watched]
     strapdown = collision_monitor.estimator.strapdown
     held = None if found else _sustained_force(flight, samples, situation, strapdown, now_us)
     return found if held is None else [held]
+
+
+def _report_crash(flight: FlightContext, estimate: ImpactEstimate, strapdown: Strapdown, now_us: int) -> None:
+    force_m_s2, down_m_s = estimate.peak_specific_force_m_s2, estimate.velocity_ned_m_s[2]
+    tilt_deg = math.degrees(tilt_rad(strapdown.valid_wxyz))
+    text = f"crash: {force_m_s2:.0f} m/s^2, sinking at {down_m_s:.1f} m/s, tilted by {tilt_deg:.0f} degrees"
+    flight.report(now_us, "crash", text, specific_force_m_s2=force_m_s2, down_m_s=down_m_s, tilt_deg=tilt_deg)
 
 
 def _sustained_force(

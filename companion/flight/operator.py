@@ -53,7 +53,7 @@ class Texts:
 # Kinds of events that are told in their own words. What a pilot may have to act on is a warning.
 _WARNING = (
     *("in_the_way", "unreachable", "timeout", "link", "implausible", "take_over", "let_go", "refused", "crossed"),
-    *("left_alone", "lost", "late", "round_trip", "damage"),
+    *("left_alone", "lost", "late", "round_trip", "damage", "crash"),
 )
 _NOTICE = ("policy", "envelope", "unconfirmed", "given_back")
 _AS_THEY_STAND = dict.fromkeys(_WARNING, Severity.WARNING) | dict.fromkeys(_NOTICE, Severity.NOTICE)

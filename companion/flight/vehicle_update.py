@@ -10,6 +10,7 @@ from companion.link.vehicle import identify, is_autopilot
 from companion.messages import Sample
 from companion.px4_mode import mode_name
 from companion.reflex.config import HELD_S
+from companion.reflex.detector import Situation
 
 
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
@@ -95,11 +96,6 @@ def _report_conflict(flight: FlightContext, now_us: int) -> None:
         flight.report(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
 
 
-# A vehicle below this height without a command to descend drags along the ground: that is no hit to recover from. Its
-# feet are 0.1 m below its centre; when it is tilted, other parts touch.
-SCRAPING_M = 0.1
-
-
 def note_height(flight: FlightContext) -> None:
     """Note whether the vehicle has left the ground. A hit that pushes it down again does not undo that."""
     height_m = flight.height_m
@@ -118,9 +114,14 @@ def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
     return messages.LandedState.UNDEFINED if is_up else flight.vehicle.landed
 
 
-def too_low(flight: FlightContext, goes_down: bool) -> str | None:
-    """Why the vehicle is too low for a hit, or None. `goes_down`: it is sent to the ground."""
-    least_m, height_m = flight.mission.companion.min_detection_height_m, flight.height_m
-    if flight.has_climbed and not goes_down:
-        least_m = min(least_m, SCRAPING_M)
-    return f"below {least_m:g} m" if height_m is None or height_m < least_m else None
+def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool) -> Situation:
+    """The detector's situation of a vehicle that somebody else flies."""
+    least_m = flight.mission.companion.min_detection_height_m
+    return Situation(
+        # Lift-off, ground effect and skids shake and push.
+        off_reason=off_state or (None if flight.has_climbed else f"below {least_m:g} m"),
+        armed=flight.vehicle.armed,
+        landed_state=flight.vehicle.landed,
+        height_m=flight.height_m,
+        descent_commanded=goes_down,
+    )

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.guard.config import GuardConfig
+from companion.guard.descent import Descent
 from companion.guard.states import Trigger
 from companion.messages import GlobalPosition, Sticks, Vector3
 
@@ -35,9 +36,17 @@ class GuardContext(FlightContext):
     left_alone: int = 0  # hits told, and left to the program that flies
     others_setpoint_us: int | None = None  # when one was last seen on its way
     sticks: Sticks | None = None
+    descent: Descent = field(default_factory=Descent)
     global_position: GlobalPosition | None = None
     # When, and to where; None for a lean alone.
     sent_ned_m: deque[tuple[int, Vector3 | None]] = field(default_factory=lambda: deque(maxlen=64))
+
+    def note_touchdown(self) -> None:
+        """The ground is here: heights count from it."""
+        FlightContext.note_touchdown(self)
+        latest, origin = self.vehicle.history.latest(), self.origin_ned_m
+        if latest is not None and origin is not None:
+            self.origin_ned_m = (origin[0], origin[1], latest.position_ned_m[2])
 
 
 class GuardStateHandler(Protocol):

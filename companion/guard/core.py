@@ -8,7 +8,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
-from companion.guard.watching import GuardConnect, why_not
+from companion.guard.watching import GuardConnect, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import GlobalPosition, PositionTarget, Sample, Sticks
@@ -39,20 +39,13 @@ class GuardCore(Core[GuardContext, GuardMachine]):
     def _setpoint_hz(self) -> float:
         return super()._setpoint_hz if self.machine.holds else self.flight.config.lead_hz
 
-    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
-        """The fence and the heights begin where the vehicle stands until it is armed.
+    @property
+    def _goes_down(self) -> bool:
+        """Whoever flies, while the guard does not."""
+        return not self.machine.holds and self.flight.descent.is_meant(self.flight.vehicle, self.now_us)
 
-        Of one met in the air only the zero of its own local frame is known, which is where its estimator began.
-        """
-        heard = super()._hear(samples, now_us)
-        guard = self.flight
-        latest = guard.vehicle.history.latest()
-        if guard.vehicle.armed is False:
-            guard.origin_ned_m = None if latest is None else latest.position_ned_m
-            guard.hits, guard.program_elsewhere = 0, False
-        elif guard.origin_ned_m is None and latest is not None:
-            guard.origin_ned_m = (latest.position_ned_m[0], latest.position_ned_m[1], 0.0)
-        return heard
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
+        return samples, observe(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         guard = self.flight

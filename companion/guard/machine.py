@@ -10,6 +10,7 @@ from companion.flight.machine import StateMachine
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
+from companion.guard.descent import THROTTLE
 from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import GuardConnect, StandBy, Watching
@@ -33,7 +34,6 @@ _KINDS = {
 STICKS = "the pilot moved the sticks"
 # PX4's COM_RC_STICK_OV, 30 %.
 MOVED = 0.3
-THROTTLE = 2
 # In these cases a program sends setpoints on a link of its own.
 _BESIDE_PROGRAM = (Trigger.HIT_BESIDE_PROGRAM, Trigger.CROSSED)
 # After these the vehicle is given back to hold whatever is configured.

@@ -1,12 +1,16 @@
 """States connecting, standing by and watching: nothing is commanded, at most it is made ready to be."""
 
+from collections.abc import Sequence
+
 from companion.flight.connecting import Meet
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target
 from companion.flight.envelope import unattended_text
+from companion.flight.vehicle_update import update_vehicle
 from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
-from companion.messages import LandedState, MessageId, SetMessageInterval, VehicleCommand
+from companion.messages import LandedState, MessageId, Sample, SetMessageInterval, VehicleCommand
 from companion.px4_mode import OFFBOARD, mode_name
+from companion.reflex.detector import ON_THE_GROUND
 
 # Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
 ECHO_HZ = 50.0
@@ -18,21 +22,44 @@ OTHERS_STOPPED_US = 1_000_000
 STREAMS_GONE_US = 3_000_000
 
 
-def why_not(guard: GuardContext) -> str | None:
-    """Why the vehicle is not to be taken over now, or None."""
+def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str | None:
+    """Update what is known of the vehicle; why it is refused, or None.
+
+    The fence and the heights begin where the vehicle stood last. Of one met in the air only the zero of its own local
+    frame is known, which is where its estimator began.
+    """
+    refusal = update_vehicle(guard, samples, now_us)
+    guard.descent.update(samples, now_us)
+    latest = guard.vehicle.history.latest()
+    if guard.vehicle.armed is False:
+        guard.hits, guard.program_elsewhere = 0, False
+    if guard.vehicle.armed is False or guard.vehicle.landed is LandedState.ON_GROUND:
+        guard.origin_ned_m = None if latest is None else latest.position_ned_m
+    elif guard.origin_ned_m is None and latest is not None:
+        guard.origin_ned_m = (latest.position_ned_m[0], latest.position_ned_m[1], 0.0)
+    return refusal
+
+
+def not_flying(guard: GuardContext) -> str | None:
+    """Why there is nothing to watch, whoever flies, or None."""
     vehicle = guard.vehicle
     if not vehicle.armed:
         return "disarmed"
-    if vehicle.landed in (LandedState.ON_GROUND, LandedState.LANDING):
-        return "on the ground" if vehicle.landed is LandedState.ON_GROUND else "landing"
-    if vehicle.failsafe:
+    if vehicle.landed is LandedState.ON_GROUND:
+        return ON_THE_GROUND
+    is_known = vehicle.custom_mode is not None and vehicle.history.latest() is not None
+    return None if is_known and guard.origin_ned_m is not None else "no position yet"
+
+
+def why_not(guard: GuardContext) -> str | None:
+    """Why the vehicle is not to be taken over now, or None."""
+    reason = not_flying(guard)
+    if reason is not None:
+        return reason
+    if guard.vehicle.failsafe:
         return "a failsafe flies"
-    if vehicle.custom_mode is None or vehicle.history.latest() is None:
-        return "no position yet"
-    name = mode_name(vehicle.custom_mode)
-    if name not in guard.config.modes:
-        return f"{name} is not among the modes that may be taken over"
-    return None if guard.origin_ned_m is not None else "no position yet"
+    name = mode_name(guard.vehicle.custom_mode or 0)
+    return None if name in guard.config.modes else f"{name} is not among the modes that may be taken over"
 
 
 class GuardConnect(Meet[GuardTransition]):

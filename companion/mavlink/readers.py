@@ -23,6 +23,8 @@ from companion.messages import Refused, Sample, is_rotation
 ACCELEROMETER_UPDATED = 0x7
 # POSITION_TARGET_TYPEMASK: x, y or z.
 POSITION_IGNORED = 0x7
+# The same of the vertical velocity.
+DESCENT_IGNORED = 0x20
 
 
 class Reader:
@@ -215,9 +217,10 @@ def _autopilot_version(flight_sw_version: int) -> Sample:
     return messages.AutopilotVersion((version >> 24 & 0xFF, version >> 16 & 0xFF, version >> 8 & 0xFF))
 
 
-def _position_target(type_mask: int, x: float, y: float, z: float) -> Sample:
+def _position_target(type_mask: int, x: float, y: float, z: float, vz: float) -> Sample:
     known = not type_mask & POSITION_IGNORED and hypot(x, y, z) <= messages.POSITION_M
-    return messages.PositionTarget((x, y, z) if known else None)
+    is_speed = not type_mask & DESCENT_IGNORED and abs(vz) <= messages.VELOCITY_M_S
+    return messages.PositionTarget((x, y, z) if known else None, vz if is_speed else None)
 
 
 def _global_position(lat: int, lon: int, alt: int) -> Sample:

@@ -113,8 +113,8 @@ class CompanionConfig(CollisionMonitorConfig):
     """All settings of the companion."""
 
     min_detection_height_m: NotNegative = 0.5
-    """Ground handling, landing gear and ground effect are below this height above the arming position: nothing is
-    detected before a take-off has reached it, nor below it in a landing. In between a low flight is a flight."""
+    """Ground handling, landing gear and ground effect are below this height above the arming position: nothing but a
+    crash is detected before a take-off has reached it."""
     streams: StreamsConfig = StreamsConfig()
     settled: SettledConfig = SettledConfig()
     link: LinkConfig = LinkConfig()

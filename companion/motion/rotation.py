@@ -39,6 +39,11 @@ def turned(attitude_wxyz: Quaternion, rates_frd_rad_s: Vector3, over_s: float) -
     )
 
 
+def tilt_rad(attitude_wxyz: Quaternion) -> float:
+    """Angle between body z and down, 0 to pi."""
+    return math.acos(max(-1.0, min(1.0, body_to_ned(attitude_wxyz, (0.0, 0.0, 1.0))[2])))
+
+
 def yaw_rad(attitude_wxyz: Quaternion) -> float:
     """Heading of the nose, clockwise from north, in (-pi, pi]."""
     w, x, y, z = attitude_wxyz

@@ -1,11 +1,19 @@
-"""The kind of an impact, from the contact force's direction, the motion before it and the flight's situation."""
+"""The kind of an impact: by what the vehicle did, then by what was asked of it. One table, read from above."""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
-from companion.messages import Vector3
-from companion.motion.config import SAME_M_S
-from companion.reflex.config import GROUND_M, STEEP
+from companion.messages import Quaternion, Vector3
+from companion.motion.config import GRAVITY_M_S2, SAME_M_S
+from companion.motion.rotation import tilt_rad
+from companion.motion.strapdown import ZERO
+from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
 from companion.reflex.detector import ImpactKind, Situation
+
+# The speed of a fall from half of the height in which the ground may be: 3.1 m/s. PX4 lands at up to 1.5 m/s
+# (MPC_Z_V_AUTO_DN) and ArduPilot, too (WPNAV_SPEED_DN).
+FASTEST_LANDING_M_S = math.sqrt(GRAVITY_M_S2 * GROUND_M)
 
 
 def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
@@ -13,21 +21,99 @@ def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
     return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < SAME_M_S
 
 
-def kind_of(force_ned: Vector3, velocity_ned_m_s: Vector3 | None, situation: Situation) -> ImpactKind:
-    """The kind by direction and situation alone; the size of the force has no influence.
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """What is known of a contact when it is noticed. Local NED, SI; `upward` is the sine of the force's elevation."""
 
-    Contact with the ground at the end of a commanded descent is a landing, however hard. The same force without a
-    commanded descent is a strike.
-    """
+    upward: float
+    velocity_ned_m_s: Vector3 | None
+    attitude_wxyz: Quaternion
+    situation: Situation
+
+    @property
+    def near_ground(self) -> bool:
+        height_m = self.situation.height_m
+        return height_m is None or height_m < GROUND_M
+
+    @property
+    def on_ground(self) -> bool:
+        """The place of arming may lie higher or lower than the ground here: a force from below is the ground's."""
+        return self.near_ground or self.upward > STEEP
+
+    @property
+    def comes_down(self) -> bool:
+        """Whether the ground is what the vehicle moves towards, rather than something beside it."""
+        north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s or ZERO
+        return down_m_s > math.hypot(north_m_s, east_m_s)
+
+    @property
+    def is_upright(self) -> bool:
+        return math.cos(tilt_rad(self.attitude_wxyz)) > STEEP
+
+    @property
+    def is_slow(self) -> bool:
+        return self.velocity_ned_m_s is None or self.velocity_ned_m_s[2] < FASTEST_LANDING_M_S
+
+    @property
+    def has_landed(self) -> bool:
+        """A vehicle on its way down meets the ground; one that is as low as its feet stands on it or scrapes along."""
+        height_m = self.situation.height_m
+        is_as_low_as_feet = height_m is not None and height_m < SCRAPING_M
+        return is_as_low_as_feet or (self.situation.descent_commanded and (self.on_ground or self.comes_down))
+
+    @property
+    def is_struck(self) -> bool:
+        return hovers(self.velocity_ned_m_s) and not self.near_ground
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One kind with its criterion, in words and as code."""
+
+    kind: ImpactKind
+    criterion: str
+    applies: Callable[[Touch], bool]
+
+
+# The first row that applies counts. A hand (`contact`) is told by how its force begins, before this table.
+TABLE = (
+    Row(
+        ImpactKind.CRASH,
+        "near the ground or pushed from below, and tilted by more than 45 degrees or sinking faster than a landing may",
+        lambda touch: touch.on_ground and not (touch.is_upright and touch.is_slow),
+    ),
+    Row(
+        ImpactKind.LANDING,
+        "sent down or flown down by hand, and near the ground, pushed from below or coming down; or as low as the feet",
+        lambda touch: touch.has_landed,
+    ),
+    Row(
+        ImpactKind.STRUCK,
+        "hovering, away from the ground",
+        lambda touch: touch.is_struck,
+    ),
+    Row(
+        ImpactKind.FLOOR,
+        "pushed from below",
+        lambda touch: touch.upward > STEEP,
+    ),
+    Row(
+        ImpactKind.CEILING,
+        "pushed from above",
+        lambda touch: touch.upward < -STEEP,
+    ),
+    Row(
+        ImpactKind.WALL,
+        "pushed from the side",
+        lambda touch: True,
+    ),
+)
+
+
+def kind_of(
+    force_ned: Vector3, velocity_ned_m_s: Vector3 | None, attitude_wxyz: Quaternion, situation: Situation
+) -> ImpactKind:
+    """The kind by direction, motion and situation; the size of the force has no influence."""
     size = math.hypot(*force_ned)
-    up = -force_ned[2] / size if size > 0.0 else 0.0
-    height_m = situation.height_m
-    near_ground = height_m is None or height_m < GROUND_M
-    if situation.descent_commanded and (near_ground or up > STEEP):
-        return ImpactKind.LANDING
-    is_hovering = hovers(velocity_ned_m_s)
-    if up > STEEP:
-        return ImpactKind.STRUCK if is_hovering and not near_ground else ImpactKind.FLOOR
-    if is_hovering:
-        return ImpactKind.STRUCK
-    return ImpactKind.CEILING if up < -STEEP else ImpactKind.WALL
+    touch = Touch(-force_ned[2] / size if size > 0.0 else 0.0, velocity_ned_m_s, attitude_wxyz, situation)
+    return next(row.kind for row in TABLE if row.applies(touch))

@@ -75,6 +75,8 @@ NO_MOTORS_RAD_S2 = 4.0 * MOTORS_RAD_S2
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
 GROUND_M = 1.0
+# The feet are 0.1 m below the centre: a vehicle at this height stands on the ground, or scrapes along it.
+SCRAPING_M = 0.1
 
 # --- the contact's force
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
@@ -110,7 +112,7 @@ CORRECTED_US = 4_500_000
 # Drag and wind are learnt at the setpoint and in free motion: the mean of so long.
 FOLLOWED_S = 1.0
 # Four times a good estimate's noise. A vehicle that moves faster with its thrust, or against it, as a gust has it, is
-# free. With 0.15 a slow gust counted as a wall.
+# free.
 STEADY_M_S = 0.12
 # A vehicle that slides along a surface moves with its thrust, too, but no faster. Above it drag and wind are what is
 # missing now: they change with the speed.
@@ -118,7 +120,7 @@ FREE_M_S = 0.5
 # Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
 # What an external force takes of the acceleration, besides what drag and wind took before: 12 degrees of tilt. A gust
-# of 5 m/s takes 1.5 m/s^2 of a light vehicle with much drag. Arms that press on a wall carry a vehicle that leans by 15
+# of 5 m/s takes 1.5 m/s^2 with a drag of 0.3 per second. Arms that press on a wall carry a vehicle that leans by 15
 # degrees; from 22 on it is tipped over.
 HELD_M_S2 = 2.0
 

@@ -1,5 +1,6 @@
 """The interface of all collision detectors: samples and the flight's situation in, impact out, state explicit."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -28,6 +29,7 @@ class ImpactKind(Enum):
     FLOOR = "floor"  # the ground, not by a landing
     STRUCK = "struck while hovering"  # the obstacle moved, not the vehicle
     LANDING = "landing"  # touchdown
+    CRASH = "crash"  # the ground, tilted or faster than a landing may be
     CONTACT = "contact"  # held or pushed gently, as by a hand
 
 
@@ -45,11 +47,11 @@ class Evidence(Enum):
 class Situation(NamedTuple):
     """What the flight knows when samples arrive; None where it does not. A tuple: one is made in every step.
 
-    `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
-    one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told
-    to, so that touching it is no surprise. The watch fills in the last two. `estimate_valid`: False while the
-    vehicle's velocity cannot be believed, because its accelerometer did not show the whole of a hit. `strapdown` has
-    heard the sample already.
+    `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming. The
+    setpoint is the one last sent, local NED. `descent_commanded`: the vehicle goes down because it was told to, or by
+    the hand that flies it, so that touching the ground is no surprise. The monitor fills in the last two: `validity`
+    of the vehicle's velocity, which lacks a part of a hit that was clipped, and `strapdown`. Both have heard the
+    sample already.
     """
 
     off_reason: str | None = None
@@ -67,6 +69,11 @@ class Situation(NamedTuple):
         if self.off_reason is not None:
             return self.off_reason
         return ON_THE_GROUND if self.landed_state is LandedState.ON_GROUND else None
+
+    @property
+    def may_crash(self) -> bool:
+        """Whether the vehicle is known to fly, be it unwatched."""
+        return self.armed is True and self.landed_state is not LandedState.ON_GROUND
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +93,11 @@ class Impact:
     kind: ImpactKind = ImpactKind.UNKNOWN
     evidence: Evidence = Evidence.FORCE
     confidence: float = 1.0
+
+    @property
+    def size_m_s2(self) -> float:
+        """Of the contact's force per mass."""
+        return math.hypot(*self.specific_force_frd_m_s2)
 
     @property
     def is_collision(self) -> bool:

@@ -14,7 +14,7 @@ from companion.messages import Vector3
 from companion.motion.config import CURRENT_US
 from companion.motion.strapdown import ZERO
 from companion.reflex.config import CLEAR, JUMP, MEAN_MEMORY_S, SHAKING, FusedConfig
-from companion.reflex.detector import DetectorState, Impact, Phase
+from companion.reflex.detector import DetectorState, Impact, ImpactKind, Phase
 from companion.reflex.force_noise import ForceNoise
 from companion.reflex.thrust import ThrustGain
 from companion.reflex.velocity_jump import VelocityJump
@@ -32,8 +32,8 @@ class FusedState(DetectorState):
     velocity_ned_m_s: Vector3 | None = None
     hovered_boot_us: int | None = None
     contact_began_boot_us: int = 0
-    is_hand: bool = False
-    """Whether the present contact, or the latest one, was taken for a hand."""
+    kind: ImpactKind = ImpactKind.UNKNOWN
+    """Of the present contact, or the latest one."""
     observed: Impact | None = None
     """The first loud sample while it is observed whether that is a hand."""
     last_frd_m_s2: Vector3 = ZERO
@@ -72,6 +72,11 @@ class FusedState(DetectorState):
         (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
         x, y = f_x + g_x, f_y + g_y
         return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
+
+    @property
+    def is_hand(self) -> bool:
+        """Whether the present contact, or the latest one, was taken for a hand."""
+        return self.kind is ImpactKind.CONTACT
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves."""

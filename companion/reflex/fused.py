@@ -79,7 +79,7 @@ class FusedDetector:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
             s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
-        if off is not None or ratio < 1.0:
+        if ratio < 1.0:
             s.observed = None
             self._learn(s, f, before_us)
             is_quiet = s.floor.known_s >= LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
@@ -87,13 +87,27 @@ class FusedDetector:
                 s.phase = Phase.ARMED
             return None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
-        if s.phase is Phase.QUIET or (s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s):
-            self._learn(s, f, before_us)  # a shaking that stays
         x, y, z = s.floor.mean_frd_m_s2
         force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
+        is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
+        if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
+            self._learn(s, f, before_us)  # a shaking that stays
         free_until_us = min(now_us - self._averaging_us, free_until_us)
         impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio))
+        if s.phase is Phase.OFF:
+            return self._unwatched(s, situation, impact)
         return self._loud(s, situation, impact, s.jumps(f))
+
+    def _unwatched(self, s: FusedState, situation: Situation, impact: Impact) -> Impact | None:
+        """A crash is reported where no hit is looked for, too: in a take-off, in a landing, under strong vibration."""
+        s.observed = None
+        since_us = impact.sample_time_boot_us - s.contact_began_boot_us
+        if not situation.may_crash or since_us <= 1e6 * self._config.longest_contact_s:
+            return None
+        if (impact := self._classified(s, situation, impact)).kind is not ImpactKind.CRASH:
+            return None
+        s.contact_began_boot_us, s.peak_specific_force_m_s2 = impact.sample_time_boot_us, impact.size_m_s2
+        return impact
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
         elapsed_us = s.last_sample_boot_us - before_us
@@ -105,12 +119,15 @@ class FusedDetector:
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
     def _loud(self, s: FusedState, situation: Situation, impact: Impact, has_jumped: bool) -> Impact | None:
-        now_us, size = impact.sample_time_boot_us, math.hypot(*impact.specific_force_frd_m_s2)
+        now_us, size = impact.sample_time_boot_us, impact.size_m_s2
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
                 is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
                 if is_another and size > 2.0 * s.peak_specific_force_m_s2:
+                    return self._fire(s, situation, impact)
+                # A touch that tips the vehicle over becomes a crash.
+                if s.kind is not ImpactKind.CRASH and self._classified(s, situation, impact).kind is ImpactKind.CRASH:
                     return self._fire(s, situation, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
@@ -122,16 +139,21 @@ class FusedDetector:
             impact = replace(impact, kind=ImpactKind.CONTACT)
         return self._fire(s, situation, impact)
 
+    def _classified(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
+        """The impact with its kind where that is unknown."""
+        if impact.kind is not ImpactKind.UNKNOWN:
+            return impact
+        attitude = LEVEL if situation.strapdown is None else situation.strapdown.valid_wxyz
+        force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
+        return replace(impact, kind=kind_of(force_ned, s.velocity_ned_m_s, attitude, situation))
+
     def _fire(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
-        """Begin the contact; the impact with its kind where that is unknown."""
-        force = impact.specific_force_frd_m_s2
-        if impact.kind is ImpactKind.UNKNOWN:
-            attitude = LEVEL if situation.strapdown is None else situation.strapdown.valid_wxyz
-            impact = replace(impact, kind=kind_of(body_to_ned(attitude, force), s.velocity_ned_m_s, situation))
+        """Begin the contact."""
+        impact = self._classified(s, situation, impact)
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
-        s.peak_specific_force_m_s2 = math.hypot(*force)
-        s.observed, s.is_hand = None, impact.kind is ImpactKind.CONTACT
+        s.peak_specific_force_m_s2 = impact.size_m_s2
+        s.observed, s.kind = None, impact.kind
         return impact
 
     # --- velocity ---------------------------------------------------------------------------------------------

@@ -14,8 +14,10 @@ from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, O
 from companion.motion.config import KEPT_US
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
 from companion.reflex.detector import Detector, DetectorState, Phase, Situation
+from companion.reflex.force_signs import FusedState
 from companion.reflex.fused import FusedDetector
 from companion.reflex.impact import ImpactEstimate, ImpactEstimator
+from companion.reflex.promise import Promise, promise_of
 from companion.reflex.stream_health import SampleGate, StreamHealth
 from companion.strict_model import StrictModel
 
@@ -74,6 +76,8 @@ class CollisionMonitor:
     imu_fault: str | None = None  # what was wrong with the newest IMU message
     is_introduced: bool = False  # threshold and losses have been reported
     invalidity_reported: bool = False
+    promise: Promise | None = None  # while it was last armed
+    promised_us: int = 0
     heard: set[MessageId] = field(default_factory=set)
 
     @property
@@ -88,7 +92,11 @@ class CollisionMonitor:
 
     def describe(self) -> str:
         """For the live line."""
-        return self.state.describe() if self.no_data_reason is None else f"blind ({self.no_data_reason})"
+        if self.no_data_reason is not None:
+            return f"blind ({self.no_data_reason})"
+        if self.promise is not None and self.state.phase is Phase.ARMED:
+            return f"{self.state.phase.value} at {self.promise.text()}"
+        return self.state.describe()
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +121,12 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     """Take the samples received since the last call, in order. Call it without samples, too: that shows a silence."""
     impacts: list[ImpactEstimate] = []
     finished: list[ImpactEstimate] = []
-    imu_samples = 0
-    situation = situation._replace(strapdown=monitor.estimator.strapdown, validity=monitor.estimator.validity)
+    imu_samples, is_on = 0, situation.off_reason is None
+    situation = situation._replace(
+        off_reason=situation.off_reason or _vibration(monitor),
+        strapdown=monitor.estimator.strapdown,
+        validity=monitor.estimator.validity,
+    )
     for sample in samples:
         if type(sample) is ImuSample:
             if not monitor.gate.imu(sample):
@@ -144,17 +156,33 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             if final is not None:
                 finished.append(final)
     monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
-    return MonitorResult(impacts, finished, _notices(monitor, situation.off_reason is None, now_us))
+    _promise(monitor, now_us)
+    return MonitorResult(impacts, finished, _notices(monitor, is_on, now_us))
+
+
+def _promise(monitor: CollisionMonitor, now_us: int) -> None:
+    """Once a second, of an armed detector whose noise is known."""
+    state = monitor.state
+    if isinstance(state, FusedState) and state.phase is Phase.ARMED and now_us - monitor.promised_us >= 1e6:
+        fixes, imu_hz = monitor.estimator.strapdown.fixes, len(monitor.stream_health.arrivals_us)
+        monitor.promise, monitor.promised_us = promise_of(state, monitor.config.fused, fixes, imu_hz), now_us
+
+
+def _vibration(monitor: CollisionMonitor) -> str | None:
+    """Why nothing but a crash is reported now: vibration has grown until only a crash would exceed the threshold."""
+    threshold_m_s2 = monitor.state.threshold_m_s2
+    is_hidden = threshold_m_s2 > monitor.config.sight.max_threshold_m_s2
+    return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2" if is_hidden else None
 
 
 def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
     """Why an armed detector could miss a hit, in one phrase, or None."""
-    config, threshold_m_s2 = monitor.config.sight, monitor.state.threshold_m_s2
+    config = monitor.config.sight
     fault = monitor.stream_health.fault(config, now_us)
     if fault is not None:
         return monitor.imu_fault or fault
-    if threshold_m_s2 > config.max_threshold_m_s2:
-        return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2"
+    if (vibration := _vibration(monitor)) is not None:
+        return vibration
     return f"no ATTITUDE_QUATERNION for {round(config.silence_s * 1e3)} ms" if monitor.is_attitude_old else None
 
 
@@ -172,11 +200,14 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
     if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
         monitor.is_introduced = True
         threshold_m_s2 = monitor.state.threshold_m_s2
-        text = f"detector '{monitor.detector.name}' armed: a hit is {threshold_m_s2:.1f} m/s^2 or more"
+        means = f"{threshold_m_s2:.1f} m/s^2" if monitor.promise is None else monitor.promise.text()
+        text = f"detector '{monitor.detector.name}' armed: from {means}"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
         losses = monitor.detector.losses.items()
         notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]
-    is_invalid = not monitor.estimator.validity.is_valid and monitor.state.phase is not Phase.CONTACT
+    estimate = monitor.estimator.estimate
+    is_hit = estimate is not None and estimate.impact.is_collision
+    is_invalid = is_hit and not monitor.estimator.validity.is_valid and monitor.state.phase is not Phase.CONTACT
     if is_invalid != monitor.invalidity_reported:
         monitor.invalidity_reported = is_invalid
         text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"

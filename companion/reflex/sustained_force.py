@@ -77,11 +77,8 @@ class SustainedForceMonitor:
         grown = plus(self.missing_m_s2, -1.0, self.wind_m_s2)
         towards = unit(grown)
         force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
-        # Friction turns the force of a surface that the vehicle slides along, by 60 degrees with a wind, and brakes it.
         along_m_s, across = split(self.velocity_m_s, towards)
-        across_m_s = math.hypot(*across)
-        back_m_s, on_m_s = min(across_m_s, 2.0 * STEADY_M_S), min(2.0 * across_m_s, FREE_M_S)
-        is_free = not -max(STEADY_M_S, back_m_s) < along_m_s < max(STEADY_M_S, on_m_s)
+        is_free = _is_free(along_m_s, math.hypot(*across))
         if is_there or is_free:
             share = 1.0 if abs(along_m_s) > FREE_M_S else elapsed_s / (FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
@@ -123,3 +120,13 @@ class SustainedForceMonitor:
         changes = plus(velocity, -1.0, self.velocity_m_s)
         self.missing_m_s2 = plus(self.thrust_ned_m_s2, -1.0 / SMOOTHING_S, changes)
         return elapsed_s
+
+
+def _is_free(along_m_s: float, across_m_s: float) -> bool:
+    """Whether a vehicle with this velocity along a force, and across it, is not held by a surface.
+
+    One that slides moves along the force, too: friction and wind turn the force by up to 60 degrees.
+    """
+    most_back_m_s = max(STEADY_M_S, min(across_m_s, 2.0 * STEADY_M_S))
+    most_on_m_s = max(STEADY_M_S, min(2.0 * across_m_s, FREE_M_S))
+    return along_m_s >= most_on_m_s or along_m_s <= -most_back_m_s

@@ -1,14 +1,18 @@
 """What every reader gives: typed samples in the order heard, and what the log cannot tell."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self, TypeAlias
 
+import numpy as np
+
 from companion import messages
 from companion.errors import ReboundError
-from companion.messages import ImuSample, MessageId, Sample, Vector3
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, Identity, identify
+from companion.messages import Heartbeat, ImuSample, MessageId, Sample, Vector3
+from rebound_cli.logs.topic import Floats
 
 # Without these a detector loses something.
 WANTED = {
@@ -19,6 +23,10 @@ WANTED = {
     MessageId.ODOMETRY: messages.Odometry,
     MessageId.VIBRATION: messages.Vibration,
 }
+# No battery lasts so long: a time stamp further from the middle of the log is damage.
+_LONGEST_US = 24 * 3600 * 1_000_000
+# Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
+_SLOW_HZ = 15.0
 
 
 class LogError(ReboundError):
@@ -63,6 +71,8 @@ class Log:
 
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
+    `low_pass_hz`: where samples are not means but points behind a low-pass filter of second order, its cut-off.
+    `marks`: what the vehicle's own log says of its health, with the time.
     """
 
     path: Path
@@ -72,6 +82,16 @@ class Log:
     losses: tuple[str, ...]
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None
+    low_pass_hz: float | None = None
+    marks: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def window_us(self) -> float | None:
+        """How long before its stamp a contact may have been that a sample still holds.
+
+        Of a low-pass filter it is the first lobe of its answer, which is 4 % below zero at most after that.
+        """
+        return self.averaging_us if self.low_pass_hz is None else 1e6 / (math.sqrt(2.0) * self.low_pass_hz)
 
     def imu(self) -> list[tuple[int, ImuSample]]:
         """All IMU samples with the time each was heard at."""
@@ -89,3 +109,33 @@ class Log:
 def vector(row: Sequence[float]) -> Vector3:
     """The first three."""
     return row[0], row[1], row[2]
+
+
+def low_pass_answer_per_s(cutoff_hz: float, step_s: float) -> Floats:
+    """What a Butterworth filter of second order gives each step after a pulse of 1, until a thousandth is left.
+
+    Its poles lie at a (-1 +- i), a = 2 pi f / sqrt(2): the answer is back at zero after pi / a = 1 / (sqrt(2) f).
+    """
+    decay_per_s = math.sqrt(2.0) * math.pi * cutoff_hz
+    since = decay_per_s * step_s * np.arange(math.ceil(7.0 / (decay_per_s * step_s)))
+    answer: Floats = 2.0 * decay_per_s * np.exp(-since) * np.sin(since)
+    return answer
+
+
+def in_order(heard: Iterable[LoggedSample], middle_us: float) -> tuple[LoggedSample, ...]:
+    """By time, without stamps that are damage; `middle_us` is that of the log."""
+    return tuple(sorted((h for h in heard if abs(h.at_us - middle_us) < _LONGEST_US), key=lambda h: h.at_us))
+
+
+def multicopter(path: Path, vehicle_type: int) -> Identity:
+    """Of a log by its MAV_TYPE. Raises LogError for any other vehicle."""
+    identity = identify(Heartbeat(1, AUTOPILOT_COMPONENT_ID, vehicle_type, MAV_AUTOPILOT_PX4, False, 0, 0))
+    if isinstance(identity, str):
+        raise LogError(f"{path}: {identity}; collisions are looked for in multicopters' logs alone.")
+    return identity
+
+
+def slow_velocity(name: str, rate_hz: float) -> Iterator[str]:
+    """What is lost where a log holds fewer velocities than the wire carries."""
+    if rate_hz < _SLOW_HZ:
+        yield f"{name} is logged at {rate_hz:.0f} Hz where the wire carries 30 or more: v_c is coarser than in flight"

@@ -12,7 +12,7 @@ from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import WANTED, Demand, Log, LogError, LoggedSample
 
-_ULOG_MAGIC = b"ULog"
+_ULOG_MAGIC, _DATAFLASH_MAGIC = b"ULog", b"\xa3\x95"
 Packets = list[tuple[int, bytes]]
 
 # POSITION_TARGET_LOCAL_NED: time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros
@@ -21,14 +21,20 @@ _TARGET = struct.Struct("<I11fHB")
 
 
 def read_log(path: Path) -> Log:
-    """A .ulg by its first bytes, whatever its name; everything else as a telemetry log. Raises LogError, OSError."""
+    """A .ulg or .bin by its first bytes, whatever its name; by its name else. Raises LogError, OSError."""
+    from rebound_cli.logs.dataflash import read_dataflash
     from rebound_cli.logs.ulog import read_ulog
 
     with path.open("rb") as file:
         magic = file.read(len(_ULOG_MAGIC))
     if not magic:
         raise LogError(f"{path}: the file is empty.")
-    log = read_ulog(path) if magic == _ULOG_MAGIC or path.suffix == ".ulg" else read_telemetry(path)
+    if magic == _ULOG_MAGIC or path.suffix == ".ulg":
+        log = read_ulog(path)
+    elif magic.startswith(_DATAFLASH_MAGIC) or path.suffix.lower() in (".bin", ".log"):
+        log = read_dataflash(path)
+    else:
+        log = read_telemetry(path)
     if len(log.imu()) < 2:
         raise LogError(f"{path}: no IMU samples in it; a collision cannot be looked for without them.")
     return log

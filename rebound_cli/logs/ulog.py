@@ -10,17 +10,15 @@ import io
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from pyulog import ULog
 
 from companion import messages
-from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
-from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, vector
-
-Floats = npt.NDArray[np.float64]
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS
+from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, in_order, multicopter, slow_velocity, vector
+from rebound_cli.logs.topic import Floats, Topic
 
 _NAMES = [
     *("sensor_combined", "vehicle_imu", "vehicle_imu_status", "estimator_sensor_bias", "estimator_selector_status"),
@@ -39,10 +37,6 @@ _COSTS = {
 }
 # A topic that begins this much later than the IMU samples was not there when something may have happened.
 _LATE_US = 1_000_000
-# No battery lasts so long: a time stamp further from the middle of the log is damage.
-_LONGEST_US = 24 * 3600 * 1_000_000
-# Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
-_SLOW_HZ = 15.0
 # Every ULog message begins with its size and its type.
 _HEADER_SIZE = 3
 
@@ -65,46 +59,7 @@ _MODES |= {state: 4 << 16 | sub << 24 for state, sub in _AUTO.items()}
 NAV_STATES = {mode: state for state, mode in _MODES.items() if state not in (12, 13)} | {10 << 16: 13}
 
 
-class _Topic:
-    """One instance of a uORB topic, in the order of time. Fields that this version has not are None."""
-
-    def __init__(self, data: Mapping[str, npt.NDArray[Any]]) -> None:
-        stamps = data["timestamp"].astype(np.int64)
-        order = np.argsort(stamps, kind="stable")
-        self.time_us: npt.NDArray[np.int64] = stamps[order]
-        self._fields = {name: values[order] for name, values in data.items()}
-
-    def column(self, *names: str) -> Floats | None:
-        """The first of these fields that there is."""
-        values = next((self._fields[name] for name in names if name in self._fields), None)
-        with np.errstate(invalid="ignore"):  # damage can make a signalling NaN
-            return None if values is None else values.astype(np.float64)
-
-    def vector(self, *names: str) -> Floats | None:
-        """Fields side by side, one row a sample; None when one of them is missing."""
-        columns = [column for name in names if (column := self.column(name)) is not None]
-        return np.column_stack(columns) if len(columns) == len(names) else None
-
-    def array(self, name: str, length: int = 3) -> Floats | None:
-        return self.vector(*(f"{name}[{index}]" for index in range(length)))
-
-    def rows(self, values: Floats | None) -> Iterator[tuple[int, int, list[float]]]:
-        """Number, time and values of each sample whose values are finite."""
-        if values is not None:
-            for index in np.flatnonzero(np.isfinite(values).all(axis=1)).tolist():
-                yield index, int(self.time_us[index]), values[index].tolist()
-
-    def rate_hz(self) -> float:
-        lasted_us = int(self.time_us[-1] - self.time_us[0])
-        return (len(self.time_us) - 1) * 1e6 / lasted_us if lasted_us > 0 else 0.0
-
-    def held(self, values: Floats, at_us: npt.NDArray[np.int64]) -> tuple[Floats, npt.NDArray[np.bool_]]:
-        """The last value at each time, the first before that; and where there was one yet."""
-        index = np.searchsorted(self.time_us, at_us, side="right") - 1
-        return values[np.maximum(index, 0)], index >= 0
-
-
-_Topics = Mapping[tuple[str, int], _Topic]
+_Topics = Mapping[tuple[str, int], Topic]
 
 
 class _Content(io.BytesIO):
@@ -133,14 +88,14 @@ def read_ulog(path: Path) -> Log:
     except Exception as error:  # damaged files make it raise whatever the bytes led to
         raise LogError(f"{path}: not a readable PX4 log: {error or type(error).__name__}.") from error
     topics = {
-        (data.name, data.multi_id): _Topic(data.data) for data in log.data_list if len(data.data.get("timestamp", ()))
+        (data.name, data.multi_id): Topic(data.data) for data in log.data_list if len(data.data.get("timestamp", ()))
     }
     # The faster of the two: by default sensor_combined is logged whole and vehicle_imu twice a second.
     inertial = [topic for name in ("vehicle_imu", "sensor_combined") if (topic := topics.get((name, 0))) is not None]
     if not inertial:
         text = "neither sensor_combined nor vehicle_imu in it; PX4 logs them by default (SDLOG_PROFILE)"
         raise LogError(f"{path}: {text}.")
-    imu = max(inertial, key=_Topic.rate_hz)
+    imu = max(inertial, key=Topic.rate_hz)
     parameters = {k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)}
     _check_multicopter(path, topics.get(("vehicle_status", 0)), parameters)
     heard = list(_imu_samples(topics, imu))
@@ -148,14 +103,13 @@ def read_ulog(path: Path) -> Log:
         topic = next((topics[name, 0] for name in names if (name, 0) in topics), None)
         heard += () if topic is None else convert(topic)
     heard += _landed_states(topics)
-    middle_us = int(np.median(imu.time_us))
     clipped, intervals = imu.column(*_CLIPPING), imu.column("accelerometer_integral_dt", "delta_velocity_dt")
     return Log(
         path=path,
         vehicle=_name(log),
         # Instants that topics share; a log's own start may lie hours of waiting before its data.
         started_at_us=int(log.start_timestamp),
-        heard=tuple(sorted((h for h in heard if abs(h.at_us - middle_us) < _LONGEST_US), key=lambda h: h.at_us)),
+        heard=in_order(heard, float(np.median(imu.time_us))),
         losses=tuple(_losses(log, topics, imu)),
         clipped_at_us=None if clipped is None else tuple(imu.time_us[clipped > 0].tolist()),
         # A driver that reads its sensor in blocks makes some of them longer.
@@ -169,7 +123,7 @@ def _name(log: ULog) -> str:
     return f"PX4{version}{f' on {hardware}' if hardware else ''}"
 
 
-def _check_multicopter(path: Path, status: _Topic | None, parameters: Mapping[str, float]) -> None:
+def _check_multicopter(path: Path, status: Topic | None, parameters: Mapping[str, float]) -> None:
     """Raise LogError where the vehicle is no multicopter by its MAV_TYPE."""
 
     def last(field: str) -> float | None:
@@ -184,12 +138,10 @@ def _check_multicopter(path: Path, status: _Topic | None, parameters: Mapping[st
         _VTOL if vtol is not None and vtol.all() else 0,
     ]
     kind = next((kind for kind in kinds if kind and kind not in MULTICOPTERS), max(kinds) or _QUADROTOR)
-    identity = identify(messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, False, 0, 0))
-    if isinstance(identity, str):
-        raise LogError(f"{path}: {identity}; collisions are looked for in multicopters' logs alone.")
+    multicopter(path, kind)
 
 
-def _losses(log: ULog, topics: _Topics, imu: _Topic) -> Iterator[str]:
+def _losses(log: ULog, topics: _Topics, imu: Topic) -> Iterator[str]:
     if log.file_corruption:
         yield "the file is damaged in places: samples are missing there"
     if (lost_s := sum(dropout.duration for dropout in log.dropouts) * 1e-3) > 0:
@@ -202,11 +154,7 @@ def _losses(log: ULog, topics: _Topics, imu: _Topic) -> Iterator[str]:
             yield f"no {name} before {(topic.time_us[0] - log.start_timestamp) * 1e-6:.1f} s: until then {cost}"
     position = topics.get(("vehicle_local_position", 0))
     if position is not None:
-        if position.rate_hz() < _SLOW_HZ:
-            yield (
-                f"vehicle_local_position is logged at {position.rate_hz():.0f} Hz where the wire carries 30 or more: "
-                "v_c is coarser than in flight"
-            )
+        yield from slow_velocity("vehicle_local_position", position.rate_hz())
         for flag, what in (("v_xy_valid", "horizontal velocity"), ("v_z_valid", "vertical velocity")):
             valid = position.column(flag)
             if valid is not None and not valid.all():
@@ -220,7 +168,7 @@ def _losses(log: ULog, topics: _Topics, imu: _Topic) -> Iterator[str]:
 _CLIPPING = ("accelerometer_clipping", "delta_velocity_clipping")
 
 
-def _imu_samples(topics: _Topics, imu: _Topic) -> Iterator[LoggedSample]:
+def _imu_samples(topics: _Topics, imu: Topic) -> Iterator[LoggedSample]:
     """Mean specific force and angular rate over each integration interval, less the estimator's biases."""
     force, turning, taken_us = imu.array("accelerometer_m_s2"), imu.array("gyro_rad"), None
     if force is None:
@@ -261,7 +209,7 @@ def _ms(time_us: int) -> int:
     return time_us // 1000 * 1000
 
 
-def _local_position(topic: _Topic) -> Iterator[LoggedSample]:
+def _local_position(topic: Topic) -> Iterator[LoggedSample]:
     """LOCAL_POSITION_NED and, where the version counts its jumps, ODOMETRY: the wire sends both, valid or not."""
     columns = [topic.column(f"{name}_reset_counter") for name in ("xy", "z", "vxy", "vz")]
     counters = [column for column in columns if column is not None]
@@ -273,14 +221,14 @@ def _local_position(topic: _Topic) -> Iterator[LoggedSample]:
             yield LoggedSample(time_us, messages.Odometry(time_us, position, velocity, int(resets[index]) % 256))
 
 
-def _attitude(topic: _Topic) -> Iterator[LoggedSample]:
+def _attitude(topic: Topic) -> Iterator[LoggedSample]:
     rates = topic.vector("rollspeed", "pitchspeed", "yawspeed")  # until v1.11
     for index, time_us, (w, x, y, z) in topic.rows(topic.array("q", 4)):
         turning = None if rates is None else vector(rates[index].tolist())
         yield LoggedSample(time_us, messages.Attitude(_ms(time_us), (w, x, y, z), turning))
 
 
-def _attitude_target(topic: _Topic) -> Iterator[LoggedSample]:
+def _attitude_target(topic: Topic) -> Iterator[LoggedSample]:
     attitudes = topic.array("q_d", 4)
     for index, time_us, thrust in topic.rows(topic.array("thrust_body")):
         w, x, y, z = [math.nan] * 4 if attitudes is None else attitudes[index].tolist()
@@ -288,7 +236,7 @@ def _attitude_target(topic: _Topic) -> Iterator[LoggedSample]:
         yield LoggedSample(time_us, messages.AttitudeTarget(_ms(time_us), math.hypot(*thrust), attitude))
 
 
-def _vibration(topic: _Topic) -> Iterator[LoggedSample]:
+def _vibration(topic: Topic) -> Iterator[LoggedSample]:
     clipping, levels = topic.array("accel_clipping"), topic.vector("gyro_vibration_metric", "accel_vibration_metric")
     if clipping is None or levels is None:
         return
@@ -298,7 +246,7 @@ def _vibration(topic: _Topic) -> Iterator[LoggedSample]:
         yield LoggedSample(time_us, messages.Vibration(time_us, gyro, accel, (int(count), 0, 0)))
 
 
-def _heartbeat(topic: _Topic) -> Iterator[LoggedSample]:
+def _heartbeat(topic: Topic) -> Iterator[LoggedSample]:
     count = len(topic.time_us)
     arming, none = topic.column("arming_state"), np.full(count, -1.0)
     if arming is None:
@@ -312,7 +260,7 @@ def _heartbeat(topic: _Topic) -> Iterator[LoggedSample]:
         yield LoggedSample(time_us, beat)
 
 
-def _demand(topic: _Topic) -> Iterator[LoggedSample]:
+def _demand(topic: Topic) -> Iterator[LoggedSample]:
     """Fields are x, y, z, vx, ... until v1.13 and position[], velocity[] since; NaN where nothing is asked."""
     positions, velocities = topic.array("position"), topic.array("velocity")
     if positions is None or velocities is None:

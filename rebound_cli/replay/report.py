@@ -45,15 +45,22 @@ class Replay:
 
 
 def replay_log(
-    log: Log, config: CompanionConfig, rate_hz: float | None, listen: Callable[[CollisionMonitor], None] | None = None
+    log: Log,
+    config: CompanionConfig,
+    rate_hz: float | None,
+    listen: Callable[[CollisionMonitor], None] | None = None,
+    modes: Sequence[str] | None = None,
 ) -> Replay:
-    """The detector over the log. Raises LogError when the rate leaves nothing."""
+    """What a guard's detector makes of the log. Raises LogError when the rate leaves nothing.
+
+    `modes`: those in which the guard may take over; None: it watches whoever flies.
+    """
     recorded_hz = shaking(log).rate_hz
     if rate_hz is not None:
         log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
         if len(log.imu()) < 2:
             raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
-    findings = watch_log(log, config, listen=listen)
+    findings = watch_log(log, config, listen=listen, modes=modes)
     return Replay(log, config.detector, recorded_hz, shaking(log), findings, _losses(log, config), None)
 
 
@@ -86,6 +93,11 @@ def report_text(replay: Replay, pictures: Sequence[str]) -> str:
     recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
     headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
     told: list[tuple[int, list[str]]] = [(h.at_us, [h.text]) for h in replay.findings.happenings]
+    told += [(at_us, [f"the vehicle's own log: {text}"]) for at_us, text in log.marks]
+    # Each interval in which a guard would have left a hit to whoever flies.
+    told += [
+        (span.start_us, [f"not watched for {span.duration_s:.2f} s: {span.reason}"]) for span in replay.findings.off
+    ]
     for finding, picture in zip(replay.findings.impacts, pictures, strict=True):
         told.append((finding.at_us, [*_finding_rows(replay, finding), f"picture: {picture}"]))
     timeline = [_entry(log.seconds(at_us), texts) for at_us, texts in sorted(told, key=lambda row: row[0])]
@@ -108,19 +120,24 @@ def _wrapped(text: str, lead: str, hanging: str) -> str:
 
 
 def _verdict(replay: Replay) -> str:
-    """One line: how many collisions, how many touches that are none, and in how much of the flight one would show."""
+    """One line: how many collisions and crashes, how many touches that are none, and how much was watched."""
     collisions, contacts = len(replay.findings.collisions), len(replay.findings.contacts)
+    crashes = len(replay.findings.crashes)
     text = f"{collisions or 'no'} collision{'' if collisions == 1 else 's'}"
+    text += f", {crashes} crash{'' if crashes == 1 else 'es'}" if crashes else ""
     text += f", {contacts} contact{' that is' if contacts == 1 else 's that are'} none" if contacts else ""
     share = replay.findings.watched_share
-    return text + ("; no flight was heard" if share is None else f"; {100.0 * share:.0f} % of the flight was watched")
+    if share is None:
+        return f"{text}; no flight was heard"
+    watched = f"{100.0 * share:.0f} % of the flight was watched"
+    return f"{text}; {watched}" if share else f"{text}; nothing of the flight was watched: that is no evidence"
 
 
 def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
     first, final, situation = finding.first, finding.final, finding.situation
-    kind = "" if final.impact.kind is ImpactKind.UNKNOWN else f": {final.impact.kind.value}"
+    kind = "" if final.impact.kind in (ImpactKind.UNKNOWN, ImpactKind.CRASH) else f": {final.impact.kind.value}"
     at_least = "at least " if final.is_lower_bound else ""
-    what = "HIT" if finding.is_collision else "contact, no collision"
+    what = "CRASH" if finding.is_crash else "HIT" if finding.is_collision else "contact, no collision"
     yield f"{what}{kind}, confidence {final.impact.confidence:.2f}"
     force = math.hypot(*first.impact.specific_force_frd_m_s2)
     how = _HOW[first.impact.evidence]
@@ -189,6 +206,7 @@ def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
         "imu_rate_hz": round(replay.shaking.rate_hz, 2),
         "recorded_imu_rate_hz": round(replay.recorded_rate_hz, 2),
         "collisions": len(findings.collisions),
+        "crashes": len(findings.crashes),
         "impacts": [
             {**_finding_data(replay, finding), "picture": name}
             for finding, name in zip(findings.impacts, pictures, strict=True)

@@ -6,99 +6,70 @@ from itertools import groupby
 
 from companion import messages
 from companion.core import POLL_INTERVAL_US
-from companion.link.vehicle import OLD_NEWS_US
+from companion.flight.vehicle_update import note_height, situation_of
+from companion.guard.config import GuardConfig
+from companion.guard.context import GuardContext
+from companion.guard.watching import not_flying, observe, why_not
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle
 from companion.mission.config import CompanionConfig
-from companion.px4_mode import AUTO_LAND, mode_name
-from companion.reflex.detector import Situation
+from companion.reflex.detector import ImpactKind, Situation
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
-from rebound_cli.logs.log import Demand, Log, LoggedSample
+from rebound_cli.logs.log import Demand, Log, LoggedSample, Told
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
 _MOST_POLLS = 20
-# AUTO.PRECLAND
-_AUTO_PRECLAND = 4 << 16 | 9 << 24
-# From this downward speed asked for PX4's land detector takes a descent to be meant: 1.1 x LNDMC_Z_VEL_MAX, 0.25 m/s
-# (land_detector/MulticopterLandDetector.cpp).
-DESCENT_M_S = 0.275
-# MANUAL, ACRO, STABILIZED, RATTITUDE: the sticks ask for an attitude or for rates, and position control is off
-# (commander/ModeUtil/control_mode.cpp). It is taken to act where the mode is unknown.
-_BY_STICKS_ALONE = (1, 5, 7, 8)
-_NO_DEMAND = Demand(0, None, None, None)
+# Of the guard's own events these tell what the vehicle did.
+_TOLD = ("mode", "disarmed", "implausible")
 
 
 class Circumstances:
-    """What a flight would have known at each moment of a foreign log; the pilot's plan is known from modes alone.
+    """What a guard would have known at each moment of a foreign log, by the guard's own code.
 
-    Takes every sample; `situation` is what they add up to.
+    Takes every sample; `situation` is what they add up to. `modes` are those in which the guard may take over; None:
+    it watches whoever flies.
     """
 
-    def __init__(self) -> None:
-        self.situation = Situation()
-        self._armed: bool | None = None
-        self._landed = messages.LandedState.UNDEFINED
-        self._mode = 0
-        self._told_mode: int | None = None  # in a heartbeat
-        self._down_m: float | None = None
-        self._ground_down_m: float | None = None
-        self._demand = _NO_DEMAND
-        self._demand_old_us = 0  # from then on it is no longer flown, unless it is renewed
+    def __init__(self, config: CompanionConfig, modes: Sequence[str] | None = None) -> None:
+        self._why_not = not_flying if modes is None else why_not
+        settings = GuardConfig.model_construct(companion=config, modes=tuple(modes or ()))
+        streams = StreamMonitor(config.streams, ())
+        self._guard = GuardContext(settings.as_mission(), Vehicle(), streams, config=settings, keeps_others_out=False)
+        self._now_us = 0
 
-    def hear(self, heard: LoggedSample) -> Sequence[str]:
-        """Take-offs, landings, arming and modes, as the sample reports them."""
-        happened: list[str] = []
-        match heard.sample:
-            case messages.LocalPosition(position_ned_m=(_, _, down_m)):
-                self._down_m = down_m
-                is_down = self._landed is messages.LandedState.ON_GROUND or self._armed is False
-                if self._ground_down_m is None and is_down:
-                    self._ground_down_m = down_m
-            case messages.Heartbeat(armed=armed, custom_mode=mode):
-                # Heights count from the place of arming, which is where the vehicle stands when it is armed.
-                if armed and self._armed is False:
-                    self._ground_down_m = self._down_m
-                if armed != self._armed and (armed or self._armed is not None):
-                    happened.append("armed" if armed else "disarmed")
-                if mode != self._told_mode:
-                    happened.append(f"mode {mode_name(mode)}")
-                self._armed, self._mode, self._told_mode = armed, mode, mode
-            case messages.CurrentMode(custom_mode=mode):
-                self._mode = mode
-            case messages.ExtendedState(landed_state=landed):
-                was_down, is_down = (state is messages.LandedState.ON_GROUND for state in (self._landed, landed))
-                if was_down != is_down and self._landed is not messages.LandedState.UNDEFINED:
-                    happened.append("landed" if is_down else "took off")
-                self._landed = landed
-            case Demand() as demand:
-                # PX4 keeps OFFBOARD for so long without a setpoint (COM_OF_LOSS_T); logs hold five in a second.
-                self._demand, self._demand_old_us = demand, heard.at_us + OLD_NEWS_US
-            case _:
-                return ()
-        self._add_up()
+    def hear(self, told: Sequence[Told], now_us: int) -> Sequence[str]:
+        """Take-offs, landings, arming and modes, as the samples report them."""
+        guard, self._now_us = self._guard, now_us
+        vehicle = guard.vehicle
+        armed, landed = vehicle.armed, vehicle.landed
+        samples = [_setpoint(sample) if isinstance(sample, Demand) else sample for sample in told]
+        observe(guard, samples, now_us)
+        note_height(guard)
+        happened = [event.text for event in guard.events if event.kind in _TOLD]
+        if vehicle.armed and armed is not True:
+            happened.append("armed")
+        on_ground = messages.LandedState.ON_GROUND
+        if landed is not messages.LandedState.UNDEFINED and (landed is on_ground) is not (vehicle.landed is on_ground):
+            happened.append("landed" if vehicle.landed is on_ground else "took off")
+        guard.events, guard.outbox = [], []
         return happened
 
-    def wait(self, now_us: int) -> None:
-        """Time has passed: a setpoint that nobody renewed is no longer flown."""
-        if self._demand is not _NO_DEMAND and now_us >= self._demand_old_us:
-            self._demand = _NO_DEMAND
-            self._add_up()
+    def note(self, impacts: Sequence[ImpactEstimate]) -> None:
+        """What the detector has reported."""
+        if any(estimate.impact.kind is ImpactKind.LANDING for estimate in impacts):
+            self._guard.note_touchdown()
 
-    def _add_up(self) -> None:
-        # The setpoint, in a mode that flies it.
-        flown = _NO_DEMAND if self._mode >> 16 & 0xFF in _BY_STICKS_ALONE else self._demand
-        is_landing = self._mode in (AUTO_LAND, _AUTO_PRECLAND) or self._landed is messages.LandedState.LANDING
-        height_m = None
-        if self._down_m is not None and self._ground_down_m is not None:
-            height_m = self._ground_down_m - self._down_m
-        self.situation = Situation(
-            off_reason="disarmed" if self._armed is False else None,
-            armed=self._armed,
-            landed_state=self._landed,
-            height_m=height_m,
-            descent_commanded=is_landing or (flown.velocity_down_m_s or 0.0) >= DESCENT_M_S,
-            setpoint_position_ned_m=flown.position_ned_m,
-        )
+    @property
+    def situation(self) -> Situation:
+        """Now."""
+        guard = self._guard
+        return situation_of(guard, self._why_not(guard), guard.descent.is_meant(guard.vehicle, self._now_us))
+
+
+def _setpoint(demand: Demand) -> messages.PositionTarget:
+    return messages.PositionTarget(demand.position_ned_m, demand.velocity_down_m_s)
 
 
 @dataclass(slots=True)
@@ -114,6 +85,10 @@ class Finding:
     @property
     def is_collision(self) -> bool:
         return self.first.impact.is_collision
+
+    @property
+    def is_crash(self) -> bool:
+        return self.first.impact.kind is ImpactKind.CRASH
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +122,7 @@ class Findings:
     happenings: list[Happening] = field(default_factory=list)
     flown_us: int = 0  # armed and in the air
     watched_us: int = 0  # of that, with a detector that was on and saw
+    promised: float = 0.0  # false alarms in that time, by the detector's own statistic
     _open: dict[str, tuple[int, str]] = field(default_factory=dict)
     _noted_us: int | None = None
 
@@ -157,7 +133,12 @@ class Findings:
 
     @property
     def collisions(self) -> list[Finding]:
-        return [finding for finding in self.impacts if finding.is_collision]
+        """Hits in flight, false ones among them."""
+        return [finding for finding in self.impacts if finding.is_collision and not finding.is_crash]
+
+    @property
+    def crashes(self) -> list[Finding]:
+        return [finding for finding in self.impacts if finding.is_crash]
 
     @property
     def contacts(self) -> list[Finding]:
@@ -179,7 +160,9 @@ class Findings:
         self._noted_us = at_us
         if situation.armed and situation.landed_state is not messages.LandedState.ON_GROUND:
             self.flown_us += elapsed_us
-            self.watched_us += elapsed_us if off is None and monitor.no_data_reason is None else 0
+            if off is None and monitor.no_data_reason is None:
+                self.watched_us += elapsed_us
+                self.promised += elapsed_us / 3.6e9 * (monitor.promise.false_alarms_per_h if monitor.promise else 0.0)
 
     def _note_span(self, name: str, reason: str | None, at_us: int) -> None:
         """A span lasts as long as there is a reason and goes by its first: a blind detector's changes its figures."""
@@ -202,41 +185,51 @@ def watch_log(
     config: CompanionConfig,
     rate_hz: float | None = None,
     listen: Callable[[CollisionMonitor], None] | None = None,
+    modes: Sequence[str] | None = None,
 ) -> Findings:
     """Everything heard, in its order; `rate_hz` is what HIGHRES_IMU is asked for, None for what was recorded.
 
-    `listen` is told of the watch before its first sample.
+    `listen` is told of the watch before its first sample. `modes`: see `Circumstances`.
     """
     heard = log.heard if rate_hz is None else tuple(thinned(log.heard, rate_hz))
-    circumstances, findings = Circumstances(), Findings()
+    circumstances, findings = Circumstances(config, modes), Findings()
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
-    monitor = start_monitor(config, start_us)
+    monitor = start_monitor(_sampled_as(log, config), start_us)
     if listen is not None:
         listen(monitor)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
-        for notice in advance(monitor, samples, circumstances.situation, now_us).notices:
+        situation = circumstances.situation
+        result = advance(monitor, samples, situation, now_us)
+        for notice in result.notices:
             findings.tell(now_us, notice.text)
-        findings.note(monitor, circumstances.situation, now_us)
+        findings.note(monitor, situation, now_us)
+        circumstances.note(result.impacts)
 
     for at_us, group in groupby(heard, key=lambda item: max(item.at_us, start_us)):
         last_poll_us = min(at_us, last_us + _MOST_POLLS * POLL_INTERVAL_US)
         for poll_us in range(last_us + POLL_INTERVAL_US, last_poll_us, POLL_INTERVAL_US):
-            circumstances.wait(poll_us)
+            circumstances.hear((), poll_us)
             step((), poll_us)
-        items = list(group)
-        for item in items:
-            for text in circumstances.hear(item):
-                findings.tell(at_us, text)
-        circumstances.wait(at_us)
+        told = [item.sample for item in group]
+        for text in circumstances.hear(told, at_us):
+            findings.tell(at_us, text)
         # One by one: two impacts of one instant would otherwise be one.
-        for item in items:
-            if not isinstance(item.sample, Demand):
-                step((item.sample,), at_us)
+        for sample in told:
+            if not isinstance(sample, Demand):
+                step((sample,), at_us)
         last_us = at_us
     findings.close(last_us)
     return findings
+
+
+def _sampled_as(log: Log, config: CompanionConfig) -> CompanionConfig:
+    """With the time that a sample of this log's source looks back over."""
+    if log.low_pass_hz is None or log.window_us is None:
+        return config
+    estimate = config.estimate.model_copy(update={"imu_averaging_interval_s": log.window_us * 1e-6})
+    return config.model_copy(update={"estimate": estimate})
 
 
 def thinned(heard: tuple[LoggedSample, ...], rate_hz: float) -> Iterator[LoggedSample]:

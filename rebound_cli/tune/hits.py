@@ -2,8 +2,9 @@
 
 A hit is head-on against a wall, level, from a side drawn evenly around the body: two guards, each by its arm, push
 with eq. 2 from the first touch on, at once with b_s v_c. It is added to what the flight's own sensor showed, as its
-mean over each sample's own averaging interval. The flight goes on as if nothing had happened, its velocity included:
-what a real hit changes afterwards would only help. So this is a detector's sight by force alone, in this vibration.
+mean over each sample's own averaging interval or as its low-pass filter lets it through. The flight goes on as if
+nothing had happened, its velocity included: what a real hit changes afterwards would only help. So this is a
+detector's sight by force alone, in this vibration.
 """
 
 import math
@@ -16,7 +17,7 @@ import numpy.typing as npt
 
 from companion.messages import ImuSample
 from companion.mission.config import CompanionConfig
-from rebound_cli.logs.log import Log
+from rebound_cli.logs.log import Log, low_pass_answer_per_s
 from rebound_cli.logs.shaking import FLYING, shaking
 from rebound_cli.replay.watching import watch_log
 from sim_vehicle.airframe import Airframe
@@ -108,20 +109,32 @@ def hit_moments(log: Log) -> Iterator[int]:
 
 def with_hits(log: Log, moments_us: Sequence[int], impulse: Floats) -> Log:
     """The log as its sensor would have shown it with a hit at each of the moments."""
-    window_us = log.averaging_us or shaking(log).interval_us
     at_us = np.array([time_us for time_us, _ in log.imu()])
-    known_us = np.arange(len(impulse)) * STEP_S * 1e6
+    shown = np.concatenate([[0.0], _shown(log, impulse), [0.0]])
+    known_us = np.arange(len(shown)) * STEP_S * 1e6
     pushed = np.zeros((len(at_us), 2))
     for number, moment_us in enumerate(moments_us):
-        since_us, side_rad = at_us - moment_us, 2.0 * math.pi * GOLDEN * number
-        taken = np.interp(since_us, known_us, impulse) - np.interp(since_us - window_us, known_us, impulse)
-        pushed -= np.outer(taken / (window_us * 1e-6), (math.cos(side_rad), math.sin(side_rad)))
+        side_rad = 2.0 * math.pi * GOLDEN * number
+        taken = np.interp(at_us - moment_us, known_us, shown)
+        pushed -= np.outer(taken, (math.cos(side_rad), math.sin(side_rad)))
     pushes = iter(pushed.tolist())
     heard = [
         replace(item, sample=_struck(item.sample, *next(pushes))) if isinstance(item.sample, ImuSample) else item
         for item in log.heard
     ]
     return replace(log, heard=tuple(heard))
+
+
+def _shown(log: Log, impulse: Floats) -> Floats:
+    """The mean over a sample's interval, or the answer of its filter, at each STEP_S after the touch; m/s^2."""
+    if log.low_pass_hz is None:
+        window_us = log.averaging_us or shaking(log).interval_us
+        steps = round(window_us * 1e-6 / STEP_S)
+        answer_per_s = np.full(steps, 1.0 / (steps * STEP_S))
+    else:
+        answer_per_s = low_pass_answer_per_s(log.low_pass_hz, STEP_S)
+    answer: Floats = np.convolve(np.diff(impulse), answer_per_s)
+    return answer
 
 
 def _struck(sample: ImuSample, ahead_m_s2: float, aside_m_s2: float) -> ImuSample:

@@ -122,10 +122,10 @@ def _why(margin: Margin, raised: Mapping[str, float]) -> str:
 
 
 def _averaging(logs: Sequence[Log], start: CompanionConfig) -> tuple[float, str]:
-    known = [log.averaging_us for log in logs if log.averaging_us is not None]
+    known = [log.window_us for log in logs if log.window_us is not None]
     if not known:
         return start.estimate.imu_averaging_interval_s, "not told by these logs: 1 / IMU_INTEG_RATE"
-    return math.ceil(max(known) / 100) / 1e4, "99 of 100 IMU samples are means over this time or less"
+    return math.ceil(max(known) / 100) / 1e4, "99 of 100 IMU samples hold this time or less"
 
 
 def _least_rate(sensitivities: Sequence[HitSensitivity], start: CompanionConfig) -> tuple[float, str]:

@@ -27,7 +27,7 @@ def test_a_mission_without_a_hit_completes():
     assert report.stream_rates_hz["LOCAL_POSITION_NED"] == pytest.approx(50, rel=0.01)
     assert report.started_at_us < report.armed_at_us < report.ended_at_us
     assert [k for k in f.kinds() if k not in ("mode", "item", "loss")] == [
-        *("connected", "streams", "plan", "takeoff", "armed", "detector", "landing", "disarmed", "done")
+        *("connected", "streams", "plan", "takeoff", "armed", "detector", "landing", "contact", "disarmed", "done")
     ]
 
 
@@ -165,15 +165,38 @@ def test_a_second_hit_while_recovering_does_not_lead_back_to_the_first_wall(stat
         assert second.recovery_setpoint_ned_m[0] == pytest.approx(alone_m, abs=1e-6)
 
 
-@pytest.mark.parametrize("state", ["takeoff", "landing"])
-def test_takeoff_and_landing_shake_without_a_detection(state):
+def test_a_takeoff_shakes_without_a_detection():
     f = flight()
-    f.run_to(state)
-    f.run_for(1.6 if state == "takeoff" else 2.2)
+    f.run_to("takeoff")
+    f.run_for(1.6)
     assert f.companion.status().detector == "off (below 0.5 m)"
     strike(f, 15.0, 15.0)
     f.run_to_end()
     assert f.report.collisions == ()
+
+
+def test_what_shakes_a_landing_is_the_ground():
+    f = flight()
+    f.run_to("landing")
+    f.run_for(2.2)
+    assert f.companion.status().detector.startswith("armed")
+    strike(f, 15.0, 15.0)
+    f.run_to_end()
+    assert f.report.collisions == ()
+    assert "landing" in f.event("contact").text
+
+
+def test_a_fall_to_the_ground_is_told_as_a_crash():
+    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
+    f.run_to("mission")
+    f.run_for(1.0)
+    f.vehicle.position[2] = -0.5
+    for _ in range(10):
+        f.vehicle.velocity[2] = 4.0
+        f.step()
+    strike(f, 60.0, 0.0)
+    crash = f.event("crash")
+    assert crash.data["down_m_s"] > 3.5 and "tilted by 0 degrees" in crash.text
 
 
 @pytest.mark.parametrize(("then", "first_item"), [("hold", 2), ("retry", 1)])
@@ -223,9 +246,9 @@ def test_a_vehicle_that_drags_itself_along_the_ground_is_not_hit_by_it():
     f.run_for(0.5)
     f.vehicle.position[2] = -0.05
     f.run_for(0.05)
-    assert f.companion.status().detector == "off (below 0.1 m)"
     strike(f, 12.0, 0.0)
     assert f.report.collisions == ()
+    assert "landing" in f.event("contact").text
 
 
 def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():

@@ -161,6 +161,12 @@ def test_after_a_detection_that_nothing_confirms_the_flight_goes_on_where_it_was
     # The take-off is over with it
     early = [event(5, "armed"), event(6, "detection"), event(6.15, "unconfirmed"), event(6.15, "item", step=1)]
     assert disobediences(flight([*early, *there, done], on_collision=policy)) == []
+    # A hold goes on, and so does what follows it
+    held = [event(9, "detection"), event(9.5, "recovered"), event(9.5, "hold")]
+    on = [event(10.15, "hold"), *there, done]
+    holds = {"on_collision": {"then": "hold", "hold_s": 3, "max_hits": 2, "after_max_hits": "land"}}
+    assert disobediences(flight([*up, *held, *taken_back, *on], **holds)) == []
+    assert disobediences(flight([*up, *held, *taken_back, *there, done], **holds))
     # Home goes on home
     home = [event(9, "detection"), event(9.9, "recovered"), event(9.9, "return")]
     away = [event(10.15, "return"), event(12.1, "landing"), done]

@@ -2,6 +2,7 @@
 
 import struct
 
+import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -9,6 +10,7 @@ from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.watching import watch_log
+from tests.rebound_cli.logs import dataflash_file
 from tests.rebound_cli.logs.test_telemetry import Writer
 from tests.rebound_cli.logs.ulog_file import every, message, sensor_combined, ulog
 
@@ -32,6 +34,20 @@ def telemetry():
 
 
 TELEMETRY = telemetry()
+EVENTS = [("EV", 1_010_000, 10), ("MODE", 1_010_000, 2, 2, 1), ("EV", 1_020_000, 28), ("ERR", 1_150_000, 12, 1)]
+PILOTED = [("CTUN", 1_010_000, 0.4, 1.0, 0, 0), ("ATT", 1_011_000, *[0.0] * 6), ("RCIN", 1_012_000, *[1500] * 4)]
+ESTIMATED = [("XKF1", 1_010_000, 0, *[0.0] * 9), ("XKF4", 1_010_000, 0, 7, 0)]
+DATAFLASH = (
+    dataflash_file.NEW,
+    [
+        ("MSG", 0, "ArduCopter V4.5.7"),
+        ("PARM", 0, "INS_ACCEL_FILTER", 20.0, 20.0),
+        *EVENTS,
+        *PILOTED,
+        *ESTIMATED,
+        *dataflash_file.new_imu(every(5000, 1_000_000, 1_200_000)),
+    ],
+)
 
 changes = st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.binary(min_size=1, max_size=8)), max_size=8)
 cuts = st.floats(0.0, 1.0)
@@ -69,8 +85,22 @@ def test_a_damaged_telemetry_log(tmp_path, spots, kept):
     read_or_refused(tmp_path / "log.tlog", damaged(TELEMETRY, spots, kept))
 
 
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes, cuts)
+@example([], 1.0)
+def test_a_damaged_ardupilot_log(tmp_path, spots, kept):
+    read_or_refused(tmp_path / "log.bin", damaged(dataflash_file.dataflash(*DATAFLASH), spots, kept))
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes, cuts)
+@example([], 1.0)
+def test_a_damaged_ardupilot_log_in_text(tmp_path, spots, kept):
+    read_or_refused(tmp_path / "log.log", damaged(dataflash_file.text(*DATAFLASH), spots, kept))
+
+
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=300), st.sampled_from(["log.ulg", "log.tlog"]))
+@given(st.binary(max_size=300), st.sampled_from(["log.ulg", "log.tlog", "log.bin", "log.log"]))
 def test_bytes_from_anywhere(tmp_path, content, name):
     read_or_refused(tmp_path / name, content)
 
@@ -83,3 +113,13 @@ def test_a_head_that_ends_in_a_damaged_message(tmp_path):
     size = len(head) + 1 - 59 - len(note)
     assert size > 10_000
     read_or_refused(tmp_path / "log.ulg", head + struct.pack("<HB", size, 0))
+
+
+@pytest.mark.parametrize("length", [0, 1, 2])
+def test_a_message_of_no_length_is_no_endless_loop(tmp_path, length):
+    # Given a format that says that its messages are shorter than their own head
+    content = dataflash_file.dataflash(*DATAFLASH)
+    spoilt = content.replace(b"\xa3\x95\x80\x83", b"\xa3\x95\x80\x83" + bytes([length]))
+    (tmp_path / "log.bin").write_bytes(spoilt)
+    with pytest.raises(LogError, match="has no length"):
+        read_log(tmp_path / "log.bin")

@@ -1,0 +1,170 @@
+"""`python -m bench flights`: every recorded flight of some folders through the detector, and what it told of each.
+
+A corpus of real flights gives the rate of false alarms. Its logs are not committed; labels of them are, made by
+looking at the pictures that this study draws.
+"""
+
+from argparse import Namespace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import yaml
+from scipy.stats import chi2
+
+from companion.mission.config import CompanionConfig
+from rebound_cli.arguments import Commands, runs
+from rebound_cli.logs.log import LogError
+from rebound_cli.logs.reader import read_log
+from rebound_cli.replay.picture import draw_impact
+from rebound_cli.replay.report import Replay, replay_log
+from rebound_cli.replay.watching import Finding
+
+SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
+LABELS = Path(__file__).with_name("flights.yaml")
+# A contact bounces and tumbles: ArduPilot's crash check waits for so long, too (crash_check.cpp, 2 s).
+ONE_EVENT_US = 2_000_000
+# A label is read off a picture.
+LABEL_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One log. Hours; rates in Hz; `promised` and the counts are of the hours watched."""
+
+    log: str
+    vehicle: str
+    flown_h: float
+    watched_h: float
+    imu_hz: float
+    promised: float
+    collisions: int
+    touchdowns: int
+    crashes: int
+    wrong: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What was told of one contact with all that followed it: by its worst, a crash before a collision."""
+
+    at_s: float
+    told: str
+    findings: Sequence[Finding]
+
+
+def events(replay: Replay) -> Iterator[Event]:
+    groups: list[list[Finding]] = []
+    for finding in replay.findings.impacts:
+        if groups and finding.at_us - groups[-1][-1].at_us < ONE_EVENT_US:
+            groups[-1].append(finding)
+        else:
+            groups.append([finding])
+    for group in groups:
+        is_crash, is_hit = any(f.is_crash for f in group), any(f.is_collision for f in group)
+        told = "crash" if is_crash else "collision" if is_hit else "touchdown"
+        yield Event(replay.log.seconds(group[0].at_us), told, group)
+
+
+def mistakes(found: Sequence[Event], labels: Mapping[float, str]) -> Iterator[str]:
+    """Each event that a label contradicts, each collision that none explains, each label that nothing was told of."""
+    near = {at_s: [e for e in found if _is_near(e, at_s)] for at_s in labels}
+    labelled = [event for told in near.values() for event in told]
+    for at_s, what in labels.items():
+        if not any(event.told == what for event in near[at_s]):
+            told = ", ".join(event.told for event in near[at_s]) or "nothing"
+            yield f"{what} at {at_s:.1f} s told as {told}"
+    for event in found:
+        if event.told == "collision" and event not in labelled:
+            yield f"{event.findings[0].first.impact.kind.value} at {event.at_s:.1f} s, where nothing was"
+
+
+def _is_near(event: Event, at_s: float) -> bool:
+    last_s = event.at_s + (event.findings[-1].at_us - event.findings[0].at_us) * 1e-6
+    return event.at_s - LABEL_S <= at_s <= last_s + LABEL_S
+
+
+def row_of(name: str, replay: Replay, labels: Mapping[float, str]) -> Row:
+    found, findings = list(events(replay)), replay.findings
+    counts = {told: sum(event.told == told for event in found) for told in ("collision", "touchdown", "crash")}
+    return Row(
+        log=name,
+        vehicle=replay.log.vehicle,
+        flown_h=findings.flown_us / 3.6e9,
+        watched_h=findings.watched_us / 3.6e9,
+        imu_hz=replay.shaking.rate_hz,
+        promised=findings.promised,
+        collisions=counts["collision"],
+        touchdowns=counts["touchdown"],
+        crashes=counts["crash"],
+        wrong=tuple(mistakes(found, labels)),
+    )
+
+
+def most_per_h(count: int, hours: float, confidence: float = 0.95) -> float:
+    """Exact upper bound of a Poisson process's rate."""
+    return float(chi2.ppf(confidence, 2 * (count + 1))) / (2.0 * hours)
+
+
+def table(rows: Sequence[Row]) -> str:
+    """As Markdown, with the sums; a log of which nothing was watched is no evidence, and only named."""
+    seen = [row for row in rows if row.watched_h > 0.0]
+    lines = [
+        "| log | vehicle | flown h | watched h | IMU Hz | collisions | touchdowns | crashes | wrong |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---|",
+    ]
+    for row in seen:
+        cells = (row.flown_h, row.watched_h), (row.collisions, row.touchdowns, row.crashes)
+        hours = " | ".join(f"{hours:.3f}" for hours in cells[0])
+        counts = " | ".join(map(str, cells[1]))
+        lines.append(f"| {row.log} | {row.vehicle} | {hours} | {row.imu_hz:.0f} | {counts} | {'; '.join(row.wrong)} |")
+    watched_h = sum(row.watched_h for row in seen)
+    false = sum(wrong.endswith("where nothing was") for row in seen for wrong in row.wrong)
+    lines.append("")
+    if watched_h:
+        lines.append(
+            f"{len(seen)} logs, {sum(row.flown_h for row in seen):.2f} h flown, {watched_h:.2f} h watched: "
+            f"{sum(row.collisions for row in seen)} collisions, {sum(row.touchdowns for row in seen)} touchdowns, "
+            f"{sum(row.crashes for row in seen)} crashes. {false} collisions where nothing was: "
+            f"{false / watched_h:.1f} an hour, at most {most_per_h(false, watched_h):.1f} with 95 % confidence; "
+            f"{sum(row.promised for row in seen):.2g} in these hours promised by Gaussian noise."
+        )
+    lines += [f"No evidence, because nothing of it was watched: {row.log}." for row in rows if not row.watched_h]
+    return "\n".join(lines)
+
+
+def run_flights(options: Namespace) -> int:
+    labels = yaml.safe_load(options.labels.read_text()) or {}
+    out: Path = options.out
+    out.mkdir(parents=True, exist_ok=True)
+    rows, refused = [], []
+    for path in sorted(p for folder in options.folders for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES):
+        name = f"{path.parent.name}/{path.name}"
+        try:
+            replay = replay_log(read_log(path), CompanionConfig(), options.rate)
+        except LogError as error:
+            refused.append(str(error))
+            continue
+        rows.append(row_of(name, replay, labels.get(name, {})))
+        for event in events(replay):
+            if event.told == "collision":
+                draw_impact(replay, event.findings[0], out / f"{path.parent.name}-{path.stem}-{event.at_s:.1f}s.png")
+        print(f"{name}: {rows[-1].watched_h * 60:.1f} min watched, {rows[-1].collisions} collisions")
+    text = table(rows) + "".join(f"\n\nNot replayed: {sentence}" for sentence in refused) + "\n"
+    (out / "flights.md").write_text(text)
+    (out / "flights.yaml").write_text(yaml.safe_dump([asdict(row) | {"wrong": list(row.wrong)} for row in rows]))
+    print(f"\n{text.splitlines()[len([r for r in rows if r.watched_h]) + 3] if rows else 'no log found'}\n{out}")
+    return 0 if rows else 1
+
+
+def add_flights(commands: Commands) -> None:
+    text = "Every log of some folders through the detector: hours watched, what was told, the rate of false alarms."
+    flights = commands.add_parser("flights", help="a corpus of recorded flights", description=text)
+    flights.add_argument("folders", metavar="FOLDER", nargs="+", type=Path, help="searched for .ulg, .bin, .log, .tlog")
+    text = "what happened when, as YAML: log, seconds, class (default: those of the public logs that were looked at)"
+    flights.add_argument("--labels", metavar="FILE", type=Path, default=LABELS, help=text)
+    text = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
+    flights.add_argument("--rate", metavar="HZ", type=float, help=text)
+    text = "folder of table and pictures (default: build/flights)"
+    flights.add_argument("--out", metavar="DIR", type=Path, default=Path("build/flights"), help=text)
+    flights.set_defaults(run=runs("bench.flights:run_flights"))

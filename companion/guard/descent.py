@@ -1,0 +1,44 @@
+"""Whether the vehicle is meant to go down: by its mode, by what its position control is asked for, or by hand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from companion.link.vehicle import OLD_NEWS_US, Vehicle
+from companion.messages import LandedState, PositionTarget, Sample, Sticks
+from companion.px4_mode import AUTO_LAND, AUTO_PRECLAND, by_hand_alone, by_sticks
+
+# From this downward speed asked for PX4's land detector takes a descent to be meant: 1.1 x LNDMC_Z_VEL_MAX, 0.25 m/s
+# (land_detector/MulticopterLandDetector.cpp).
+DESCENT_M_S = 0.275
+# Stick deflection around the middle that asks for no climb: PX4's MPC_HOLD_DZ.
+STICK_DEADZONE = 0.1
+THROTTLE = 2
+
+
+@dataclass(slots=True)
+class Descent:
+    """Changed only by `update`. Receive times are on the companion's clock."""
+
+    velocity_down_m_s: float | None = None
+    setpoint_us: int | None = None
+    throttle: float | None = None
+
+    def update(self, samples: Sequence[Sample], now_us: int) -> None:
+        for sample in samples:
+            if isinstance(sample, PositionTarget):
+                self.velocity_down_m_s, self.setpoint_us = sample.velocity_down_m_s, now_us
+            elif isinstance(sample, Sticks):
+                self.throttle = sample.deflections[THROTTLE]
+
+    def is_meant(self, vehicle: Vehicle, now_us: int) -> bool:
+        """A pilot who flies by attitude or rates has the thrust in hand: what lets the vehicle down is meant.
+
+        So it is where the sticks ask for velocities, and nothing has ever told which.
+        """
+        mode = vehicle.custom_mode or 0
+        if vehicle.landed is LandedState.LANDING or mode in (AUTO_LAND, AUTO_PRECLAND) or by_hand_alone(mode):
+            return True
+        if by_sticks(mode) and (self.setpoint_us is None if self.throttle is None else self.throttle < -STICK_DEADZONE):
+            return True
+        is_current = self.setpoint_us is not None and now_us - self.setpoint_us < OLD_NEWS_US
+        return is_current and self.velocity_down_m_s is not None and self.velocity_down_m_s >= DESCENT_M_S

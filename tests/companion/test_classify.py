@@ -1,0 +1,83 @@
+"""The kind of an impact: what the vehicle did, then what was asked of it."""
+
+import math
+
+import pytest
+
+from companion.reflex.classify import FASTEST_LANDING_M_S, TABLE, kind_of
+from companion.reflex.config import GROUND_M, SCRAPING_M
+from companion.reflex.detector import ImpactKind, Situation
+
+UP, DOWN, BACK = (0.0, 0.0, -30.0), (0.0, 0.0, 30.0), (-30.0, 0.0, 0.0)
+FORWARD, HOVER = (2.0, 0.0, 0.0), (0.0, 0.05, 0.0)
+
+
+def tilted(degrees):
+    half = math.radians(degrees) / 2.0
+    return (math.cos(half), math.sin(half), 0.0, 0.0)
+
+
+def kind(force, velocity=FORWARD, tilt_deg=0.0, height_m=5.0, descends=False):
+    situation = Situation(armed=True, height_m=height_m, descent_commanded=descends)
+    return kind_of(force, velocity, tilted(tilt_deg), situation)
+
+
+def sinking(speed_m_s):
+    return (0.3, 0.0, speed_m_s)
+
+
+@pytest.mark.parametrize(
+    ("force", "expected"), [(BACK, ImpactKind.WALL), (DOWN, ImpactKind.CEILING), (UP, ImpactKind.FLOOR)]
+)
+def test_in_flight_the_direction_names_what_was_hit(force, expected):
+    assert kind(force) is expected
+
+
+def test_a_vehicle_that_hovers_away_from_the_ground_was_struck():
+    assert kind(BACK, HOVER) is ImpactKind.STRUCK
+    # near the ground its own skids may have pushed
+    assert kind(BACK, HOVER, height_m=0.9 * GROUND_M) is ImpactKind.WALL
+    assert kind(BACK, None) is ImpactKind.WALL
+
+
+@pytest.mark.parametrize("force", [UP, BACK])
+@pytest.mark.parametrize("speed_m_s", [0.2, 2.0])
+def test_who_is_sent_down_and_meets_the_ground_upright_and_slow_has_landed(force, speed_m_s):
+    near = {"velocity": sinking(speed_m_s), "height_m": 0.5 * GROUND_M, "tilt_deg": 20.0}
+    assert kind(force, **near, descends=True) is ImpactKind.LANDING
+    assert kind(UP, **near) is ImpactKind.FLOOR
+
+
+def test_ground_above_the_place_of_arming_is_known_by_its_force_from_below():
+    assert kind(UP, sinking(0.5), descends=True) is ImpactKind.LANDING
+    # and by a vehicle that comes down rather than along
+    assert kind(BACK, sinking(0.5), descends=True) is ImpactKind.LANDING
+    assert kind(BACK, sinking(0.2), descends=True) is ImpactKind.WALL
+
+
+def test_as_low_as_its_feet_a_vehicle_stands_or_scrapes():
+    assert kind(BACK, height_m=0.9 * SCRAPING_M) is ImpactKind.LANDING
+    assert kind(BACK, height_m=1.5 * SCRAPING_M) is ImpactKind.WALL
+
+
+@pytest.mark.parametrize("descends", [True, False])
+@pytest.mark.parametrize(
+    ("tilt_deg", "speed_m_s"), [(0.0, 1.05 * FASTEST_LANDING_M_S), (50.0, 0.5), (111.0, 13.0), (180.0, 0.0)]
+)
+def test_ground_met_fast_or_tilted_is_a_crash_whatever_was_asked(tilt_deg, speed_m_s, descends):
+    assert kind(UP, sinking(speed_m_s), tilt_deg, 0.2, descends) is ImpactKind.CRASH
+
+
+@pytest.mark.parametrize("height_m", [1.0, 2.0, 3.0])
+def test_a_fall_from_a_metre_is_faster_than_a_landing(height_m):
+    assert kind(UP, sinking(math.sqrt(2.0 * 9.81 * height_m)), height_m=0.1) is ImpactKind.CRASH
+
+
+def test_a_wall_met_at_a_steep_tilt_high_up_is_no_crash():
+    assert kind(BACK, tilt_deg=60.0) is ImpactKind.WALL
+
+
+def test_the_table_ends_with_a_row_for_everything_and_names_each_kind_once():
+    kinds = [row.kind for row in TABLE]
+    assert len(set(kinds)) == len(kinds)
+    assert {*kinds, ImpactKind.UNKNOWN, ImpactKind.CONTACT} == set(ImpactKind)

@@ -1,0 +1,297 @@
+"""ArduPilot's logs as PX4's link would have carried them: both ages of the format, and what is refused."""
+
+import math
+
+import pytest
+
+from companion.messages import (
+    Attitude,
+    AttitudeTarget,
+    ExtendedState,
+    Heartbeat,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    Sticks,
+    Vibration,
+)
+from companion.motion.rotation import body_to_ned
+from companion.px4_mode import mode_name
+from rebound_cli.logs.log import Demand, LogError, low_pass_answer_per_s
+from rebound_cli.logs.reader import read_log
+from tests.rebound_cli.logs.dataflash_file import NEW, OLD, dataflash, new_imu, old_imu, text
+
+COPTER = ("MSG", 0, "ArduCopter V4.5.7 (2a3dc4b7)")
+OLD_COPTER = ("MSG", "ArduCopter V3.2 (c8e0f3e1)")
+IMU = new_imu([1_000_000, 1_020_000])
+OLD_IMU = old_imu([1000, 1020])
+
+
+def read(tmp_path, rows, formats=NEW, write=dataflash, name="flight.BIN"):
+    path = tmp_path / name
+    path.write_bytes(write(formats, rows))
+    return read_log(path)
+
+
+def of(log, kind):
+    return [heard.sample for heard in log.heard if isinstance(heard.sample, kind)]
+
+
+@pytest.mark.parametrize(("write", "name"), [(dataflash, "flight.BIN"), (dataflash, "flight"), (text, "flight.log")])
+@pytest.mark.parametrize(
+    ("formats", "rows"), [(NEW, [COPTER, *IMU]), (OLD, [OLD_COPTER, *OLD_IMU])], ids=["in us", "in ms"]
+)
+def test_the_imu_at_rest(tmp_path, formats, rows, write, name):
+    # Given a log of either age, in bytes or as a ground station's text
+    log = read(tmp_path, rows, formats, write, name)
+    # Then a vehicle at rest is held up: its specific force is -9.81 m/s^2 on the axis that points down
+    first, second = of(log, ImuSample)
+    assert (first.time_boot_us, second.time_boot_us) == (1_000_000, 1_020_000)
+    assert first.specific_force_frd_m_s2 == pytest.approx((0.0, 0.0, -9.81), abs=1e-6)
+    assert first.angular_velocity_frd_rad_s == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
+    assert log.started_at_us == 1_000_000
+
+
+def test_of_several_imus_the_first(tmp_path):
+    log = read(tmp_path, [COPTER, *IMU, *new_imu([1_000_000], force=(5.0, 0.0, 0.0), instance=1)])
+    assert len(of(log, ImuSample)) == 2
+
+
+def test_a_sample_holds_what_its_low_pass_filter_has_not_forgotten(tmp_path):
+    # Given the filter's cut-off among the parameters
+    log = read(tmp_path, [COPTER, ("PARM", 0, "INS_ACCEL_FILTER", 20.0, 20.0), *IMU])
+    # When a contact of 1 m/s goes through it
+    step_s = 1e-4
+    answer = low_pass_answer_per_s(20.0, step_s)
+    assert answer.sum() * step_s == pytest.approx(1.0, abs=0.01)
+    # Then the window ends where the pulse is first back at nothing, and what comes after it is below a twentieth
+    window = round(log.window_us * 1e-6 / step_s)
+    assert (answer[1:window] > 0.0).all() and answer[window] == pytest.approx(0.0, abs=0.5)
+    assert abs(answer[window:]).max() < 0.05 * answer.max()
+    assert log.averaging_us is None
+
+
+@pytest.mark.parametrize("told", [0.0, -5.0, math.nan])
+def test_what_no_parameter_tells_is_the_default_filter(tmp_path, told):
+    rows = [OLD_COPTER, *[("PARM", name, told) for name in ("INS_MPU6K_FILTER", "FRAME_CLASS", "RCMAP_YAW")], *OLD_IMU]
+    assert read(tmp_path, rows, OLD).low_pass_hz == 20.0
+
+
+def test_attitude_turns_gravity_as_it_should(tmp_path):
+    # Given a vehicle that hovers rolled to the right by 30 degrees, with its nose east
+    rows = [COPTER, *IMU, ("ATT", 1_005_000, 0.0, 30.0, 0.0, 0.0, 90.0, 90.0)]
+    (attitude,) = of(read(tmp_path, rows), Attitude)
+    # Then its body's down is half way to the left, which is north
+    down = body_to_ned(attitude.attitude_wxyz, (0.0, 0.0, 1.0))
+    assert down == pytest.approx((0.5, 0.0, math.cos(math.radians(30.0))), abs=1e-6)
+
+
+def test_a_nose_that_is_up_points_up(tmp_path):
+    rows = [COPTER, *IMU, ("ATT", 1_005_000, 0.0, 0.0, 0.0, 30.0, 0.0, 0.0)]
+    (attitude,) = of(read(tmp_path, rows), Attitude)
+    assert body_to_ned(attitude.attitude_wxyz, (1.0, 0.0, 0.0))[2] == pytest.approx(-0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("formats", "rows"),
+    [
+        (NEW, [COPTER, *IMU, ("CTUN", 1_000_000, 0.4, 0.0, 0, 0), ("ATT", 1_005_000, 10.0, *[0.0] * 5)]),
+        (OLD, [OLD_COPTER, *OLD_IMU, ("CTUN", 1000, 400, 0.0, 0.0, 0, 0), ("ATT", 1005, 10.0, *[0.0] * 5)]),
+    ],
+)
+def test_thrust_is_a_fraction_in_every_version(tmp_path, formats, rows):
+    (target,) = of(read(tmp_path, rows, formats), AttitudeTarget)
+    assert target.time_boot_us == 1_005_000
+    assert target.thrust_fraction == pytest.approx(0.4)
+    assert body_to_ned(target.attitude_wxyz, (0.0, 1.0, 0.0))[2] == pytest.approx(math.sin(math.radians(10.0)))
+
+
+def test_the_estimate_is_of_the_core_that_flies(tmp_path):
+    # Given two cores, of which the second becomes the primary one between two estimates
+    rows = [COPTER, *IMU]
+    for time_us, primary in ((1_000_000, 0), (1_010_000, 1)):
+        rows.append(("XKF4", time_us, 0, 0xFF, primary))
+        rows += [
+            ("XKF1", time_us + 10, core, 0.0, 0.0, 0.0, 1.0 + core, 2.0, 3.0, 4.0, 5.0, -6.0 - core) for core in (0, 1)
+        ]
+    first, second = of(read(tmp_path, rows), LocalPosition)
+    assert (first.velocity_ned_m_s, first.position_ned_m) == ((1.0, 2.0, 3.0), (4.0, 5.0, -6.0))
+    assert (second.velocity_ned_m_s, second.position_ned_m) == ((2.0, 2.0, 3.0), (4.0, 5.0, -7.0))
+
+
+def test_without_att_the_estimator_tells_the_attitude(tmp_path):
+    rows = [COPTER, *IMU, ("XKF1", 1_000_000, 0, 0.0, 0.0, 90.0, *[0.0] * 6)]
+    (attitude,) = of(read(tmp_path, rows), Attitude)
+    assert body_to_ned(attitude.attitude_wxyz, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize(("velocity_down", "taken"), [(-0.5, -0.5), (0.0, -0.45), (300.0, -0.45)])
+def test_an_old_estimator_counts_where_it_works(tmp_path, velocity_down, taken):
+    # Given a climb at 0.45 m/s by what the vehicle flies by, and an EKF that was running beside it
+    rows = [OLD_COPTER, *OLD_IMU]
+    rows += [("CTUN", 1000, 500, 0.0, 7.0, 0, 45), ("EKF1", 1001, 0.0, 0.0, 0.0, 1.0, 2.0, velocity_down, 0, 0, -7.1)]
+    (position,) = of(read(tmp_path, rows, OLD), LocalPosition)
+    # Then one that agrees is taken, and not one that never started or went astray
+    assert position.velocity_ned_m_s[2] == pytest.approx(taken)
+
+
+def test_without_an_estimator_the_way_is_the_satellites(tmp_path):
+    # Given a climb at 0.5 m/s, and a GPS with a fix from 1.1 s on, that goes east at 2 m/s
+    rows = [OLD_COPTER, *OLD_IMU]
+    rows += [("CTUN", 1000, 500, 0.0, 7.0, 0, 50)]
+    rows += [("GPS", 1, 5, 1800, 45.0, 7.0, 9.0, 0.0, 1050), ("GPS", 3, 6, 1800, 45.0, 7.0, 2.0, 90.0, 1100)]
+    rows += [("GPS", 3, 7, 1800, 45.0001, 7.0, 2.0, 90.0, 1200), ("CTUN", 1200, 500, 0.0, 7.5, 0, 50)]
+    log = read(tmp_path, rows, OLD)
+    before, after = of(log, LocalPosition)
+    assert before == LocalPosition(1_000_000, (0.0, 0.0, -7.0), (0.0, 0.0, -0.5))
+    assert after.velocity_ned_m_s == pytest.approx((0.0, 2.0, -0.5), abs=1e-6)
+    assert after.position_ned_m == pytest.approx((11.12, 0.0, -7.5), abs=0.01)
+    assert any("no GPS fix" in loss for loss in log.losses)
+
+
+def test_events_arm_and_land(tmp_path):
+    # Given a flight: armed 10, not landed 28, land complete 18, disarmed 11
+    events = [("EV", 1_100_000 + 100_000 * number, event) for number, event in enumerate((10, 28, 18, 11))]
+    log = read(tmp_path, [COPTER, *IMU, *events])
+    states = [(h.at_us, h.sample.landed_state) for h in log.heard if isinstance(h.sample, ExtendedState)]
+    assert states == [
+        (1_000_000, LandedState.ON_GROUND),
+        (1_100_000, LandedState.ON_GROUND),
+        (1_200_000, LandedState.IN_AIR),
+        (1_300_000, LandedState.ON_GROUND),
+        (1_400_000, LandedState.ON_GROUND),
+    ]
+    assert [beat.armed for beat in of(log, Heartbeat)] == [True, False]
+
+
+def test_a_log_that_begins_in_the_air(tmp_path):
+    log = read(tmp_path, [COPTER, *IMU, ("EV", 1_100_000, 18), ("EV", 1_200_000, 11)])
+    assert of(log, ExtendedState)[0].landed_state is LandedState.IN_AIR
+
+
+def test_one_log_of_two_flights_disarms_between_them(tmp_path):
+    # Given a log that is written while armed, and so ends before it can tell of the disarming
+    log = read(tmp_path, [OLD_COPTER, *OLD_IMU, ("EV", 10), *old_imu([9000]), ("EV", 10)], OLD)
+    assert [(h.at_us, h.sample.armed) for h in log.heard if isinstance(h.sample, Heartbeat)] == [
+        (1_020_000, True),
+        (9_000_000, False),
+        (9_000_000, True),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("number", "name"),
+    [
+        *[(0, "STABILIZED"), (1, "ACRO"), (2, "ALTCTL"), (3, "AUTO.MISSION"), (4, "OFFBOARD"), (5, "POSCTL")],
+        *[(6, "AUTO.RTL"), (9, "AUTO.LAND"), (16, "POSCTL"), (17, "AUTO.LOITER"), (23, "AUTO.FOLLOW")],
+    ],
+)
+def test_modes_are_those_of_px4_that_do_the_same(tmp_path, number, name):
+    (beat,) = of(read(tmp_path, [COPTER, *IMU, ("MODE", 1_000_000, number, number, 1)]), Heartbeat)
+    assert mode_name(beat.custom_mode) == name
+
+
+def test_a_mode_in_words(tmp_path):
+    rows = [OLD_COPTER, *OLD_IMU, ("MODE", "ALT_HOLD", 500)]
+    (beat,) = of(read(tmp_path, rows, OLD, text, "flight.log"), Heartbeat)
+    assert mode_name(beat.custom_mode) == "ALTCTL"
+
+
+def pulses(parameters, *, named="REV"):
+    """Sticks pushed: roll on channel 2 right, pitch on channel 1 forward, throttle up, yaw in the middle."""
+    given = {"RCMAP_ROLL": 2.0, "RCMAP_PITCH": 1.0, f"RC1_{named}": 1.0 if named == "REV" else 0.0} | parameters
+    rows = [COPTER, *[("PARM", 0, name, value, value) for name, value in given.items()], *IMU]
+    return [*rows, ("RCIN", 1_000_000, 1300, 1900, 1900, 1500)]
+
+
+def test_sticks_forward_right_and_up_are_positive(tmp_path):
+    (sticks,) = of(read(tmp_path, pulses({})), Sticks)
+    assert sticks.deflections == pytest.approx((0.5, 1.0, 1.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "named", "deflections"),
+    [
+        # RC2 was of the pitch, whatever its channel, and is of channel 2 since it is called REVERSED
+        ({"RC2_REV": -1.0}, "REV", (-0.5, 1.0, 1.0, 0.0)),
+        ({"RC2_REVERSED": 1.0}, "REVERSED", (0.5, -1.0, 1.0, 0.0)),
+        ({"RC2_MIN": 700.0, "RC4_TRIM": 1700.0, "RC4_MIN": 1300.0}, "REV", (0.25, 1.0, 1.0, -0.5)),
+    ],
+)
+def test_sticks_go_by_the_radios_calibration(tmp_path, parameters, named, deflections):
+    (sticks,) = of(read(tmp_path, pulses(parameters, named=named)), Sticks)
+    assert sticks.deflections == pytest.approx(deflections)
+
+
+def test_the_climb_rate_that_is_asked_for(tmp_path):
+    slow = read(tmp_path, [COPTER, *IMU, ("CTUN", 1_000_000, 0.4, 0.0, -50, 0)])
+    assert of(slow, Demand) == [Demand(1_000_000, None, None, 0.5)]
+    whole = read(tmp_path, [COPTER, *IMU, ("CTUN", 1_000_000, 0.4, 0.0, -50, 0), ("PSCD", 1_000_000, -3.0, 0.25, 9.0)])
+    assert of(whole, Demand) == [Demand(1_000_000, None, None, 0.25)]
+
+
+def test_clipped_samples_are_counted(tmp_path):
+    rows = [COPTER, *IMU, ("VIBE", 1_000_000, 0, 3.0, 0.0, 4.0, 17), ("VIBE", 1_000_000, 1, 0.0, 0.0, 0.0, 2)]
+    assert of(read(tmp_path, rows), Vibration) == [Vibration(1_000_000, 0.0, 5.0, (17, 0, 0))]
+
+
+def test_what_the_vehicle_says_of_itself(tmp_path):
+    rows = [COPTER, *IMU, ("ERR", 1_100_000, 12, 1), ("ERR", 1_200_000, 5, 0), ("ERR", 1_300_000, 200, 3)]
+    assert read(tmp_path, rows).marks == ((1_100_000, "crash check (code 1)"), (1_300_000, "subsystem 200 (code 3)"))
+
+
+def test_the_vehicle_is_named(tmp_path):
+    rows = [COPTER, ("PARM", 0, "FRAME_CLASS", 4.0, 0.0), *IMU]
+    assert read(tmp_path, rows).vehicle == "ArduCopter V4.5.7 (2a3dc4b7), octorotor"
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([("MSG", 0, "ArduPlane V4.5.7"), *IMU], "fixed-wing aircraft"),
+        ([("MSG", 0, "ArduRover v2.46beta2"), *IMU], "ground rover"),
+        ([COPTER, ("PARM", 0, "FRAME_CLASS", 6.0, 0.0), *IMU], "helicopter"),
+        ([COPTER, ("MSG", 0, "Frame: HELI"), *IMU], "helicopter"),
+        (IMU, "does not say what vehicle"),
+        ([COPTER], "no IMU samples"),
+        ([COPTER, IMU[0]], "no IMU samples"),
+    ],
+)
+def test_a_log_that_cannot_be_used_is_refused_in_a_sentence(tmp_path, rows, words):
+    with pytest.raises(LogError, match=words) as refused:
+        read(tmp_path, rows)
+    assert "\n" not in str(refused.value)
+
+
+def test_samples_without_times_are_refused(tmp_path):
+    # Given Copter 3.0, whose samples have no stamps
+    formats = OLD | {"IMU": ("ffffff", "GyrX,GyrY,GyrZ,AccX,AccY,AccZ")}
+    with pytest.raises(LogError, match="no IMU samples with times"):
+        read(tmp_path, [OLD_COPTER, *[("IMU", 0, 0, 0, 0, 0, -9.81)] * 5], formats)
+
+
+@pytest.mark.parametrize("name", ["flight.bin", "flight.log"])
+@pytest.mark.parametrize("content", [b"", b"ULO", bytes(9000), b"FMT, 128\n", b"a letter\n" * 900])
+def test_a_foreign_file_is_refused_in_a_sentence(tmp_path, content, name):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(LogError) as refused:
+        read_log(path)
+    assert str(path) in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_what_is_missing_is_said_with_its_cost(tmp_path):
+    losses = read(tmp_path, [COPTER, *IMU]).losses
+    assert any("no ATT" in loss and "direction of a hit" in loss for loss in losses)
+    assert any("no CTUN" in loss and "thrust is not known" in loss for loss in losses)
+    assert any("no EV" in loss and "arming" in loss for loss in losses)
+
+
+def test_an_invalid_velocity_is_said(tmp_path):
+    rows = [COPTER, *IMU]
+    for number in range(4):
+        time_us = 1_000_000 + 50_000 * number
+        rows += [("XKF1", time_us, 0, *[0.0] * 9), ("XKF4", time_us, 0, 0xFD if number else 0xFF, 0)]
+    losses = read(tmp_path, rows).losses
+    assert any("horizontal velocity is invalid" in loss and "75 %" in loss for loss in losses)
+    assert not any("vertical velocity" in loss for loss in losses)
