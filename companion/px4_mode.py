@@ -34,6 +34,11 @@ def by_sticks(custom_mode: int) -> bool:
     return custom_mode >> 16 & 0xFF in _BY_VELOCITY
 
 
+def is_by_hand(custom_mode: int) -> bool:
+    """Whether the pilot's sticks fly it, by thrust or by velocities."""
+    return by_hand_alone(custom_mode) or by_sticks(custom_mode)
+
+
 def mode_name(custom_mode: int) -> str:
     """The mode as PX4's own tools print it, for example OFFBOARD or AUTO.LAND."""
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF

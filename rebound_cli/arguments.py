@@ -349,7 +349,7 @@ def add_replay(commands: Commands) -> None:
     _add_set(replay, "change a setting, e.g. companion.fused.side_threshold_m_s2=6")
     _option(replay, "--expect", "exit 1 unless there are exactly so many collisions", "none|N", type=_expected)
     text = "watch whoever flies, in every mode; default: only where `rebound guard` would take over"
-    _option(replay, "--any-mode", text, action="store_true")
+    replay.add_argument("--any-mode", action="store_true", help=text)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
     text = "PX4's own log of a run: write a copy of it with the run's events, hits and setpoints"

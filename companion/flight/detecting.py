@@ -32,10 +32,10 @@ def collisions(
             kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
             text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
             flight.report(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
-            if estimate.impact.kind is ImpactKind.LANDING:
-                flight.note_touchdown()
         elif estimate.impact.kind is ImpactKind.CRASH:
             _report_crash(flight, estimate, collision_monitor.estimator.strapdown, now_us)
+        if estimate.impact.is_ground:
+            flight.note_touchdown()
     # A crash is told where no hit is looked for, too.
     is_watched = situation.off_reason is None
     found = [estimate for estimate in result.impacts if estimate.impact.is_collision and is_watched]

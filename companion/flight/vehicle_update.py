@@ -8,7 +8,7 @@ from companion.flight.envelope import LOSS_PARAMETER, longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
 from companion.messages import Sample
-from companion.px4_mode import mode_name
+from companion.px4_mode import is_by_hand, mode_name
 from companion.reflex.config import HELD_S
 from companion.reflex.detector import Situation
 
@@ -124,4 +124,5 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool) 
         landed_state=flight.vehicle.landed,
         height_m=flight.height_m,
         descent_commanded=goes_down,
+        flown_by_hand=is_by_hand(flight.vehicle.custom_mode or 0),
     )

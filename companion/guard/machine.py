@@ -17,6 +17,7 @@ from companion.guard.watching import GuardConnect, StandBy, Watching
 from companion.messages import Sticks
 from companion.motion.rotation import yaw_rad
 from companion.px4_mode import OFFBOARD, mode_name
+from companion.reflex.detector import ImpactKind
 
 # What is told of a move that has a story.
 _KINDS = {
@@ -68,6 +69,8 @@ class GuardMachine(StateMachine):
         before = self.handler
         self._take(self._from_outside(inputs, now_us), now_us)
         for estimate in inputs.impacts:
+            if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
+                continue  # a wreck is not taken over
             trigger = self._trigger_of_hit()
             if trigger is Trigger.HIT_BESIDE_PROGRAM and self.flight.config.beside_program == "tell":
                 self.flight.left_alone += 1

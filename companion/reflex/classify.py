@@ -59,7 +59,8 @@ class Touch:
         """A vehicle on its way down meets the ground; one that is as low as its feet stands on it or scrapes along."""
         height_m = self.situation.height_m
         is_as_low_as_feet = height_m is not None and height_m < SCRAPING_M
-        return is_as_low_as_feet or (self.situation.descent_commanded and (self.on_ground or self.comes_down))
+        meets_ground = self.on_ground or (self.situation.flown_by_hand and self.comes_down)
+        return is_as_low_as_feet or (self.situation.descent_commanded and meets_ground)
 
     @property
     def is_struck(self) -> bool:
@@ -84,7 +85,8 @@ TABLE = (
     ),
     Row(
         ImpactKind.LANDING,
-        "sent down or flown down by hand, and near the ground, pushed from below or coming down; or as low as the feet",
+        "sent down, near the ground or pushed from below; flown down by hand, moving down more than along; or as low "
+        "as the feet",
         lambda touch: touch.has_landed,
     ),
     Row(

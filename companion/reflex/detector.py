@@ -49,9 +49,9 @@ class Situation(NamedTuple):
 
     `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming. The
     setpoint is the one last sent, local NED. `descent_commanded`: the vehicle goes down because it was told to, or by
-    the hand that flies it, so that touching the ground is no surprise. The monitor fills in the last two: `validity`
-    of the vehicle's velocity, which lacks a part of a hit that was clipped, and `strapdown`. Both have heard the
-    sample already.
+    the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks. The
+    monitor fills in `validity` of the vehicle's velocity, which lacks a part of a hit that was clipped, and
+    `strapdown`. Both have heard the sample already.
     """
 
     off_reason: str | None = None
@@ -62,6 +62,7 @@ class Situation(NamedTuple):
     setpoint_position_ned_m: Vector3 | None = None
     validity: VelocityValidity | None = None
     strapdown: Strapdown | None = None
+    flown_by_hand: bool = False
 
     @property
     def why_off(self) -> str | None:
@@ -98,6 +99,11 @@ class Impact:
     def size_m_s2(self) -> float:
         """Of the contact's force per mass."""
         return math.hypot(*self.specific_force_frd_m_s2)
+
+    @property
+    def is_ground(self) -> bool:
+        """The vehicle lies or stands on it now, or bounces."""
+        return self.kind in (ImpactKind.LANDING, ImpactKind.CRASH)
 
     @property
     def is_collision(self) -> bool:

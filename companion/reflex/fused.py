@@ -143,9 +143,13 @@ class FusedDetector:
         """The impact with its kind where that is unknown."""
         if impact.kind is not ImpactKind.UNKNOWN:
             return impact
-        attitude = LEVEL if situation.strapdown is None else situation.strapdown.valid_wxyz
+        strapdown, free_us = situation.strapdown, impact.contact_free_until_boot_us
+        attitude, fixes = (LEVEL, ()) if strapdown is None else (strapdown.valid_wxyz, strapdown.fixes)
+        # The newest velocity may contain a part of the contact already.
+        before = (fix.velocity_ned_m_s for fix in reversed(fixes) if fix.time_boot_us <= free_us)
+        velocity = next(before, s.velocity_ned_m_s)
         force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
-        return replace(impact, kind=kind_of(force_ned, s.velocity_ned_m_s, attitude, situation))
+        return replace(impact, kind=kind_of(force_ned, velocity, attitude, situation))
 
     def _fire(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
         """Begin the contact."""

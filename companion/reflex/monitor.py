@@ -165,7 +165,9 @@ def _promise(monitor: CollisionMonitor, now_us: int) -> None:
     state = monitor.state
     if isinstance(state, FusedState) and state.phase is Phase.ARMED and now_us - monitor.promised_us >= 1e6:
         fixes, imu_hz = monitor.estimator.strapdown.fixes, len(monitor.stream_health.arrivals_us)
-        monitor.promise, monitor.promised_us = promise_of(state, monitor.config.fused, fixes, imu_hz), now_us
+        counted = MessageId.ODOMETRY in monitor.heard
+        monitor.promise = promise_of(state, monitor.config.fused, fixes, imu_hz, counted)
+        monitor.promised_us = now_us
 
 
 def _vibration(monitor: CollisionMonitor) -> str | None:

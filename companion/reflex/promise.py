@@ -22,7 +22,7 @@ class Promise(NamedTuple):
 
     def text(self) -> str:
         jump = f" or {self.jump_m_s:.2f} m/s" if math.isfinite(self.jump_m_s) else ""
-        return f"{self.force_m_s2:.1f} m/s^2{jump}, {self.false_alarms_per_h:.2g} false alarms an hour"
+        return f"{self.force_m_s2:.1f} m/s^2{jump}, at most {self.false_alarms_per_h:.2g} false alarms an hour"
 
     def summary(self) -> dict[str, float | None]:
         """As summary.json has it."""
@@ -33,7 +33,9 @@ class Promise(NamedTuple):
         }
 
 
-def promise_of(state: FusedState, config: FusedConfig, fixes: Sequence[VelocityFix], imu_hz: float) -> Promise:
+def promise_of(
+    state: FusedState, config: FusedConfig, fixes: Sequence[VelocityFix], imu_hz: float, resets_are_counted: bool
+) -> Promise:
     """From the thresholds and the standard deviations that they are compared with.
 
     Sideways noise exceeds a threshold of r standard deviations with exp(-r^2/2), by Rayleigh; each of the 3 axes of a
@@ -43,7 +45,7 @@ def promise_of(state: FusedState, config: FusedConfig, fixes: Sequence[VelocityF
     per_hour = 3600.0 * imu_hz * per_sample
     if not state.jump.known or len(fixes) < 2:
         return Promise(state.threshold_m_s2, math.inf, per_hour)
-    caution = 1.0  # as if ODOMETRY counted the estimator's resets
+    caution = 1.0 if resets_are_counted else 2.0
     jump_m_s = state.jump.least_m_s(config, fixes[-1].time_boot_us, caution, 0.0, 0.0)
     r = _ratio(jump_m_s, math.sqrt(state.jump.variance_m2_s2))
     per_step = 0.0

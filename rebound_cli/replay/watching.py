@@ -58,7 +58,7 @@ class Circumstances:
 
     def note(self, impacts: Sequence[ImpactEstimate]) -> None:
         """What the detector has reported."""
-        if any(estimate.impact.kind is ImpactKind.LANDING for estimate in impacts):
+        if any(estimate.impact.is_ground for estimate in impacts):
             self._guard.note_touchdown()
 
     @property

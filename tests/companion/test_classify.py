@@ -17,8 +17,8 @@ def tilted(degrees):
     return (math.cos(half), math.sin(half), 0.0, 0.0)
 
 
-def kind(force, velocity=FORWARD, tilt_deg=0.0, height_m=5.0, descends=False):
-    situation = Situation(armed=True, height_m=height_m, descent_commanded=descends)
+def kind(force, velocity=FORWARD, tilt_deg=0.0, height_m=5.0, descends=False, by_hand=False):
+    situation = Situation(armed=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
     return kind_of(force, velocity, tilted(tilt_deg), situation)
 
 
@@ -50,9 +50,10 @@ def test_who_is_sent_down_and_meets_the_ground_upright_and_slow_has_landed(force
 
 def test_ground_above_the_place_of_arming_is_known_by_its_force_from_below():
     assert kind(UP, sinking(0.5), descends=True) is ImpactKind.LANDING
-    # and by a vehicle that comes down rather than along
-    assert kind(BACK, sinking(0.5), descends=True) is ImpactKind.LANDING
-    assert kind(BACK, sinking(0.2), descends=True) is ImpactKind.WALL
+    assert kind(BACK, sinking(0.5), descends=True) is ImpactKind.WALL
+    # A hand that brings it down, rather than along, means the ground, whatever a barometer says of the height
+    assert kind(BACK, sinking(0.5), descends=True, by_hand=True) is ImpactKind.LANDING
+    assert kind(BACK, sinking(0.2), descends=True, by_hand=True) is ImpactKind.WALL
 
 
 def test_as_low_as_its_feet_a_vehicle_stands_or_scrapes():

@@ -32,8 +32,8 @@ def test_a_lockstep_flight_is_decided_again_to_the_bit(flown, tmp_path, capsys):
     assert code == 0
     assert "identical: every decision of the flight came again to the bit" in text
     assert "1 collision" in text
-    # With its picture and its page, and with the flight's own times
-    picture, page = sorted(tmp_path.iterdir())
+    # With its picture and its page, and with the flight's own times; the touchdown is shown, too
+    picture, _, page = sorted(tmp_path.iterdir())
     assert page.name == "report.html" and f"page: {page}" in text
     assert picture.name == "impact-1.png" and picture.stat().st_size > 20_000
     (hit,) = json.loads((flown / "summary.json").read_text())["collisions"]
@@ -44,7 +44,8 @@ def test_a_program_reads_the_same_and_an_expectation_that_fails_is_exit_code_1(f
     code, text, error = replay(capsys, flown, "--json", "--expect", "none", "--out", tmp_path)
     found = json.loads(text)
     (hit,) = json.loads((flown / "summary.json").read_text())["collisions"]
-    (impact,) = found["impacts"]
+    impact, touchdown = found["impacts"]
+    assert touchdown["kind"] == "landing" and not touchdown["is_collision"]
     assert found["reproduction"]["identical"]
     assert impact["at_s"] == hit["detected_at_s"]
     assert impact["impact_velocity_m_s"] == hit["impact_velocity_ned_m_s"]
