@@ -187,7 +187,7 @@ def test_what_shakes_a_landing_is_the_ground():
 
 
 def test_a_fall_to_the_ground_is_told_as_a_crash():
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 5}}, {"land": {}}])
+    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
     f.run_to("mission")
     f.run_for(1.0)
     f.vehicle.position[2] = -0.5
