@@ -202,7 +202,7 @@ def _add_ablation(commands: Commands) -> None:
 
 
 def _add_flights(commands: Commands) -> None:
-    text = "Every log of some folders through the detector: hours watched, what was told, the rate of false alarms."
+    text = "Every log of some folders through the detector: hours watched, events, the rate of false alarms."
     flights = commands.add_parser("flights", help="a corpus of recorded flights", description=text)
     flights.add_argument("folders", metavar="FOLDER", nargs="+", type=Path, help="searched for .ulg, .bin, .log, .tlog")
     text = "what happened when, as YAML: log, seconds, class (default: those of the public logs that were looked at)"
@@ -252,9 +252,8 @@ def _add_hits(commands: Commands) -> None:
 def _add_hand(commands: Commands) -> None:
     hand = commands.add_parser(
         "hand",
-        help="fly drawn vehicles hard by hand, with nothing to run into, and count what is reported",
-        description="Full deflections, reversals and 30 to 45 degrees of tilt, in gusts, in the modes of the sticks; "
-        "one minute a flight. 0 impacts may be reported.",
+        help="fly drawn vehicles hard by hand, and count what is reported",
+        description="Full deflections, reversals, 30 to 45 degrees of tilt, gusts; one minute a flight.",
     )
     hand.add_argument("--flights", type=count, default=300, metavar="N", help="at each IMU rate (default 300)")
     text = "sticks of the real logs in it in every second flight"

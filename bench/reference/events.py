@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bench.reference.markdown import code, table
 from companion.guard.machine import _KINDS
+from companion.reflex.classify import TABLE
 
 ROOT = Path(__file__).parents[2]
 # What is told under a kind that stands in no call.
@@ -75,7 +76,9 @@ def events_page() -> str:
     text += "for people and `data`\nfor programs. `CollisionGuard.watch_events()` gives the same.\n\n"
     told = data_keys()
     rows = [(code(kind), meaning, ", ".join(map(code, told.get(kind, ())))) for kind, meaning in MEANINGS.items()]
-    return text + table(("kind", "meaning", "data"), rows)
+    kinds = [(row.kind.value, row.criterion) for row in TABLE]
+    text += table(("kind", "meaning", "data"), rows) + "\n\n## Kinds of impact\n\nThe first row that holds counts.\n\n"
+    return text + table(("kind", "criterion"), kinds)
 
 
 def data_keys() -> dict[str, list[str]]:

@@ -24,8 +24,8 @@ FLIGHT = {
     "refused_messages": "Messages with an impossible value, counted by name.",
     "refused_packets": "With `--signing-key`: refused packets, counted by reason.",
     "unconfirmed": "Detections that were not confirmed. They are no `collisions`.",
-    "promise": "What the detector promised by this vehicle's own noise: the smallest hit that it sees, as a force in "
-    "one sample and as a velocity jump, and its false alarms an hour by Gaussian noise; null if it was never armed.",
+    "promise": "By this vehicle's noise: the smallest visible hit, as a force and as a velocity jump, and false alarms "
+    "an hour; null if never armed.",
     "false_detections": "Detections that no contact explains; null on a real vehicle.",
     "missed_contacts": "Contacts that were not detected; null on a real vehicle.",
     "recontacts": "Contacts before the last collision was recovered from; null on a real vehicle.",

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.cases.hand_pilot import Pilot, wishes
 from bench.cases.mishaps import FAMILIES
-from bench.cases.stick_logs import LoggedSticks, logs_with_sticks
 from bench.cases.vehicles import AIRFRAMES, vehicle_of
-from bench.fly.watched import (
+from bench.fly.by_hand.hand_pilot import Pilot, wishes
+from bench.fly.by_hand.stick_logs import LoggedSticks, logs_with_sticks
+from bench.fly.by_hand.watched import (
     IMU_HZ,
     STICKS_S,
     GuardedFlight,
@@ -26,10 +26,10 @@ from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 
-HAND_MODES = ("POSCTL", "ALTCTL", "STABILIZED", "ACRO")
+HAND_MODES = ("POSCTL", "ALTCTL", "STABILIZED")
 AIR = ("calm", "gusts", "turbulence", "vibration")
 # Limits as a pilot of a racer sets them. PX4's own: 35 deg, 3 m/s^2, 8 m/s^3, 100 deg/s.
-TILT_DEG, ACRO_DEG_S, JERK_M_S3, ACCELERATION_M_S2 = (30.0, 45.0), (200.0, 720.0), (30.0, 200.0), (6.0, 12.0)
+TILT_DEG, JERK_M_S3, ACCELERATION_M_S2 = (30.0, 45.0), (30.0, 200.0), (6.0, 12.0)
 SPEED_M_S, CLIMB_M_S, SINK_M_S, YAW_DEG_S = (5.0, 12.0), (2.0, 5.0), (1.5, 4.0), (90.0, 200.0)
 # Half of the vehicles know where they are by a filter, the others with errors that are drawn.
 FILTER_SHARE = 0.5
@@ -71,7 +71,7 @@ def fly_by_hand(case: HandCase) -> Row:
     scene = Scene.model_validate({"faults": FAMILIES[air](rng).faults})
     vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
     settings = {**built.settings, "streams": {"highres_imu_hz": float(case.imu_hz)}}
-    config = {"modes": (*DEFAULT_MODES, "STABILIZED", "ACRO"), "companion": settings}
+    config = {"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings}
     guard = Guard(GuardConfig.model_validate(config))
     flight = GuardedFlight(vehicle, guard)
     tilts = Pilot(flight, airframe, parameters, wishes(case.logged, rng), case.mode, guard).fly()
@@ -97,7 +97,6 @@ def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[
     tilt_deg = min(float(rng.uniform(*TILT_DEG)), steepest_deg)
     climb, sink = float(rng.uniform(*CLIMB_M_S)), float(rng.uniform(*SINK_M_S))
     control = {"tilt_max_rad": math.radians(tilt_deg), "climb_max_m_s": climb, "descent_max_m_s": sink}
-    acro_deg_s = float(rng.uniform(*ACRO_DEG_S))
     parameters = {
         "MPC_MAN_TILT_MAX": tilt_deg,
         "MPC_MAN_Y_MAX": float(rng.uniform(*YAW_DEG_S)),
@@ -106,11 +105,6 @@ def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[
         "MPC_JERK_MAX": float(rng.uniform(*JERK_M_S3)),
         "MPC_ACC_UP_MAX": 10.0,
         "MPC_ACC_DOWN_MAX": 10.0,
-        "MC_ACRO_R_MAX": acro_deg_s,
-        "MC_ACRO_P_MAX": acro_deg_s,
-        "MC_ACRO_Y_MAX": float(rng.uniform(*YAW_DEG_S)),
-        # A full deflection is none of the gestures that arm and disarm.
-        "MAN_ARM_GESTURE": 0,
     }
     update = {"control": airframe.control.model_copy(update=control)}
     return airframe.model_copy(update=update | (by_filter(airframe) if rng.random() < FILTER_SHARE else {})), parameters

@@ -4,8 +4,8 @@ from argparse import Namespace
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from bench.cases.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
-from bench.fly.watched import IMU_HZ, Row, rows_of
+from bench.fly.by_hand.watched import IMU_HZ, Row, rows_of
+from bench.fly.by_hand.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
 
 CRASH, NO_COLLISION = "crash", ("landing", "contact")
 # A crash is reported within this time of its greatest deceleration.

@@ -80,13 +80,12 @@ class Row:
 TABLE = (
     Row(
         ImpactKind.CRASH,
-        "near the ground or pushed from below, and tilted by more than 45 degrees or sinking faster than a landing may",
+        "near the ground or pushed from below; tilted by more than 45 degrees, or sinking faster than 3.1 m/s",
         lambda touch: touch.on_ground and not (touch.is_upright and touch.is_slow),
     ),
     Row(
         ImpactKind.LANDING,
-        "sent down, near the ground or pushed from below; flown down by hand, moving down more than along; or as low "
-        "as the feet",
+        "sent down, near the ground or pushed from below; flown down by hand; as low as the feet",
         lambda touch: touch.has_landed,
     ),
     Row(

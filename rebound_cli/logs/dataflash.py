@@ -148,7 +148,8 @@ def read_dataflash(path: Path) -> Log:
     except LogError:
         raise
     except Exception as error:  # damaged files make it raise whatever the bytes led to
-        raise LogError(f"{path}: not a readable ArduPilot log: {error or type(error).__name__}.") from error
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise LogError(f"{path}: not a readable ArduPilot log: {text}.") from error
     vehicle = _vehicle(path, texts, parameters)
     imu = topics["IMU"]
     if not imu.rate_hz():

@@ -124,7 +124,7 @@ def _verdict(replay: Replay) -> str:
     collisions, contacts = len(replay.findings.collisions), len(replay.findings.contacts)
     crashes = len(replay.findings.crashes)
     text = f"{collisions or 'no'} collision{'' if collisions == 1 else 's'}"
-    text += f", {crashes} crash{'' if crashes == 1 else 'es'}" if crashes else ""
+    text += f", {crashes} of them {'a crash' if crashes == 1 else 'crashes'}" if crashes else ""
     text += f", {contacts} contact{' that is' if contacts == 1 else 's that are'} none" if contacts else ""
     share = replay.findings.watched_share
     if share is None:

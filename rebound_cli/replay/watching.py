@@ -133,11 +133,12 @@ class Findings:
 
     @property
     def collisions(self) -> list[Finding]:
-        """Hits in flight, false ones among them."""
-        return [finding for finding in self.impacts if finding.is_collision and not finding.is_crash]
+        """Hits, crashes among them."""
+        return [finding for finding in self.impacts if finding.is_collision]
 
     @property
     def crashes(self) -> list[Finding]:
+        """Those that end on the ground."""
         return [finding for finding in self.impacts if finding.is_crash]
 
     @property

@@ -19,7 +19,7 @@ def sentence(flight: ShownFlight) -> str:
     """Hit what, how fast, when, and how it ended."""
     hits = flight.hits
     if not hits:
-        touched = len(flight.findings.contacts)
+        touched = sum(not finding.first.impact.is_ground for finding in flight.findings.contacts)
         touches = "a touch that is none" if touched == 1 else f"{touched} touches that are none"
         told = f"No hit, {touches}" if touched else "No hit"
     else:

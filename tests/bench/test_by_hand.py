@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from bench.cases.hand_pilot import wishes
-from bench.cases.stick_logs import LoggedSticks, StickLogError, logs_with_sticks, moved
-from bench.fly.watched import STICKS_S, at_most_an_hour
+from bench.fly.by_hand.hand_pilot import wishes
+from bench.fly.by_hand.stick_logs import LoggedSticks, StickLogError, logs_with_sticks, moved
+from bench.fly.by_hand.watched import STICKS_S, at_most_an_hour
 from bench.studies.hand import HandCase, agile, fly_by_hand, table
 from sim_vehicle.airframe import load_built_in
 
@@ -98,7 +98,7 @@ def test_the_bound_of_nothing_in_an_hour_is_the_rule_of_three():
 def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():
     # Given an hour at each rate, with one report in the air at 50 Hz and one after a touch at 100 Hz
     def row(imu_hz, reported):
-        vehicle = {"imu_hz": imu_hz, "mode": "ACRO", "sticks": "drawn", "seed": 1, "air": "calm"}
+        vehicle = {"imu_hz": imu_hz, "mode": "STABILIZED", "sticks": "drawn", "seed": 1, "air": "calm"}
         return {**vehicle, "watched_s": 3600.0, "tilt_deg": [20.0, 35.0, 50.0], "touched": False, "reported": reported}
 
     in_the_air, after = {"kind": "wall", "since_touch_s": None}, {"kind": "floor", "since_touch_s": 0.1}
@@ -110,10 +110,10 @@ def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["POSCTL", "ALTCTL", "STABILIZED", "ACRO"])
+@pytest.mark.parametrize("mode", ["POSCTL", "ALTCTL", "STABILIZED"])
 def test_a_flight_by_hand_is_vigorous_and_is_watched_in_every_mode(mode, monkeypatch):
     # Given ten seconds in place of a minute
-    monkeypatch.setattr("bench.cases.hand_pilot.FLOWN_S", 10.0)
+    monkeypatch.setattr("bench.fly.by_hand.hand_pilot.FLOWN_S", 10.0)
     # When a drawn vehicle is flown by drawn sticks
     row = fly_by_hand(HandCase(7, 250, mode))
     # Then it leant by 20 degrees and more, met nothing, and was watched all the time

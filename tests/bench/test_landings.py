@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from bench.cases.ways_down import FALLS, FALLS_FROM_M, GROUNDS, LANDINGS, GroundCase
-from bench.fly.watched import IMU_HZ
+from bench.fly.by_hand.watched import IMU_HZ
+from bench.fly.by_hand.ways_down import FALLS, FALLS_FROM_M, GROUNDS, LANDINGS, GroundCase
 from bench.studies.landings import draw_case, fly_to_the_ground, judged, table
 
 TOUCHED_S = 5.0

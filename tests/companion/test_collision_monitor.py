@@ -182,3 +182,28 @@ def test_samples_that_are_the_same_to_the_last_bit_are_none_only_of_a_vehicle_th
         samples: list[Sample] = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)), Attitude(t, (1.0, roll, 0.0, 0.0))]
         notices += advance(monitor, samples, WANTED, t).notices
     assert [notice.text for notice in notices] == (["detector blind: IMU stuck at one value"] if turns else [])
+
+
+def test_under_vibration_that_hides_all_but_crashes_the_detector_is_silent_and_says_so():
+    # Given a vehicle that begins to shake so much that the threshold passes the largest one
+    def shaking(t):
+        return 20.0 * (-1.0) ** (t // INTERVAL_US) if t > 2_000_000 else 0.0
+
+    config = CompanionConfig()
+    monitor = start_monitor(config, 0)
+    fly(monitor, 2_000_000)
+    fly(monitor, 4_000_000, shaking, start_us=2_000_000)
+    assert monitor.state.threshold_m_s2 > config.sight.max_threshold_m_s2
+    # When it is struck harder than that
+    impacts, _, _ = fly(monitor, 4_100_000, lambda t: shaking(t) - 200.0, start_us=4_000_000)
+    # Then nothing is reported but why
+    assert impacts == [] and "vibration hides hits" in monitor.no_data_reason
+    # But a crash is: the same on a vehicle that falls
+    low = Situation(armed=True, height_m=0.2)
+    monitor.detector.step(monitor.state, LocalPosition(4_100_000, (0.0, 0.0, -0.2), (0.0, 0.0, 5.0)), low)
+    state, impact = monitor.detector.step(
+        monitor.state,
+        ImuSample(4_104_000, (-2000.0, 0.0, -9.81), (0.0, 0.0, 0.0)),
+        low._replace(off_reason="vibration"),
+    )
+    assert state.phase is Phase.OFF and impact is not None and impact.kind.value == "crash"

@@ -9,7 +9,7 @@ from rebound_cli.documents import load_document
 from rebound_cli.inputs import mission_from, world_from
 from tests.simulated import MISSIONS
 
-DOCUMENT = MISSIONS.parent / "docs" / "reference" / "missions.md"
+DOCUMENT = MISSIONS.parent / "docs" / "reference" / "mission.md"
 NAMES = tuple(sorted(path.stem for path in MISSIONS.glob("*.yaml")))
 # Nothing in them that a real vehicle could not find: they fly on one as they are.
 WITHOUT_OBSTACLES = ("orbit", "path", "square")
@@ -24,10 +24,9 @@ def load(name):
     return mission_from(document, world), world
 
 
-def test_the_document_lists_all_and_says_which_a_real_vehicle_can_fly():
-    rows = re.findall(r"^\| `(\w+)\.yaml` \|.*\| (.*) \|$", DOCUMENT.read_text(), flags=re.MULTILINE)
-    assert sorted(name for name, _ in rows) == list(NAMES)
-    assert sorted(name for name, obstacles in rows if obstacles == "none") == list(WITHOUT_OBSTACLES)
+def test_the_document_lists_all():
+    listed = DOCUMENT.read_text().split("## Missions that ship")[1]
+    assert sorted(re.findall(r"^\| `(\w+)` \|", listed, flags=re.MULTILINE)) == list(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -84,7 +84,7 @@ def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(topics
     assert schemas["/scene"] == "foxglove.SceneUpdate" and schemas["/log"] == "foxglove.Log"
     assert len(topics["/imu"]) == len(log.imu())
     assert [data["text"] for _, _, data in topics["/event"]] == [event["text"] for event in shown.events]
-    assert [data["kind"] for _, _, data in topics["/hit"]] == ["wall"]
+    assert [data["kind"] for _, _, data in topics["/hit"]] == ["wall", "landing"]
     # At the companion's own times, in nanoseconds
     assert [at_ns for _, at_ns, _ in topics["/imu"]] == [at_us * 1000 for at_us, _ in log.imu()]
     # and the truth as often as the vehicle says where it is, by the same clock
@@ -162,7 +162,7 @@ def test_the_latest_message_of_a_topic_draws_all_of_it(flight):
     cart = {"size_m": [1, 2, 3], "motion": {"velocity_ned_m_s": [0, 0.2, 0], "from_s": 5, "until_s": 15}}
     carts = [{**cart, "centre_ned_m": [2, e, -1], "name": f"cart {e}"} for e in (1, 3)]
     scene = Scene.model_validate({"walls": walls, "boxes": carts})
-    (hit,) = shown.findings.impacts
+    (hit,) = shown.findings.collisions
     findings = Findings([hit, replace(hit, at_us=hit.at_us + 1_000_000)])
     told = next(event for event in shown.events if event["kind"] == "obstacle")
     events = [*shown.events, {**told, "time_us": told["time_us"] + 1_000_000}]
@@ -207,8 +207,9 @@ def test_a_ulog_is_read_back_by_pyulog_and_searched_as_px4s_own(exported, flight
     assert all(f"[rebound] {event['text']}" in said for event in shown.events)
     hit = written.get_dataset("rebound_hit").data
     (finding,) = shown.hits
-    assert hit["timestamp"].tolist() == [finding.first.impact.sample_time_boot_us]
-    assert hit["is_collision"][0] == 1
+    # The touchdown is in it, too
+    assert hit["timestamp"][0] == finding.first.impact.sample_time_boot_us
+    assert hit["is_collision"].tolist() == [1, 0]
     assert hit["impact_velocity_m_s[0]"][0] == pytest.approx(finding.first.velocity_ned_m_s[0], abs=1e-4)
     # Every IMU sample again, at its own stamp
     again = [sample for _, sample in read_log(exported / "wall.ulg").imu()]
@@ -346,7 +347,7 @@ def test_a_runs_events_are_put_into_px4s_own_log_by_its_clock(wall_flight, fligh
     assert found.get_dataset("rebound_hit").data["timestamp"][0] == hit["data"]["sample_time_boot_us"]
     # A second run's go in beside the first one's
     again = merged(flight, tmp_path, path.read_bytes())
-    assert len(ULog(str(again)).get_dataset("rebound_hit", 1).data["timestamp"]) == 1
+    assert len(ULog(str(again)).get_dataset("rebound_hit", 1).data["timestamp"]) == 2
 
 
 def test_a_log_that_power_ended_takes_them_before_its_cut(flight, tmp_path):

@@ -51,6 +51,6 @@ def test_a_flight_with_a_hit_and_one_without(drawn, tmp_path, changes, parts):
 def test_a_hit_of_a_log(drawn, wall_flight, tmp_path):
     folder, _ = wall_flight
     assert run_here("replay", folder, "--out", tmp_path).returncode == 0
-    (figure,) = drawn
-    assert len(figure.axes) == 3
-    assert_legible(figure)
+    hit, touchdown = drawn
+    assert len(hit.axes) == len(touchdown.axes) == 3
+    assert_legible(hit)

@@ -142,8 +142,10 @@ def test_without_an_estimator_the_way_is_the_satellites(tmp_path):
     rows += [("GPS", 1, 5, 1800, 45.0, 7.0, 9.0, 0.0, 1050), ("GPS", 3, 6, 1800, 45.0, 7.0, 2.0, 90.0, 1100)]
     rows += [("GPS", 3, 7, 1800, 45.0001, 7.0, 2.0, 90.0, 1200), ("CTUN", 1200, 500, 0.0, 7.5, 0, 50)]
     log = read(tmp_path, rows, OLD)
-    before, after = of(log, LocalPosition)
+    # Then it rests until the first fix, and from there on each fix is a position
+    before, first, after = of(log, LocalPosition)
     assert before == LocalPosition(1_000_000, (0.0, 0.0, -7.0), (0.0, 0.0, -0.5))
+    assert first.position_ned_m == pytest.approx((0.0, 0.0, -7.0), abs=0.01)
     assert after.velocity_ned_m_s == pytest.approx((0.0, 2.0, -0.5), abs=1e-6)
     assert after.position_ned_m == pytest.approx((11.12, 0.0, -7.5), abs=0.01)
     assert any("no GPS fix" in loss for loss in log.losses)

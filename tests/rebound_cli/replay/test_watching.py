@@ -6,7 +6,7 @@ import pytest
 
 from companion.messages import ExtendedState, LandedState, LocalPosition
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import Situation
+from companion.reflex.detector import ImpactKind, Situation
 from rebound_cli.logs.log import Demand, LoggedSample
 from rebound_cli.logs.shaking import Stage, shaking
 from rebound_cli.replay.watching import Circumstances, thinned, watch_log
@@ -105,3 +105,39 @@ def test_noise_is_told_for_each_stage_of_a_flight():
     assert set(noise) == {Stage.GROUND, Stage.TAKEOFF, Stage.UNDER_WAY}
     for values in noise.values():
         assert values == pytest.approx([0.3, 0.3, 0.3], rel=0.15)
+
+
+def test_a_touchdown_begins_the_next_take_off():
+    # Given a vehicle that lands by hand on a hill, 3 m above the place of arming
+    circumstances = Circumstances(CompanionConfig())
+    air, stabilized = ExtendedState(LandedState.IN_AIR), 7 << 16
+    for sample in (beat(False), position(0, 0.0), beat(True, stabilized), air, position(1, 3.0)):
+        circumstances.hear((sample,), 0)
+    assert circumstances.situation.off_reason is None and circumstances.situation.height_m == pytest.approx(3.0)
+    # When it touches the ground
+    (finding,) = watch_log(flight(), LATERAL).impacts
+    touch = replace(finding.first, impact=replace(finding.first.impact, kind=ImpactKind.LANDING))
+    circumstances.note([touch])
+    circumstances.hear((position(2, 3.1),), 1)
+    # Then heights count from there, and what shakes it until it has climbed again is no hit
+    assert circumstances.situation.height_m == pytest.approx(0.1)
+    assert circumstances.situation.off_reason == "below 0.5 m"
+    circumstances.hear((position(3, 3.7),), 2)
+    assert circumstances.situation.off_reason is None
+
+
+@pytest.mark.parametrize(
+    ("modes", "failsafe", "reason"),
+    [
+        (("POSCTL",), 0, "STABILIZED is not among the modes that may be taken over"),
+        (("STABILIZED",), 5, "a failsafe flies"),
+        (("STABILIZED",), 4, None),
+        (None, 5, None),
+    ],
+)
+def test_a_replay_watches_where_the_guard_would(modes, failsafe, reason):
+    circumstances = Circumstances(CompanionConfig(), modes)
+    flies = replace(beat(True, 7 << 16), system_status=failsafe)
+    for sample in (beat(False), position(0, 0.0), flies, ExtendedState(LandedState.IN_AIR), position(1, 3.0)):
+        circumstances.hear((sample,), 0)
+    assert circumstances.situation.off_reason == reason

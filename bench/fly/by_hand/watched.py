@@ -26,7 +26,7 @@ Case = TypeVar("Case")
 
 IMU_HZ = (50, 100, 250)
 # Of PX4's modes, as DO_SET_MODE takes them: main and sub mode.
-MODES = {"ALTCTL": (2, 0), "POSCTL": (3, 0), "AUTO.RTL": (4, 5), "AUTO.LAND": (4, 6), "ACRO": (5, 0)}
+MODES = {"ALTCTL": (2, 0), "POSCTL": (3, 0), "AUTO.RTL": (4, 5), "AUTO.LAND": (4, 6)}
 MODES |= {"STABILIZED": (7, 0)}
 CONFIDENCE = 0.95
 GRAVITY_M_S2 = 9.81

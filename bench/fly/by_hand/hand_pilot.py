@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.cases.stick_logs import Floats, LoggedSticks
-from bench.fly.watched import STICKS_S, GuardedFlight, Sticks, limited
+from bench.fly.by_hand.stick_logs import Floats, LoggedSticks
+from bench.fly.by_hand.watched import STICKS_S, GuardedFlight, Sticks
 from companion.guard.guard import Guard
 from companion.guard.states import State
 from sim_vehicle.airframe import Airframe
@@ -20,7 +20,7 @@ STROKE_S, HAND_MEMORY_S, HAND_SHAKE = (0.15, 1.5), 0.3, 0.12
 STROKES, STROKE_SHARES = ("full", "part", "reversed", "released"), (0.35, 0.25, 0.25, 0.15)
 MINUTES_LOOKED_AT = 5
 # How a pilot holds the tilt by rates, and the climb by the throttle.
-ANGLE_P_PER_S, CLIMB_P_PER_S = 7.0, 2.0
+CLIMB_P_PER_S = 2.0
 
 
 class Pilot:
@@ -38,10 +38,8 @@ class Pilot:
         self._flight, self._wished, self._mode, self._guard = flight, wished, mode, guard
         self._body = flight.vehicle.state.body
         self._hover, self._climb_m_s = airframe.hover_fraction, airframe.control.climb_max_m_s
-        self._tilt_rad = math.radians(parameters["MPC_MAN_TILT_MAX"])
-        self._acro_rad_s = math.radians(parameters["MC_ACRO_R_MAX"])
         self._speed_m_s = parameters["MPC_VEL_MANUAL"]
-        self._chosen = "STABILIZED" if mode == "ACRO" else mode
+        self._chosen = mode
         self._next = self._idle
         self._ask_mode_s, self._arm_s, self._end_s = 0.0, ARM_FROM_S, BEGIN_WITHIN_S
         self._tilts_deg: list[float] = []
@@ -99,26 +97,16 @@ class Pilot:
         return self._in_mode(Sticks(roll, pitch, throttle, wish.yaw))
 
     def _in_mode(self, wish: Sticks) -> Sticks:
-        if self._flight.mode not in ("STABILIZED", "ACRO"):
+        if self._flight.mode != "STABILIZED":
             return wish
         climbs_m_s = -self._flight.velocity_ned_m_s[2]
         asked_m_s2 = CLIMB_P_PER_S * (wish.throttle * self._climb_m_s - climbs_m_s)
         upright = max(math.cos(math.radians(self._flight.tilt_deg)), 0.5)
         thrust = self._hover / upright * max(1.0 + asked_m_s2 / 9.81, 0.1)
-        if self._flight.mode == "ACRO":
-            roll_rad, pitch_rad = self._leans()
-            roll = ANGLE_P_PER_S * (wish.roll * self._tilt_rad - roll_rad) / self._acro_rad_s
-            pitch = ANGLE_P_PER_S * (wish.pitch * self._tilt_rad + pitch_rad) / self._acro_rad_s
-            return Sticks(roll, pitch, 2.0 * thrust - 1.0, wish.yaw)
         # MPC_THR_CURVE has hovering in the middle.
         above = thrust - self._hover
         throttle = above / (1.0 - self._hover) if above > 0.0 else above / self._hover
         return Sticks(wish.roll, wish.pitch, throttle, wish.yaw)
-
-    def _leans(self) -> tuple[float, float]:
-        w, x, y, z = self._body[6:10].tolist()
-        roll_rad = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        return roll_rad, math.asin(limited(2.0 * (w * y - z * x)))
 
     def _in_heading(self, north: float, east: float) -> tuple[float, float]:
         w, x, y, z = self._body[6:10].tolist()

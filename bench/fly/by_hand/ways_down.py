@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
-from bench.fly.watched import GRAVITY_M_S2, GuardedFlight, Sticks
+from bench.fly.by_hand.watched import GRAVITY_M_S2, GuardedFlight, Sticks
 from companion.companion import Companion
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard

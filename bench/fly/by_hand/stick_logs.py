@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.fly.watched import STICKS_S
+from bench.fly.by_hand.watched import STICKS_S
 from companion.errors import ReboundError
 from companion.messages import Sticks as StickSample
 from rebound_cli.logs.log import LogError
