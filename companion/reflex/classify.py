@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.messages import Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S
-from companion.motion.rotation import tilt_rad
-from companion.motion.strapdown import ZERO
+from companion.motion.rotation import body_to_ned, tilt_rad
+from companion.motion.strapdown import LEVEL, ZERO
 from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
-from companion.reflex.detector import ImpactKind, Situation
+from companion.reflex.detector import Impact, ImpactKind, Situation
 
 # The speed of a fall from half of the height in which the ground may be: 3.1 m/s. PX4 lands at up to 1.5 m/s
 # (MPC_Z_V_AUTO_DN) and ArduPilot, too (WPNAV_SPEED_DN).
@@ -118,3 +118,15 @@ def kind_of(
     size = math.hypot(*force_ned)
     touch = Touch(-force_ned[2] / size if size > 0.0 else 0.0, velocity_ned_m_s, attitude_wxyz, situation)
     return next(row.kind for row in TABLE if row.applies(touch))
+
+
+def classified(impact: Impact, velocity_ned_m_s: Vector3 | None, situation: Situation) -> Impact:
+    """The impact with its kind where that is unknown. `velocity_ned_m_s` is the newest."""
+    if impact.kind is not ImpactKind.UNKNOWN:
+        return impact
+    strapdown, free_us = situation.strapdown, impact.contact_free_until_boot_us
+    attitude, fixes = (LEVEL, ()) if strapdown is None else (strapdown.valid_wxyz, strapdown.fixes)
+    # The newest velocity may contain a part of the contact already.
+    before = (fix.velocity_ned_m_s for fix in reversed(fixes) if fix.time_boot_us <= free_us)
+    force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
+    return replace(impact, kind=kind_of(force_ned, next(before, velocity_ned_m_s), attitude, situation))

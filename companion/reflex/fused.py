@@ -20,9 +20,8 @@ from typing import ClassVar
 
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.config import LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
-from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import LEVEL
-from companion.reflex.classify import hovers, kind_of
+from companion.motion.rotation import ned_to_body
+from companion.reflex.classify import classified, hovers
 from companion.reflex.config import LEARNT_S, SETTLED_US, WORSE_AFTER_US, FusedConfig
 from companion.reflex.detector import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.reflex.force_signs import FusedState
@@ -104,7 +103,7 @@ class FusedDetector:
         since_us = impact.sample_time_boot_us - s.contact_began_boot_us
         if not situation.may_crash or since_us <= 1e6 * self._config.longest_contact_s:
             return None
-        if (impact := self._classified(s, situation, impact)).kind is not ImpactKind.CRASH:
+        if (impact := classified(impact, s.velocity_ned_m_s, situation)).kind is not ImpactKind.CRASH:
             return None
         s.contact_began_boot_us, s.peak_specific_force_m_s2 = impact.sample_time_boot_us, impact.size_m_s2
         return impact
@@ -127,7 +126,10 @@ class FusedDetector:
                 if is_another and size > 2.0 * s.peak_specific_force_m_s2:
                     return self._fire(s, situation, impact)
                 # A touch that tips the vehicle over becomes a crash.
-                if s.kind is not ImpactKind.CRASH and self._classified(s, situation, impact).kind is ImpactKind.CRASH:
+                if (
+                    s.kind is not ImpactKind.CRASH
+                    and classified(impact, s.velocity_ned_m_s, situation).kind is ImpactKind.CRASH
+                ):
                     return self._fire(s, situation, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
@@ -139,21 +141,9 @@ class FusedDetector:
             impact = replace(impact, kind=ImpactKind.CONTACT)
         return self._fire(s, situation, impact)
 
-    def _classified(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
-        """The impact with its kind where that is unknown."""
-        if impact.kind is not ImpactKind.UNKNOWN:
-            return impact
-        strapdown, free_us = situation.strapdown, impact.contact_free_until_boot_us
-        attitude, fixes = (LEVEL, ()) if strapdown is None else (strapdown.valid_wxyz, strapdown.fixes)
-        # The newest velocity may contain a part of the contact already.
-        before = (fix.velocity_ned_m_s for fix in reversed(fixes) if fix.time_boot_us <= free_us)
-        velocity = next(before, s.velocity_ned_m_s)
-        force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
-        return replace(impact, kind=kind_of(force_ned, velocity, attitude, situation))
-
     def _fire(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
         """Begin the contact."""
-        impact = self._classified(s, situation, impact)
+        impact = classified(impact, s.velocity_ned_m_s, situation)
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
         s.peak_specific_force_m_s2 = impact.size_m_s2

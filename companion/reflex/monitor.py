@@ -12,8 +12,9 @@ from pydantic import field_validator
 
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample
 from companion.motion.config import KEPT_US
+from companion.reflex.classify import classified
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
-from companion.reflex.detector import Detector, DetectorState, Phase, Situation
+from companion.reflex.detector import Detector, DetectorState, Impact, ImpactKind, Phase, Situation
 from companion.reflex.force_signs import FusedState
 from companion.reflex.fused import FusedDetector
 from companion.reflex.impact import ImpactEstimate, ImpactEstimator
@@ -150,7 +151,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             monitor.estimator.strapdown.fixes.clear()
         monitor.state, impact = monitor.detector.step(monitor.state, sample, situation)
         if impact is not None:
-            impacts.append(monitor.estimator.begin(impact))
+            impacts.append(monitor.estimator.begin(_on_ground(impact, situation)))
         elif type(sample) is ImuSample:
             final = monitor.estimator.follow(sample, monitor.state)
             if final is not None:
@@ -158,6 +159,12 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
     _promise(monitor, now_us)
     return MonitorResult(impacts, finished, _notices(monitor, is_on, now_us))
+
+
+def _on_ground(impact: Impact, situation: Situation) -> Impact:
+    """A landing of a detector that does not classify: the ground is no hit."""
+    named = classified(impact, None, situation)
+    return named if named.kind is ImpactKind.LANDING else impact
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:

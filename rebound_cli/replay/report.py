@@ -94,10 +94,10 @@ def report_text(replay: Replay, pictures: Sequence[str]) -> str:
     headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
     told: list[tuple[int, list[str]]] = [(h.at_us, [h.text]) for h in replay.findings.happenings]
     told += [(at_us, [f"the vehicle's own log: {text}"]) for at_us, text in log.marks]
-    # Each interval in which a guard would have left a hit to whoever flies.
-    told += [
-        (span.start_us, [f"not watched for {span.duration_s:.2f} s: {span.reason}"]) for span in replay.findings.off
-    ]
+    if replay.reproduction is None:
+        # Each interval in which a guard would have left a hit to whoever flies.
+        spans = replay.findings.off
+        told += [(s.start_us, [f"not watched for {s.duration_s:.2f} s: {s.reason}"]) for s in spans]
     for finding, picture in zip(replay.findings.impacts, pictures, strict=True):
         told.append((finding.at_us, [*_finding_rows(replay, finding), f"picture: {picture}"]))
     timeline = [_entry(log.seconds(at_us), texts) for at_us, texts in sorted(told, key=lambda row: row[0])]
@@ -121,11 +121,14 @@ def _wrapped(text: str, lead: str, hanging: str) -> str:
 
 def _verdict(replay: Replay) -> str:
     """One line: how many collisions and crashes, how many touches that are none, and how much was watched."""
-    collisions, contacts = len(replay.findings.collisions), len(replay.findings.contacts)
+    collisions, contacts = len(replay.findings.collisions), replay.findings.contacts
+    touchdowns = sum(contact.first.impact.is_ground for contact in contacts)
+    others = len(contacts) - touchdowns
     crashes = len(replay.findings.crashes)
     text = f"{collisions or 'no'} collision{'' if collisions == 1 else 's'}"
     text += f", {crashes} of them {'a crash' if crashes == 1 else 'crashes'}" if crashes else ""
-    text += f", {contacts} contact{' that is' if contacts == 1 else 's that are'} none" if contacts else ""
+    text += f", {touchdowns} touchdown{'' if touchdowns == 1 else 's'}" if touchdowns else ""
+    text += f", {others} contact{' that is' if others == 1 else 's that are'} none" if others else ""
     share = replay.findings.watched_share
     if share is None:
         return f"{text}; no flight was heard"
