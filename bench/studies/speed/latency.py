@@ -235,7 +235,7 @@ def _peer(name: str, flight: Recorded) -> Iterator[tuple[str, int]]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", "bench.speed.peers", name, str(port), str(_stamp_us(flight))]
+    command = [sys.executable, "-m", "bench.studies.speed.peers", name, str(port), str(_stamp_us(flight))]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield "127.0.0.1", port
