@@ -101,11 +101,13 @@ class FusedDetector:
         """A crash is reported where no hit is looked for, too: in a take-off, in a landing, under strong vibration."""
         s.observed = None
         since_us = impact.sample_time_boot_us - s.contact_began_boot_us
-        if not situation.may_crash or since_us <= 1e6 * self._config.longest_contact_s:
+        is_known = s.kind is ImpactKind.CRASH and since_us <= 1e6 * self._config.longest_contact_s
+        if is_known or not situation.may_crash:
             return None
         if (impact := classified(impact, s.velocity_ned_m_s, situation)).kind is not ImpactKind.CRASH:
             return None
         s.contact_began_boot_us, s.peak_specific_force_m_s2 = impact.sample_time_boot_us, impact.size_m_s2
+        s.kind = impact.kind
         return impact
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:

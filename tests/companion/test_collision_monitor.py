@@ -207,3 +207,21 @@ def test_under_vibration_that_hides_all_but_crashes_the_detector_is_silent_and_s
         low._replace(off_reason="vibration"),
     )
     assert state.phase is Phase.OFF and impact is not None and impact.kind.value == "crash"
+
+
+def test_a_touch_that_tips_the_vehicle_over_is_a_crash_as_soon_as_it_lies_there():
+    # Given a vehicle that has touched the ground, upright, and is in its next take-off for the detector
+    down = Situation(armed=True, height_m=0.2, descent_commanded=True)
+    monitor = start_monitor(CompanionConfig(), 0)
+    fly(monitor, 2_000_000, situation=down._replace(height_m=3.0))
+    (touch,), *_ = fly(monitor, 2_020_000, lambda t: -60.0, situation=down, start_us=2_000_000)
+    assert touch.impact.kind.value == "landing"
+    # When it tumbles 0.2 s later
+    monitor.estimator.strapdown.valid_wxyz = (0.5, math.sqrt(0.75), 0.0, 0.0)
+    tilted = down._replace(off_reason="below 0.5 m", strapdown=monitor.estimator.strapdown)
+    sample = ImuSample(2_220_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    _, impact = monitor.detector.step(monitor.state, sample, tilted)
+    assert impact is not None and impact.kind.value == "crash"
+    # Then it is one crash
+    again = ImuSample(2_240_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    assert monitor.detector.step(monitor.state, again, tilted)[1] is None
