@@ -47,6 +47,11 @@ class Touch:
         return down_m_s > math.hypot(north_m_s, east_m_s)
 
     @property
+    def comes_to_ground(self) -> bool:
+        """High up, a tilted vehicle that is pushed along its thrust has met a wall, unless it comes down."""
+        return self.near_ground or (self.upward > STEEP and self.comes_down)
+
+    @property
     def is_upright(self) -> bool:
         return math.cos(tilt_rad(self.attitude_wxyz)) > STEEP
 
@@ -80,8 +85,8 @@ class Row:
 TABLE = (
     Row(
         ImpactKind.CRASH,
-        "near the ground or pushed from below; tilted by more than 45 degrees, or sinking faster than 3.1 m/s",
-        lambda touch: touch.on_ground and not (touch.is_upright and touch.is_slow),
+        "near the ground, or coming down and pushed from below; tilted by over 45 degrees, or sinking at over 3.1 m/s",
+        lambda touch: touch.comes_to_ground and not (touch.is_upright and touch.is_slow),
     ),
     Row(
         ImpactKind.LANDING,

@@ -76,6 +76,9 @@ def test_a_fall_from_a_metre_is_faster_than_a_landing(height_m):
 
 def test_a_wall_met_at_a_steep_tilt_high_up_is_no_crash():
     assert kind(BACK, tilt_deg=60.0) is ImpactKind.WALL
+    # even where its own thrust is what pushes, as along a wall that leans
+    assert kind(UP, tilt_deg=60.0) is ImpactKind.FLOOR
+    assert kind(UP, sinking(0.5), tilt_deg=60.0) is ImpactKind.CRASH
 
 
 def test_the_table_ends_with_a_row_for_everything_and_names_each_kind_once():
