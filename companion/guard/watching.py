@@ -33,7 +33,9 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
     latest = guard.vehicle.history.latest()
     if guard.vehicle.armed is False:
         guard.hits, guard.program_elsewhere = 0, False
-    if guard.vehicle.armed is False or guard.vehicle.landed is LandedState.ON_GROUND:
+    # Not while the guard has the vehicle: one forged report would move the fence.
+    stands = guard.vehicle.landed is LandedState.ON_GROUND and guard.expected_mode is None
+    if guard.vehicle.armed is False or stands:
         guard.origin_ned_m = None if latest is None else latest.position_ned_m
     elif guard.origin_ned_m is None and latest is not None:
         guard.origin_ned_m = (latest.position_ned_m[0], latest.position_ned_m[1], 0.0)

@@ -8,7 +8,9 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
+from companion.guard.watching import observe
 from companion.link.streams import StreamMonitor
+from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Phase
 from tests.guard.flying import FACE_NORTH_M, HOLD, LAND, MANUAL_POSITION, MISSION, OFFBOARD, AttachedFlight
@@ -330,6 +332,19 @@ def test_a_vehicle_that_a_hit_throws_down_is_watched_to_the_ground():
     air.guard.core.flight.origin_ned_m = (north, east, down + 0.05)
     air.step()
     assert air.guard.core.situation().off_reason is None
+
+
+def test_a_report_of_the_ground_moves_heights_and_fence_only_while_somebody_else_flies():
+    air = Air()
+    air.take_off()
+    guard = air.guard.core.flight
+    origin, here = guard.origin_ned_m, guard.vehicle.history.latest().position_ned_m
+    guard.vehicle.landed, guard.expected_mode = LandedState.ON_GROUND, 1
+    observe(guard, (), air.guard.core.now_us)
+    assert guard.origin_ned_m == origin
+    guard.expected_mode = None
+    observe(guard, (), air.guard.core.now_us)
+    assert guard.origin_ned_m == here
 
 
 def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told():
