@@ -115,16 +115,17 @@ class Signing:
         if not checksum_holds(data, start, length):
             return False
         packet = data[start : start + length]
-        return message_id_of(packet) in dialect.mavlink_map or self._is_signed(packet)
+        return message_id_of(packet) in dialect.mavlink_map or self.is_signed(packet)
 
-    def _is_signed(self, packet: bytes) -> bool:
+    def is_signed(self, packet: bytes) -> bool:
+        """Whether it was signed with the key, at whatever time."""
         return has_signature(packet) and hmac.compare_digest(self._hash(packet[:-_HASH]), packet[-_HASH:])
 
     def _refusal(self, packet: bytes) -> str | None:
         if not has_signature(packet):
             return UNSIGNED
         # Signature first: the stamp of a forged packet means nothing.
-        if not self._is_signed(packet):
+        if not self.is_signed(packet):
             return FORGED
         stamp, newest = _stamp(packet), self._streams.get(_stream(packet))
         if newest is None:

@@ -29,6 +29,7 @@ def open_connection(
     url: str,
     peer: str | None = None,
     is_genuine: Callable[[bytes], bool] = lambda packet: True,
+    has_key: Callable[[bytes], bool] = lambda packet: True,
     waits: bool = False,
 ) -> Connection:
     """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin, and only genuine packets pin it.
@@ -49,7 +50,7 @@ def open_connection(
     if scheme in ("udpout", "tcpout"):
         _check_one_host(url, scheme, host, port)
     if scheme == "udpin":
-        return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), is_genuine))
+        return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), is_genuine, has_key))
     if scheme == "udpout":
         return udp_out(host, port)
     if scheme == "tcpout":

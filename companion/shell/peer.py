@@ -7,8 +7,8 @@
               A heartbeat from the old one takes it back: it was a gap, and who filled it was another
 
 An address can be forged where the network lets it be; what keeps such packets out is MAVLink's signing. With it only
-genuine packets pin, hold and move an address. Whoever is answered before has not to be genuine: the vehicle learns the
-time stamp of its signatures from what it is sent.
+genuine packets pin, hold and move an address. Before, whoever has the key is answered, even with an old time stamp:
+the vehicle learns the time from what it is sent.
 """
 
 from collections.abc import Callable, Iterator
@@ -35,10 +35,14 @@ class Peer:
     """
 
     def __init__(
-        self, only: tuple[str, int | None] | None = None, is_genuine: Callable[[bytes], bool] = lambda packet: True
+        self,
+        only: tuple[str, int | None] | None = None,
+        is_genuine: Callable[[bytes], bool] = lambda packet: True,
+        has_key: Callable[[bytes], bool] = lambda packet: True,
     ) -> None:
         self._only = only
         self._is_genuine = is_genuine
+        self._has_key = has_key
         self._pinned: Address | None = None
         self._moved: Address | None = None  # sent the vehicle's heartbeat since the pinned one last spoke
         self._before: Address | None = None  # pinned until the last move
@@ -74,7 +78,7 @@ class Peer:
         # Of a flood beside a vehicle that is heard the first packet is enough to look at.
         for packet in islice(_packets(datagram), None if is_released else 1):
             source = source_of(packet)
-            if self._vehicle is None:
+            if self._vehicle is None and self._has_key(packet):
                 self.answered = sender
             is_vehicle = source[1] == AUTOPILOT_COMPONENT_ID and self._vehicle in (None, source)
             if message_id_of(packet) == HEARTBEAT and is_vehicle and self._is_genuine(packet):

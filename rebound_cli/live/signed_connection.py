@@ -58,7 +58,7 @@ def open_signed(options: Namespace, waits: bool = False) -> Connection:
         return open_connection(options.connect, options.peer, waits=waits)
     clock, stamps = Clock(), StampFile(options.signing_key)
     signing = Signing(read_key(options.signing_key), stamps.first(clock.now_us()))
-    connection = open_connection(options.connect, options.peer, signing.is_genuine, waits)
+    connection = open_connection(options.connect, options.peer, signing.is_genuine, signing.is_signed, waits)
     try:
         return SignedConnection(connection, signing, stamps, clock)
     except Exception:

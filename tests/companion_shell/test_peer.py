@@ -151,9 +151,9 @@ def test_where_packets_are_signed_only_genuine_ones_pin_hold_and_move_an_address
     end.seq = 1
     forged = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3).pack(end))
     peer = Peer(is_genuine=lambda packet: packet[4] % 2 == 0)
-    # Then a forged heartbeat pins nothing; who sent it may be the vehicle, and is answered until the genuine one comes
+    # Then a forged heartbeat pins nothing
     peer.accepts(forged, STRANGER, 0)
-    assert peer.answered == STRANGER
+    assert peer.accepts(forged, VEHICLE, 0)
     assert peer.accepts(genuine, VEHICLE, 1) and peer.answered == VEHICLE
     assert not peer.accepts(genuine, STRANGER, 2)
     # And with the vehicle's address alone nobody holds its place once it has moved, nor takes it
@@ -161,3 +161,13 @@ def test_where_packets_are_signed_only_genuine_ones_pin_hold_and_move_an_address
     assert peer.accepts(forged, VEHICLE, 2 * RELEASED_US)
     assert not peer.accepts(forged, moved, 2 * RELEASED_US) and peer.answered == VEHICLE
     assert peer.accepts(genuine, moved, 2 * RELEASED_US) and peer.answered == moved
+
+
+def test_a_stranger_without_the_key_is_not_answered_in_the_place_of_a_vehicle_whose_time_is_old():
+    # Given a vehicle that has the key, its time stamp old until it has heard the companion
+    peer = Peer(is_genuine=lambda packet: False, has_key=lambda packet: packet == HEARTBEAT)
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    # When somebody without the key sends more often
+    peer.accepts(IMU, STRANGER, 1)
+    # Then the vehicle is answered
+    assert peer.answered == VEHICLE
