@@ -63,6 +63,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         self.flight, self.machine, self.monitor = flight, machine, monitor
         self.started_at_us = self.now_us = now_us
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
+        self._sample_boot_us = 0
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
 
@@ -155,12 +156,19 @@ class Core(ABC, Generic[FlightT, MachineT]):
         )
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
-        """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one."""
-        if not moved and now_us < self._setpoint_due_us:
+        """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
+
+        An attitude is sent for each IMU sample.
+        """
+        sample_us, target = self.monitor.estimator.strapdown.time_boot_us, self.flight.target
+        follows_imu = target is not None and target.lean is not None and sample_us != self._sample_boot_us
+        self._sample_boot_us = sample_us
+        if not (moved or follows_imu) and now_us < self._setpoint_due_us:
             return
         interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
         due_us = self._setpoint_due_us + interval_us
-        self._setpoint_due_us = due_us if not moved and due_us > now_us else now_us + interval_us
+        is_on_time = not (moved or follows_imu) and due_us > now_us
+        self._setpoint_due_us = due_us if is_on_time else now_us + interval_us
         flight, limiter = self.flight, self.limiter
         if not flight.vehicle.is_mode_known:
             return
@@ -311,5 +319,5 @@ class Limiter:
             flight.report(now_us, "envelope", text, reason=reason)
         self.last = target
         # Without a position setpoint there is no step to the next one.
-        self.last_ned_m, self.last_us = None if target.acceleration_only else target.position_ned_m, now_us
+        self.last_ned_m, self.last_us = None if target.lean is not None else target.position_ned_m, now_us
         return target

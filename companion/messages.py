@@ -297,19 +297,22 @@ class SendCommand(Outgoing):
 
 @dataclass(frozen=True, slots=True)
 class PositionSetpoint(Outgoing):
-    """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
-
-    `acceleration_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
-    `is_height_free`: down by velocity and acceleration, whatever height is given.
-    """
+    """Setpoint in the vehicle's local NED; a None part is left to the vehicle."""
 
     time_us: int
     position_ned_m: Vector3
     yaw_rad: float | None
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
-    acceleration_only: bool = False
-    is_height_free: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSetpoint(Outgoing):
+    """SET_ATTITUDE_TARGET: attitude in the vehicle's own frame, collective thrust as a share of the most."""
+
+    time_us: int
+    attitude_wxyz: Quaternion
+    thrust_fraction: float
 
 
 @dataclass(frozen=True, slots=True)

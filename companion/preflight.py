@@ -19,7 +19,7 @@ from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
-from companion.reflex.config import EXCESS, HELD_S
+from companion.reflex.config import MOST_HELD_S
 
 # The streams need a second to settle at their new rates; what comes then counts.
 SETTLING_US = 1_000_000
@@ -357,9 +357,10 @@ def _integration(name: str, rate_hz: float, survey: Survey) -> PreflightItem:
 
 def _offboard_loss_time(name: str, loss_s: float, survey: Survey) -> PreflightItem:
     found = f"{loss_s:g} s until PX4 acts when the companion has died"
-    further = f"at 2 m/s the vehicle flies {2.0 * (loss_s - HELD_S):g} m further unattended"
-    case = (loss_s > HELD_S, DOUBTFUL, f"{name} = {HELD_S:g}; {further}")
-    return _judged(name, found, case, mended=HELD_S, beyond=f"; setpoints are made safe to hold {HELD_S:g} s")
+    slow = "a program that streams at less than 4 Hz then loses OFFBOARD"
+    remedy = f"{name} = {MOST_HELD_S:g}, or recoveries are flown by position alone; {slow}"
+    case = (round(loss_s, 3) > MOST_HELD_S, DOUBTFUL, remedy)
+    return _judged(name, found, case, mended=MOST_HELD_S, beyond=f"; an attitude is safe to hold {MOST_HELD_S:g} s")
 
 
 def _offboard_loss(name: str, action: float, survey: Survey) -> PreflightItem:

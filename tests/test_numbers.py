@@ -12,8 +12,6 @@ CONFIGS = [COMPANION / "reflex" / "config.py", COMPANION / "motion" / "config.py
 FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
 # Those that a derivation gives.
 DERIVED = {
-    "reflex/planner.py": {0.25, 3, 4, 5, 6, 10, 12, 15, 30, 60, 120, 180},  # a polynomial of the fifth degree
-    "reflex/laws.py": {12},  # what such a plan's first acceleration covers
     "reflex/velocity_jump.py": {3},  # axes; Student's t by degrees of freedom
     "reflex/motion_estimator.py": {3},  # axes
     "reflex/impact.py": {4},  # a beginning that is known by two windows: half of half a window

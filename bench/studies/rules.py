@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.fly.moments import Copies
-from companion.reflex.planner import REST
+from companion.motion.strapdown import ZERO
 
 Arguments = tuple[Any, ...]
 
@@ -87,27 +87,27 @@ RULES = (
         _says(0.0),
     ),
     Rule("change", "the normal by the change of velocity", _FLIGHT + "collision:with_change", _argument(0)),
+    Rule("held off", "no attitude that leads into what is near", _REFLEX + "attitude_law:held_off", _argument(0)),
     Rule(
-        "pressing on",
-        "accelerations alone for one that leans on",
-        _FLIGHT + "recovering:Recover._tilts_into_surface",
-        _says(False),
+        "leaves",
+        "no vehicle goes on into what it has hit",
+        _REFLEX + "motion_estimator:FilterBank.leave",
+        _says(None),
+        lambda arguments: arguments[0].leaves.fill(1.0),
     ),
-    Rule("kept off", "no acceleration into what is near", _REFLEX + "planner:kept_off", _argument(0)),
     Rule(
         "known rest",
         "what is missing still is known and asked for",
         _REFLEX + "motion_estimator:FilterBank.mean_error",
-        _says(REST),
+        _says(ZERO),
     ),
     Rule(
         "velocity by places",
         "no velocity that the places deny",
         _REFLEX + "motion_estimator:_rate_error",
-        _says(REST),
+        _says(ZERO),
     ),
     Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "obstacle_map:remembered_surfaces", _says([])),
-    Rule("climb", "brakes a climb", _REFLEX + "planner:height_feedback", _says(0.0)),
 )
 
 

@@ -8,7 +8,7 @@ from itertools import takewhile
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
 from companion.motion.history import MotionHistory
-from companion.motion.strapdown import VelocityFix
+from companion.motion.strapdown import ZERO, VelocityFix
 from companion.reflex.config import DECIDED_US
 from companion.reflex.confirmation import Hypothesis
 from companion.reflex.detector import DetectorState, Phase
@@ -17,7 +17,6 @@ from companion.reflex.impact import ImpactEstimator
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.normal import Normal, unit, with_change
-from companion.reflex.planner import REST
 from companion.report import CollisionReport
 
 
@@ -45,8 +44,6 @@ class CollisionRecord:
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     rebound_speed_m_s: float | None = None  # the largest along the normal, until the rebound is over
-    estimated_down_m_s: float = 0.0  # the vehicle's own estimate now, right or wrong
-    level_acceleration_m_s2: Vector3 = (0.0, 0.0, 0.0)  # of a vehicle that is level by its own attitude, NED
 
     @property
     def normal(self) -> Normal:
@@ -71,10 +68,6 @@ class CollisionRecord:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
             self.contact_normal = level(estimate.normal)
             self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us)
-        self.level_acceleration_m_s2 = strapdown.level_acceleration_m_s2
-        if self.fixes:
-            fix = self.fixes[-1]
-            self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
         self.estimator.imu(strapdown)
 
     def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
@@ -92,7 +85,7 @@ class CollisionRecord:
         """Update overshoot and rebound speed while the vehicle recovers."""
         normal = self.normal.direction_ned
         away = unit(plus(self.setpoint_ned_m, -1.0, self.contact.position_ned_m))
-        past_m = split(plus(sample.position_ned_m, -1.0, self.setpoint_ned_m), normal if away == REST else away)[0]
+        past_m = split(plus(sample.position_ned_m, -1.0, self.setpoint_ned_m), normal if away == ZERO else away)[0]
         self.overshoot_m = max(self.overshoot_m, past_m)
         if self.is_rebound(sample.time_boot_us):
             self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, split(sample.velocity_ned_m_s, normal)[0])

@@ -12,14 +12,24 @@ from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
-from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, PositionTarget, Sticks, Vector3
+from companion.messages import (
+    AttitudeSetpoint,
+    CommandAck,
+    LocalPosition,
+    Outgoing,
+    PositionSetpoint,
+    PositionTarget,
+    Sticks,
+    Vector3,
+)
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
+from companion.reflex.attitude_law import Lean, attitude_and_thrust
 from companion.reflex.impact import ImpactEstimate
-from companion.reflex.planner import MotionState
 from companion.reflex.sustained_force import SustainedForceMonitor
+from companion.reflex.thrust import ThrustGain
 from companion.report import Event, JsonValue, Outcome
 
 
@@ -27,34 +37,25 @@ from companion.report import Event, JsonValue, Outcome
 class Target:
     """The setpoint to be sent; local NED. Without a velocity the vehicle stops at the position.
 
-    `acceleration_only`: only the acceleration is a setpoint, because the vehicle's position and velocity estimates are
-    wrong. `is_height_free`: the height has velocity and acceleration setpoints, and no position. `expected`: its motion
-    as far as known, with the acceleration that it has where it takes itself for level.
+    With a `lean` the acceleration is sent as attitude and thrust. The position is then where the vehicle is to rest.
     """
 
     position_ned_m: Vector3
     yaw_rad: float | None
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
-    acceleration_only: bool = False
-    is_height_free: bool = False
-    expected: MotionState | None = None
+    lean: Lean | None = None
 
     def at_rest(self) -> "Target":
         """The position alone, which PX4 can hold without further setpoints."""
         return Target(self.position_ned_m, self.yaw_rad)
 
-    def setpoint(self, time_us: int) -> PositionSetpoint:
+    def setpoint(self, time_us: int) -> PositionSetpoint | AttitudeSetpoint:
         """As it is sent."""
-        return PositionSetpoint(
-            time_us,
-            self.position_ned_m,
-            self.yaw_rad,
-            self.velocity_ned_m_s,
-            self.acceleration_ned_m_s2,
-            self.acceleration_only,
-            self.is_height_free,
-        )
+        if self.lean is not None and self.acceleration_ned_m_s2 is not None:
+            return AttitudeSetpoint(time_us, *attitude_and_thrust(self.acceleration_ned_m_s2, self.lean))
+        velocity, acceleration = self.velocity_ned_m_s, self.acceleration_ned_m_s2
+        return PositionSetpoint(time_us, self.position_ned_m, self.yaw_rad, velocity, acceleration)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +164,9 @@ class FlightContext:
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)
     loss_s: float | None = None  # the vehicle's COM_OF_LOSS_T
+    thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
+    thrust_boot_us: int = 0  # its newest sample
+    told_by_position: bool = False  # that recoveries are not flown by attitude
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, Sample
-from companion.motion.config import KEPT_US
+from companion.motion.config import KEPT_US, LONGEST_GAP_US
 from companion.motion.rotation import tilt_rad
 from companion.motion.strapdown import Strapdown
 from companion.reflex import monitor
-from companion.reflex.detector import ImpactKind, Situation
+from companion.reflex.detector import ImpactKind, Phase, Situation
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor
 
@@ -39,6 +39,7 @@ def collisions(
     # A crash is told where no hit is looked for, too.
     is_watched = situation.off_reason is None
     found = [estimate for estimate in result.impacts if estimate.impact.is_collision and is_watched]
+    _learn_thrust(flight, samples, collision_monitor.state.phase)
     strapdown = collision_monitor.estimator.strapdown
     held = None if found else _sustained_force(flight, samples, situation, strapdown, now_us)
     return found if held is None else [held]
@@ -51,6 +52,17 @@ def _report_crash(flight: FlightContext, estimate: ImpactEstimate, strapdown: St
     flight.report(now_us, "crash", text, specific_force_m_s2=force_m_s2, down_m_s=down_m_s, tilt_deg=tilt_deg)
 
 
+def _learn_thrust(flight: FlightContext, samples: Sequence[Sample], phase: Phase) -> None:
+    """What thrust there is, from all flight in free air; before the detector is armed, too."""
+    for sample in samples:
+        if isinstance(sample, AttitudeTarget):
+            flight.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
+        elif isinstance(sample, ImuSample):
+            elapsed_s, flight.thrust_boot_us = 1e-6 * (sample.time_boot_us - flight.thrust_boot_us), sample.time_boot_us
+            if flight.has_climbed and phase is not Phase.CONTACT and elapsed_s < 1e-6 * LONGEST_GAP_US:
+                flight.thrust.learn(sample.time_boot_us, -sample.specific_force_frd_m_s2[2], elapsed_s)
+
+
 def _sustained_force(
     flight: FlightContext, samples: Sequence[Sample], situation: Situation, strapdown: Strapdown, now_us: int
 ) -> ImpactEstimate | None:
@@ -60,7 +72,7 @@ def _sustained_force(
     if not flight.has_position:
         force.forget()  # half a second without a position is no tilt that lasted half a second
     is_off = situation.off_reason is not None or situation.descent_commanded or not flight.has_position
-    if is_off or target is None or target.acceleration_only:
+    if is_off or target is None or target.lean is not None:
         flown_to = None
     for sample in samples:
         if type(sample) is ImuSample:

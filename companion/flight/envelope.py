@@ -18,8 +18,10 @@ from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
+from companion.reflex.attitude_law import held_off
 from companion.reflex.config import (
     BEHIND_M,
+    BRAKES_M_S2,
     CLIMB_GAIN_PER_S,
     HEIGHT_PER_S,
     HELD_S,
@@ -28,17 +30,12 @@ from companion.reflex.config import (
     VELOCITY_PER_S,
 )
 from companion.reflex.halfspace import Surface, plus, split
-from companion.reflex.planner import REST, MotionState
+from companion.reflex.laws import MotionState
 
 LOSS_PARAMETER = "COM_OF_LOSS_T"
 # PX4's gains of north, east and down.
 PLACE_GAINS_PER_S = (PLACE_PER_S, PLACE_PER_S, HEIGHT_PER_S)
 VELOCITY_GAINS_PER_S = (VELOCITY_PER_S, VELOCITY_PER_S, CLIMB_GAIN_PER_S)
-# PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
-BRAKES_M_S2 = 3.0
-# After a lean PX4 brings to rest what its estimate says, which is wrong. After a hit at 2 m/s it was right again within
-# 0.4 s with the parameters of `rebound airframe px4`, within 1.5 s with PX4's own (bench/notes/px4.md).
-REPAIRED_S = 1.5
 # At a rebound of 1 m/s a look every 0.2 m.
 _TIMES_S = tuple((HELD_S + NOTICED_S) * look / 6 for look in range(1, 7))
 
@@ -64,6 +61,11 @@ class KnownSurface:
         must_m = min(self.surface.distance_m, offs_m[0], self.surface.off_m(place_ned_m))
         beside = [o - must_m for o, place in zip(offs_m, path, strict=True) if self._is_there(o, must_m, place)]
         return min([0.0, *beside])
+
+    def is_before(self, place_ned_m: Vector3) -> bool:
+        """Whether a vehicle there is in front of it."""
+        off_m = self.surface.off_m(place_ned_m)
+        return off_m >= -BEHIND_M and self._is_there(off_m, self.surface.distance_m, place_ned_m)
 
     def _is_there(self, off_m: float, must_m: float, place_ned_m: Vector3) -> bool:
         """Whether a place that is too near lies in front of the surface, and not past its end."""
@@ -96,39 +98,29 @@ def touched(place_ned_m: Vector3, normal_ned: Vector3) -> Surface:
 
 
 def held_path(target: Target, motion: MotionState) -> list[Vector3]:
-    """Places that a vehicle which moves so passes, the present one first, the last where it stops.
-
-    The motion's own acceleration comes to that of a lean.
-    """
+    """Places that a vehicle which moves so passes, the present one first, the last where it stops."""
     axes = []
     for axis in range(3):
         place_m, speed_m_s = motion.position_ned_m[axis], motion.velocity_ned_m_s[axis]
-        axes.append([place_m, *_led(axis, place_m, speed_m_s, *_asked(target, motion, axis))])
+        axes.append([place_m, *_led(axis, place_m, speed_m_s, *_asked(target, axis))])
     return [(n, e, d) for n, e, d in zip(*axes, strict=True)]
 
 
-def _asked(target: Target, motion: MotionState, axis: int) -> tuple[float | None, float | None, float]:
-    """Place, velocity and acceleration on one axis; None where it is not asked for."""
+def _asked(target: Target, axis: int) -> tuple[float, float, float]:
+    """Place, velocity and acceleration on one axis."""
     velocity, acceleration = target.velocity_ned_m_s, target.acceleration_ned_m_s2
-    a_s = 0.0 if acceleration is None else acceleration[axis]
-    v_s = None if velocity is None else velocity[axis]
-    if not target.acceleration_only:
-        return target.position_ned_m[axis], v_s, a_s
-    if axis < 2:
-        return None, None, a_s + motion.acceleration_ned_m_s2[axis]
-    return None if target.is_height_free else target.position_ned_m[2], v_s, a_s
+    v_s = 0.0 if velocity is None else velocity[axis]
+    return target.position_ned_m[axis], v_s, 0.0 if acceleration is None else acceleration[axis]
 
 
-def _led(axis: int, x: float, v: float, x_s: float | None, v_s: float | None, a_s: float) -> list[float]:
+def _led(axis: int, x: float, v: float, x_s: float, v_s: float, a_s: float) -> list[float]:
     """Of one axis: at each time, and stopped."""
-    k_x, off_m = (0.0, 0.0) if x_s is None else (PLACE_GAINS_PER_S[axis], x_s - x)
-    leans = x_s is None and v_s is None
-    k_v = 0.0 if leans else VELOCITY_GAINS_PER_S[axis]
-    asked_m_s2, answers = k_v * ((v_s or 0.0) + k_x * off_m) + a_s, _answers(k_x, k_v)
+    k_x, k_v = PLACE_GAINS_PER_S[axis], VELOCITY_GAINS_PER_S[axis]
+    asked_m_s2, answers = k_v * (v_s + k_x * (x_s - x)) + a_s, _answers(k_x, k_v)
     path = [x + by_asked * asked_m_s2 + by_speed * v for by_asked, by_speed, _ in answers]
     _, by_speed, left = answers[-1]
     after_m_s = by_speed * asked_m_s2 + left * v
-    return [*path, path[-1] + after_m_s * (REPAIRED_S if leans else 0.5 * abs(after_m_s) / BRAKES_M_S2)]
+    return [*path, path[-1] + 0.5 * after_m_s * abs(after_m_s) / BRAKES_M_S2]
 
 
 @cache
@@ -139,13 +131,7 @@ def _answers(k_x: float, k_v: float) -> Sequence[tuple[float, float, float]]:
     for time_s in _TIMES_S:
         left, cosine = math.exp(-half * time_s), math.cos(turn * time_s)
         sine = math.sin(turn * time_s) / turn if turn else time_s
-        if stiff:
-            found.append(((1.0 - left * (cosine + half * sine)) / stiff, left * sine, left * (cosine - half * sine)))
-        elif k_v:
-            fades_s = (1.0 - math.exp(-k_v * time_s)) / k_v
-            found.append(((time_s - fades_s) / k_v, fades_s, 1.0 - k_v * fades_s))
-        else:
-            found.append((0.5 * time_s**2, time_s, 1.0))
+        found.append(((1.0 - left * (cosine + half * sine)) / stiff, left * sine, left * (cosine - half * sine)))
     return found
 
 
@@ -187,13 +173,15 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Setpoint
     """
     if not is_finite(target):
         raise SetpointError(f"a value of the setpoint is not finite: {target}")
+    if target.lean is not None:
+        return _with_lean(target, around, fence), ""
     reasons: list[str] = []
     target = _with_place(target, around, fence, limits, reasons)
     target = _with_velocity(target, limits, reasons)
     target = _with_acceleration(target, limits, reasons)
     target = _with_path(target, around, fence, reasons)
     target = _with_height(target, around, fence, reasons)
-    target = _with_tilt(target, limits)
+    target = _with_acceleration(target, limits, [])
     if target.yaw_rad is not None and abs(target.yaw_rad) > math.pi:
         target = replace(target, yaw_rad=math.remainder(target.yaw_rad, math.tau))
     return target, ", ".join(reasons)
@@ -209,15 +197,10 @@ def is_finite(target: Target) -> bool:
 def _with_place(
     target: Target, around: Surroundings, fence: Fence, limits: SetpointLimits, reasons: list[str]
 ) -> Target:
-    """The place within the step and the fence. What of it is not asked for, as of a lean, is left alone."""
-    if target.acceleration_only and target.is_height_free:
-        return target
+    """The place within the step and the fence."""
     place, vehicle = target.position_ned_m, around.vehicle_ned_m
-    if target.acceleration_only and vehicle is not None:
-        # Only the height is asked for.
-        place = (vehicle[0], vehicle[1], place[2])
     asked = place
-    if around.last_ned_m is not None and not target.acceleration_only:
+    if around.last_ned_m is not None:
         most_m = limits.max_speed_m_s * around.since_last_s + _ROUNDING_M
         place, is_fast = _within_step(place, around.last_ned_m, most_m)
         reasons += [f"moves faster than {limits.max_speed_m_s:g} m/s"] if is_fast else []
@@ -226,14 +209,10 @@ def _with_place(
         reasons += [f"more than {limits.max_step_m:g} m from the vehicle"] if is_far else []
     if around.origin_ned_m is not None:
         inside = _within_fence(place, around.origin_ned_m, fence, around.has_floor)
-        if target.acceleration_only:
-            inside = (place[0], place[1], inside[2])
         reasons += ["outside the fence"] if math.dist(inside, place) > _ROUNDING_M else []
         place = inside if math.dist(inside, place) > _ROUNDING_M else place
     if place == asked:
         return target
-    if target.acceleration_only:
-        return replace(target, position_ned_m=(*target.position_ned_m[:2], place[2]))
     return Target(place, target.yaw_rad)
 
 
@@ -245,8 +224,7 @@ def _with_velocity(target: Target, limits: SetpointLimits, reasons: list[str]) -
     reasons.append(f"velocity above {most_m_s:g} m/s")
     scale = most_m_s / math.hypot(*velocity)
     n, e, d = velocity
-    acceleration = target.acceleration_ned_m_s2 if target.acceleration_only else None
-    return replace(target, velocity_ned_m_s=(n * scale, e * scale, d * scale), acceleration_ned_m_s2=acceleration)
+    return replace(target, velocity_ned_m_s=(n * scale, e * scale, d * scale), acceleration_ned_m_s2=None)
 
 
 def _with_acceleration(target: Target, limits: SetpointLimits, reasons: list[str]) -> Target:
@@ -273,21 +251,12 @@ def _with_path(target: Target, around: Surroundings, fence: Fence, reasons: list
         return target
     if target.velocity_ned_m_s is None and target.acceleration_ned_m_s2 is None:
         return target
-    motions = [MotionState(around.vehicle_ned_m, around.velocity_ned_m_s)]
-    if target.expected is not None:
-        # The vehicle is wrong about its motion, and what is expected is no more than that: places and velocities of
-        # both count. So does a tilt that the vehicle is right about by then.
-        expected = replace(target.expected, acceleration_ned_m_s2=REST)
-        reported = replace(expected, velocity_ned_m_s=around.velocity_ned_m_s)
-        later = replace(reported, acceleration_ned_m_s2=plus(REST, -1.0, target.expected.acceleration_ned_m_s2))
-        motions = list(dict.fromkeys((expected, reported, later, *motions)))
-    known = list(around.known)
-    for motion in motions:
-        known += _sides(held_path(target, motion), around.origin_ned_m, fence)
+    motion = MotionState(around.vehicle_ned_m, around.velocity_ned_m_s)
+    known = [*around.known, *_sides(held_path(target, motion), around.origin_ned_m, fence)]
 
     def free_m(candidate: Target, surfaces: Sequence[KnownSurface] = known) -> float:
-        paths = [held_path(candidate, motion) for motion in motions]
-        return min((one.free_m(path, candidate.position_ned_m) for one in surfaces for path in paths), default=0.0)
+        path = held_path(candidate, motion)
+        return min((one.free_m(path, candidate.position_ned_m) for one in surfaces), default=0.0)
 
     asked = target
     for surface in known:
@@ -295,11 +264,27 @@ def _with_path(target: Target, around: Surroundings, fence: Fence, reasons: list
             target = _off(target, surface, free_m)
     if target is asked:
         return asked
-    if not target.acceleration_only:
-        # Of a lean, which every brake is after a clipped hit, it would be told in every flight.
-        reasons.append("leads too near to what is known, or out of the fence")
-    still = _less(target, None, 1.0) if target.acceleration_only else target.at_rest()
-    return max(target, still, asked, key=free_m)
+    reasons.append("leads too near to what is known, or out of the fence")
+    return max(target, target.at_rest(), asked, key=free_m)
+
+
+def _with_lean(target: Target, around: Surroundings, fence: Fence) -> Target:
+    """The acceleration, held until PX4 notices a silence, stays off surfaces, fence, floor and top."""
+    lean, acceleration = target.lean, target.acceleration_ned_m_s2
+    assert lean is not None and acceleration is not None, "a lean is one of an acceleration"
+    belief, origin = lean.belief, around.origin_ned_m
+    surfaces = [one.surface for one in around.known if one.is_before(belief.position_ned_m)]
+    if origin is not None:
+        top_m, floor_m = _heights(origin, fence, around.has_floor)
+        surfaces += [
+            Surface((0.0, 0.0, top_m), (0.0, 0.0, 1.0), 0.0),
+            Surface((0.0, 0.0, floor_m), (0.0, 0.0, -1.0), 0.0),
+        ]
+        ends_m_s = plus(belief.velocity_ned_m_s, lean.held_s, plus(acceleration, 1.0, belief.external_m_s2))
+        ends = plus(belief.position_ned_m, 0.5 * lean.held_s, plus(belief.velocity_ned_m_s, 1.0, ends_m_s))
+        stops = plus(ends, 0.5 * math.hypot(*ends_m_s) / BRAKES_M_S2, ends_m_s)
+        surfaces += [one.surface for one in _sides([belief.position_ned_m, stops], origin, fence)]
+    return replace(target, acceleration_ned_m_s2=held_off(acceleration, belief, surfaces, lean.held_s))
 
 
 def _off(target: Target, known: KnownSurface, free_m: Callable[[Target, Sequence[KnownSurface]], float]) -> Target:
@@ -312,13 +297,11 @@ def _off(target: Target, known: KnownSurface, free_m: Callable[[Target, Sequence
     return _less(target, known.surface.normal_ned, most)
 
 
-def _less(target: Target, normal: Vector3 | None, share: float) -> Target:
-    """With a share taken from what of velocity and acceleration leads towards a surface; None for all but down."""
+def _less(target: Target, normal: Vector3, share: float) -> Target:
+    """With a share taken from what of velocity and acceleration leads towards a surface."""
 
     def less(vector: Vector3 | None) -> Vector3 | None:
-        if vector is None or normal is None:
-            return None if vector is None else (0.0, 0.0, vector[2])
-        return plus(vector, -share * min(0.0, split(vector, normal)[0]), normal)
+        return None if vector is None else plus(vector, -share * min(0.0, split(vector, normal)[0]), normal)
 
     velocity, acceleration = less(target.velocity_ned_m_s), less(target.acceleration_ned_m_s2)
     return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
@@ -346,15 +329,9 @@ def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: li
     velocity, acceleration = target.velocity_ned_m_s, target.acceleration_ned_m_s2
     if around.origin_ned_m is None or (velocity is None and acceleration is None):
         return target
-    if not target.is_height_free:
-        start_down_m, leads_s = target.position_ned_m[2], _LEADS_S
-    elif around.vehicle_ned_m is not None:
-        start_down_m, leads_s = around.vehicle_ned_m[2], HELD_S
-    else:
-        return target
     top_m, floor_m = _heights(around.origin_ned_m, fence, around.has_floor)
-    least_m_s = min(0.0, (top_m - start_down_m) / leads_s)
-    most_m_s = max(0.0, (floor_m - start_down_m) / leads_s)
+    least_m_s = min(0.0, (top_m - target.position_ned_m[2]) / _LEADS_S)
+    most_m_s = max(0.0, (floor_m - target.position_ned_m[2]) / _LEADS_S)
     down_m_s = 0.0 if velocity is None else velocity[2]
     down_m_s2 = 0.0 if acceleration is None else acceleration[2]
     leads_m_s = down_m_s + down_m_s2 / CLIMB_GAIN_PER_S
@@ -368,18 +345,6 @@ def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: li
         room = (CLIMB_GAIN_PER_S * (least_m_s - down_m_s), CLIMB_GAIN_PER_S * (most_m_s - down_m_s))
         acceleration = (acceleration[0], acceleration[1], min(max(down_m_s2, room[0]), room[1]))
     return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
-
-
-def _with_tilt(target: Target, limits: SetpointLimits) -> Target:
-    """Within the tilt after all else: what keeps off a slant makes sideways of down.
-
-    Of a vehicle that is wrong about its tilt, the lean to ask for so that it has the one that was meant.
-    """
-    if target.expected is not None and target.acceleration_ned_m_s2 is not None:
-        asked = plus(target.acceleration_ned_m_s2, -1.0, target.expected.acceleration_ned_m_s2)
-        is_reported = replace(target.expected, acceleration_ned_m_s2=REST)
-        target = replace(target, acceleration_ned_m_s2=asked, expected=is_reported)
-    return _with_acceleration(target, limits, [])
 
 
 def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3, bool]:

@@ -42,7 +42,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         elif isinstance(sample, messages.Parameter) and sample.name == LOSS_PARAMETER:
             if flight.loss_s is None and sample.value > HELD_S:
                 flight.report(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
-            flight.loss_s = sample.value
+            flight.loss_s = round(sample.value, 3)  # single precision on the wire
         elif isinstance(sample, messages.TimeSyncRequest):
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, messages.TimeSyncAnswer):

@@ -128,9 +128,8 @@ class Gate:
 
 
 def _mark(fields: Mapping[str, object]) -> Mark:
-    """Time, mask and place, which may be NaN; two setpoints with the same of these are the same."""
-    place = tuple(
-        round(value, 3) if isinstance(value, float | int) and math.isfinite(value) else None
-        for value in map(fields.get, "xyz")
-    )
-    return (fields.get("time_boot_ms"), fields.get("type_mask"), *place)
+    """Time, mask, and place or attitude, which may be NaN; two setpoints with the same of these are the same."""
+    attitude = fields.get("q")
+    numbers = attitude if isinstance(attitude, Sequence) else [fields.get(name) for name in "xyz"]
+    rounded = (round(n, 3) if isinstance(n, float | int) and math.isfinite(n) else None for n in numbers)
+    return (fields.get("time_boot_ms"), fields.get("type_mask"), *rounded)

@@ -11,7 +11,15 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
 from companion.mavlink.packet import MAGIC_V2
-from companion.messages import ComputerStatus, Outgoing, PositionSetpoint, Reposition, SendCommand, StatusText
+from companion.messages import (
+    AttitudeSetpoint,
+    ComputerStatus,
+    Outgoing,
+    PositionSetpoint,
+    Reposition,
+    SendCommand,
+    StatusText,
+)
 
 COMPONENT_ID = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
 # Before the vehicle is known: PX4's own default MAV_SYS_ID.
@@ -19,11 +27,11 @@ DEFAULT_SYSTEM_ID = 1
 
 # POSITION_TARGET_TYPEMASK: a set bit tells the vehicle to ignore the part.
 IGNORE_VELOCITY = 0x038
-IGNORE_NORTH_AND_EAST = 0x01B  # place and velocity
-IGNORE_HEIGHT = 0x004
 IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
+# ATTITUDE_TARGET_TYPEMASK: the body rates.
+IGNORE_RATES = 0x07
 
 NAN = math.nan
 
@@ -36,8 +44,9 @@ TEXT_LENGTH = 50
 
 
 # What leaves most often, and at once after a hit, goes round pymavlink's objects: the same fields to the same bytes.
-_SETPOINT = dialect.MAVLink_set_position_target_local_ned_message
-_IN_WIRE_ORDER = itemgetter(*map(_SETPOINT.fieldnames.index, _SETPOINT.ordered_fieldnames))
+_PLACE = dialect.MAVLink_set_position_target_local_ned_message
+_PLACE_IN_WIRE_ORDER = itemgetter(*map(_PLACE.fieldnames.index, _PLACE.ordered_fieldnames))
+_ATTITUDE = dialect.MAVLink_set_attitude_target_message
 # Length, two bytes of flags, sequence, system, component, message id.
 _HEADER = struct.Struct("<BHBBBHB")
 
@@ -58,7 +67,10 @@ class Encoder:
     def packets(self, outgoing: Outgoing) -> list[bytes]:
         """All that it takes; of most messages one."""
         if isinstance(outgoing, PositionSetpoint):
-            return [self._pack_setpoint(outgoing)]
+            return [self._pack_fields(_PLACE, _PLACE_IN_WIRE_ORDER(self._position_fields(outgoing)))]
+        if isinstance(outgoing, AttitudeSetpoint):
+            time_ms, *target, type_mask, attitude, roll, pitch, yaw, thrust = self._attitude_fields(outgoing)
+            return [self._pack_fields(_ATTITUDE, (time_ms, *attitude, roll, pitch, yaw, thrust, *target, type_mask))]
         return [self._pack(message) for message in self._messages(outgoing)]
 
     def all_packets(self, outgoing: Iterable[Outgoing], on_fault: Callable[[Exception], None]) -> tuple[bytes, ...]:
@@ -85,13 +97,13 @@ class Encoder:
         self._mavlink.seq = (self._mavlink.seq + 1) % 256
         return packet
 
-    def _pack_setpoint(self, setpoint: PositionSetpoint) -> bytes:
+    def _pack_fields(self, kind: Any, in_wire_order: tuple[Any, ...]) -> bytes:
         """MAVLink 2 leaves out the zeros at a payload's end."""
         link = self._mavlink
-        payload = _SETPOINT.unpacker.pack(*_IN_WIRE_ORDER(self._setpoint(setpoint))).rstrip(b"\0")
-        header = _HEADER.pack(len(payload), 0, link.seq, link.srcSystem, link.srcComponent, _SETPOINT.id, 0)
+        payload = kind.unpacker.pack(*in_wire_order).rstrip(b"\0")
+        header = _HEADER.pack(len(payload), 0, link.seq, link.srcSystem, link.srcComponent, kind.id, 0)
         link.seq = (link.seq + 1) % 256
-        checksum: int = mcrf4xx(header + payload + bytes((_SETPOINT.crc_extra,)))
+        checksum: int = mcrf4xx(header + payload + bytes((kind.crc_extra,)))
         packet: bytes = bytes((MAGIC_V2,)) + header + payload + checksum.to_bytes(2, "little")
         return packet
 
@@ -112,7 +124,9 @@ class Encoder:
     def _message(self, outgoing: Outgoing) -> Any:
         match outgoing:
             case PositionSetpoint():
-                return _SETPOINT(*self._setpoint(outgoing))
+                return _PLACE(*self._position_fields(outgoing))
+            case AttitudeSetpoint():
+                return _ATTITUDE(*self._attitude_fields(outgoing))
             case SendCommand(Reposition() as command, _):
                 return self._reposition(command)
             case SendCommand(command, confirmation):
@@ -147,9 +161,9 @@ class Encoder:
             *self._target, dialect.MAV_FRAME_GLOBAL, command.command_id, 0, 0, *asked, *place
         )
 
-    def _setpoint(self, setpoint: PositionSetpoint) -> tuple[Any, ...]:
+    def _position_fields(self, setpoint: PositionSetpoint) -> tuple[Any, ...]:
         """The fields as pymavlink orders them."""
-        type_mask = IGNORE_YAW_RATE
+        type_mask, yaw = IGNORE_YAW_RATE, setpoint.yaw_rad
         velocity, acceleration = setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2
         if velocity is None:
             type_mask |= IGNORE_VELOCITY
@@ -157,20 +171,20 @@ class Encoder:
         if acceleration is None:
             type_mask |= IGNORE_ACCELERATION
             acceleration = (NAN, NAN, NAN)
-        place = setpoint.position_ned_m
-        if setpoint.acceleration_only:
-            type_mask |= IGNORE_NORTH_AND_EAST
-            place, velocity = (NAN, NAN, place[2]), (NAN, NAN, velocity[2])
-        if setpoint.is_height_free:
-            type_mask |= IGNORE_HEIGHT
-            place = (*place[:2], NAN)
-        yaw = setpoint.yaw_rad
         if yaw is None:
             type_mask |= IGNORE_YAW
             yaw = NAN
-        time_ms = setpoint.time_us // 1000 & 0xFFFFFFFF
-        head = (time_ms, *self._target, dialect.MAV_FRAME_LOCAL_NED, type_mask)
-        return (*head, *place, *velocity, *acceleration, yaw, NAN)
+        head = (_time_ms(setpoint.time_us), *self._target, dialect.MAV_FRAME_LOCAL_NED, type_mask)
+        return (*head, *setpoint.position_ned_m, *velocity, *acceleration, yaw, NAN)
+
+    def _attitude_fields(self, setpoint: AttitudeSetpoint) -> tuple[Any, ...]:
+        """The same. Its rates are ignored: PX4's attitude loop makes its own."""
+        head = (_time_ms(setpoint.time_us), *self._target, IGNORE_RATES)
+        return (*head, list(setpoint.attitude_wxyz), 0.0, 0.0, 0.0, setpoint.thrust_fraction)
+
+
+def _time_ms(time_us: int) -> int:
+    return time_us // 1000 & 0xFFFFFFFF
 
 
 def command_name(number: int) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from companion.messages import (
     VELOCITY_M_S,
+    AttitudeSetpoint,
     LocalPosition,
     Odometry,
     PositionSetpoint,
@@ -84,9 +85,9 @@ class Resets:
         n, e, d = (s + j for s, j in zip(self.shift_ned_m, jump, strict=True))
         return (n, e, d)
 
-    def sent(self, setpoint: PositionSetpoint) -> PositionSetpoint:
+    def sent(self, setpoint: PositionSetpoint | AttitudeSetpoint) -> PositionSetpoint | AttitudeSetpoint:
         """A setpoint moved from the companion's local NED, without resets, into the vehicle's."""
-        if self.shift_ned_m == ZERO:
+        if self.shift_ned_m == ZERO or isinstance(setpoint, AttitudeSetpoint):
             return setpoint
         x, y, z = (p + s for p, s in zip(setpoint.position_ned_m, self.shift_ned_m, strict=True))
         return replace(setpoint, position_ned_m=(x, y, z))

@@ -133,42 +133,50 @@ DECIDED_US = SHOWN_US
 # Standard deviations of the noise that a rejection needs.
 SURE = 3.0
 
-# --- parts of a plan
-# A plan's acceleration is looked at between so many equal parts: its first part's is largest at 1/2, the last's at 0.21
-# and 0.79.
-PLAN_PARTS = 8
-
-# --- the plan
-# The thrust's direction lags behind the acceleration setpoint: two time constants of a critically damped attitude loop
-# of 12 rad/s, and a motor's 0.02 s.
+# --- the attitude law
+# The thrust's direction lags behind the attitude setpoint: two time constants of a critically damped attitude loop of
+# 12 rad/s, and a motor's 0.02 s.
 LEAD_S = 0.15
-# A shorter plan ends before a vehicle of that bandwidth has tilted both ways.
-SHORTEST_S = 1.25
-# Factor on the acceleration limit in front of a surface: a tilt of 31 degrees instead of 17.
-HARD_BRAKING = 2.0
-# Ratio of one tried duration to the next. The lag is known less precisely than to 5 %.
-DURATION_STEP = 1.05
-# PX4's velocity loop subtracts a share of the measured acceleration: MPC_XY_VEL_D_ACC, 0.2 at most.
-ACCELERATION_GAIN = 1.1
-# PX4's MPC_Z_VEL_P_ACC, 1/s: the gain of its own loop against a climb. The companion adds the same again.
-CLIMB_GAIN_PER_S = 4.0
-# PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
-HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
-# A tilt of 14 degrees. Arms that press on a wall carry a vehicle tilted by 15 degrees; from 22 on it tips over.
-PRESSING_TILT_M_S2 = 2.5
-# Half of gravity, down. The other half is thrust to steer with.
-DESCENT_M_S2 = 0.5 * GRAVITY_M_S2
-# Acceleration that stops a descent: hover at 78 % of the thrust, not yet level.
-STOPPING_M_S2 = 2.0
+# From a speed to the acceleration that brakes it, 1/s: with the attitude's lag, and as much acceleration taken off as
+# the vehicle has, the braking has a damping of 0.9 and a time constant of 0.15 s.
+BRAKING_PER_S = 7.0
+# The way of that to rest over the speed at its beginning: the law's integral from there to rest.
+WAY_S = 2.0 / BRAKING_PER_S
+# The present tilt is that of so much later: a setpoint's way to the vehicle, and its motors.
+TILT_AHEAD_S = 0.05
+# Back off a surface, m/s for each metre of the clearance that is missing: a third as fast as the speed is braked.
+RETURN_PER_S = 2.5
+# Height and climb: critically damped at 2 rad/s, below what thrust and tilt share.
+HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 4.0, 4.0, 4.0
+# Largest tilt, 35 degrees: 6.9 m/s^2, with 22 % more thrust than hover's.
+MOST_TILT_RAD = 0.61
+# Thrust that the tilt leaves for the height, over what hovers at it.
+HOVER_MARGIN = 1.1
+# A vehicle that turns faster about its yaw axis than this, rad/s, leans less, and keeps a tenth of its thrust to brake
+# the turn with: at full thrust the motors have no moment about that axis left.
+SPIN_RAD_S, SPIN_THRUST = 3.0, 0.9
+# The rotors keep turning: PX4's MPC_THR_MIN.
+LEAST_THRUST = 0.12
+# The thrust gain is good enough to fly by after so long: 15 reports of the thrust at 30 Hz.
+THRUST_LEARNT_S = 0.5
+# Rest, by the belief: as slow as a hovering vehicle wanders by a poor estimate, for so long, and this share of the
+# clearance off all surfaces. The vehicle's own velocity differs by no more.
+RESTS_M_S, RESTS_S, CLEAR_SHARE = 0.2, 0.1, 0.7
 # Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
 # A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
 YAW_LEAD_RAD = 0.28
+# PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
+BRAKES_M_S2 = 3.0
+# An attitude is flown on for COM_OF_LOSS_T: no vehicle that leans by 35 degrees is safe for longer than this.
+MOST_HELD_S = 0.3
+
+# --- what a setpoint of a position leads to
+# PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, MPC_Z_VEL_P_ACC, 1/s.
+HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S, CLIMB_GAIN_PER_S = 1.0, 0.95, 1.8, 4.0
 
 # PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s by default, and notices the silence late: with 1 s set, a real PX4
 # changed to hold after 1.04 to 1.13 s (bench/notes/px4.md).
 HELD_S, NOTICED_S = 1.0, 0.13
-# Largest speed at that moment. From 1 m/s a vehicle stops within 0.2 m with MPC_ACC_HOR.
-HELD_TO_M_S = 1.0
 
 # --- half-spaces
 # Cosine between two normals. Below it the surfaces face each other, as in a corridor: the goal is then no further from
@@ -199,9 +207,14 @@ TILT_PER_S = 0.5
 MODEL_ERROR = 0.03
 # Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
+# How fast the integral's drift from the reported velocities is learnt, 1/s: half a second is longer than their errors
+# last. Gyroscopes miss a part of a hit's turn between their samples, and the tilt is then wrong.
+DRIFT_PER_S = 2.0
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
 COMPARED_S = 0.5
+# The logistic function with this factor differs from the normal distribution's by less than 1 %.
+LOGISTIC = 1.702
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames
 # return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
 SPREAD = 0.3
@@ -302,6 +315,8 @@ class EstimateConfig(StrictModel):
 class RecoveryConfig(StrictModel):
     """The mission's `recovery:` part; `gamma` in seconds, one number or one for each horizontal axis."""
 
+    retired = frozenset({"acceleration_m_s2", "clearance_s", "vertical_acceleration_m_s2"})
+
     law: Literal["adaptive", "normal", "paper"] = "adaptive"
     """What sets the recovery setpoint."""
     gamma: Positive | tuple[Positive, Positive] = 0.5
@@ -310,16 +325,7 @@ class RecoveryConfig(StrictModel):
     tangential: Literal["damped", "kept"] = "damped"
     """Laws `normal` and `adaptive`: what becomes of the motion along the obstacle."""
     clearance_m: Positive = 0.35
-    """Law `adaptive`, but for the vertical acceleration, which `normal` has too. The guards stay 0.3 m clear; the
-    wavering of a hover on optical flow takes 5 cm."""
-    clearance_s: NotNegative = 0.31
-    """More where the hit was harder: half of eq. 3's distance with the paper's gamma, 0.25 s, and what a vehicle still
-    trimmed against the drag of its approach stops short by, up to 0.06 s times v_c in simulation."""
-    acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 3.0
-    """PX4's MPC_ACC_HOR: a tilt of 17 degrees, which leaves a vehicle that hovers at 78 % of its thrust its height."""
-    vertical_acceleration_m_s2: Annotated[NotNegative, Field(le=9.81)] = 3.0
-    """Besides the vehicle's own loop, against climbing or falling after a hit. Hovering at 78 % of the thrust leaves
-    2.8 m/s^2 upwards. 0: none."""
+    """Law `adaptive`. The guards stay 0.3 m clear; the wavering of a hover on optical flow takes 5 cm."""
     restitution: Annotated[NotNegative, Field(le=1.0)] = 0.45
     """Of the speed into the obstacle, until the rebound has been measured: vehicles give back anything up to 0.9."""
 

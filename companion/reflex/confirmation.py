@@ -13,12 +13,11 @@ from statistics import median, stdev
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2, SAME_M_S
 from companion.motion.history import MotionHistory
-from companion.motion.strapdown import VelocityFix
+from companion.motion.strapdown import ZERO, VelocityFix
 from companion.reflex.config import DECIDED_US, STRUCK_M_S, SURE
 from companion.reflex.detector import Evidence
 from companion.reflex.halfspace import plus, split
 from companion.reflex.impact import ImpactEstimate
-from companion.reflex.planner import REST
 
 
 @dataclass(slots=True)
@@ -105,7 +104,7 @@ def hypothesis_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s
     is_jump, earlier = impact.evidence is Evidence.VELOCITY_JUMP, estimate.earlier
     if size_m_s2 == 0.0 or (not is_jump and (estimate.is_final or earlier is None)):
         return None
-    away = plus(REST, 1.0 / size_m_s2, force_ned_m_s2)
+    away = plus(ZERO, 1.0 / size_m_s2, force_ned_m_s2)
     if is_jump:
         return Hypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
     return Hypothesis(hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, earlier)

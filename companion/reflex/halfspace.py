@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from companion.fence import Fence
 from companion.messages import Vector3
-from companion.reflex.config import BEHIND_M, FACING_COSINE, ROUNDS, STEEP
+from companion.reflex.config import ROUNDS, STEEP
 from companion.reflex.normal import unit
 
 
@@ -14,6 +14,11 @@ def away_from(normal_ned: Vector3) -> Vector3:
     """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
     n, e, d = normal_ned
     return unit((n, e, d if abs(d) > STEEP * math.hypot(n, e, d) else 0.0))
+
+
+def along(vector: Vector3, normal: Vector3) -> float:
+    """The component of a vector along a unit normal."""
+    return vector[0] * normal[0] + vector[1] * normal[1] + vector[2] * normal[2]
 
 
 def split(vector: Vector3, normal: Vector3) -> tuple[float, Vector3]:
@@ -46,9 +51,15 @@ class Surface:
     normal_ned: Vector3
     distance_m: float
 
+    @property
+    def level_m(self) -> float:
+        """The least component of a clear place along the normal."""
+        return along(self.point_ned_m, self.normal_ned) + self.distance_m
+
     def off_m(self, place_ned_m: Vector3) -> float:
         """Distance of a position from touching, m; negative behind the surface."""
-        return split(plus(place_ned_m, -1.0, self.point_ned_m), self.normal_ned)[0]
+        (n, e, d), (a, b, c), (x, y, z) = place_ned_m, self.normal_ned, self.point_ned_m
+        return (n - x) * a + (e - y) * b + (d - z) * c
 
 
 def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
@@ -65,15 +76,17 @@ def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, se
     return plus((n, e, min(max(end_d, -fence.max_height_m), -fence.min_height_m)), 1.0, origin_ned_m)
 
 
-def clear_goal(
-    surfaces: Sequence[Surface], contact_ned_m: Vector3, normal_ned: Vector3, goal_ned_m: Vector3
-) -> Vector3:
-    """The goal, clear of each surface by its distance; between facing surfaces by at most half of the room."""
-    for surface in list(surfaces) * ROUNDS:
-        wanted_m, room_m = surface.distance_m, surface.off_m(contact_ned_m)
-        if split(normal_ned, surface.normal_ned)[0] < FACING_COSINE:
-            wanted_m = min(wanted_m, 0.5 * max(0.0, room_m))
-        short_m = wanted_m - surface.off_m(goal_ned_m)
-        if room_m >= -BEHIND_M and short_m > 0.0:
-            goal_ned_m = plus(goal_ned_m, short_m, surface.normal_ned)
-    return goal_ned_m
+def projected(vector: Vector3, sides: Sequence[tuple[Vector3, float]]) -> Vector3:
+    """The vector, moved by as little as gives it so much along each unit normal at least.
+
+    Of places, velocities and accelerations alike. It converges in a few rounds, or between facing surfaces never.
+    """
+    for _ in range(ROUNDS):
+        before = vector
+        for normal, least in sides:
+            short = least - along(vector, normal)
+            if short > 0.0:
+                vector = plus(vector, short, normal)
+        if vector is before:
+            break
+    return vector

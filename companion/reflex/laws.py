@@ -5,23 +5,31 @@ positive axes; read for any approach, gamma_i |v_ci| back along each horizontal 
 
 `normal`, eq. 3 along the normal: x_d = x(t_c) + gamma |v_c . n| n + tau, tau = 0 (tangential: damped) or gamma v_t.
 
-`adaptive`, as near as is safe. From the motion x, v, a that follows the contact, with v_t the part of v along it:
+`adaptive`, as near as is safe. From the motion x, v that follows the contact, with v_t the part of v along it:
 
-    r   = v T / 2 + a T^2 / 12,  r_t what of it is along the obstacle
-    D   = max(d_0,  t_0 |v_c . n|,  (x - x(t_c) + r) . n)
-    x_d = x + (D - (x - x(t_c)) . n) n + r_t,  height x_3(t_c) unless the obstacle is steep
+    D   = max(d_0,  (x - x(t_c) + T v) . n),    T = WAY_S
+    x_d = x + (D - (x - x(t_c)) . n) n + T v_t, height x_3(t_c) unless the obstacle is steep
 
-that is d_0 (clearance_m) or t_0 |v_c . n| (clearance_s) off the obstacle, further where the rebound would carry the
-vehicle further before it could stop, and along the obstacle where it comes to rest.
+that is d_0 (clearance_m) off the obstacle, further where the rebound carries the vehicle further, and along the
+obstacle where it comes to rest: T v is the way of the attitude law (see attitude_law), whatever the attitude's lag.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.reflex.config import RecoveryConfig
-from companion.reflex.halfspace import plus, split
-from companion.reflex.planner import MotionState, shortest
+from companion.motion.strapdown import ZERO
+from companion.reflex.config import WAY_S, RecoveryConfig
+from companion.reflex.halfspace import along, plus, split
+
+
+@dataclass(frozen=True, slots=True)
+class MotionState:
+    """Position, velocity and acceleration, local NED. The acceleration is that of the vehicle's own thrust alone."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3 = ZERO
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +54,12 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """`follows`: goal and plan are found anew as more is known of the contact. `plans`: else the goal is asked for at
-    once, from the first moment on."""
+    """`follows`: the goal is found anew as more is known of the contact. `leans`: attitude and thrust are set until the
+    vehicle rests; else its own loops fly it to the goal from the first moment on."""
 
     goal_ned_m: Callable[[RecoveryConfig, Contact, MotionState], Vector3]
     follows: bool
-    plans: bool
+    leans: bool
 
 
 def _paper(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
@@ -68,27 +76,20 @@ def _normal(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Ve
 
 
 def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
-    normal, x = contact.normal_ned, motion.position_ned_m
-    off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
-    off_m = split(plus(x, -1.0, contact.position_ned_m), normal)[0]
-    clear_m = max(config.clearance_m, -config.clearance_s * split(contact.velocity_ned_m_s, normal)[0])
+    normal, ways_m = contact.normal_ned, plus(ZERO, WAY_S, motion.velocity_ned_m_s)
+    off_m = along(plus(motion.position_ned_m, -1.0, contact.position_ned_m), normal)
+    off_way_m, along_way = split(ways_m, normal)
     if normal[2] == 0.0:
-        tangential = (tangential[0], tangential[1], 0.0)
-    leant_m_s2, leant_along = split(motion.acceleration_ned_m_s2, normal)
-
-    def goal_after(duration_s: float) -> Vector3:
-        stops_m = 0.5 * off_m_s * duration_s + leant_m_s2 * duration_s**2 / 12.0
-        goal = plus(x, max(clear_m - off_m, stops_m), normal)
-        return plus(plus(goal, 0.5 * duration_s, tangential), duration_s**2 / 12.0, leant_along)
-
-    goal = shortest(motion, goal_after, config.acceleration_m_s2).goal_ned_m
+        along_way = (along_way[0], along_way[1], 0.0)
+    goal = plus(motion.position_ned_m, max(config.clearance_m - off_m, off_way_m), normal)
+    goal = plus(goal, 1.0, along_way)
     if config.tangential == "kept":
-        goal = plus(goal, config.gamma_per_axis[0], tangential)
+        goal = plus(goal, config.gamma_per_axis[0] / (WAY_S), along_way)
     return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])
 
 
 RECOVERY_LAWS: Mapping[str, Law] = {
-    "paper": Law(_paper, follows=False, plans=False),
-    "normal": Law(_normal, follows=True, plans=False),
-    "adaptive": Law(_adaptive, follows=True, plans=True),
+    "paper": Law(_paper, follows=False, leans=False),
+    "normal": Law(_normal, follows=True, leans=False),
+    "adaptive": Law(_adaptive, follows=True, leans=True),
 }

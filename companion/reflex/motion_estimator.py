@@ -16,16 +16,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from companion.messages import LocalPosition, Vector3
+from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import DELAY_S, GRAVITY_M_S2, LATEST_S, LONGEST_GAP_US, SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.rotation import body_to_ned, turned
-from companion.motion.strapdown import Strapdown
+from companion.motion.strapdown import LEVEL, ZERO, Strapdown
 from companion.reflex import config as reflex
+from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
 from companion.reflex.correction import MODELS, Floats, error_response
-from companion.reflex.halfspace import limited, plus, split
-from companion.reflex.laws import Contact
-from companion.reflex.planner import REST, MotionState
+from companion.reflex.halfspace import along, limited, plus, split
+from companion.reflex.laws import Contact, MotionState
 
 
 class FilterBank:
@@ -34,7 +34,7 @@ class FilterBank:
     Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
     """
 
-    __slots__ = ("covariance", "log_likelihoods", "state")
+    __slots__ = ("covariance", "leaves", "log_likelihoods", "state")
 
     def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
         """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
@@ -42,7 +42,7 @@ class FilterBank:
         spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
         self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
-        self.log_likelihoods = np.zeros(models)
+        self.log_likelihoods, self.leaves = np.zeros(models), np.ones(models)
         self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
         self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
 
@@ -63,6 +63,16 @@ class FilterBank:
         self.covariance = self.covariance - with_it[..., None] * gain[:, None]
         self.log_likelihoods = self.log_likelihoods - (missed**2).sum(axis=1) / size - 3.0 * np.log(size)
 
+    def leave(self, normal: Vector3, along_m_s: float, error_rad: float) -> None:
+        """Take that no vehicle goes on into what it has hit: the probability that a model's velocity left it.
+
+        `along_m_s`: what the vehicle's own thrust has added since; `error_rad`: of the normal.
+        """
+        velocity, variance = self.state[..., 1], self.covariance[:, 1, 1]
+        off_m_s = velocity @ np.array(normal) - along_m_s
+        spread2 = variance + error_rad**2 * (velocity**2).sum(axis=1)
+        self.leaves = np.maximum(0.5 + 0.5 * np.tanh(0.5 * reflex.LOGISTIC * off_m_s / np.sqrt(spread2)), 1e-9)
+
     def estimate(self, left: Floats) -> tuple[MotionState, float, float]:
         """Motion, largest standard deviation of its velocity, largest further swing of the reported velocity.
 
@@ -81,7 +91,7 @@ class FilterBank:
 
     def _probabilities(self) -> Floats:
         """Probability of each model."""
-        share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max()))
+        share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max())) * self.leaves
         share /= share.sum()
         return share
 
@@ -99,17 +109,21 @@ class MotionEstimator:
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
-    tilt_m_s2: Vector3 = REST  # horizontal acceleration of the thrust, LEAD_S ahead
-    external_m_s2: Vector3 = REST  # external force per mass across the thrust, horizontal: wind, a gust or a contact
+    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
+    external_m_s2: Vector3 = ZERO  # external force per mass across the thrust, horizontal: wind and drag
+    attitude_wxyz: Quaternion = LEVEL
+    yaw_rate_rad_s: float = 0.0
+    drift_m_s2: Vector3 = ZERO  # of the integral from the reported velocities: the gyroscopes' tilt is wrong
+    level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
-    position_error_m: Vector3 = REST  # remaining error of the reported position, once it has converged
+    position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
     _bank: FilterBank | None = None  # from the first report on
-    _summed_m_s: Vector3 = REST  # the accelerometer's integral
+    _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
     _at_boot_us: int = 0  # the bank's time
-    _moved_m_s: Vector3 = REST  # the integral up to that time
+    _moved_m_s: Vector3 = ZERO  # the integral up to that time
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
-    _hidden_error_m_s: Vector3 = REST  # remaining error of the reported velocity
-    _rate_error_m_s: Vector3 = REST  # its difference from the positions' rate
+    _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
+    _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
     def __post_init__(self) -> None:
@@ -117,10 +131,10 @@ class MotionEstimator:
         self._begin()
 
     def _begin(self) -> None:
-        self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, REST, None
+        self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
         self._newest, self.has_converged = None, False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
-        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = REST
+        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
         """Take what is known of the contact by now: whether it was measured whole, and the time of its last sample."""
@@ -137,17 +151,35 @@ class MotionEstimator:
         if not 0.0 < elapsed_s < 1e-6 * LONGEST_GAP_US:
             return
         pushed = strapdown.acceleration_ned_m_s2
-        if math.hypot(*pushed) >= GRAVITY_M_S2:
-            pushed = REST
+        pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else plus(pushed, 1.0, self.drift_m_s2)
         was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
         mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
-        self.tilt_m_s2 = tilt_ahead(strapdown, reflex.LEAD_S)
-        down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
-        n, e, _ = split(plus(mean, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
-        self.external_m_s2 = (n, e, 0.0)
+        self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
+        self.level_m_s2 = strapdown.level_acceleration_m_s2
+        self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
+        if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
+            down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
+            n, e, _ = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
+            share = elapsed_s / (reflex.SMOOTHING_S + elapsed_s)
+            self.external_m_s2 = plus(self.external_m_s2, share, plus((n, e, 0.0), -1.0, self.external_m_s2))
+
+    @property
+    def belief(self) -> Belief:
+        """What the attitude law goes by."""
+        motion = self.motion
+        return Belief(
+            motion.position_ned_m,
+            motion.velocity_ned_m_s,
+            self.spread_m_s,
+            self.tilt_m_s2,
+            plus(self.external_m_s2, 1.0, self.drift_m_s2),
+            self.attitude_wxyz,
+            self.yaw_rate_rad_s,
+            self.level_m_s2,
+        )
 
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
@@ -171,7 +203,7 @@ class MotionEstimator:
             return
         config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - self._at_boot_us), 1e-6 * (now_us - at_us)
         # Clipping hides between none and all of the change of velocity.
-        half = plus(REST, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
+        half = plus(ZERO, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
         bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
         bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s))
         self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
@@ -186,6 +218,8 @@ class MotionEstimator:
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
+        normal = self.contact.normal_ned
+        bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
         estimate, spread_m_s, left_m_s = bank.estimate(left)
         self.has_converged = self.has_converged or left_m_s <= SAME_M_S
         if self.has_converged:
@@ -204,7 +238,11 @@ class MotionEstimator:
             if 0.0 < elapsed_s < reflex.COMPARED_S:
                 self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
         place = plus(was.position_ned_m, share, plus(measured.position_ned_m, -1.0, was.position_ned_m))
-        velocity = plus(was.velocity_ned_m_s, share, plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
+        missed_m_s = plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s)
+        velocity = plus(was.velocity_ned_m_s, share, missed_m_s)
+        if before is not None:
+            n, e, _ = plus(self.drift_m_s2, share * reflex.DRIFT_PER_S, missed_m_s)
+            self.drift_m_s2 = (n, e, 0.0)
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = 0.0
 

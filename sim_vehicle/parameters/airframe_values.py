@@ -14,6 +14,7 @@ def defaults_from(airframe: Airframe) -> dict[str, float]:
     """What ``airframe`` has in place of PX4's defaults; one gain for all axes becomes PX4's two."""
     control = airframe.control
     return {
+        "COM_OF_LOSS_T": 0.3,  # as `rebound airframe px4` sets it
         "IMU_INTEG_RATE": _MICROSECONDS // airframe.imu.integration_interval_us,
         "MPC_THR_HOVER": airframe.hover_fraction,
         "MPC_TILTMAX_AIR": math.degrees(control.tilt_max_rad),

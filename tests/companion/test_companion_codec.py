@@ -15,6 +15,7 @@ from companion.mavlink.packet import payload_of
 from companion.mavlink.readers import LONE_GUARD_READERS, Reader
 from companion.messages import (
     Attitude,
+    AttitudeSetpoint,
     AttitudeTarget,
     AutopilotVersion,
     Battery,
@@ -318,6 +319,7 @@ def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
         PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), 1.0, (0.5, 0.0, -0.5), (0.0, 2.0, 0.0)),
         PositionSetpoint(0, (0.0, 0.0, 0.0), None, None, None),
         PositionSetpoint(5_000_000_000_000, (-1e4, 1e-9, 0.1), -3.0, (0.0, 0.0, 0.0), None),
+        AttitudeSetpoint(5_000_000_000_000, (1.0, 0.0, 0.0, 0.0), 0.5),
     ],
 )
 def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs_it(setpoint, sequence):
@@ -325,9 +327,8 @@ def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs
     encoder.speak_to(7, 1)
     encoder._mavlink.seq = link.seq = sequence
     ((name, fields),) = encoder.fields(setpoint)
-    theirs = mav.MAVLink_set_position_target_local_ned_message(
-        **{key: math.nan if value is None else value for key, value in fields.items()}
-    )
+    kind = mav.mavlink_map[mav.__dict__[f"MAVLINK_MSG_ID_{name}"]]
+    theirs = kind(**{key: math.nan if value is None else value for key, value in fields.items()})
     (packet,) = encoder.packets(setpoint)
     assert packet == theirs.pack(link)
     assert mav.MAVLink(None).decode(bytearray(packet)).get_type() == name
@@ -362,13 +363,11 @@ def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
             assert value == (tuple(found) if isinstance(found := getattr(heard, name), list) else found), name
 
 
-@pytest.mark.parametrize(("is_height_free", "mask"), [(False, 0x81B), (True, 0x81F)])
-def test_a_setpoint_that_leans_only_asks_for_the_acceleration_alone(is_height_free, mask):
-    lean = (0.5, -0.5, 0.25)
-    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, True, is_height_free))
-    assert m.type_mask == mask
-    assert all(math.isnan(value) for value in (m.x, m.y, m.vx, m.vy)) and math.isnan(m.z) is is_height_free
-    assert (m.vz, m.afx, m.afy, m.afz, m.yaw) == (0.5, *lean, 1.0)
+def test_an_attitude_leaves_the_body_rates_to_the_vehicle():
+    m = sent(AttitudeSetpoint(2_000_000, (0.5, 0.5, -0.5, 0.5), 0.625))
+    assert m.get_type() == "SET_ATTITUDE_TARGET"
+    assert (m.type_mask, m.target_system, m.target_component, m.time_boot_ms) == (0x07, 7, 1, 2000)
+    assert (m.q, m.thrust) == ([0.5, 0.5, -0.5, 0.5], 0.625)
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,7 @@ def test_a_second_hit_is_a_new_collision_with_a_new_setpoint(state):
 
     first, second = f.report.collisions
     assert f.state == "recovering"
-    assert second.normal_ned == pytest.approx((0.0, 1.0, 0.0), abs=0.01)
+    assert second.normal_ned == pytest.approx((0.0, 1.0, 0.0), abs=0.1)
     assert second.sample_time_boot_us > first.sample_time_boot_us
     m = f.vehicle.setpoints[-1][1]
     f.step()
@@ -159,8 +159,9 @@ def test_a_second_hit_while_recovering_does_not_lead_back_to_the_first_wall(stat
     first, second = f.report.collisions
     alone_m = second.position_ned_m[0] - 0.5 * second.impact_velocity_ned_m_s[0]
     if keeps_clear:
-        assert alone_m > first.recovery_setpoint_ned_m[0] + 0.1
-        assert second.recovery_setpoint_ned_m[0] == pytest.approx(first.recovery_setpoint_ned_m[0], abs=0.05)
+        clear_m = first.position_ned_m[0] - 0.35
+        assert alone_m > clear_m + 0.01
+        assert second.recovery_setpoint_ned_m[0] == pytest.approx(clear_m, abs=0.02)
     else:
         assert second.recovery_setpoint_ned_m[0] == pytest.approx(alone_m, abs=1e-6)
 

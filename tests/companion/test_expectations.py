@@ -30,7 +30,7 @@ AFTER_IT = [
     ({"recovered": None}, True, "settled after"),
     ({"recovered": {"within_s": 0.1}}, False, "settled after"),
     ({"recovered": {"max_overshoot_m": 0.5}}, True, "too far"),
-    ({"position": {"ned_m": [2.45, 0, -1.5], "within_m": 0.3}}, True, ""),
+    ({"position": {"ned_m": [1.95, 0, -1.5], "within_m": 0.3}}, True, ""),
     ({"position": {"ned_m": [5, 0, -1.5], "within_m": 0.3}}, False, ""),
     ({"height": {"min_m": 1.3, "max_m": 1.7}}, True, "1.5"),
     ({"height": {"max_m": 1.0}}, False, "1.5"),

@@ -56,7 +56,7 @@ def broken_target(self, now_us):
         ("companion.flight.progress.FlyItems.target", broken_target),
         ("companion.core.bounded", breaks),
         ("companion.core.status_text", breaks),
-        ("companion.mavlink.encode.Encoder._setpoint", breaks),
+        ("companion.mavlink.encode.Encoder._position_fields", breaks),
     ],
 )
 def test_what_breaks_on_the_way_out_hands_the_vehicle_over_by_setpoints_that_are_safe_to_hold(monkeypatch, place, does):

@@ -2,7 +2,6 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,8 +22,9 @@ from companion.flight.plan import mission_lines
 from companion.memory.patch import Patch
 from companion.mission.model import Mission
 from companion.mission.policy import SetpointLimits
-from companion.reflex.config import HELD_S, NOTICED_S
-from companion.reflex.planner import MotionState
+from companion.reflex.attitude_law import Belief, Lean
+from companion.reflex.config import HELD_S, MOST_HELD_S, NOTICED_S
+from companion.reflex.laws import MotionState
 from tests.companion.hostile import flight_in
 
 DOCS = Path(__file__).parents[2] / "bench" / "notes" / "px4.md"
@@ -32,6 +32,7 @@ ORIGIN = (0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)
 FENCE, LIMITS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), SetpointLimits()
 HERE = (0.0, 0.0, -1.5)
+HELD_BY_ATTITUDE_S = MOST_HELD_S + NOTICED_S
 # A wall that is touched with the centre 0.5 m north of here.
 WALL = touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0))
 
@@ -41,7 +42,7 @@ def around(velocity, known=(), vehicle=HERE) -> Surroundings:
 
 
 def lean(acceleration, velocity=REST, place=HERE) -> Target:
-    return Target(place, 0.0, REST, acceleration, acceleration_only=True, expected=MotionState(place, velocity))
+    return Target(place, 0.0, None, acceleration, Lean(Belief(place, velocity), (), 15.0, 0.0, HELD_BY_ATTITUDE_S))
 
 
 def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, tuple]:
@@ -51,7 +52,7 @@ def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, t
     for _ in range(round(seconds * 1e3)):
         for axis, (k_x, k_v) in enumerate(((0.95, 1.8), (0.95, 1.8), (1.0, 4.0))):
             pulled = k_v * (wanted[axis] + k_x * (target.position_ned_m[axis] - place[axis]) - velocity[axis])
-            velocity[axis] += 1e-3 * (ahead[axis] if target.acceleration_only and axis < 2 else pulled + ahead[axis])
+            velocity[axis] += 1e-3 * (pulled + ahead[axis])
             place[axis] += 1e-3 * velocity[axis]
     return tuple(place), tuple(velocity)
 
@@ -61,7 +62,6 @@ def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, t
     [
         Target((1.0, -0.5, -2.0), 0.0),
         Target((1.0, -0.5, -2.0), 0.0, (1.5, 0.5, -0.4), (-2.0, 1.0, 0.5)),
-        lean((2.0, -1.0, 0.8)),
     ],
 )
 def test_the_way_is_that_of_px4s_loops(target):
@@ -70,75 +70,40 @@ def test_the_way_is_that_of_px4s_loops(target):
     place, velocity = flown(target, motion, HELD_S + NOTICED_S)
     assert way[0] == HERE
     assert way[-2] == pytest.approx(place, abs=0.01)
-    # and then it stops: from 3 m/s^2 on a place, and of a lean as late as the docs say that PX4's estimate is right
-    n = 0.5 * abs(velocity[0]) * velocity[0] / 3.0 if not target.acceleration_only else 1.5 * velocity[0]
-    assert way[-1][0] - way[-2][0] == pytest.approx(n, abs=0.02)
+    # and then it stops, with 3 m/s^2
+    assert way[-1][0] - way[-2][0] == pytest.approx(0.5 * abs(velocity[0]) * velocity[0] / 3.0, abs=0.02)
 
 
-def test_a_brake_after_a_rebound_leads_back_to_the_wall_and_is_weakened_by_as_little_as_that_takes():
-    """0.8 m/s off the wall and 3 m/s^2 towards it: after 1.1 s it would come back at 2.5 m/s."""
-    off = (-0.8, 0.0, 0.0)
-    known = [KnownSurface(WALL)]
-    asked = lean((3.0, 1.0, 0.0), off)
-    sent, _ = bounded(asked, around(off, known), FENCE, LIMITS)
-    north, east, _ = sent.acceleration_ned_m_s2
-    assert 0.0 < north < 1.5 and east == 1.0
-    assert min(WALL.off_m(place) for place in held_path(sent, MotionState(HERE, off))) == pytest.approx(0.15, abs=0.15)
-    # a hair more and it were too near
-    more = lean((north + 0.2, 1.0, 0.0), off)
-    assert min(WALL.off_m(place) for place in held_path(more, MotionState(HERE, off))) < 0.15
+@pytest.mark.parametrize("off_m_s", [-1.0, 0.0, 0.8, 2.5])
+def test_a_lean_that_is_held_leads_no_nearer_to_the_wall_than_can_be_braked(off_m_s):
+    # Given a vehicle half a metre off the wall, and an acceleration to the wall and along it
+    velocity = (-off_m_s, 0.3, 0.0)
+    asked = lean((6.0, 1.0, 0.0), velocity)
+    # When PX4 holds what is sent until it notices the silence, and then brakes with 3 m/s^2
+    sent, _ = bounded(asked, around(velocity, [KnownSurface(WALL)]), FENCE, LIMITS)
+    north_m_s = velocity[0] + HELD_BY_ATTITUDE_S * sent.acceleration_ned_m_s2[0]
+    north_m = HERE[0] + 0.5 * HELD_BY_ATTITUDE_S * (velocity[0] + north_m_s)
+    # Then it stops off the wall, where physics allows that at all, and along the wall nothing is taken
+    stops_m = north_m + 0.5 * max(0.0, north_m_s) ** 2 / 3.0
+    assert WALL.off_m((stops_m, 0.0, -1.5)) >= WALL.distance_m - 1e-6
+    assert sent.acceleration_ned_m_s2[1] == 1.0 and sent.acceleration_ned_m_s2[0] <= 6.0
+    # and what leaves fast enough may brake as hard as it likes
+    assert (sent.acceleration_ned_m_s2[0] == 6.0) is (off_m_s == 2.5)
 
 
-def test_a_vehicle_that_is_slower_off_the_wall_than_expected_may_brake_no_harder_than_that_allows():
-    """The estimate says 0.2 m/s off the wall, the hit's law 1 m/s: which of them is right nobody knows."""
-    expected, told = (-1.0, 0.0, 0.0), (-0.2, 0.0, 0.0)
-    alone, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(expected, [KnownSurface(WALL)]), FENCE, LIMITS)
-    both, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(told, [KnownSurface(WALL)]), FENCE, LIMITS)
-    assert both.acceleration_ned_m_s2[0] < 0.6 * alone.acceleration_ned_m_s2[0]
-
-
-def test_a_vehicle_that_is_nearer_to_the_wall_than_expected_may_brake_no_harder_than_that_allows():
-    """The hit's law has it 0.5 m off the wall, its estimate 0.2 m: which of them is right nobody knows."""
-    off, asked = (-0.6, 0.0, 0.0), lean((2.0, 0.0, 0.0), (-0.6, 0.0, 0.0))
-    far, near = (
-        bounded(asked, around(off, [KnownSurface(WALL)], vehicle), FENCE, LIMITS)[0]
-        for vehicle in (HERE, (0.3, 0.0, -1.5))
-    )
-    assert near.acceleration_ned_m_s2[0] < far.acceleration_ned_m_s2[0] - 0.1
-
-
-def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
-    # Given a vehicle that leans by 0.7 m/s^2 towards the wall where it takes itself for level
-    off = MotionState(HERE, (-1.0, 0.0, 0.0), (0.7, 0.0, 0.0))
-    surroundings = around(off.velocity_ned_m_s, [KnownSurface(WALL)])
-    # When it is to brake by 0.5
-    sent, _ = bounded(replace(lean((0.5, 0.2, 0.0)), expected=off), surroundings, FENCE, LIMITS)
-    # Then it is told to lean off the wall by 0.2, once
-    assert sent.acceleration_ned_m_s2 == pytest.approx((-0.2, 0.2, 0.0))
-    assert bounded(sent, surroundings, FENCE, LIMITS)[0].acceleration_ned_m_s2 == sent.acceleration_ned_m_s2
-    # and never further than it may tilt
-    capsized = replace(off, acceleration_ned_m_s2=(90.0, 0.0, 0.0))
-    sent, _ = bounded(replace(lean((0.5, 0.2, 0.0)), expected=capsized), surroundings, FENCE, LIMITS)
-    assert math.hypot(*sent.acceleration_ned_m_s2[:2]) <= 9.81 * math.tan(math.radians(LIMITS.max_tilt_deg))
-
-
-def test_a_tilt_error_that_ends_meanwhile_does_not_lead_to_the_wall():
-    """What is told to lean to the wall, because it leans off it by itself, must be safe when it does not any more."""
-    off = MotionState(HERE, (-1.0, 0.0, 0.0))
-    plain, _ = bounded(
-        replace(lean((0.8, 0.0, 0.0)), expected=off), around(off.velocity_ned_m_s, [KnownSurface(WALL)]), FENCE, LIMITS
-    )
-    errs = replace(off, acceleration_ned_m_s2=(-0.9, 0.0, 0.0))
-    sent, _ = bounded(
-        replace(lean((0.8, 0.0, 0.0)), expected=errs), around(off.velocity_ned_m_s, [KnownSurface(WALL)]), FENCE, LIMITS
-    )
-    assert plain.acceleration_ned_m_s2[0] < sent.acceleration_ned_m_s2[0] < 0.8 + 0.9
-    assert min(WALL.off_m(place) for place in held_path(sent, off)) > 0.1
+def test_a_lean_that_is_held_stays_inside_the_fence_above_the_floor_and_below_the_top():
+    edge, low = (11.5, 0.0, -0.5), (0.0, 0.0, -0.4)
+    outwards, _ = bounded(lean((5.0, 0.0, 0.0), (1.0, 0.0, 0.0), edge), around((1.0, 0.0, 0.0)), FENCE, LIMITS)
+    assert 1.0 + HELD_BY_ATTITUDE_S * outwards.acceleration_ned_m_s2[0] < 0.9
+    down, _ = bounded(lean((0.0, 0.0, 4.0), REST, low), around(REST), FENCE, LIMITS)
+    assert down.acceleration_ned_m_s2[2] < 1.0
+    up, _ = bounded(lean((0.0, 0.0, -4.0), (0.0, 0.0, -1.0), (0.0, 0.0, -4.9)), around(REST), FENCE, LIMITS)
+    assert up.acceleration_ned_m_s2[2] > 0.0
 
 
 def test_what_leads_away_from_the_wall_or_along_it_passes():
     asked = lean((-3.0, 2.0, 0.0))
-    assert bounded(asked, around(REST, [KnownSurface(WALL)]), FENCE, LIMITS) == (asked, "")
+    assert bounded(asked, around(REST, [KnownSurface(WALL)]), FENCE, LIMITS)[0] == asked
 
 
 def test_a_place_with_a_velocity_into_the_wall_loses_that_and_says_so():

@@ -16,12 +16,9 @@ from companion.mission.model import Mission
 from companion.motion.config import SAME_M_S
 from companion.motion.strapdown import Strapdown
 from companion.reflex.config import IMPULSE_RAD, TILT_PER_S, EstimateConfig
-from companion.reflex.detector import DetectorState
-from companion.reflex.impact import ImpactEstimator
-from companion.reflex.laws import Contact
+from companion.reflex.laws import Contact, MotionState
 from companion.reflex.motion_estimator import MotionEstimator, tilt_ahead
 from companion.reflex.normal import Normal
-from companion.reflex.planner import MotionState
 
 NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
 ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
@@ -84,8 +81,8 @@ def test_the_motion_is_found_long_before_the_estimate_is_right_again(way, speed_
         # Then it is never taken for right before what is missing still is known: to a few times its noise and a share
         least_m_s = SAME_M_S + 0.05 * hidden_m_s
         assert not found.has_converged or abs(told_m_s - found.velocity_error_m_s[0] - true_m_s) < least_m_s
-        # and the motion is known to half of what was hidden at any time, and to a tenth after a second
-        assert abs(velocity_error_m_s) < (0.5 if since_s < 1.0 else 0.1) * hidden_m_s
+        # and the motion is known to half of what was hidden at any time, and to a tenth and noise after a second
+        assert abs(velocity_error_m_s) < 0.01 + (0.5 if since_s < 1.0 else 0.1) * hidden_m_s
 
 
 @pytest.mark.parametrize("speed_m_s", [1.0, 3.0])
@@ -234,78 +231,15 @@ def test_a_lean_is_known_ahead_by_the_rates():
 def recovering(**hit):
     mission = Mission.model_validate({"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
-    flight.origin_ned_m = ZERO
+    flight.origin_ned_m, flight.loss_s = ZERO, 0.3
+    flight.vehicle.attitude = Attitude(HIT_US, LEVEL)
+    flight.thrust.full_m_s2 = flight.thrust.known_s = 16.0
     estimator = reckoned(**hit)
     record = CollisionRecord(
         0, HIT_US, "fused", estimator.contact, (2.6, 0.0, -2.0), Normal(SOUTH, 0.2), 20.0, estimator
     )
     flight.collisions.append(record)
     return flight, record, Recover(flight, 0)
-
-
-def test_the_plan_begins_anew_when_a_slow_contact_is_over():
-    # Given arms that push for 0.15 s, while which the vehicle still flies in
-    flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
-    record.estimator.note_contact(True, HIT_US)
-
-    def hears(at_us, north_m, north_m_s):
-        sample = LocalPosition(HIT_US + at_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
-        recover.step(flight, Inputs(positions=[sample]), at_us)
-        return recover.target(at_us)
-
-    first = hears(80_000, 3.05, 0.2)
-    assert first.velocity_ned_m_s[0] == 0.0, "towards the wall is never asked for"
-    assert first.acceleration_ned_m_s2[0] < 0.0
-    # When the vehicle leaves
-    anew = hears(300_000, 2.99, -0.5)
-    # Then the plan goes on from there
-    assert anew.position_ned_m[0] == pytest.approx(3.01, abs=0.02)
-    assert anew.velocity_ned_m_s[0] == pytest.approx(-0.35, abs=0.15)
-    assert record.setpoint_ned_m[0] < 2.7
-
-
-def test_what_pushes_a_vehicle_along_takes_its_surface_and_its_goal_with_it():
-    # Given a screen that carries a vehicle south with 0.8 m/s
-    flight, record, recover = recovering(velocity=ZERO)
-    record.estimator.note_contact(True, HIT_US)
-    goals = []
-    for at_us in range(100_000, 1_500_000, 20_000):
-        record.estimator.external_m_s2 = (-3.0, 0.0, 0.0)
-        sample = LocalPosition(HIT_US + at_us, (3.0 - 0.8e-6 * at_us, 0.0, -2.0), (-0.8, 0.0, 0.0))
-        recover.step(flight, Inputs(positions=[sample]), at_us)
-        asked = recover.target(at_us)
-        goals.append(record.setpoint_ned_m[0])
-        assert asked.acceleration_ned_m_s2[0] < 2.8, "it brakes no harder than it can take back"
-    # Then the goal goes with it, and stays ahead of it
-    assert goals[0] - goals[-1] > 0.85
-    assert goals[-1] < 3.0 - 0.8 * 1.48 - 0.3
-
-
-def test_a_vehicle_whose_estimate_is_off_for_seconds_comes_to_rest_where_it_is_to_be():
-    # Given a clipped hit at 2 m/s, off the wall at as much, and a vehicle that comes to rest 0.6 m off it by itself
-    flight, record, recover = recovering()
-    strapdown, gone_s = Strapdown(), 0.3
-    for tick in range(1, 1_250):
-        since_s = 0.004 * tick
-        left = math.exp(-since_s / gone_s)
-        strapdown.time_boot_us, strapdown.acceleration_ned_m_s2 = HIT_US + 4_000 * tick, (2.0 / gone_s * left, 0.0, 0.0)
-        record.estimator.imu(strapdown)
-        if tick % 5:
-            continue
-        lacks_m_s, lacks_m = (4.0 * each for each in missing(since_s, *PX4))
-        told = LocalPosition(
-            HIT_US + 4_000 * tick,
-            (3.0 - 2.0 * gone_s * (1.0 - left) + lacks_m, 0.0, -2.0),
-            (lacks_m_s - 2.0 * left, 0.0, 0.0),
-        )
-        if recover.step(flight, Inputs(positions=[told]), 4_000 * tick) is not None:
-            break
-        if since_s == pytest.approx(1.6):
-            asked_m_s, velocity_error_m_s = recover.target(4_000 * tick + 5_000_000).velocity_ned_m_s[0], lacks_m_s
-    # Then PX4 is asked for what it takes for motion at rest, and the recovery is over before its estimate is right
-    assert velocity_error_m_s < -0.25 and asked_m_s == pytest.approx(velocity_error_m_s, abs=0.1)
-    assert record.is_over and lacks_m_s < -0.1
-    assert record.settled_after_s < 3.5
 
 
 def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
@@ -316,10 +250,9 @@ def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
         recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
         if record.is_over:
             break
-    # Then the recovery is over although 0.15 m/s is told, and PX4 is asked for as much at rest
+    # Then the recovery is over although 0.15 m/s is told
     assert record.setpoint_ned_m[0] == pytest.approx(2.38, abs=0.05)
     assert record.estimator.velocity_error_m_s[0] == pytest.approx(0.15, abs=0.05)
-    assert recover.target(at_us + 3_000_000).velocity_ned_m_s[0] == record.estimator.velocity_error_m_s[0]
     assert record.is_over and record.settled_after_s < 3.5
 
 
@@ -402,28 +335,6 @@ def test_a_vehicle_that_a_hit_has_turned_is_turned_back_at_leisure(heading_deg, 
     assert flight.target.yaw_rad == 0.0
 
 
-def test_what_shakes_a_vehicle_that_leaves_as_it_is_asked_to_moves_no_surface():
-    # Given a vehicle that follows its plan off a wall, and shakes so that the contact seems never to end
-    flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
-    record.estimator.note_contact(True, HIT_US)
-    north_m, north_m_s, goal_m = 3.0, -0.2, None
-    for at_us in range(100_000, 2_500_000, 20_000):
-        record.estimator.pushed_boot_us = HIT_US + at_us
-        sample = LocalPosition(HIT_US + at_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
-        if recover.step(flight, Inputs(positions=[sample]), at_us) is not None:
-            break
-        asked = recover.target(at_us)
-        north_m_s += 0.02 * (
-            asked.acceleration_ned_m_s2[0] + 1.8 * (asked.velocity_ned_m_s or ZERO)[0] - 1.8 * north_m_s
-        )
-        north_m += 0.02 * north_m_s
-        if at_us == 300_000:
-            goal_m = record.setpoint_ned_m[0]
-    # Then it comes to rest where the first plan led, and not wherever the shaking would take it
-    assert record.setpoint_ned_m[0] == pytest.approx(goal_m, abs=0.05)
-    assert north_m == pytest.approx(goal_m, abs=0.15)
-
-
 def test_a_whole_hit_is_followed_by_what_is_told_even_while_it_pushes():
     # Given arms that push for half a second, each sample shown whole
     found = reckoned((0.5, 0.0, 0.0))
@@ -432,23 +343,6 @@ def test_a_whole_hit_is_followed_by_what_is_told_even_while_it_pushes():
         found.update(said(0.3, since_us, (3.0 + 0.3e-6 * since_us, 0.0, -2.0)))
     # Then the motion is what the estimate says, not what was expected of the hit
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.3, abs=0.02)
-
-
-def test_a_lean_is_meant_for_the_tilt_that_the_gyroscopes_show():
-    # Given a vehicle that takes itself for pitched up by 8 degrees since a hit, which its gyroscopes deny
-    up_rad = math.radians(8.0)
-    source = ImpactEstimator(EstimateConfig())
-    strapdown = source.strapdown
-    strapdown.attitude(HIT_US + 140_000, LEVEL)
-    strapdown.imu(HIT_US + 150_000, (0.0, 0.0, -9.80665), ZERO)
-    strapdown.attitude(HIT_US + 160_000, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), most_wrong_rad=0.4)
-    _, record, recover = recovering()
-    # When the recovery asks for a lean
-    record.follow(DetectorState(), source)
-    target = recover.target(160_000)
-    # Then it is known to what that is added
-    assert target.acceleration_only
-    assert target.expected.acceleration_ned_m_s2[0] == pytest.approx(9.80665 * math.tan(up_rad))
 
 
 def test_gyroscopes_that_deny_more_tilt_than_a_hit_can_hide_are_wrong_themselves():
@@ -477,13 +371,3 @@ def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
     assert n < 2.7 and abs(e) < 0.1 and d == pytest.approx(-2.0)
     # And of the speed off the wall nothing is said: no velocity of that time was believed
     assert record.report().rebound_speed_m_s is None
-
-
-def test_in_doubt_accelerations_alone_are_asked_for():
-    flight, record, recover = recovering()
-    recover.step(flight, Inputs(positions=[said(2.2, 100_000, (3.1, 0.0, -2.0))]), 100_000)
-    asked = recover.target(100_000)
-    assert asked.acceleration_only and asked.is_height_free
-    assert asked.acceleration_ned_m_s2[0] < 0.5, "0.4 m/s off the wall: braked gently, never towards it harder"
-    motion = record.estimator.motion
-    assert asked.expected == MotionState(motion.position_ned_m, (min(0.0, motion.velocity_ned_m_s[0]), 0.0, 0.0))

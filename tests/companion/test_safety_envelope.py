@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 from bench.fly.packets import made
 from companion.fence import Fence
 from companion.flight.context import Target
-from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded
+from companion.flight.envelope import SetpointError, Surroundings, bounded
 from companion.mission.policy import SetpointLimits
 from companion.mission.trajectory import LineProfile
 from companion.motion.config import GRAVITY_M_S2
-from companion.reflex.halfspace import Surface, plus
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.hostile import attacked
 
@@ -76,55 +75,30 @@ def test_on_the_way_up_from_the_ground_the_ground_is_the_floor():
     assert place_of(under)[2] == pytest.approx(0.0) and "outside the fence" in reason
 
 
-def lean(acceleration, velocity=(0.0, 0.0, 0.0), place=(0.0, 0.0, -1.5), is_height_free=True) -> Target:
-    return replace(asked(place, velocity, acceleration), acceleration_only=True, is_height_free=is_height_free)
-
-
-def test_a_lean_is_bounded_by_the_tilt_and_by_gravity():
-    target, reason = bounded(lean((60.0, 80.0, 0.0)), around(), FENCE, LIMITS)
+def test_an_acceleration_is_bounded_by_the_tilt_and_by_gravity():
+    place = (0.0, 0.0, -1.5)
+    target, reason = bounded(asked(place, (0.0, 0.0, 0.0), (60.0, 80.0, 0.0)), around(), FENCE, LIMITS)
     n, e, d = target.acceleration_ned_m_s2
     assert math.hypot(n, e) == pytest.approx(GRAVITY_M_S2), "45 degrees"
     assert e / n == pytest.approx(80 / 60) and d == 0.0
     assert reason == "tilt above 45 degrees"
-    target, _ = bounded(lean((0.0, 0.0, -80.0)), around(), FENCE, LIMITS)
+    target, _ = bounded(asked(place, (0.0, 0.0, 0.0), (0.0, 0.0, -80.0)), around(), FENCE, LIMITS)
     assert target.acceleration_ned_m_s2[2] >= -GRAVITY_M_S2
 
 
-def test_kept_off_a_slant_a_lean_that_falls_is_bounded_by_the_tilt_still():
-    # Given a roof that slants by 50 degrees close below, and a lean along it that falls as fast as may be
-    slant = (-math.sin(math.radians(40.0)), 0.0, -math.cos(math.radians(40.0)))
-    below = KnownSurface(Surface(plus(ORIGIN, -1.0, (0.0, 0.0, 1.0)), slant, 0.3))
-    beside = replace(around(), velocity_ned_m_s=(0.0, 0.0, 0.0), known=[below])
-    for n, e in ((0.0, 9.7), (-3.0, 9.3), (-6.0, -7.7)):
-        target, _ = bounded(lean((n, e, 9.0)), beside, Fence(radius_m=50, max_height_m=4), LIMITS)
-        # Then what is kept from falling onto it makes no steeper lean than the mission allows
-        assert math.hypot(*target.acceleration_ned_m_s2[:2]) <= GRAVITY_M_S2 + 1e-9
-
-
-def test_a_lean_stays_a_lean_wherever_the_estimate_that_is_not_flown_by_says_the_vehicle_is():
-    far = lean((2.0, 0.0, 0.0), place=(25.0, 0.0, -1.5))
-    assert bounded(far, around((-25.0, 0.0, -1.5)), FENCE, LIMITS) == (far, "")
-    held = lean((2.0, 0.0, 0.0), place=(25.0, 0.0, 3.0), is_height_free=False)
-    target, reason = bounded(held, around(), FENCE, LIMITS)
-    assert target.acceleration_only and target.acceleration_ned_m_s2[0] == 2.0
-    assert place_of(target)[2] == pytest.approx(-0.5) and "outside the fence" in reason, "its height is asked for"
-
-
-@pytest.mark.parametrize("is_height_free", [True, False])
 @pytest.mark.parametrize("height_m", [0.6, 1.0, 3.9])
 @pytest.mark.parametrize(("down_m_s", "down_m_s2"), [(0.0, 8.0), (2.5, 0.0), (1.0, 9.0), (-2.5, 0.0), (0.0, -9.0)])
 def test_held_for_com_of_loss_t_a_setpoint_leads_neither_below_the_floor_nor_out_of_the_top(
-    is_height_free, height_m, down_m_s, down_m_s2
+    height_m, down_m_s, down_m_s2
 ):
     """By PX4's own loops: velocity gain MPC_Z_VEL_P_ACC = 4, height gain MPC_Z_P = 1; held for 1 s."""
     place = (0.0, 0.0, -height_m)
-    wanted = lean((0.0, 0.0, down_m_s2), (0.0, 0.0, down_m_s), place, is_height_free)
+    wanted = asked(place, (0.0, 0.0, down_m_s), (0.0, 0.0, down_m_s2))
     target, _ = bounded(wanted, around(place), FENCE, LIMITS)
 
     down_m, speed_m_s, step_s = -height_m, 0.0, 0.001
     for _ in range(1000):
-        wish_m_s = target.velocity_ned_m_s[2]
-        wish_m_s += 0.0 if is_height_free else place_of(target)[2] - down_m
+        wish_m_s = target.velocity_ned_m_s[2] + place_of(target)[2] - down_m
         speed_m_s += step_s * (target.acceleration_ned_m_s2[2] + 4.0 * (wish_m_s - speed_m_s))
         down_m += step_s * speed_m_s
     assert -4.0 - 0.01 <= down_m <= -0.5 + 0.01

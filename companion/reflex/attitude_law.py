@@ -1,0 +1,119 @@
+"""The law of the first second: attitude and collective thrust, for each IMU sample, from the companion's own belief.
+
+With position x, velocity v and the acceleration e by wind, drag and contact, and b the acceleration by the thrust at
+the tilt of TILT_AHEAD_S later, horizontally
+
+    a = k (v_o - v) - (b + e) - e,        k = BRAKING_PER_S
+
+v_o is the slowest velocity that leads off each surface by RETURN_PER_S times what is missing of its clearance.
+Vertically a_d = HEIGHT_PER_S2 (d_0 - d) - CLIMB_PER_S v_d. What PX4 makes of it, held until it notices that nothing
+follows, stays off every half-space (`held_off`). The thrust's axis is along a - g; its size carries the vehicle at the
+present tilt.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from companion.messages import Quaternion, Vector3
+from companion.motion.config import GRAVITY_M_S2
+from companion.motion.rotation import body_to_ned
+from companion.motion.strapdown import LEVEL, ZERO
+from companion.reflex import config as reflex
+from companion.reflex.halfspace import Surface, along, limited, plus, projected
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """The vehicle's motion and attitude as the companion knows them; local NED, body FRD."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    spread_m_s: float = 0.0  # standard deviation of the velocity
+    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
+    external_m_s2: Vector3 = ZERO  # horizontal acceleration by wind and drag
+    attitude_wxyz: Quaternion = LEVEL
+    yaw_rate_rad_s: float = 0.0
+    level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude
+
+
+@dataclass(frozen=True, slots=True)
+class Lean:
+    """What makes attitude and thrust of an acceleration."""
+
+    belief: Belief
+    surfaces: Sequence[Surface]
+    full_m_s2: float  # specific force at full thrust
+    yaw_rad: float
+    held_s: float  # for so long PX4 flies it on, if nothing follows
+
+
+def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector3:
+    """The acceleration, besides that by wind and drag, that brings the vehicle to rest clear of the surfaces."""
+    place, velocity, external = belief.position_ned_m, belief.velocity_ned_m_s, belief.external_m_s2
+    v_d = velocity[2]
+    sides = [(one.normal_ned, reflex.RETURN_PER_S * (one.distance_m - one.off_m(place))) for one in surfaces]
+    for normal, off_m_s in sides:
+        leaves_m_s = along(velocity, normal)
+        if off_m_s > 0.0 and leaves_m_s > 0.0:
+            # Near a surface only what is certain of the speed away from it is braked.
+            velocity = plus(velocity, -min(leaves_m_s, belief.spread_m_s), normal)
+        if off_m_s > 0.0:
+            # What it pushes with is no wind to lean against.
+            external = plus(external, -max(0.0, along(external, normal)), normal)
+    off = projected(ZERO, [side for side in sides if side[1] > 0.0])
+    short, moves = plus(off, -1.0, velocity), plus(belief.tilt_m_s2, 1.0, external)
+    n, e, _ = plus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), -1.0, moves)
+    climbs = reflex.HEIGHT_PER_S2 * (down_m - place[2]) - reflex.CLIMB_PER_S * v_d
+    return (n, e, min(max(climbs, -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2))
+
+
+def held_off(acceleration_ned_m_s2: Vector3, belief: Belief, surfaces: Sequence[Surface], held_s: float) -> Vector3:
+    """The acceleration whose speed towards each surface, after `held_s`, can still be braked in front of it.
+
+    With room r beyond the clearance at the present speed, a speed s towards the surface needs s T / 2 + s^2 / 2 a <= r.
+    """
+    sides = []
+    for surface in surfaces:
+        speed_m_s = along(belief.velocity_ned_m_s, surface.normal_ned)
+        room_m = surface.off_m(belief.position_ned_m) - surface.distance_m + 0.5 * speed_m_s * held_s
+        half = 0.5 * reflex.BRAKES_M_S2 * held_s
+        most_m_s = math.sqrt(half * half + 2.0 * reflex.BRAKES_M_S2 * room_m) - half if room_m > 0.0 else 0.0
+        by_wind = along(belief.external_m_s2, surface.normal_ned)
+        sides.append((surface.normal_ned, (-most_m_s - speed_m_s) / held_s - by_wind))
+    return projected(acceleration_ned_m_s2, sides)
+
+
+def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Quaternion, float]:
+    """Attitude in the vehicle's own frame, and the collective thrust as a share of the most."""
+    belief, full_m_s2, turns_rad_s = lean.belief, lean.full_m_s2, abs(lean.belief.yaw_rate_rad_s)
+    lifts_m_s2 = GRAVITY_M_S2 - acceleration_ned_m_s2[2]
+    least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), reflex.HOVER_MARGIN * GRAVITY_M_S2 / full_m_s2), 1.0)
+    most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
+    most_thrust = 1.0
+    if turns_rad_s > reflex.SPIN_RAD_S:
+        # The lean lags behind the turn, and full thrust leaves nothing to brake the turn with.
+        most_m_s2, most_thrust = most_m_s2 * reflex.SPIN_RAD_S / turns_rad_s, reflex.SPIN_THRUST
+    n, e, d = acceleration_ned_m_s2
+    n, e, _ = limited((n, e, 0.0), most_m_s2)
+    force = (n, e, d - GRAVITY_M_S2)
+    up = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0))
+    presses = any(
+        surface.off_m(belief.position_ned_m) < surface.distance_m and along(up, surface.normal_ned) < 0.0
+        for surface in lean.surfaces
+    )
+    upright = -up[2]
+    by_axis = along(force, up)
+    thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
+    thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), most_thrust)
+    asked = plus((n, e, -lifts_m_s2), -1.0, belief.level_m_s2)
+    return tilted(asked, lean.yaw_rad), thrust
+
+
+def tilted(force_ned: Vector3, yaw_rad: float) -> Quaternion:
+    """The shortest tilt from level that has the thrust along a force, with that heading."""
+    size = math.hypot(*force_ned)
+    n, e, d = (-part / size for part in force_ned)
+    w, x, y = 1.0 + d, -e, n
+    size, c, s = math.sqrt(w * w + x * x + y * y), math.cos(0.5 * yaw_rad), math.sin(0.5 * yaw_rad)
+    return (w * c / size, (x * c + y * s) / size, (y * c - x * s) / size, w * s / size)

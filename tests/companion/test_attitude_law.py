@@ -1,0 +1,142 @@
+"""The attitude law: to rest, clear of what is near, with attitudes and thrusts that a vehicle can fly."""
+
+import math
+import random
+from dataclasses import replace
+
+import pytest
+
+from companion.motion.config import GRAVITY_M_S2
+from companion.motion.rotation import body_to_ned, turned, yaw_rad
+from companion.motion.strapdown import LEVEL, ZERO
+from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, held_off, tilted, wanted
+from companion.reflex.config import HELD_S, LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S, SPIN_THRUST
+from companion.reflex.halfspace import Surface, along, plus
+
+HERE, FULL_M_S2 = (0.0, 0.0, -2.0), 16.0
+SOUTH = (-1.0, 0.0, 0.0)
+# A vehicle that is HERE has just touched it.
+WALL = Surface(HERE, SOUTH, 0.35)
+FAR = Surface((5.0, 0.0, -2.0), SOUTH, 0.35)
+
+
+def lean(belief, surfaces=(), heading_rad=0.0, full_m_s2=FULL_M_S2) -> Lean:
+    return Lean(belief, surfaces, full_m_s2, heading_rad, MOST_HELD_S + NOTICED_S)
+
+
+def up_of(attitude_wxyz):
+    return body_to_ned(attitude_wxyz, (0.0, 0.0, -1.0))
+
+
+def flown(velocity, surfaces, wind_m_s2=ZERO, full_m_s2=FULL_M_S2, believed_full_m_s2=FULL_M_S2, seconds=3.0):
+    """Places and velocities of a vehicle whose attitude follows as a critically damped loop of 12 rad/s does."""
+    place, up, turns, tick_s, path = HERE, (0.0, 0.0, -1.0), ZERO, 0.004, []
+    for _ in range(round(seconds / tick_s)):
+        ahead = plus(up, 0.05, turns)
+        tilt = (GRAVITY_M_S2 * ahead[0] / -ahead[2], GRAVITY_M_S2 * ahead[1] / -ahead[2], 0.0)
+        belief = Belief(place, velocity, 0.0, tilt, wind_m_s2, tilted(up, 0.0))
+        asked = lean(belief, surfaces, full_m_s2=believed_full_m_s2)
+        attitude, thrust = attitude_and_thrust(wanted(belief, surfaces, HERE[2]), asked)
+        pulls = plus(plus(ZERO, 144.0, plus(up_of(attitude), -1.0, up)), -24.0, turns)
+        turns = plus(turns, tick_s, pulls)
+        up = plus(up, tick_s, turns)
+        force = plus(plus(wind_m_s2, thrust * full_m_s2, up), GRAVITY_M_S2, (0.0, 0.0, 1.0))
+        velocity = plus(velocity, tick_s, force)
+        place = plus(place, tick_s, velocity)
+        path.append((place, velocity))
+    return path
+
+
+@pytest.mark.parametrize("speed_m_s", [0.3, 1.0, 2.0, 3.5])
+@pytest.mark.parametrize("wind_m_s2", [ZERO, (1.0, -0.5, 0.0)])
+def test_a_vehicle_that_leaves_a_wall_is_at_rest_within_a_second_and_clear(speed_m_s, wind_m_s2):
+    path = flown((-speed_m_s, 0.4, 0.0), [WALL], wind_m_s2)
+    late = path[250:] if speed_m_s <= 2.0 else path[325:]
+    assert max(math.hypot(*velocity) for _, velocity in late) < 0.2
+    assert WALL.off_m(path[-1][0]) > 0.33
+    assert max(abs(place[2] - HERE[2]) for place, _ in path) < 0.1, "the height is kept"
+    assert min(WALL.off_m(place) for place, _ in path) > -0.02, "never back into the wall"
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_thrust_gain_that_is_wrong_by_a_tenth_costs_a_quarter_of_a_metre_of_height_at_most(share):
+    path = flown((-2.0, 0.0, 0.0), [WALL], believed_full_m_s2=share * FULL_M_S2)
+    assert max(abs(place[2] - HERE[2]) for place, _ in path) < 0.28
+    assert math.hypot(*path[-1][1]) < 0.1
+
+
+def test_at_rest_and_clear_a_vehicle_hovers_level_with_its_heading():
+    belief = Belief(HERE, ZERO)
+    attitude, thrust = attitude_and_thrust(wanted(belief, [FAR], HERE[2]), lean(belief, [FAR], 1.2))
+    assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0))
+    assert yaw_rad(attitude) == pytest.approx(1.2)
+    assert thrust == pytest.approx(GRAVITY_M_S2 / FULL_M_S2)
+
+
+def test_near_a_surface_only_what_is_certain_of_the_speed_away_from_it_is_braked():
+    off = Belief(HERE, (-1.0, 0.0, 0.0))
+    certain, doubtful = (wanted(replace(off, spread_m_s=s), [WALL], HERE[2])[0] for s in (0.0, 0.6))
+    assert certain - doubtful == pytest.approx(7.0 * 0.6)
+    # far from it, and along it, all of it
+    assert wanted(replace(off, spread_m_s=0.6), [FAR], HERE[2]) == wanted(off, [FAR], HERE[2])
+    beside = Belief(HERE, (0.0, 1.0, 0.0))
+    doubtful = wanted(replace(beside, spread_m_s=0.6), [WALL], HERE[2])
+    assert doubtful == wanted(beside, [WALL], HERE[2])
+
+
+def test_what_an_obstacle_pushes_with_is_not_leant_against():
+    pushed = Belief(HERE, ZERO, external_m_s2=(-3.0, 0.0, 0.0))
+    assert wanted(pushed, [WALL], HERE[2])[0] < 0.0
+    assert wanted(pushed, [FAR], HERE[2])[0] > 0.0, "a wind is"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_attitude_is_one_that_a_vehicle_can_fly(seed):
+    draw = random.Random(seed)
+
+    def vector(most):
+        return (draw.uniform(-most, most), draw.uniform(-most, most), draw.uniform(-most, most))
+
+    attitude = turned(LEVEL, vector(3.0), draw.uniform(0.0, 1.0))
+    belief = Belief(HERE, vector(5.0), 0.5, (*vector(9.0)[:2], 0.0), (*vector(2.0)[:2], 0.0), attitude, vector(9.0)[0])
+    acceleration = held_off(wanted(belief, [WALL], HERE[2]), belief, [WALL], HELD_S)
+    asked, thrust = attitude_and_thrust(acceleration, lean(belief, [WALL], vector(3.0)[0]))
+    assert math.hypot(*asked) == pytest.approx(1.0)
+    assert math.acos(-up_of(asked)[2]) <= MOST_TILT_RAD + 1e-6
+    assert LEAST_THRUST <= thrust <= 1.0
+
+
+def test_a_vehicle_with_little_thrust_to_spare_leans_less():
+    belief = Belief(HERE, (-4.0, 0.0, 0.0))
+    weak, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=1.25 * GRAVITY_M_S2))
+    strong, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=3.0 * GRAVITY_M_S2))
+    assert math.acos(-up_of(strong)[2]) == pytest.approx(MOST_TILT_RAD)
+    assert -up_of(weak)[2] == pytest.approx(1.1 / 1.25), "hover's share of the thrust, and a tenth to spare"
+
+
+def test_a_vehicle_that_spins_leans_less_and_keeps_thrust_to_brake_the_turn_with():
+    still = Belief(HERE, (-4.0, 0.0, 0.0))
+    slow, _ = attitude_and_thrust((9.0, 0.0, -4.0), lean(still))
+    spun, thrust = attitude_and_thrust((9.0, 0.0, -4.0), lean(replace(still, yaw_rate_rad_s=-12.0)))
+    assert up_of(spun)[0] < 0.5 * up_of(slow)[0]
+    assert thrust <= SPIN_THRUST
+
+
+def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():
+    # Given a vehicle that leans by 40 degrees into the wall that it touches
+    into = tilted((math.sin(math.radians(40.0)), 0.0, -math.cos(math.radians(40.0))), 0.0)
+    belief = Belief(HERE, ZERO, attitude_wxyz=into)
+    asked = wanted(belief, [WALL], HERE[2])
+    _, pressing = attitude_and_thrust(asked, lean(belief, [WALL]))
+    _, lifting = attitude_and_thrust(asked, lean(belief, [FAR]))
+    # Then its thrust is the projection of the wanted force, not what would carry it
+    force = plus(asked, -GRAVITY_M_S2, (0.0, 0.0, 1.0))
+    assert pressing == pytest.approx(max(LEAST_THRUST, along(force, up_of(into)) / FULL_M_S2))
+    assert pressing < 0.75 * lifting
+
+
+def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
+    # Given one that accelerates by 1 m/s^2 to the north where it takes itself for level
+    belief = Belief(HERE, ZERO, level_m_s2=(1.0, 0.0, 0.0))
+    attitude, _ = attitude_and_thrust((1.0, 0.0, 0.0), lean(belief))
+    assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0)), "level by its own attitude"

@@ -1,0 +1,195 @@
+"""Where a recovery comes to rest: by each law, clear of all surfaces, inside the fence, the same in every direction."""
+
+import math
+
+import pytest
+
+from companion.fence import Fence
+from companion.motion.strapdown import ZERO
+from companion.reflex.config import WAY_S, RecoveryConfig
+from companion.reflex.halfspace import Surface, away_from, inside_fence, projected
+from companion.reflex.laws import RECOVERY_LAWS, Contact, MotionState
+
+AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)
+ALL_SPEEDS = (0.5, 1.0, 2.0, 3.5, 5.0)
+
+
+def turned(vector, angle_rad):
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2])
+
+
+def mirrored(vector):
+    return (vector[0], -vector[1], vector[2])
+
+
+def hit(speed_m_s, slant_rad=0.0, climb_m_s=0.0):
+    """North into a wall whose normal is turned from south by the slant."""
+    return Contact(0, AT, (speed_m_s, 0.0, climb_m_s), turned(SOUTH, slant_rad))
+
+
+def off_m(touched, place):
+    return Surface(touched.position_ned_m, touched.normal_ned, 0.0).off_m(place)
+
+
+def goal_of(name, touched, motion=None, **config):
+    settings = RecoveryConfig(law=name, **config)
+    motion = motion or touched.rebound(settings.restitution)
+    return RECOVERY_LAWS[name].goal_ned_m(settings, touched, motion)
+
+
+# --- goals
+
+
+@pytest.mark.parametrize("north", [2.0, -2.0])
+@pytest.mark.parametrize("east", [1.0, -1.0])
+def test_eq_3_lies_back_along_the_approach_in_every_quadrant(north, east):
+    goal = goal_of("paper", Contact(0, AT, (north, east, 0.7), SOUTH), gamma=(0.5, 0.25))
+    assert (goal[0] - 4.0) / -north == pytest.approx(0.5), "gamma_1 |v_c1|, against the approach"
+    assert (goal[1] + 2.0) / -east == pytest.approx(0.25), "gamma_2 |v_c2|, against the approach"
+    assert goal[2] == -1.5, "height kept, climb or not"
+
+
+def test_the_papers_own_numbers():
+    """v_c = 2.1 m/s and gamma = 0.5 from x(t_c) = [0.6, 0, -0.5] give x_d = [-0.45, 0, -0.5]."""
+    assert goal_of("paper", Contact(0, (0.6, 0.0, -0.5), (2.1, 0.0, 0.0), SOUTH)) == pytest.approx((-0.45, 0.0, -0.5))
+    assert goal_of("paper", Contact(0, AT, ZERO, SOUTH)) == AT, "hit while hovering: stay"
+
+
+def test_eq_3_is_asked_for_at_once_and_never_changed():
+    assert not RECOVERY_LAWS["paper"].follows and not RECOVERY_LAWS["paper"].leans
+
+
+def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
+    # 2 m/s at 60 degrees from the normal: 1 m/s into the wall, 1.73 along it
+    touched = hit(2.0, math.radians(60))
+    goal, on = (goal_of("normal", touched, tangential=how) for how in ("damped", "kept"))
+    assert off_m(touched, goal) == pytest.approx(0.5) and math.dist(goal, AT) == pytest.approx(0.5)
+    assert off_m(touched, on) == pytest.approx(0.5) and math.dist(on, goal) == pytest.approx(0.5 * math.sqrt(3))
+
+
+@pytest.mark.parametrize("speed", ALL_SPEEDS)
+def test_adaptive_keeps_the_guards_clear_by_the_distance_asked_for(speed):
+    touched = hit(speed)
+    soft = goal_of("adaptive", touched, touched.rebound(0.0))
+    assert off_m(touched, soft) == pytest.approx(0.35)
+    assert soft[2] == AT[2], "height is held"
+    # a stiff airframe that needs more room to stop gets it
+    stiff = goal_of("adaptive", touched, touched.rebound(0.9))
+    assert off_m(touched, stiff) == pytest.approx(max(0.35, 0.9 * speed * WAY_S))
+
+
+@pytest.mark.parametrize("name", ["adaptive", "normal"])
+@pytest.mark.parametrize("tangential", ["damped", "kept"])
+def test_turning_or_mirroring_the_world_turns_or_mirrors_the_recovery(name, tangential):
+    touched = Contact(0, (0.0, 0.0, -2.0), (1.7, 0.4, 0.1), turned(SOUTH, 0.4))
+    goal = goal_of(name, touched, touched.rebound(0.3), tangential=tangential)
+    for change in (lambda v: turned(v, 1.234), mirrored):
+        other = Contact(0, *(change(v) for v in (touched.position_ned_m, touched.velocity_ned_m_s, touched.normal_ned)))
+        other_goal = goal_of(name, other, other.rebound(0.3), tangential=tangential)
+        assert other_goal == pytest.approx(change(goal))
+
+
+def test_along_the_wall_adaptive_comes_to_rest_where_the_motion_along_it_ends():
+    touched = hit(2.0, math.radians(60))
+    goal = goal_of("adaptive", touched, touched.rebound(0.2))
+    assert off_m(touched, goal) == pytest.approx(0.35)
+    beside_m = math.sqrt(math.dist(goal, AT) ** 2 - off_m(touched, goal) ** 2)
+    assert beside_m == pytest.approx(math.sqrt(3) * WAY_S)
+
+
+def test_a_hovering_vehicle_that_is_struck_gives_way():
+    struck = Contact(0, AT, ZERO, (0.0, 1.0, 0.0))
+    goal = goal_of("adaptive", struck, MotionState((4.0, -1.95, -1.5), (0.0, 0.45, 0.0)))
+    assert goal[:2] == pytest.approx((4.0, -1.65)), "0.35 m from where it was struck, more than it takes to stop"
+
+
+def test_what_overtook_the_vehicle_needs_no_more_clearance():
+    # Given one that is struck from behind while it flies away from what strikes it
+    fled = Contact(0, AT, (-3.0, 0.0, 0.0), SOUTH)
+    assert fled.rebound(0.45).velocity_ned_m_s == (-3.0, 0.0, 0.0), "it goes on leaving"
+
+
+# --- half-spaces
+
+
+@pytest.mark.parametrize("corner_deg", [60.0, 90.0, 120.0])
+def test_projected_into_a_corner_a_vector_has_its_least_part_along_both_normals(corner_deg):
+    sides = [(SOUTH, 0.5), (turned(SOUTH, math.radians(180.0 - corner_deg)), 0.3)]
+    found = projected((2.0, 0.1, -1.0), sides)
+    for (n, e, _), least in sides:
+        assert n * found[0] + e * found[1] >= least - 0.02
+    assert found[2] == -1.0
+    assert projected(found, sides) == pytest.approx(found, abs=0.02)
+    assert projected((-3.0, 0.0, 0.0), [(SOUTH, 0.5)]) == (-3.0, 0.0, 0.0), "what is inside stays"
+
+
+@pytest.mark.parametrize(
+    ("normal", "away"),
+    [
+        ((-0.9, 0.1, 0.3), (-0.9939, 0.1104, 0.0)),  # a wall, and the vehicle leant: height is held
+        ((0.05, 0.0, 0.99), (0.0504, 0.0, 0.9987)),  # a ceiling: away is down
+        ((0.0, 0.0, -1.0), (0.0, 0.0, -1.0)),  # a floor
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ],
+)
+def test_away_is_level_from_a_wall_and_straight_from_what_is_steep(normal, away):
+    assert away_from(normal) == pytest.approx(away, abs=1e-3)
+
+
+ROOM = Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4)
+
+
+def in_room(surfaces, contact_m, goal_m):
+    goal_m = projected(goal_m, [(surface.normal_ned, surface.level_m) for surface in surfaces])
+    return inside_fence(ROOM, ZERO, contact_m, goal_m)
+
+
+def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
+    under = Contact(0, (0.0, 0.0, -2.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
+    assert goal_of("adaptive", under) == pytest.approx((0.0, 0.0, -1.65))
+    low = Contact(0, (0.0, 0.0, -0.6), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
+    goal = goal_of("adaptive", low)
+    assert in_room((), low.position_ned_m, goal) == pytest.approx((0.0, 0.0, -0.4))
+
+
+def test_the_fence_stops_a_recovery():
+    touched = Contact(0, (5.5, 0.0, -1.5), (-5.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    motion = touched.rebound(0.5)
+    goal = in_room((), touched.position_ned_m, goal_of("adaptive", touched, motion))
+    assert goal[0] == pytest.approx(6.0)
+
+
+FENCE, FENCE_AT = Fence(radius_m=5.0, max_height_m=6.0), (10.0, 0.0, 2.0)
+
+
+def test_a_setpoint_inside_the_fence_is_left_alone():
+    assert inside_fence(FENCE, FENCE_AT, (12.0, 0.0, 0.0), (11.0, 1.0, 0.0)) == (11.0, 1.0, 0.0)
+
+
+def test_the_way_back_is_shortened_at_the_fence_not_bent():
+    clamped = inside_fence(FENCE, FENCE_AT, (10.0, 3.0, 0.0), (18.0, 3.0, 0.0))
+    assert math.hypot(clamped[0] - 10.0, clamped[1]) == pytest.approx(5.0)
+    assert clamped == pytest.approx((14.0, 3.0, 0.0)), "still on the line from the contact to the wish"
+
+
+def test_a_contact_outside_the_fence_is_answered_with_the_nearest_place_inside():
+    assert inside_fence(FENCE, FENCE_AT, (17.0, 0.0, 0.0), (19.0, 0.0, 0.0)) == pytest.approx((15.0, 0.0, 0.0))
+
+
+def test_height_is_limited_from_the_arming_position():
+    assert inside_fence(FENCE, FENCE_AT, (10.0, 0.0, -5.0), (10.0, 0.0, -5.0))[2] == -4.0
+
+
+NORTH_WALL = Surface((3.0, 2.0, -1.5), SOUTH, 0.5)
+
+
+def test_out_of_a_corner_the_goal_is_clear_of_both_walls():
+    """Leaving the north wall when the east wall is hit: eq. 3 alone leads back into the first."""
+    east_wall = Contact(0, (2.7, 2.8, -1.5), (-0.4, 1.4, 0.0), (0.0, -1.0, 0.0))
+    alone = goal_of("paper", east_wall)
+    assert alone[0] > 2.7
+    goal = in_room((NORTH_WALL,), east_wall.position_ned_m, alone)
+    assert goal == pytest.approx((2.5, alone[1], -1.5))
+    further = (1.0, 2.0, -1.5)
+    assert in_room((NORTH_WALL,), east_wall.position_ned_m, further) == further
