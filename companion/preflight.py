@@ -19,7 +19,7 @@ from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
-from companion.reflex.config import MOST_HELD_S
+from companion.reflex.config import EXCESS, MOST_HELD_S
 
 # The streams need a second to settle at their new rates; what comes then counts.
 SETTLING_US = 1_000_000
