@@ -59,6 +59,7 @@ class Severity(IntEnum):
 class MessageId(IntEnum):
     """MAVLink ids of the streams the companion asks for and of the messages it requests."""
 
+    HEARTBEAT = 0
     ATTITUDE_QUATERNION = 31
     LOCAL_POSITION_NED = 32
     MANUAL_CONTROL = 69

@@ -7,7 +7,7 @@ from companion.flight.context import FlightContext
 from companion.flight.envelope import LOSS_PARAMETER, longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
-from companion.messages import Sample
+from companion.messages import MessageId, Sample
 from companion.px4_mode import is_by_hand, mode_name
 from companion.reflex.config import HELD_S
 from companion.reflex.detector import Situation
@@ -16,7 +16,7 @@ from companion.reflex.detector import Situation
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
-    mode, armed, conflicts = vehicle.custom_mode, vehicle.armed, vehicle.conflicts
+    mode, armed, conflicts, was_known = vehicle.custom_mode, vehicle.armed, vehicle.conflicts, vehicle.is_mode_known
     vehicle.note_silence(now_us)
     own_modes = flight.own_modes
     for sample in samples:
@@ -56,6 +56,9 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         flight.report(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.report(now_us, "disarmed", "disarmed")
+    if was_known and not vehicle.is_mode_known:
+        # PX4 answers within milliseconds; its next report by itself may take half a second, longer than COM_OF_LOSS_T.
+        flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
     if vehicle.identity is not None:
         _measure_round_trip(flight, now_us)
     return None

@@ -38,8 +38,8 @@ class GuardContext(FlightContext):
     sticks: Sticks | None = None
     descent: Descent = field(default_factory=Descent)
     global_position: GlobalPosition | None = None
-    # When, and to where; None for a lean alone.
-    sent_ned_m: deque[tuple[int, Vector3 | None]] = field(default_factory=lambda: deque(maxlen=64))
+    # When, and to where; PX4 echoes no attitude.
+    sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
 
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""

@@ -65,4 +65,5 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         return moved
 
     def _note_sent(self, target: Target, now_us: int) -> None:
-        self.flight.sent_ned_m.append((now_us, None if target.lean is not None else target.position_ned_m))
+        if target.lean is None:
+            self.flight.sent_ned_m.append((now_us, target.position_ned_m))

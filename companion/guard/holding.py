@@ -94,11 +94,13 @@ def recovered(guard: GuardContext, recover: Recover, inputs: Inputs, now_us: int
 
 
 def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
-    """Whether the vehicle flies to a place, or by a velocity alone, that the guard has not lately asked for."""
-    recent = [place for sent_us, place in guard.sent_ned_m if now_us - sent_us <= ECHO_AGE_US]
-    if echo.position_ned_m is None:
-        return None not in recent
-    return all(place is None or math.dist(place, echo.position_ned_m) > CROSSED_M for place in recent)
+    """Whether the vehicle flies to a place that the guard has not lately asked for, or by a velocity alone.
+
+    Of an attitude PX4 echoes no position.
+    """
+    place = echo.position_ned_m
+    recent = [sent for sent_us, sent in guard.sent_ned_m if now_us - sent_us <= ECHO_AGE_US]
+    return place is None or all(math.dist(sent, place) > CROSSED_M for sent in recent)
 
 
 class StepAside:

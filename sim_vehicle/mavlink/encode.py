@@ -17,7 +17,7 @@ from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
+from sim_vehicle.setpoint import AttitudeSetpoint, Axis3, RatesSetpoint, TrajectorySetpoint
 
 # One of pymavlink's, which carry no types, or a `framing.Packed`; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any
@@ -176,9 +176,11 @@ def current_mode(state: Telemetry) -> Message:
     return dialect.MAVLink_current_mode_message(shown.standard_mode, shown.custom_mode, intended.custom_mode)
 
 
-def position_target_local_ned(state: Telemetry) -> Message:
-    """What the position control flies; all ignored while the motors idle or stand."""
+def position_target_local_ned(state: Telemetry) -> Message | None:
+    """What the position control flies, nothing where it does not; all ignored while the motors idle or stand."""
     applied = state.autopilot.applied
+    if isinstance(applied, AttitudeSetpoint | RatesSetpoint):
+        return None
     if not isinstance(applied, TrajectorySetpoint):
         return dialect.MAVLink_position_target_local_ned_message(
             boot_ms(state.published), dialect.MAV_FRAME_LOCAL_NED, 0xDFF, *([NAN] * 11)

@@ -53,9 +53,13 @@ def test_not_one_of_the_programs_setpoints_reaches_the_vehicle_while_the_guard_h
 
 def test_the_guards_own_setpoints_carry_the_vehicle_meanwhile_from_the_hit_on(air):
     taken_s, back_s = (air.event_s("take_over"), air.event_s("given_back"))
+    attitudes = air.sent_by("guard", "SET_ATTITUDE_TARGET", taken_s, back_s)
     own = air.setpoints("guard", taken_s, back_s)
-    assert len(own) == pytest.approx(50 * (back_s - taken_s), abs=3)
-    assert air.sent_by("guard", "", taken_s, taken_s + 0.005) != []
+    # First by attitude, at the IMU's rate, then by place, fifty times a second
+    assert air.sent_by("guard", "SET_ATTITUDE_TARGET", taken_s, taken_s + 0.005) != []
+    leans_s = air.event_s("hand_over") - taken_s
+    assert len(attitudes) == pytest.approx(250 * leans_s, rel=0.05)
+    assert len(own) == pytest.approx(50 * (back_s - taken_s - leans_s), abs=3)
     assert own[-1].x < 3.7
 
 
@@ -111,7 +115,7 @@ def test_a_stiff_hit_after_which_the_guard_leans_is_recovered_from_in_peace():
     air.fly_into_the_wall(2.5)
     air.run_to(State.WATCHING, 10.0)
     assert "recovered" in air.kinds() and "crossed" not in air.kinds()
-    assert any(setpoint.x != setpoint.x for setpoint in air.setpoints("guard", air.event_s("take_over")))
+    assert air.sent_by("guard", "SET_ATTITUDE_TARGET", air.event_s("take_over")) != []
     assert air.setpoints("program", air.event_s("take_over") + 0.004, air.event_s("given_back")) == []
 
 
@@ -128,14 +132,13 @@ def test_the_gate_knows_its_own_by_content_and_each_but_once():
     assert not gate.is_own(own)
 
 
-def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_or_for_a_lean_of_late():
+def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
     guard = AttachedFlight().guard.core.flight
     there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
     guard.sent_ned_m.append((1_000_000, (1.1, 0.0, -2.0)))
     assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]
-    guard.sent_ned_m.append((1_100_000, None))
-    assert [is_foreign(guard, echo, 1_200_000) for echo in (there, elsewhere, no_place)] == [False, True, False]
-    assert is_foreign(guard, no_place, 1_600_000)
+    # Nor does it have places of the guard's while the guard flies it by attitude
+    assert is_foreign(guard, there, 1_600_000)
 
 
 # --- names and fields
