@@ -5,7 +5,7 @@ Source: ROMFS/px4fmu_common/init.d-posix/rcS, which multiplies these by PX4_SIM_
 
 from sim_vehicle.parameters.definitions import definitions
 
-_AT_REAL_TIME = {"COM_DL_LOSS_T": 10.0, "COM_RC_LOSS_T": 1.0, "COM_OF_LOSS_T": 1.0}
+_AT_REAL_TIME = {"COM_DL_LOSS_T": 10.0, "COM_RC_LOSS_T": 1.0, "COM_OF_LOSS_T": 0.3}
 
 
 def time_outs_at(speed: float) -> dict[str, float]:

@@ -6,7 +6,7 @@ import pytest
 
 from bench.studies.ablation import detections_campaign, detections_table, flights_table, work_out_heard
 from bench.studies.rules import RULES, Rule, switched
-from companion.reflex import halfspace, planner
+from companion.reflex import attitude_law, halfspace
 
 RULE = Rule("away", "away from what was hit", "companion.reflex.halfspace:plus", lambda arguments, found: (9, 9, 9))
 RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "risen_m": 0.0, "returned": 0, "rest_s": 1.2, "normal_deg": 5.0}
@@ -14,7 +14,7 @@ RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "risen_m": 0.0, "returned": 0, "res
 
 def flown(copies):
     """Three steps, of which the second is the rule's."""
-    steps = [("first",), halfspace.plus((0, 0, 0), 1.0, (1, 0, 0)), planner.plus((1, 0, 0), 1.0, (1, 0, 0))]
+    steps = [("first",), halfspace.plus((0, 0, 0), 1.0, (1, 0, 0)), attitude_law.plus((1, 0, 0), 1.0, (1, 0, 0))]
     copies.leave(lambda: {"steps": steps})
     return steps
 
@@ -35,10 +35,10 @@ def test_where_a_rule_changes_nothing_there_is_no_copy():
 
 
 def test_afterwards_the_companion_is_as_it_was():
-    before = halfspace.plus, planner.plus
+    before = halfspace.plus, attitude_law.plus
     with switched([RULE]):
-        assert halfspace.plus is not before[0] and planner.plus is not before[1]
-    assert (halfspace.plus, planner.plus) == before
+        assert halfspace.plus is not before[0] and attitude_law.plus is not before[1]
+    assert (halfspace.plus, attitude_law.plus) == before
 
 
 def test_a_copy_that_fails_is_told():

@@ -26,7 +26,7 @@ from companion.preflight import SerialLine, Survey, Verdict, advance, findings, 
 
 PX4 = Heartbeat(1, 1, 2, 12, False, 0, 3)
 HEALTHY = {
-    "COM_OF_LOSS_T": 1.0,
+    "COM_OF_LOSS_T": 0.3,
     "COM_OBL_RC_ACT": 4,
     "COM_RC_IN_MODE": 4,
     "COM_RCL_EXCEPT": 0,
@@ -194,7 +194,7 @@ def test_what_hovers_is_judged_by_how_it_shakes_and_not_by_how_it_wanders():
 @pytest.mark.parametrize(
     ("changed", "verdict", "mended"),
     [
-        ({"COM_OF_LOSS_T": 5.0}, Verdict.DOUBTFUL, 1.0),
+        ({"COM_OF_LOSS_T": 5.0}, Verdict.DOUBTFUL, 0.3),
         ({"COM_OBL_RC_ACT": 0}, Verdict.DOUBTFUL, 4),
         ({"COM_OBL_RC_ACT": 7}, Verdict.BAD, 4),
         ({"CBRK_FLIGHTTERM": 0}, Verdict.DOUBTFUL, 121212),

@@ -83,7 +83,7 @@ def test_the_card_of_the_first_flight_has_what_was_found_and_fits_a_page():
     assert len(lines) < 66 and max(map(len, lines)) <= 100
     text = "\n".join(lines)
     assert "quadrotor, battery 100 %" in text and "Link serial:///dev/ttyAMA0:921600" in text
-    assert "[ ] look: COM_OBL_RC_ACT" in text and "PX4 acts 1 s later (COM_OF_LOSS_T): position" in text
+    assert "[ ] look: COM_OBL_RC_ACT" in text and "PX4 acts 0.3 s later (COM_OF_LOSS_T): position" in text
 
 
 def test_a_remedy_that_is_taken_is_taken_by_the_vehicle():

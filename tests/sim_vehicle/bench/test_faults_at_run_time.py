@@ -94,8 +94,8 @@ def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
 
 
 def test_setpoints_lost_on_a_cut_link_make_the_vehicle_fail_safe() -> None:
-    """What test authors cut links for: PX4's answer to lost setpoints, 1.0 to 1.1 s later."""
-    pilot = hovering(parameters={"COM_OBL_RC_ACT": 5})
+    """What test authors cut links for: PX4's answer to lost setpoints, 0.03 to 0.11 s after COM_OF_LOSS_T."""
+    pilot = hovering(parameters={"COM_OBL_RC_ACT": 5, "COM_OF_LOSS_T": 1.0})
     for _ in range(20):
         setpoint(pilot)
         pilot.fly(0.05)
