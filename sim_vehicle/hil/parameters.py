@@ -152,6 +152,7 @@ def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
 def _flight_rules() -> Iterable[Parameter]:
     yield Parameter("COM_RC_IN_MODE", 4, "no sticks")
     yield Parameter("COM_RCL_EXCEPT", 4, "no remote control needed in OFFBOARD")
+    yield Parameter("COM_OF_LOSS_T", 0.3, "s; a companion that dies leaves PX4 an attitude, safe to hold for so long")
     yield Parameter("NAV_DLL_ACT", 0, "no ground station needed")
     yield Parameter("CBRK_SUPPLY_CHK", 894281, "no power module in a simulation")
     # As rcS starts it, its loop holds up the lockstep until EKF2 has run: with samples in between, for ever.
