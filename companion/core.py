@@ -26,6 +26,7 @@ from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outg
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
 from companion.px4_mode import mode_name
+from companion.reflex.config import HELD_S, NOTICED_S
 from companion.reflex.detector import Situation
 from companion.reflex.monitor import CollisionMonitor, start_monitor
 from companion.report import CollisionReport, Event, Status
@@ -309,7 +310,7 @@ class Limiter:
             has_floor=has_floor,
             last_ned_m=None if moved else self.last_ned_m,
             since_last_s=(now_us - self.last_us) * 1e-6,
-            velocity_ned_m_s=None if latest is None else latest.velocity_ned_m_s,
+            held_s=min(flight.loss_s or HELD_S, HELD_S) + NOTICED_S,
             known=known_surfaces(flight),
         )
         target, reason = bounded(wanted, around, flight.mission.fence, flight.mission.limits)

@@ -69,19 +69,21 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
 
 
 def held_off(acceleration_ned_m_s2: Vector3, belief: Belief, surfaces: Sequence[Surface], held_s: float) -> Vector3:
-    """The acceleration whose speed towards each surface, after `held_s`, can still be braked in front of it.
-
-    With room r beyond the clearance at the present speed, a speed s towards the surface needs s T / 2 + s^2 / 2 a <= r.
-    """
+    """The acceleration whose speed towards each surface, after `held_s`, can still be braked in front of it."""
     sides = []
     for surface in surfaces:
         speed_m_s = along(belief.velocity_ned_m_s, surface.normal_ned)
+        # The present speed's half of the way until then; the other half is that of the speed then.
         room_m = surface.off_m(belief.position_ned_m) - surface.distance_m + 0.5 * speed_m_s * held_s
-        half = 0.5 * reflex.BRAKES_M_S2 * held_s
-        most_m_s = math.sqrt(half * half + 2.0 * reflex.BRAKES_M_S2 * room_m) - half if room_m > 0.0 else 0.0
         by_wind = along(belief.external_m_s2, surface.normal_ned)
-        sides.append((surface.normal_ned, (-most_m_s - speed_m_s) / held_s - by_wind))
+        sides.append((surface.normal_ned, (-brakable_m_s(room_m, 0.5 * held_s) - speed_m_s) / held_s - by_wind))
     return projected(acceleration_ned_m_s2, sides)
+
+
+def brakable_m_s(room_m: float, later_s: float) -> float:
+    """The largest speed s that, braked so much later, ends within the room r: s t + s^2 / 2 a = r."""
+    lost_m_s = reflex.BRAKES_M_S2 * later_s
+    return math.sqrt(lost_m_s**2 + 2.0 * reflex.BRAKES_M_S2 * max(0.0, room_m)) - lost_m_s
 
 
 def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Quaternion, float]:

@@ -170,10 +170,7 @@ BRAKES_M_S2 = 3.0
 # An attitude is flown on for COM_OF_LOSS_T: no vehicle that leans by 35 degrees is safe for longer than this.
 MOST_HELD_S = 0.3
 
-# --- what a setpoint of a position leads to
-# PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, MPC_Z_VEL_P_ACC, 1/s.
-HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S, CLIMB_GAIN_PER_S = 1.0, 0.95, 1.8, 4.0
-
+# --- what a setpoint leads to
 # PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s by default, and notices the silence late: with 1 s set, a real PX4
 # changed to hold after 1.04 to 1.13 s (bench/notes/px4.md).
 HELD_S, NOTICED_S = 1.0, 0.13
