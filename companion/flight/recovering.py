@@ -164,7 +164,6 @@ class Recover:
         agrees = (
             estimator.has_converged
             and math.dist(sample.velocity_ned_m_s, motion.velocity_ned_m_s) < reflex.RESTS_M_S
-            and math.dist(sample.position_ned_m, motion.position_ned_m) < reflex.PLACE_SPREAD_M
         )
         is_clear = all(
             one.off_m(motion.position_ned_m) >= reflex.CLEAR_SHARE * one.distance_m for one in self._surfaces

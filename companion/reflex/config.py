@@ -147,7 +147,7 @@ TILT_AHEAD_S = 0.05
 # Back off a surface, m/s for each metre of the clearance that is missing: a third as fast as the speed is braked.
 RETURN_PER_S = 2.5
 # Height and climb: critically damped at 2 rad/s, below what thrust and tilt share.
-HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 4.0, 4.0, 4.0
+HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 16.0, 8.0, 4.0
 # Largest tilt, 35 degrees: 6.9 m/s^2, with 22 % more thrust than hover's.
 MOST_TILT_RAD = 0.61
 # Thrust that the tilt leaves for the height, over what hovers at it.

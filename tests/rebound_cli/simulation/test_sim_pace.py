@@ -67,4 +67,4 @@ def test_px4s_variable_sets_speed_and_time_outs(monkeypatch):
         parser = dialect.MAVLink(None)
         while (message := parser.decode(bytearray(client.recv(2048)))).get_type() != "PARAM_VALUE":
             pass
-    assert (message.param_id, message.param_value) == ("COM_OF_LOSS_T", 0.9)
+    assert (message.param_id, message.param_value) == ("COM_OF_LOSS_T", pytest.approx(0.9))
