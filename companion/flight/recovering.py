@@ -159,16 +159,12 @@ class Recover:
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
 
     def _rests(self, sample: LocalPosition) -> bool:
-        """Whether it rests by the belief, clear of all surfaces, and the vehicle's own estimate agrees."""
+        """Whether it rests, clear of all surfaces, and the errors of the vehicle's own estimate are known."""
         estimator, motion = self._record.estimator, self._record.estimator.motion
-        agrees = (
-            estimator.has_converged
-            and math.dist(sample.velocity_ned_m_s, motion.velocity_ned_m_s) < reflex.RESTS_M_S
-        )
         is_clear = all(
             one.off_m(motion.position_ned_m) >= reflex.CLEAR_SHARE * one.distance_m for one in self._surfaces
         )
-        if not agrees or not is_clear or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
+        if not estimator.has_converged or not is_clear or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
             self._slow_since_us = None
             return False
         self._slow_since_us = self._slow_since_us or sample.time_boot_us
