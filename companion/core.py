@@ -18,6 +18,7 @@ from companion.flight.envelope import Surroundings, bounded
 from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
+from companion.flight.recovering import as_the_vehicle_has_it
 from companion.flight.states import FINAL_STATES, State
 from companion.flight.vehicle_update import landed, note_height, situation_of, update_vehicle
 from companion.link.streams import StreamMonitor
@@ -131,7 +132,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             if flight.unconfirmed > unconfirmed:
                 self.monitor.reject()
             if flight.collisions:
-                flight.collisions[-1].follow(monitor.state, monitor.estimator)
+                flight.collisions[-1].follow(monitor.state, monitor.estimator, positions)
             note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)
@@ -187,6 +188,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             target = limiter.last.at_rest()
         if holds:
             flight.target = target
+            target = as_the_vehicle_has_it(flight, target, sample_us)
             self._note_sent(target, now_us)
         flight.outbox.append(self.resets.sent(target.setpoint(now_us - self.started_at_us)))
 

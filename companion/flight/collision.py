@@ -9,7 +9,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import ZERO, VelocityFix
-from companion.reflex.config import DECIDED_US
+from companion.reflex.config import CORRECTED_US, DECIDED_US
 from companion.reflex.confirmation import Hypothesis
 from companion.reflex.detector import DetectorState, Phase
 from companion.reflex.halfspace import away_from, plus, split
@@ -55,7 +55,7 @@ class CollisionRecord:
             after = (after[0], after[1], before[2])  # an upright surface does not lift
         return level(with_change(self.contact_normal, before, after))
 
-    def follow(self, state: DetectorState, source: ImpactEstimator) -> None:
+    def follow(self, state: DetectorState, source: ImpactEstimator, positions: Sequence[LocalPosition]) -> None:
         """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
         strapdown, estimate, self.fixes = source.strapdown, source.estimate, source.strapdown.fixes
         # In these phases the state still describes the contact.
@@ -69,6 +69,9 @@ class CollisionRecord:
             self.contact_normal = level(estimate.normal)
             self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us)
         self.estimator.imu(strapdown)
+        if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= CORRECTED_US:
+            for sample in positions:
+                self.estimator.update(sample)
 
     def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""

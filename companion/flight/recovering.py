@@ -44,17 +44,12 @@ class Recover:
         self._monitor = SettlingMonitor(flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
-        """Attitude and thrust until it rests; then its place, moved by the known error of the vehicle's estimate."""
-        flight, record, estimator = self._flight, self._record, self._record.estimator
-        if not self._law.leans:
-            return Target(record.setpoint_ned_m, self._yaw_rad)
+        """Attitude and thrust until it rests; then its place."""
+        flight, record = self._flight, self._record
         if not self._leans:
-            # The known errors of the vehicle's estimate and tilt are added, and what its integrators have forgotten.
-            place = plus(record.setpoint_ned_m, 1.0, estimator.position_error_m)
-            pushed = plus(estimator.belief.external_m_s2, 1.0, estimator.level_m_s2)
-            return Target(place, self._yaw_rad, estimator.velocity_error_m_s, plus(ZERO, -1.0, pushed))
+            return Target(record.setpoint_ned_m, self._yaw_rad)
         assert flight.loss_s is not None, "only a known one lets it lean"
-        belief = estimator.belief
+        belief = record.estimator.belief
         lean = Lean(
             belief, self._surfaces, flight.thrust.full_m_s2, self._yaw_rad or 0.0, flight.loss_s + reflex.NOTICED_S
         )
@@ -239,6 +234,25 @@ def _report_detection(flight: FlightContext, hit: CollisionReport) -> None:
         specific_force_m_s2=force_m_s2,
         position_ned_m=hit.position_ned_m,
         recovery_setpoint_ned_m=hit.recovery_setpoint_ned_m,
+    )
+
+
+def as_the_vehicle_has_it(flight: FlightContext, target: Target, time_boot_us: int) -> Target:
+    """A position with the errors that a hit has left in the vehicle's estimate and tilt, and with what its integrators
+    have forgotten while it was flown by attitude. PX4 has put all of it right by CORRECTED_US.
+    """
+    record = flight.collisions[-1] if flight.collisions else None
+    if record is None or target.lean is not None or not (_law(flight).leans and record.estimator.has_converged):
+        return target
+    if time_boot_us - record.sample_time_boot_us > reflex.CORRECTED_US:
+        return target
+    estimator = record.estimator
+    pushed = plus(estimator.belief.external_m_s2, 1.0, estimator.level_m_s2)
+    return replace(
+        target,
+        position_ned_m=plus(target.position_ned_m, 1.0, estimator.position_error_m),
+        velocity_ned_m_s=plus(target.velocity_ned_m_s or ZERO, 1.0, estimator.velocity_error_m_s),
+        acceleration_ned_m_s2=plus(target.acceleration_ned_m_s2 or ZERO, -1.0, pushed),
     )
 
 
