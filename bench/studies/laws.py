@@ -150,7 +150,7 @@ def _bars(airframe: str, found: Sequence[tuple[Any, Any]]) -> list[Bar]:
     clean = share(new.past_m <= OVERSHOOT_MOST_M and not new.recontacts for new in adaptive)
     back = share(new.past_m <= OVERSHOOT_MOST_M and not new.returned for new in adaptive)
     judged = airframe == "foldable"
-    clear = [_is_clear(old.clear_m, new.clear_m) for old, new in found if not np.isnan(new.clear_m)]
+    clear = [new.clear_m >= CLEAR_LEAST_M - CLEAR_SLACK_M for new in adaptive if not np.isnan(new.clear_m)]
     slow = [new.lost_m for new in adaptive if new.speed_m_s <= LOST_UP_TO_M_S]
     return [
         Bar(
@@ -176,7 +176,7 @@ def _bars(airframe: str, found: Sequence[tuple[Any, Any]]) -> list[Bar]:
         ),
         Bar(f"{airframe}: the same, but for other guards that swing in", "", f"{per_cent(back)} %", None, of),
         Bar(
-            f"{airframe}: guards at rest clear by 0.3 m, or by half of `paper`'s distance if that is more",
+            f"{airframe}: guards at rest clear by {CLEAR_LEAST_M:g} m",
             "100 %",
             f"{per_cent(share(clear))} %",
             all(clear),
@@ -185,11 +185,6 @@ def _bars(airframe: str, found: Sequence[tuple[Any, Any]]) -> list[Bar]:
         _metres(f"{airframe}, up to 2.5 m/s: height lost", slow, LOST_MOST_M),
         _metres(f"{airframe}, 1 to 5 m/s: height gained", [new.risen_m for new in adaptive], RISEN_MOST_M),
     ]
-
-
-def _is_clear(paper_m: float, adaptive_m: float) -> bool:
-    wanted_m = max(CLEAR_LEAST_M, 0.0 if np.isnan(paper_m) else 0.5 * paper_m)
-    return bool(adaptive_m >= wanted_m - CLEAR_SLACK_M)
 
 
 def _metres(what: str, values: Sequence[float], most_m: float) -> Bar:

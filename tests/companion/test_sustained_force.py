@@ -184,7 +184,7 @@ def test_a_wall_met_at_a_crawl_is_backed_away_from():
     flight = flown({"go_to": {"position_ned_m": [1.5, 0, -1.5], "speed_m_s": 0.06}}, walls=[wall(0.5)])
     # Then it leans on it for no longer than it takes to be sure, backs away, and the policy follows
     (collision,) = flight.report.collisions
-    assert flight.kinds().count("in_the_way") == 1 and flight.tilt_deg.max() < 35.0
+    assert flight.kinds().count("in_the_way") == 1 and flight.tilt_deg.max() < 45.0
     assert collision.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.2)
     assert collision.recovery_setpoint_ned_m[0] < collision.position_ned_m[0] - 0.25
     assert collision.settled_after_s is not None and collision.settled_after_s < 4.0
@@ -210,7 +210,7 @@ def test_a_door_that_comes_after_the_hovering_vehicle_is_moved_away_from(speed_m
     comes = {"velocity_ned_m_s": [-speed_m_s, 0, 0], "from_s": 9.5, "until_s": 20.5 if speed_m_s < 0.1 else 12.5}
     flight = flown({"hold": {"duration_s": 14}}, walls=[wall(0.6 if speed_m_s < 0.1 else 1.0, motion=comes)])
     # Then the vehicle gives way, never leans on it, and takes the end of the long push for no hit from the other side
-    assert flight.report.collisions and flight.tilt_deg.max() < 35.0
+    assert flight.report.collisions and flight.tilt_deg.max() < 45.0
     assert all(collision.normal_ned[0] < -0.5 for collision in flight.report.collisions)
     assert flight.report.collisions[-1].settled_after_s is not None
 

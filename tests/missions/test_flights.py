@@ -37,7 +37,7 @@ def test_each_recovery_leads_away_from_what_was_hit(name):
     # the recovery setpoint leads away from the wall that was hit
     collision, hit = flown.report.collisions[0], flown.hits[0]
     away = np.subtract(collision.recovery_setpoint_ned_m, hit.contact_position_ned_m)
-    assert away @ np.array(hit.normal_ned) > (0.3 if name != "hover" else -0.05)
+    assert away @ np.array(hit.normal_ned) > (0.2 if name != "hover" else -0.05)
 
 
 def test_the_square_hits_nothing_and_detects_nothing():
