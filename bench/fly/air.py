@@ -157,6 +157,7 @@ class Air:
     """Setpoints and commands for mode or arming that it sent afterwards."""
     has_left_offboard: bool = False
     """Whether somebody else has flown since the first item: PX4's failsafe, its landing, a pilot."""
+    has_pilot: bool = False  # seen in his mode since he has taken over
     is_overruled: bool = False
     """Whether the vehicle has left the pilot's mode."""
     _to_vehicle: list[bytes] = field(default_factory=list)
@@ -248,8 +249,9 @@ class Air:
         said = self.vehicle.step(b"".join(self.injector.to_vehicle(self, frames)))
         if self._pilot is not None:
             self._pilot.take()
-        if self.pilot_mode is not None and self.pilot_at_s is not None and self.now_s > self.pilot_at_s + 0.1:
-            self.is_overruled |= self.vehicle.mode != "Position"
+        if self.pilot_at_s is not None:
+            self.is_overruled |= self.has_pilot and self.vehicle.mode != "Position"
+            self.has_pilot |= self.vehicle.mode == "Position"
         return list(self.injector.to_companion(self, list(said)))
 
     def alone(self, seconds: float) -> None:

@@ -126,7 +126,7 @@ class Overruling(Taken):
     """Soon after the pilot has taken over, somebody asks for OFFBOARD in the companion's name."""
 
     def to_vehicle(self, air: Air, frames: list[bytes]) -> list[bytes]:
-        if air.pilot_at_s is None or not 0.05 < air.now_s - air.pilot_at_s < 0.5:
+        if not air.has_pilot:
             return frames
         fields = {"command": SET_MODE, "param1": 1.0, "param2": 6.0, "target_system": 1, "target_component": 1}
         setpoint = SETPOINT | {"target_system": 1, "target_component": 1, "coordinate_frame": 1}
