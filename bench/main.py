@@ -33,7 +33,6 @@ def build_parser() -> ArgumentParser:
     _add_paper(commands)
     _add_detectors(commands)
     _add_campaign(commands)
-    _add_corpus(commands)
     _add_ablation(commands)
     _add_flights(commands)
     _add_hits(commands)
@@ -154,31 +153,6 @@ def _add_campaign(commands: Commands) -> None:
     page.set_defaults(run=runs("bench.studies.campaign:run_page"))
 
 
-def _add_corpus(commands: Commands) -> None:
-    corpus = commands.add_parser(
-        "corpus",
-        help="record flights with their truth, and compare on them what two versions of the code make of them",
-        description="A corpus is a folder of run folders, recorded here or brought along, such as those of real PX4.",
-    )
-    parts = corpus.add_subparsers(required=True, metavar="PART", dest="part")
-    record = parts.add_parser("record", help="fly random missions with drawn vehicles and keep bytes and truth")
-    record.add_argument("folder", type=Path, metavar="FOLDER")
-    record.add_argument("--missions", type=count, default=500, metavar="N", help="with each kind (default 500)")
-    _add_seed(record)
-    _add_jobs(record)
-    record.set_defaults(run=runs("bench.studies.corpus:run_record"))
-    judge = parts.add_parser("judge", help="let this version of the code hear every flight, and write its verdicts")
-    judge.add_argument("folder", type=Path, metavar="FOLDER")
-    judge.add_argument("--out", type=Path, required=True, metavar="FILE", help="verdicts, as JSON")
-    _add_data(judge)
-    _add_workers(judge)
-    judge.set_defaults(run=runs("bench.studies.corpus:run_judge"))
-    compare = parts.add_parser("compare", help="print what has changed between two files of verdicts")
-    compare.add_argument("old", type=Path, metavar="OLD")
-    compare.add_argument("new", type=Path, metavar="NEW")
-    compare.set_defaults(run=runs("bench.studies.corpus:run_compare"))
-
-
 def _add_ablation(commands: Commands) -> None:
     from bench.studies.rules import RULES
 
@@ -224,26 +198,12 @@ def _add_hits(commands: Commands) -> None:
     _add_seed(hits)
     _add_vehicles(hits, "every hit")
     _add_workers(hits)
-    instead = hits.add_mutually_exclusive_group()
-    instead.add_argument(
+    hits.add_argument(
         "--verdicts",
-        dest="part",
-        action="store_const",
-        const="verdicts",
+        action="store_true",
         help="fly each hit only until the guard tells of it, dozens from one approach: a million an hour",
     )
-    instead.add_argument(
-        "--worst",
-        dest="part",
-        nargs="?",
-        const="margin",
-        choices=("margin", "recovery"),
-        help="search the hits nearest to being missed (default), or those with the worst recovery: N tries for each "
-        "airframe and rate, the vehicle included",
-    )
     hits.add_argument("--growth", action="store_true", help=SUPPRESS)
-    text = "with --worst: keep their flights there, for `corpus judge`"
-    hits.add_argument("--corpus", type=Path, metavar="FOLDER", help=text)
     _add_out(hits, "hits")
     gone = {"growth": "each row says what its hit cost"}
     hits.set_defaults(run=runs("bench.studies.hits:run_hits"), gone=gone)
