@@ -281,19 +281,6 @@ def _add_service(commands: Commands) -> None:
     text = "measure in real time, beside pymavlink and MAVSDK 4, how soon so many hits are answered; nothing else"
     speed.add_argument("--latency", type=count, metavar="HITS", help=text)
     speed.set_defaults(run=runs("bench.studies.speed.study:run_speed"))
-    soak = commands.add_parser(
-        "soak",
-        help="run the guard as a service by the clock: a hit a minute, reboots, an unplugged line, a full disk",
-        description="By the clock, on a serial line that loses packets. The disk is filled only where DIR is a file "
-        "system of less than 1 GB: mount -t tmpfs -o size=128m tmpfs DIR.",
-    )
-    soak.add_argument("--minutes", type=count, default=120, metavar="N", help="default 120")
-    soak.add_argument("--loss", type=float, default=0.05, metavar="SHARE", help="of the packets (default 0.05)")
-    soak.add_argument("--folder", type=Path, required=True, metavar="DIR", help="where the service records its flights")
-    text = "of the environment that the guard has, such as a drone's (default: this one)"
-    soak.add_argument("--python", metavar="PATH", help=text)
-    _add_out(soak, "soak")
-    soak.set_defaults(run=runs("bench.studies.soak:run_soak"))
 
 
 def _add_manual(commands: Commands) -> None:
