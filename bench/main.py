@@ -76,16 +76,6 @@ def _add_vehicles(parser: ArgumentParser, each: str) -> None:
     )
 
 
-def _add_data(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--data",
-        type=Path,
-        metavar="DIR",
-        default=os.environ.get("REBOUND_DATA") or None,
-        help="folder with px4_logs/*.ulg and drops/ for recorded flights and impacts (default: $REBOUND_DATA)",
-    )
-
-
 def _add_paper(commands: Commands) -> None:
     text = "The paper's figures and numbers beside ours, flown in lockstep."
     paper = commands.add_parser("paper", help="fly the paper's studies and write figures and tables", description=text)
@@ -94,17 +84,10 @@ def _add_paper(commands: Commands) -> None:
     paper.add_argument("--seeds", type=count, default=6, help="walls from any side: flights at each speed (default 6)")
     _add_jobs(paper)
     paper.set_defaults(run=runs("bench.studies.paper.command:run_paper"))
-    text = "Lockstep wall hits at four speeds with both airframes, as a table in Markdown."
-    parts = paper.add_subparsers(metavar="PART", dest="part")
-    results = parts.add_parser("results", help="fly the wall hits of the paper and write the table", description=text)
-    _add_out(results, "results")
-    results.add_argument("--seeds", type=count, default=20, help="flights for each speed and airframe (default 20)")
-    _add_jobs(results)
-    results.set_defaults(run=runs("bench.studies.paper.results:run_results"))
 
 
 def _add_detectors(commands: Commands) -> None:
-    text = "Simulated and recorded hits and flights through every detector."
+    text = "Simulated hits and healthy flights through every detector."
     detectors = commands.add_parser(
         "detectors", help="try every collision detector on hits and healthy flights", description=text
     )
@@ -114,22 +97,19 @@ def _add_detectors(commands: Commands) -> None:
     )
     _add_seed(detectors, 0)
     _add_vehicles(detectors, "every case")
-    _add_data(detectors)
     _add_workers(detectors)
     _add_out(detectors, "detection")
     detectors.set_defaults(run=runs("bench.studies.detectors:run_detectors"))
 
 
 def _add_campaign(commands: Commands) -> None:
-    text = "Random missions with both airframes, hits with both laws. Rows are kept: a broken-off run goes on."
+    text = "Random missions with both airframes. Rows are kept: a broken-off run goes on."
     campaign = commands.add_parser(
         "campaign", help="fly random missions in random rooms and write what became of them", description=text
     )
     campaign.add_argument("--missions", type=count, default=1000, metavar="N", help="random missions (default 1000)")
     _add_seed(campaign)
     _add_vehicles(campaign, "every mission")
-    text = "of each hit with each recovery law (default 5)"
-    campaign.add_argument("--hits", type=count, default=5, metavar="SEEDS", help=text)
     _add_workers(campaign)
     text = "fly this one mission again and keep its whole run folder, by default runs/<time>-random-SEED"
     campaign.add_argument("--only", type=count, metavar="SEED", help=text)
@@ -137,20 +117,6 @@ def _add_campaign(commands: Commands) -> None:
     campaign.add_argument("--airframe", choices=("foldable", "rigid"), help=text)
     _add_out(campaign, "campaign")
     campaign.set_defaults(run=runs("bench.studies.campaign:run_missions"))
-    parts = campaign.add_subparsers(metavar="PART", dest="part")
-    text = "Lockstep wall hits at 1 to 5 m/s, square and slanted, both airframes, laws paper and adaptive."
-    laws = parts.add_parser("recoveries", help="fly hits with the laws side by side", description=text)
-    _add_out(laws, "recovery")
-    laws.add_argument("--seeds", type=count, default=10, help="flights for each hit and law (default 10)")
-    _add_jobs(laws)
-    laws.set_defaults(run=runs("bench.studies.laws:run_laws"))
-    text = "Bars, every failure with the command that flies it again, and two versions compared."
-    page = parts.add_parser("page", help="a campaign's record as a page to look at", description=text)
-    text = "of random missions (default: the newest that there is)"
-    page.add_argument("record", type=Path, nargs="?", metavar="RECORD", help=text)
-    page.add_argument("--against", type=Path, metavar="RECORD", help="another version's, to be compared with")
-    page.add_argument("--out", type=Path, metavar="FILE", help="default: beside the record, as .md")
-    page.set_defaults(run=runs("bench.studies.campaign:run_page"))
 
 
 def _add_ablation(commands: Commands) -> None:
@@ -170,7 +136,6 @@ def _add_ablation(commands: Commands) -> None:
     _add_out(ablation, "ablation")
     text = "drawn hits for the detector alone, with hands and flights"
     ablation.add_argument("--hits", type=count, metavar="N", help=text)
-    _add_data(ablation)
     _add_workers(ablation)
     ablation.set_defaults(run=runs("bench.studies.ablation:run_ablation"))
 
@@ -278,7 +243,7 @@ def _add_service(commands: Commands) -> None:
     _add_out(speed, "speed")
     text = "count function calls alone, and make what the count is held to anew"
     speed.add_argument("--calls", action="store_true", help=text)
-    text = "measure in real time, beside pymavlink and MAVSDK 4, how soon so many hits are answered; nothing else"
+    text = "measure in real time how soon so many hits are answered; nothing else"
     speed.add_argument("--latency", type=count, metavar="HITS", help=text)
     speed.set_defaults(run=runs("bench.studies.speed.study:run_speed"))
 

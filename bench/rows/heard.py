@@ -2,34 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from bench.cases.hits import HandCase, HitCase, vehicle_of_hit
 from bench.cases.mishaps import FlightCase
 from bench.cases.vehicles import BenchVehicle, vehicle_of
 from bench.detectors.config import BaselineConfig
 from bench.fly.cruise import FlownHealthy, fly_healthy, hit_of, hover_in_hand
-from bench.fly.recorded import (
-    DROP_STEP_S,
-    DROPS_FILE,
-    ELEVATION_MAX_DEG,
-    LOGS_FOLDER,
-    LONGEST_INTERVAL_US,
-    RECORDED_RATES,
-    SLICE_BEFORE_S,
-    HealthyCase,
-    InjectedCase,
-    drops,
-    moments_of,
-    read,
-    scaled,
-    turned,
-    with_impact,
-)
 from bench.fly.watching import (
     ASKED_HZ,
     FOUND_WITHIN_US,
@@ -42,7 +22,6 @@ from bench.fly.watching import (
 from bench.fly.wire import LINKS, HeardStep, VehicleRecording, Wire, over_link
 from companion.messages import ImuSample, Vector3
 from companion.reflex.impact import ImpactEstimate
-from rebound_cli.replay.watching import watch_log
 from sim_vehicle.truth import Hit
 
 # A force counts as above the noise floor from this many standard deviations of an IMU sample on: of ten hours at
@@ -256,51 +235,4 @@ def work_out_hand(case: HandCase) -> dict[str, Any]:
                 "told_after_ms": 1e-3 * (told_us[0] - began_us) if told_us else None,
             }
         result["rates"][str(rate)] = {"detectors": entries}
-    return result
-
-
-def work_out_healthy(case: HealthyCase) -> dict[str, Any]:
-    """Collisions and touches that each detector reports, in seconds after the log's start."""
-    log = read(Path(case.folder) / LOGS_FOLDER / case.log)
-    if case.scale != 1.0:
-        log = replace(log, heard=tuple(scaled(log, case.scale)))
-    result: dict[str, Any] = {"seconds": log.duration_s, "rates": {}}
-    for rate, asked_hz in RECORDED_RATES.items():
-        detectors = {}
-        for name in case.detectors:
-            findings = watch_log(log, configuration(name), asked_hz)
-            detectors[name] = {
-                "collisions": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.collisions],
-                "touches": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.contacts],
-                "blind_s": sum(span.duration_s for span in findings.blind),
-            }
-        result["rates"][rate] = detectors
-    return result
-
-
-def work_out_injected(case: InjectedCase) -> dict[str, Any]:
-    """Whether and when each detector reports it, at each rate; what it reported before."""
-    rng = np.random.default_rng([case.seed, 3])
-    folder = Path(case.folder)
-    log = read(folder / LOGS_FOLDER / case.log)
-    force, elevation = drops(folder / DROPS_FILE)[case.drop], math.radians(ELEVATION_MAX_DEG)
-    side, up = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(-elevation, elevation))
-    towards = (math.cos(up) * math.cos(side), math.cos(up) * math.sin(side), math.sin(up))
-    force = turned(force, towards, float(rng.uniform(-math.pi, math.pi)))
-    moments = moments_of(folder / LOGS_FOLDER / case.log)
-    hit_us = moments[int(rng.integers(len(moments)))] + int(rng.integers(LONGEST_INTERVAL_US))
-    # When the link sends its first sample has nothing to do with when the hit comes.
-    begun_us = hit_us - round(1e6 * SLICE_BEFORE_S) - int(rng.integers(LONGEST_INTERVAL_US))
-    struck = with_impact(log, force, begun_us, hit_us)
-    result: dict[str, Any] = {"rates": {}, "impulse_m_s": float(np.linalg.norm(force.sum(axis=0)) * DROP_STEP_S)}
-    for rate, asked_hz in RECORDED_RATES.items():
-        detectors: dict[str, Any] = {}
-        for name in case.detectors:
-            collisions = watch_log(struck, configuration(name), asked_hz).collisions
-            times = [f.at_us for f in collisions]
-            late = [time - hit_us for time in times if 0 <= time - hit_us <= FOUND_WITHIN_US]
-            detectors[name] = {"false": sum(time < hit_us for time in times)}
-            if late:
-                detectors[name]["latency_ms"] = 1e-3 * late[0]
-        result["rates"][rate] = detectors
     return result

@@ -1,12 +1,10 @@
 """What the default detector must show, line by line, with the figures and a verdict. Frames are by campaign."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import pandas as pd
 
 from bench.cases.hits import GRIPS, SPEEDS_M_S
-from bench.fly.recorded import RECORDED_RATES, SCALES, STRIKE_LOG, STRIKE_S
 from bench.fly.watching import ASKED_HZ, FLOWN_WITH, FOUND_WITHIN_US
 from bench.rows.tables import Bar, per_cent, percentile, rms, share, text_of
 from companion.reflex.detector import ImpactKind
@@ -24,7 +22,6 @@ LATE_BAR = 0.01
 FAST_M_S, SPEED_ERROR_BAR_M_S, SPEED_ERROR_BAR = 2.0, 0.05, 0.03
 HEAD_ON_DEG, HEAD_ON_BAR_DEG, ALL_BAR_DEG, NORMAL_FROM_M_S = 30.0, 10.0, 20.0, 1.0
 HOURS_BAR = 10.0
-INJECTED_BARS = {200: 0.995, 50: 0.95}
 EARLIER_BAR, FOUND_WITHIN_MS = 10.0, 1e-3 * FOUND_WITHIN_US
 # The family of a hit, and of which of them the bar speaks.
 BESIDE = {"link": "link with jitter, loss and reordering", "struck": "struck in hover at 0.5 to 3 m/s"}
@@ -42,8 +39,6 @@ def all_bars(frames: Mapping[str, pd.DataFrame]) -> list[Bar]:
         some = ours[(ours["family"] == family) & (ours["speed_m_s"] >= least_m_s)]
         bars += [found_bar(airframe, rate, what, _of(some, airframe, rate)) for airframe, rate in FOUND_BARS]
     bars += hand_bars(frames["hands"]) + flight_bars(frames["flights"])
-    if "recorded-flights" in frames:
-        bars += [*_recorded_bars(frames["recorded-flights"]), *_injected_bars(frames["recorded-impacts"])]
     return bars + list(_beside_baseline(hits, frames["flights"]))
 
 
@@ -165,44 +160,6 @@ def flight_bars(flights: pd.DataFrame) -> list[Bar]:
         is_met = False if alarms else True if hours >= HOURS_BAR else None
         bars.append(Bar(f"{rate} Hz: {what}", f"none in {HOURS_BAR:g} h", measured, is_met, f"{len(some)} flights"))
     return bars
-
-
-def _recorded_bars(flights: pd.DataFrame) -> Iterator[Bar]:
-    ours = flights[flights["detector"] == DEFAULT].assign(count=lambda rows: rows["collisions"].map(len))
-    is_strike = ours["log"] == STRIKE_LOG
-    for rate in map(int, RECORDED_RATES):
-        some = ours[~is_strike & (ours["scale"] == 1.0) & (ours["rate"] == rate)]
-        count = int(some["count"].sum())
-        yield Bar(f"{rate} Hz: false alarms in real flights", "none", str(count), count == 0, f"{len(some)} logs")
-    for scale in SCALES:
-        some = ours[ours["scale"] == scale]
-        # Judged at the recorded rate, as few samples of the strike are left at the lower ones; landings at all.
-        found = [row.rate for row in some[is_strike].itertuples() if any(map(_is_strike, row.collisions))]
-        false = int(some[~is_strike]["count"].sum())
-        yield Bar(
-            f"real flights, magnitudes times {scale:g}: ground strike found, landings told from it",
-            "found, no landing taken for a strike",
-            f"strike found at {', '.join(map(str, found)) or 'no'} Hz; {false} landings or manoeuvres taken for one",
-            int(next(iter(RECORDED_RATES))) in found and false == 0,
-            f"{len(RECORDED_RATES)} rates",
-        )
-
-
-def _is_strike(told: Any) -> bool:
-    return bool(STRIKE_S[0] <= told[0] <= STRIKE_S[1])
-
-
-def _injected_bars(hits: pd.DataFrame) -> Iterator[Bar]:
-    for rate in map(int, RECORDED_RATES):
-        some = hits[(hits["detector"] == DEFAULT) & (hits["rate"] == rate)]
-        found, wanted = share(some["latency_ms"].notna()), INJECTED_BARS.get(rate)
-        yield Bar(
-            f"semi-synthetic (recorded impacts in recorded flights), {rate} Hz",
-            "apart" if wanted is None else f"≥ {100 * wanted:g} %",
-            f"{per_cent(found, 2)} %",
-            None if wanted is None else found >= wanted,
-            f"{len(some)} hits, {some['false'].sum()} false alarms before them",
-        )
 
 
 def _beside_baseline(hits: pd.DataFrame, flights: pd.DataFrame) -> Iterator[Bar]:

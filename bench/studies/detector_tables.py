@@ -24,7 +24,7 @@ def all_tables(frames: Mapping[str, pd.DataFrame]) -> dict[str, str]:
     hits = frames["hits"].assign(band=pd.cut(frames["hits"]["speed_m_s"], SPEED_BINS_M_S, right=False))
     counted = hits[(hits["family"] == "plain") & (hits["speed_m_s"] >= SPEEDS_M_S[0])]
     ours, usual = hits[hits["detector"] == DEFAULT], ["airframe", "rate"]
-    parts = {
+    return {
         "Every detector on simulated hits": by(counted, "detector", *usual),
         "By obstacle": by(counted[counted["detector"] == DEFAULT], "approach", *usual),
         "By speed": by(ours[ours["family"] == "plain"], "band", *usual),
@@ -41,17 +41,6 @@ def all_tables(frames: Mapping[str, pd.DataFrame]) -> dict[str, str]:
             frames["flights"][frames["flights"]["detector"] == DEFAULT], "family", "rate"
         ),
     }
-    if "recorded-flights" in frames:
-        real = frames["recorded-flights"][frames["recorded-flights"]["scale"] == 1.0]
-        told = real["collisions"].map(lambda found: ", ".join(f"{at_s:.2f}" for at_s, _ in found[:4]) or "none")
-        parts["Recorded flights"] = table(
-            real.assign(told=told).pivot(index=["log", "detector"], columns="rate", values="told").reset_index()
-        )
-        impacts = frames["recorded-impacts"]
-        parts["Semi-synthetic: recorded impacts in recorded flights"] = by(
-            impacts.assign(possible_ms=0.0), "detector", "rate"
-        )
-    return parts
 
 
 def by(hits: pd.DataFrame, *keys: str) -> str:

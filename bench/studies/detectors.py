@@ -1,10 +1,9 @@
-"""`bench detectors`: every collision detector on simulated and recorded hits, and on hard healthy flights."""
+"""`bench detectors`: every collision detector on simulated hits and on hard healthy flights."""
 
 import math
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -13,10 +12,9 @@ from bench.cases.hits import draw_case, draw_hand
 from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Results, Workers, run_campaign
-from bench.fly.recorded import SCALES, STRIKE_LOG, HealthyCase, InjectedCase, data_files
 from bench.fly.watching import detector_names
 from bench.fly.wire import JITTERY
-from bench.rows.heard import work_out_flight, work_out_hand, work_out_healthy, work_out_hit, work_out_injected
+from bench.rows.heard import work_out_flight, work_out_hand, work_out_hit
 from bench.rows.tables import Page, bars_text, summary_text
 from bench.studies.detector_bars import all_bars
 from bench.studies.detector_tables import all_tables, figures
@@ -48,8 +46,6 @@ OF_FOUND: tuple[str, ...] = (
     "kind",
 )
 OF_FOUND += ("time_error_ms", "bound", "impulse")
-# Recorded impacts: each once for a first look, more often where the hits are many.
-HITS_PER_ROUND = 2500
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +76,6 @@ def run_detectors(options: Namespace) -> int:
         hands_campaign(options.hits, drawing),
         flights_campaign(options.hours, drawing),
     ]
-    if options.data is not None:
-        rounds = max(1, round(options.hits / HITS_PER_ROUND))
-        campaigns += [healthy_campaign(options.data), injected_campaign(options.data, rounds)]
     results = {campaign.name: run_campaign(campaign, workers) for campaign in campaigns}
     frames = {campaign.name: rows(campaign, results[campaign.name]) for campaign in campaigns}
     bars, failed = all_bars(frames), "\n".join(filter(None, (results[one.name].text(one) for one in campaigns)))
@@ -151,28 +144,6 @@ def flights_campaign(hours: float, drawing: Drawing = NAMED) -> Campaign:
         for seed in range(drawing.first_seed, drawing.first_seed + count)
     ]
     return drawing.campaign("flights", {"hours": hours}, cases, work_out_flight)
-
-
-def healthy_campaign(folder: Path, detectors: tuple[str, ...] | None = None) -> Campaign:
-    """Every recorded flight, at half, whole and double magnitude; by all detectors, or these. Raises DataError."""
-    logs, _ = data_files(folder)
-    cases = [HealthyCase(str(folder), log, scale, detectors or detector_names()) for scale in SCALES for log in logs]
-    return Campaign("recorded-flights", {"logs": logs, "by": detectors}, cases, work_out_healthy)
-
-
-def injected_campaign(folder: Path, rounds: int, detectors: tuple[str, ...] | None = None) -> Campaign:
-    """Every recorded impact so many times, each time in another flight; the first time by all detectors, or always by
-    these. Raises DataError."""
-    logs, drops = data_files(folder)
-    healthy = [log for log in logs if log != STRIKE_LOG]
-    cases = []
-    for turn in range(rounds):
-        by = detectors or (detector_names() if turn == 0 else _thorough())
-        for number, drop in enumerate(drops):
-            log, seed = healthy[(number + turn) % len(healthy)], turn * len(drops) + number
-            cases.append(InjectedCase(str(folder), log, drop, seed, by))
-    parameters = {"logs": healthy, "rounds": rounds, "by": detectors}
-    return Campaign("recorded-impacts", parameters, cases, work_out_injected)
 
 
 def _side(hits: int, at_most: int) -> int:

@@ -23,8 +23,8 @@ from bench.fly.moments import Moment
 from bench.rows.hits import work_out_flown
 from bench.rows.tables import at_most, at_most_of_groups
 from bench.studies.hits import flown_campaign, flown_parts, flown_rows, verdict_campaign, verdict_parts, verdict_rows
-from bench.studies.laws import RecoveryCase, work_out
 from companion.companion import StepResult
+from tests.bench.test_recoveries import flown as flown_whole
 
 pytestmark = pytest.mark.slow
 
@@ -39,11 +39,11 @@ def judged(case: FlownHit) -> dict:
 )
 def test_a_hit_alone_is_judged_as_the_hit_of_a_whole_mission(airframe, speed_m_s):
     # Given a square hit on a wall after a take-off and a way to it
-    whole = work_out(RecoveryCase("adaptive", airframe, 0, speed_m_s, 1))
+    outcome, whole = flown_whole(airframe, speed_m_s)
     # When the same hit is flown alone
     alone = judged(FlownHit(HitCase("flown", 1, airframe, "wall", speed_m_s, ()), 250))
     # Then both were found, neither came back or fell, and both came to rest: by the truth before the estimate shows it
-    assert whole["outcome"] == "completed" and alone["found"] and not alone["false"]
+    assert outcome == "completed" and alone["found"] and not alone["false"]
     assert alone["closing_m_s"] == pytest.approx(speed_m_s, abs=0.15)
     assert alone["again"] == whole["returned"] == 0
     assert max(alone["lost_m"], whole["lost_m"]) < 0.05

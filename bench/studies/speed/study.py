@@ -8,7 +8,7 @@ from bench.stamps import FLOWN
 from bench.studies.speed.budget import measured_budget
 from bench.studies.speed.calls import calls_an_interval, hold_to
 from bench.studies.speed.flight import fly, parse_us
-from bench.studies.speed.latency import compared
+from bench.studies.speed.latency import measured
 from bench.studies.speed.parts import PARTS
 
 CODE = (*FLOWN, "rebound_cli")
@@ -71,9 +71,7 @@ def latency_table(hits: int) -> str:
     """Milliseconds."""
     columns = {"p50": "p50", "p99": "p99", "p999": "p99.9", "most": "most"}
     rows = [
-        {"program": name, "beside it": state, "setpoints": row["found"]}
-        | {label: f"{row[key]:.2f}" for key, label in columns.items()}
-        for name, states in compared(hits).items()
-        for state, row in states.items()
+        {"beside it": state, "setpoints": row["found"]} | {label: f"{row[key]:.2f}" for key, label in columns.items()}
+        for state, row in measured(hits).items()
     ]
     return table(rows)
