@@ -34,22 +34,12 @@ HIT_SPEEDS_M_S = (1.0, 5.0)
 LEVEL_M_S = 0.3
 UPRIGHT = 0.7
 # Of a hit that nobody answered, and of one after which nothing was touched, there are no such figures.
-OF_ANSWERED = [
-    "seen",
-    "again",
-    "others",
-    "returned",
-    "past_m",
-    "settled_s",
-    "clear_m",
-    "lost_m",
-    "risen_m",
-    "leant_deg",
-]
+OF_ANSWERED = ["seen", "again", "others", "returned"]
+OF_ANSWERED += ["past_m", "settled_s", "clear_m", "lost_m", "risen_m", "leant_deg"]
 
 
 def missions_campaign(missions: int, first_seed: int = 1, is_drawn: bool = False) -> Campaign:
-    """Seeds from the first on, each with every airframe; `is_drawn`: or with a vehicle of its kind drawn from the seed."""
+    """Seeds from the first on, each with every airframe, or where `is_drawn` with a vehicle of its kind."""
     seeds = range(first_seed, first_seed + missions)
     cases = [MissionCase(seed, name, is_drawn) for seed in seeds for name in AIRFRAMES]
     parameters = {"missions": missions, "first_seed": first_seed, "is_drawn": is_drawn}
