@@ -167,7 +167,7 @@ def work_out_heard(heard: DetectionCase) -> Json:
 def _said(heard: DetectionCase) -> Json:
     """By rate: hits found and when, and alarms that were none."""
     rates = _WORK[type(heard.case)](heard.case)["rates"]
-    return {rate: _of_rate(found.get("detectors", found)[FLOWN_WITH[0]]) for rate, found in rates.items()}
+    return {rate: _of_rate(found["detectors"][FLOWN_WITH[0]]) for rate, found in rates.items()}
 
 
 def _of_rate(entry: Json) -> Json:

@@ -16,16 +16,12 @@ from bench.fly.watching import detector_names
 from bench.fly.wire import JITTERY
 from bench.rows.heard import work_out_flight, work_out_hand, work_out_hit
 from bench.rows.tables import Page, bars_text, summary_text
-from bench.studies.detector_bars import all_bars
-from bench.studies.detector_tables import all_tables, figures
+from bench.studies.detector_tables import all_bars, all_tables
 
 # Tried on everything. The others are compared on at least so many hits and flights, and on one in eight at most sizes:
 # all seven take three times as long as these two.
 THOROUGH = ("fused", "threshold")
 COMPARED_HITS, COMPARED_FLIGHTS, COMPARED_EVERY_AT_MOST = 400, 16, 8
-# Of these so many are heard at other thresholds too: seven detectors at seven thresholds take fifty times as long.
-SWEPT_HITS = 200
-
 # Beside the hits of the airframes as they are, one in so many again with more vibration, and with a worse velocity.
 VARIED_SHARE = 16
 # An IMU sample's spread on each axis; four public PX4 logs of healthy flights lie between 1.2 and 4 m/s^2.
@@ -37,15 +33,7 @@ VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
 SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
 # Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
 FLIGHT_S = AIRBORNE_S + 40.0
-OF_FOUND: tuple[str, ...] = (
-    "latency_ms",
-    "samples_late",
-    "speed_error_m_s",
-    "velocity_error_m_s",
-    "normal_error_deg",
-    "kind",
-)
-OF_FOUND += ("time_error_ms", "bound", "impulse")
+OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "velocity_error_m_s", "normal_error_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +68,7 @@ def run_detectors(options: Namespace) -> int:
     frames = {campaign.name: rows(campaign, results[campaign.name]) for campaign in campaigns}
     bars, failed = all_bars(frames), "\n".join(filter(None, (results[one.name].text(one) for one in campaigns)))
     parts = {"What must be shown": bars_text(bars), **all_tables(frames)}
-    page.write("Detection", options.typed, parts, figures(frames), frames["hits"])
+    page.write("Detection", options.typed, parts, rows=frames["hits"])
     print(f"{summary_text(bars)}\n{failed}")
     return 1 if failed else 0
 
@@ -92,9 +80,8 @@ def rows(campaign: Campaign, results: Results) -> pd.DataFrame:
         case = {name: value for name, value in asdict(campaign.cases[at]).items() if name != "detectors"}
         truth = {f"true_{name}": value for name, value in result.items() if name != "rates"}
         for rate, heard in result["rates"].items():
-            swept = heard.get("swept") or {}
-            for detector, entry in heard.get("detectors", heard).items():
-                told = {"possible_ms": heard.get("possible_ms"), "swept": swept.get(detector), **entry}
+            for detector, entry in heard["detectors"].items():
+                told = {"possible_ms": heard.get("possible_ms"), **entry}
                 found.append({"case": at, **case, **truth, "rate": int(rate), "detector": detector, **told})
     frame = pd.DataFrame(found)
     # A detector that finds nothing tells nothing of it.
@@ -104,9 +91,8 @@ def rows(campaign: Campaign, results: Results) -> pd.DataFrame:
 def hits_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
     """So many hits as the vehicles are, a sixteenth more of each variation, and some over a bad link and in hover."""
     every, first = _every(hits, COMPARED_HITS), drawing.first_seed
-    swept = every * max(1, round(hits / (every * SWEPT_HITS)))
     seeds = range(first, first + hits)
-    cases = [draw_case("plain", seed, _compared(seed, every), sweeps=_is_turn(seed, swept)) for seed in seeds]
+    cases = [draw_case("plain", seed, _compared(seed, every)) for seed in seeds]
     first += hits
     for seed in range(first, first + hits // VARIED_SHARE):
         vibration = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
@@ -139,7 +125,6 @@ def flights_campaign(hours: float, drawing: Drawing = NAMED) -> Campaign:
             seed=seed,
             airframe=AIRFRAMES[seed % 2],
             detectors=_compared(seed, every),
-            sweeps=_is_turn(seed, 2 * every),
         )
         for seed in range(drawing.first_seed, drawing.first_seed + count)
     ]
