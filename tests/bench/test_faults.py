@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from bench.faults.catalogue import FLOWN, GROUPS
-from bench.faults.injectors import Rewritten, Simulated, setting
-from bench.faults.pilot import Taken
+from bench.faults.injectors import Rewritten, setting, simulated
+from bench.faults.people import Taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.faulted import FaultedFlight
 from bench.fly.packets import ARM, IMU, SET_MODE, made, outside
@@ -140,8 +140,8 @@ def test_a_judge_names_each_kind_of_loss() -> None:
     bad = {
         "setpoint outside: outside the fence": lambda _: Sending(),
         "the pilot was overruled": lambda _: Overruling(When("mission", 0.3)),
-        "tumbled: ": lambda _: Simulated(motor_failure(0), When("mission", 0.3)),
-        "1 false hits counted": lambda _: Simulated(
+        "tumbled: ": lambda _: simulated(motor_failure(0), When("mission", 0.3)),
+        "1 false hits counted": lambda _: simulated(
             other("push", force_ned_n=(0.0, 12.0, 0.0), rise_s=0.01), When("mission", 0.3, 0.1)
         ),
     }
