@@ -11,12 +11,24 @@ from pathlib import Path
 from rebound_cli.arguments import Commands, count, number, runs
 from rebound_cli.main import run
 
+# Studies that were, and what shows now what they showed.
+GONE = {
+    "campaign page": "`bench campaign` writes the page, and the rows beside it",
+    "campaign recoveries": "`bench hits` and `bench ablation` measure recoveries",
+    "corpus": "`bench hits --verdicts` and `bench detectors` judge a version on the same seeds",
+    "paper results": "`bench paper` has the flight tests by speed and airframe",
+    "soak": "`rebound guard` itself says what it takes of the computer",
+}
 hours = number(float, math.ulp(0.0), 10_000, "a time: give hours, such as 0.5")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one study and return its exit code."""
     words = sys.argv[1:] if arguments is None else arguments
+    for gone, instead in GONE.items():
+        if [*words][: len(gone.split())] == gone.split():
+            print(f"bench: `{gone}` is no more: {instead}.", file=sys.stderr)
+            return 2
     options = build_parser().parse_args(words)
     options.typed = shlex.join(("python", "-m", "bench", *words))
     for gone, instead in vars(options).get("gone", {}).items():

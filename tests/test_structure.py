@@ -13,7 +13,7 @@ import pytest
 
 import bench.main
 import rebound_cli.main
-from bench.import_graph import PACKAGES, imported_names, module_imports
+from tests.import_graph import PACKAGES, imported_names, module_imports
 
 ROOT = Path(__file__).parent.parent
 
