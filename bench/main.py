@@ -17,7 +17,7 @@ GONE = {
     "campaign recoveries": "`bench hits` and `bench ablation` measure recoveries",
     "corpus": "`bench hits --verdicts` and `bench detectors` judge a version on the same seeds",
     "paper results": "`bench paper` has the flight tests by speed and airframe",
-    "soak": "`rebound guard` itself says what it takes of the computer",
+    "soak": "hours as a service are no study any more",
 }
 hours = number(float, math.ulp(0.0), 10_000, "a time: give hours, such as 0.5")
 

@@ -10,8 +10,9 @@ import numpy as np
 from bench.fly.cruise import AFTER_S, HeadOnHit, head_on
 from bench.studies.paper.claims import claim
 from bench.studies.paper.figures import CONTACT, finish, mark_paper, new_figure
-from bench.studies.paper.flights import Floats, StudyFlight, StudyResult
+from bench.studies.paper.flights import StudyFlight, StudyResult
 from bench.studies.paper.study import StudyFindings
+from bench.studies.paper.track import Floats
 from sim_vehicle.airframe import load_built_in
 
 # The paper, section IV.

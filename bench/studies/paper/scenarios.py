@@ -20,8 +20,9 @@ from bench.studies.paper.figures import (
     mark_paper,
     new_figure,
 )
-from bench.studies.paper.flights import StudyFlight, StudyResult, StudyTrack, Vector3
+from bench.studies.paper.flights import StudyFlight, StudyResult
 from bench.studies.paper.study import StudyFindings
+from bench.studies.paper.track import StudyTrack, Vector3
 from rebound_cli.inputs import load_mission_document
 
 MISSION_FILE = Path("missions/paper.yaml")

@@ -12,8 +12,9 @@ from bench.fly.cruise import head_on
 from bench.rows.tables import table
 from bench.studies.paper.claims import claim
 from bench.studies.paper.figures import add_legend, draw_position, draw_velocity, new_figure
-from bench.studies.paper.flights import Floats, StudyFlight, StudyResult
+from bench.studies.paper.flights import StudyFlight, StudyResult
 from bench.studies.paper.study import StudyFindings, safety_text
+from bench.studies.paper.track import Floats
 from rebound_cli.results.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.plant.plant import Plant
