@@ -14,8 +14,6 @@ from rebound_cli.results.summary import BREAKING_FORCE_N
 # A hit counts as lost on the way when less than this share of it lies in samples that arrived: a tenth of a
 # millisecond, clipped at 157 m/s^2, adds 3.9 m/s^2 to a mean over 4 ms, just below the detector's threshold.
 LOST_SHARE = 0.1
-# An overshoot below this cannot be seen in the paper's plots, nor told from the noise of an estimate.
-NO_OVERSHOOT_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
