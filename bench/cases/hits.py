@@ -55,8 +55,6 @@ class HitCase:
     """Standard deviation of an IMU sample on each axis; None: the airframe's own."""
     velocity_noise_m_s: float | None = None
     """RMS on each axis of the vehicle's velocity estimate; None: the airframe's own."""
-    sweeps: bool = False
-    """Whether the detectors' thresholds are swept, too."""
     is_struck: bool = False
     """The vehicle hovers, and the obstacle comes at it with the speed."""
     link: str | None = None

@@ -119,7 +119,6 @@ class FlightCase:
     seed: int
     airframe: str
     detectors: tuple[str, ...]
-    sweeps: bool = False
     is_drawn: bool = False
 
 

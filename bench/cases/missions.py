@@ -43,8 +43,6 @@ class MissionCase:
 
     seed: int
     airframe: str
-    feed_forward: bool = True
-    """Whether a climb or a fall after a hit is braked by an acceleration of its own."""
     is_drawn: bool = False
     """Whether the vehicle, too, is drawn from the seed: one of the airframe's kind, with other numbers."""
 
@@ -121,7 +119,6 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
         "description": f"{room.kind}, {stream_hz} Hz, wind up to {wind_m_s:g} m/s, seed {case.seed}",
         "items": items,
         "on_collision": follows,
-        **({} if case.feed_forward else {"recovery": {"vertical_acceleration_m_s2": 0.0}}),
         "obstacles": {"on_unreachable": out_of_reach},
         "on_interrupt": interrupted,
         "fence": room.fence,

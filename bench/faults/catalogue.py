@@ -1,18 +1,140 @@
-"""All faults, in the table's order."""
+"""All faults, in the order of `faults.yaml`, made anew for every flight as its chance has it."""
 
-from bench.faults import clocks, estimator, files, hostile, link, machine, pilot, processes, sensors, weather
+import math
+import random
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
 
-GROUPS = {
-    "link": link.FAULTS,
-    "sensors": sensors.FAULTS,
-    "clock": clocks.FAULTS,
-    "process": processes.FAULTS,
-    "disk and console": machine.FAULTS,
-    "estimator": estimator.FAULTS,
-    "wind and body": weather.FAULTS,
-    "hostile packets": hostile.FAULTS,
-    "pilot": pilot.FAULTS,
+import yaml
+
+from bench.faults import injectors, people
+from bench.faults.injectors import CHANGES, Change, Once, Rewritten, adding, setting, simulated
+from bench.faults.people import Forged
+from bench.fly.air import Air, Expected, Fault, Injector, When
+from bench.fly.packets import NUMBERS
+from sim_vehicle.bench.faults import FaultRequest, ekf_reset, other
+
+Row = Mapping[str, Any]
+_ARMED = 0x80
+
+
+def _numbers(names: Sequence[str]) -> tuple[int, ...]:
+    return tuple(NUMBERS[name] for name in names)
+
+
+def _change(row: Row) -> Change:
+    return setting(**row["set"]) if "set" in row else adding(**row["add"])
+
+
+def _moment(chance: random.Random, name: str = "flying") -> When:
+    return When.recovering(chance) if name == "recovering" else When.flying(chance)
+
+
+def _once(do: Callable[[Air], None], chance: random.Random, moment: str = "flying") -> Injector:
+    return Once(_moment(chance, moment), do)
+
+
+def _reset(chance: random.Random, position_m: float, velocity_m_s: float) -> Injector:
+    """Sideways from any side."""
+    north, east = (f(chance.uniform(-math.pi, math.pi)) for f in (math.cos, math.sin))
+    jump, hop = (position_m * north, position_m * east, 0.0), (velocity_m_s * north, velocity_m_s * east, 0.0)
+    return simulated(ekf_reset(jump, hop), When.flying(chance))
+
+
+def _gust(chance: random.Random) -> Injector:
+    side, speed = chance.uniform(-math.pi, math.pi), chance.uniform(4.0, 8.0)
+    wind = (speed * math.cos(side), speed * math.sin(side), 0.0)
+    return simulated(other("gust", velocity_ned_m_s=wind, rise_s=0.3), When.flying(chance, 2.0))
+
+
+def _push(chance: random.Random) -> Injector:
+    side = chance.uniform(-math.pi, math.pi)
+    force = (2.0 * math.cos(side), 2.0 * math.sin(side), 0.0)
+    return simulated(other("push", force_ned_n=force), When.flying(chance, 0.5))
+
+
+def _disarm(message: Any, air: Air) -> None:
+    message.base_mode &= ~_ARMED
+
+
+def _forged_velocity(chance: random.Random) -> Injector:
+    """One packet, of ODOMETRY or of LOCAL_POSITION_NED, with a velocity 2 m/s aside."""
+    axis, name = chance.choice(("vx", "vy", "vz")), chance.choice(("ODOMETRY", "LOCAL_POSITION_NED"))
+    return Forged(When.flying(chance), NUMBERS[name], adding(**{axis: chance.choice((-2.0, 2.0))}))
+
+
+def _forged_imu(names: Sequence[str], chance: random.Random, size: float, times: int = 1) -> Injector:
+    when, axis = When.flying(chance), chance.choice(names)
+    return Forged(when, NUMBERS["HIGHRES_IMU"], adding(**{axis: chance.choice((-size, size))}), times, 0.004)
+
+
+# By the words after `do` in the file: what is drawn, in this order, belongs to the seed.
+DOES: dict[str, Callable[..., Injector]] = {
+    "stuck": lambda c, names, for_s=math.inf: injectors.Stuck(When.flying(c, for_s), _numbers(names)),
+    "thinned": lambda c, names, every: injectors.Thinned(When.flying(c), _numbers(names), every),
+    "jumped": lambda c, jump_s: injectors.Jumped(When.flying(c), jump_s),
+    "anew": lambda c: injectors.anew(When.flying(c)),
+    "stalled": lambda c, seconds, moment="flying": _once(injectors.stall(seconds), c, moment),
+    "signalled": lambda c, reason, moment="flying": _once(injectors.signal(reason), c, moment),
+    "killed": partial(_once, Air.kill),
+    "step_breaks": partial(_once, injectors.break_step),
+    "memory_ends": partial(_once, lambda air: injectors.break_step(air, MemoryError())),
+    "encoder_breaks": partial(_once, injectors.break_encoder),
+    "reset": _reset,
+    "height_reset": lambda c: simulated(ekf_reset((0.0, 0.0, c.choice((-0.5, 0.5)))), When.flying(c)),
+    "gust": _gust,
+    "push": _push,
+    "forged_disarm": lambda c, *times: Forged(When.flying(c), NUMBERS["HEARTBEAT"], _disarm, *times),
+    "forged_velocity": _forged_velocity,
+    "forged_rate": partial(_forged_imu, ("xgyro", "ygyro")),
+    "forged_force": partial(_forged_imu, ("xacc", "yacc")),
+    "denied": lambda c: people.Denied(When.flying(c)),
+    "strangers": lambda c: people.Strangers(When("connect", 2.0)),
+    "flood": lambda c: people.Strangers(When.flying(c, 3.0), 10),
+    "foreign_byte": lambda c: people.Noise(When("connect", 2.0), 1),
+    "foreign_bytes": lambda c: people.Noise(When.flying(c), 300),
+    "hostile": lambda c, spared=(): people.Hostile(When.flying(c), _numbers(spared)),
+    "taken": lambda c, state, from_s, within_s, stall_s=0.0, cut_s=0.0: people.Taken(
+        When(state, c.uniform(from_s, from_s + within_s)), stall_s, cut_s
+    ),
 }
+
+
+def _injected(row: Row, chance: random.Random) -> Injector:
+    if "do" in row:
+        name, *arguments = row["do"]
+        return DOES[name](chance, *arguments)
+    when = When(row["when"]) if "when" in row else When.flying(chance, row.get("for_s", math.inf))
+    if "vehicle" in row:
+        kind, *_ = row["vehicle"].values()
+        return simulated(FaultRequest(kind, {k: v for k, v in row["vehicle"].items() if k != "kind"}), when)
+    if "forge" in row:
+        forged = row["forge"]
+        times, every_s = forged.get("times", 1), forged.get("every_s", 0.0)
+        return Forged(when, NUMBERS[forged["message"]], _change(forged), times, every_s)
+    rewritten = row["rewrite"]
+    change = CHANGES[rewritten["by"]] if "by" in rewritten else _change(rewritten)
+    return Rewritten(when, _numbers(rewritten["messages"]), change)
+
+
+def _read(file: Path) -> dict[str, tuple[Fault, ...]]:
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    expectations = {"lands": Expected()}
+    for name, words in content["expectations"].items():
+        expectations[name] = Expected(**{**words, "outcomes": tuple(words.get("outcomes", Expected().outcomes))})
+    return {
+        group: tuple(_fault(name, row, expectations) for name, row in rows.items())
+        for group, rows in content["groups"].items()
+    }
+
+
+def _fault(name: str, row: Row, expectations: Mapping[str, Expected]) -> Fault:
+    expected = expectations[row.get("expected", "lands")]
+    return Fault(name, row["injected"], partial(_injected, row), expected, from_the_start="when" in row)
+
+
+GROUPS = _read(Path(__file__).with_name("faults.yaml"))
 FLOWN = {fault.name: fault for faults in GROUPS.values() for fault in faults}
-FILES = {fault.name: fault for fault in files.FAULTS}
 assert len(FLOWN) == sum(map(len, GROUPS.values())), "every fault has a name of its own"

@@ -5,7 +5,6 @@ Whatever an injector does, it does here: to the bytes of either direction, to th
 
 from __future__ import annotations
 
-import io
 import math
 import random
 from collections.abc import Callable, Sequence
@@ -26,8 +25,6 @@ from bench.fly.packets import (
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
-from rebound_cli.background import Background
-from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.bench.changeable import ChangeableVehicle
@@ -56,9 +53,6 @@ class Injector:
     def begin(self, air: Air) -> None:
         """Before the first interval."""
 
-    def end(self) -> None:
-        """After the last one."""
-
     def each(self, air: Air) -> None:
         """Before every interval of the vehicle."""
 
@@ -71,14 +65,6 @@ class Injector:
     def clock_us(self, air: Air, now_us: int) -> int:
         """What the companion's clock shows."""
         return now_us
-
-    def console(self) -> Console:
-        """Where the timeline is printed."""
-        return Console(io.StringIO())
-
-    def writer(self) -> Background | None:
-        """Who writes the log; None: it is written at once."""
-        return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,15 +82,6 @@ class Workers:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """Of one case: its result, or why there is none."""
-
-    number: int
-    result: Any
-    failure: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Results:
     """Results by case number in ascending order, and the failures."""
 
@@ -110,11 +101,10 @@ def run_campaign(campaign: Campaign, workers: Workers, folder: Path = RECORDS_FO
     """
     path = campaign.record_path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    _cut_torn_line(path)
     head, known = read_record(path) if path.exists() else (None, {})
     if head not in (None, campaign.head):
         raise CampaignError(f"{path} holds another campaign's results; move it away.")
-    missing = [(n, case) for n, case in enumerate(campaign.cases) if n not in known or known[n].failure is not None]
+    missing = [(n, case) for n, case in enumerate(campaign.cases) if "result" not in known.get(n, {})]
     if known and missing:
         _say(f"{campaign.name}: going on after {len(campaign.cases) - len(missing)} of {len(campaign.cases)} cases")
     with path.open("a", encoding="utf-8") as file:
@@ -123,33 +113,27 @@ def run_campaign(campaign: Campaign, workers: Workers, folder: Path = RECORDS_FO
         try:
             found = outcomes(campaign.work_out, missing, workers)
             for outcome in with_progress(found, len(missing), campaign.name) if missing else ():
-                word, value = ("result", outcome.result) if outcome.failure is None else ("failure", outcome.failure)
-                # Read back as it will be by a run that goes on: numbers then are the same bits either way.
-                entry = _write(file, {"case": outcome.number, word: value})
-                known[outcome.number] = Outcome(outcome.number, entry.get("result"), entry.get("failure"))
+                known[outcome["case"]] = _write(file, outcome)
         except KeyboardInterrupt:
             _say(f"\n{campaign.name}: broken off after {len(known)} cases; the same command goes on from there")
             raise
     # Without what a longer campaign of the same cases has beyond them.
-    ordered = [known[number] for number in sorted(known) if number < len(campaign.cases)]
-    return Results(
-        {one.number: one.result for one in ordered if one.failure is None},
-        {one.number: one.failure for one in ordered if one.failure is not None},
-    )
+    ordered = {number: known[number] for number in sorted(known) if number < len(campaign.cases)}
+    return Results(*({n: one[word] for n, one in ordered.items() if word in one} for word in ("result", "failure")))
 
 
 def worked_out(function: Callable[[Any], Any], cases: Sequence[Any], workers: Workers) -> list[Any]:
     """The results of cases whose results are no JSON, in the order of cases. Raises CampaignError where one failed."""
     found = outcomes(function, list(enumerate(cases)), workers)
-    ordered = sorted(with_progress(found, len(cases), "flights"), key=lambda one: one.number)
+    ordered = sorted(with_progress(found, len(cases), "flights"), key=lambda one: one["case"])
     for outcome in ordered:
-        if outcome.failure is not None:
-            raise CampaignError(f"case {outcome.number} failed: {outcome.failure}; {cases[outcome.number]}")
-    return [outcome.result for outcome in ordered]
+        if "failure" in outcome:
+            raise CampaignError(f"case {outcome['case']} failed: {outcome['failure']}; {cases[outcome['case']]}")
+    return [outcome["result"] for outcome in ordered]
 
 
-def outcomes(function: Callable[[Any], Any], cases: Sequence[tuple[int, Any]], workers: Workers) -> Iterator[Outcome]:
-    """As they come. Here, where one process is all that is asked for."""
+def outcomes(function: Callable[[Any], Any], cases: Sequence[tuple[int, Any]], workers: Workers) -> Iterator[Json]:
+    """Of each case its number and its result or failure, as they come. Here, where one process is enough."""
     if workers.scheduler is None and workers.jobs == 1:
         for case in cases:
             yield from work_out(function, [case])
@@ -170,11 +154,11 @@ def outcomes(function: Callable[[Any], Any], cases: Sequence[tuple[int, Any]], w
                 yield from future.result()
             else:
                 # Not the cases' own exceptions, which are outcomes: a worker that died, time and again.
-                yield from (Outcome(number, None, f"worker lost: {future.exception()!r}") for number, _ in task)
+                yield from ({"case": number, "failure": f"worker lost: {future.exception()!r}"} for number, _ in task)
             future.release()
 
 
-def work_out(function: Callable[[Any], Any], numbered: Sequence[tuple[int, Any]]) -> list[Outcome]:
+def work_out(function: Callable[[Any], Any], numbered: Sequence[tuple[int, Any]]) -> list[Json]:
     """The outcomes of some cases. An exception is that case's outcome and does not stop the next."""
     # A case makes millions of small objects and hardly a cycle: looking for cycles all the time is a third of its cost.
     gc.disable()
@@ -184,27 +168,32 @@ def work_out(function: Callable[[Any], Any], numbered: Sequence[tuple[int, Any]]
         gc.enable()
 
 
-def _outcome(function: Callable[[Any], Any], number: int, case: Any) -> Outcome:
+def _outcome(function: Callable[[Any], Any], number: int, case: Any) -> Json:
     try:
-        return Outcome(number, function(case))
+        return {"case": number, "result": function(case)}
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
-        return Outcome(number, None, f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})")
+        at = f"{Path(where.filename).name}:{where.lineno}"
+        return {"case": number, "failure": f"{type(error).__name__}: {error} ({at})"}
 
 
-def read_record(path: Path) -> tuple[Json | None, dict[int, Outcome]]:
-    """The head of a file of results, None in an empty one, and the outcomes by case number; without half a line at its
-    end, of a campaign that goes on or was killed. Raises CampaignError, OSError.
+def read_record(path: Path) -> tuple[Json | None, dict[int, Json]]:
+    """The head of a file of results, None in an empty one, and the outcomes by case number.
+
+    Half a line at its end, of a run that was killed while it wrote, is cut off. Raises CampaignError, OSError.
     """
     content = path.read_bytes()
+    whole = content[: content.rfind(b"\n") + 1]
+    if len(whole) < len(content):
+        path.write_bytes(whole)
     head, found = None, {}
-    for number, line in enumerate(content[: content.rfind(b"\n") + 1].splitlines(), start=1):
+    for number, line in enumerate(whole.splitlines(), start=1):
         try:
             entry = dict(json.loads(line))
             if number == 1:
                 head = entry
             else:
-                found[entry["case"]] = Outcome(entry["case"], entry.get("result"), entry.get("failure"))
+                found[entry["case"]] = entry
         except (ValueError, KeyError, TypeError) as error:
             raise CampaignError(f"{path} is damaged in line {number}; move it away.") from error
     return head, found
@@ -266,18 +255,12 @@ def _check_versions(client: Client, module: str) -> None:
 
 
 def _write(file: Any, entry: Json) -> Json:
+    """Read back as it will be by a run that goes on: numbers then are the same bits either way."""
     line = json.dumps(entry, separators=(",", ":"))
     file.write(line + "\n")
     file.flush()
     read_back: Json = json.loads(line)
     return read_back
-
-
-def _cut_torn_line(path: Path) -> None:
-    """A run that was killed while it wrote leaves half a line at the end."""
-    content = path.read_bytes() if path.exists() else b""
-    if content and not content.endswith(b"\n"):
-        path.write_bytes(content[: content.rfind(b"\n") + 1])
 
 
 def _say(text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import random
@@ -19,8 +20,8 @@ from bench.fly.moments import Copies
 from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.shell.tlog import may_be_logged
-from rebound_cli.background import Background
 from rebound_cli.inputs import resolved, with_guards
+from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
 from rebound_cli.results import run_folder
@@ -42,8 +43,8 @@ TO_THE_GROUND = 1
 class Noting(FlightRecorder):
     """Keeps the vehicle's time of every event: the companion's own clock may be what is wrong."""
 
-    def __init__(self, folder: Path, writer: Background | None, air: Air) -> None:
-        super().__init__(folder, writer)
+    def __init__(self, folder: Path, air: Air) -> None:
+        super().__init__(folder)
         self.folder, self._air = folder, air
         self.told_s: list[float] = []
         self.counted = 0
@@ -53,7 +54,7 @@ class Noting(FlightRecorder):
         self.counted += sum(map(may_be_logged, result.received_frames)) + len(result.sent_frames)
         super().record(now_us, result)
 
-    def move_to(self, folder: Path, writer: Background | None) -> None:
+    def move_to(self, folder: Path) -> None:
         """Go on in a copy of the folder, as only a process that was forked may."""
         shutil.copytree(self.folder, folder, dirs_exist_ok=True)
         for file, name in (
@@ -65,8 +66,6 @@ class Noting(FlightRecorder):
             os.dup2(descriptor, file.fileno())
             os.close(descriptor)
         self.folder = self._folder = folder
-        if writer is not None:
-            self.writer, self._do = writer, writer.give
 
 
 def mission_of(number: int) -> Mission:
@@ -112,10 +111,10 @@ class FaultedFlight:
         run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(self.mission, None))
         run_folder.write_json(folder / run_folder.VERSIONS_NAME, {})
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, {})
-        self.recorder = Noting(folder, self.injector.writer(), self.air)
+        self.recorder = Noting(folder, self.air)
 
     def fly(self) -> None:
-        air, console = self.air, self.injector.console()
+        air, console = self.air, Console(io.StringIO())
         try:
             loop = Loop(self.companion, air, _clock(air), self.recorder, console, self.interrupts)
             fly_realtime(self.companion, loop, ConfirmAtOnce())
@@ -123,7 +122,6 @@ class FaultedFlight:
             self.fault_text = str(error)
         except (Killed, Hung, Landing) as end:
             self.ended = {Killed: KILLED, Hung: "hung", Landing: COMPLETED}[type(end)]
-        self.injector.end()
         self.killed_at_s = air.now_s
         air.alone({KILLED: KILLED_FOR_S, COMPLETED: 0.0}.get(self.ended, LEFT_ALONE_S))
         if self.ended == KILLED:
@@ -167,7 +165,7 @@ class FaultedFlight:
         self.fault = fault
         self.injector = self.air.injector = fault.inject(self._chance())
         self.air.chance = self._chance()
-        self.recorder.move_to(Path(tempfile.mkdtemp()), self.injector.writer())
+        self.recorder.move_to(Path(tempfile.mkdtemp()))
         self._begin()
 
     def _begin(self) -> None:

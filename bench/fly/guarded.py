@@ -188,8 +188,8 @@ def approach_of(number: int) -> str:
 class Approach:
     """A vehicle on its way through free air; what it meets is put before it."""
 
-    def __init__(self, case: FlownHit, built: BenchVehicle | None = None) -> None:
-        self.case, self.built = case, built or vehicle_of_hit(case.hit)
+    def __init__(self, case: FlownHit) -> None:
+        self.case, self.built = case, vehicle_of_hit(case.hit)
         self.flight = begun(self.built, case, velocity_of(case.hit), Scene(), keeps_path=False)
 
     @property

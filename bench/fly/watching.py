@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 from bench.detectors.config import BaselineConfig
@@ -17,27 +16,11 @@ from companion.reflex.monitor import advance, start_monitor
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
 
-DEFAULTS: Mapping[str, Any] = MappingProxyType({})
 FLOWN_WITH = (BaselineConfig().detector,)
 """The detector of a drone."""
 
 # A hit that is reported no later than this after its first touch has been found.
 FOUND_WITHIN_US = 400_000
-
-# What a detector's sensitivity hangs on is taken times these.
-SWEPT_FACTORS = (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)
-# Its settings; of detectors that are not here it is the first of their settings.
-SWEPT_FIELDS = {
-    "hybrid": ("threshold_m_s2", "torque_threshold_rad_s2"),
-    "lateral": ("threshold_m_s2", "noise_factor"),
-    "fused": (
-        "side_threshold_m_s2",
-        "vertical_threshold_m_s2",
-        "noise_factor",
-        "velocity_step_m_s",
-        "rate_step_rad_s",
-    ),
-}
 
 
 @dataclass(slots=True)
@@ -49,21 +32,9 @@ class Found:
     final: ImpactEstimate
 
 
-def configuration(detector: str, settings: Mapping[str, Any] = DEFAULTS, factor: float = 1.0) -> BaselineConfig:
-    """The vehicle's settings with the detector's name, and its thresholds times `factor`."""
-    if factor == 1.0:
-        return BaselineConfig.model_validate({**settings, "detector": detector})
-    config = configuration(detector, settings)
-    own = getattr(config, detector)
-    changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
-    swept = type(own).model_validate({**own.model_dump(), **changes})
-    return config.model_copy(update={detector: swept})
-
-
-def swept_fields(detector: str) -> tuple[str, ...]:
-    """Names of the settings that are swept together."""
-    fields: dict[str, object] = type(getattr(BaselineConfig(), detector)).model_fields
-    return SWEPT_FIELDS.get(detector, (next(iter(fields)),))
+def configuration(detector: str, settings: Mapping[str, Any]) -> BaselineConfig:
+    """The vehicle's settings with the detector's name."""
+    return BaselineConfig.model_validate({**settings, "detector": detector})
 
 
 def detector_names() -> tuple[str, ...]:

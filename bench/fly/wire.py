@@ -6,9 +6,9 @@ against the whole wire, bytes included.
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -141,10 +141,9 @@ class Wire:
         return self._builders[message]
 
 
-def _as_floats(rows: Sequence[Sequence[float]]) -> list[list[float]]:
-    """Numbers as a MAVLink float carries them."""
-    narrow: list[list[float]] = np.array(rows, np.float32).astype(np.float64).tolist()
-    return narrow
+def _as_floats(rows: Iterable[Sequence[float]]) -> list[Any]:
+    """Tuples of numbers as a MAVLink float carries them."""
+    return [tuple(row) for row in np.array(list(rows), np.float32).astype(np.float64).tolist()]
 
 
 def _milliseconds(sample: PlantOutput) -> int:
@@ -154,52 +153,35 @@ def _milliseconds(sample: PlantOutput) -> int:
 
 def _imu(recording: VehicleRecording) -> Builder:
     samples = recording.samples
-    rows = _as_floats([(*s.specific_force_frd_m_s2, *s.angular_velocity_frd_rad_s) for s in samples])
-
-    def build(index: int) -> Sample:
-        a, b, c, p, q, r = rows[index]
-        return ImuSample(samples[index].time_boot_us, (a, b, c), (p, q, r))
-
-    return build
+    rows = _as_floats((*s.specific_force_frd_m_s2, *s.angular_velocity_frd_rad_s) for s in samples)
+    return lambda index: ImuSample(samples[index].time_boot_us, rows[index][:3], rows[index][3:])
 
 
 def _local_position(recording: VehicleRecording) -> Builder:
     published = recording.published
-    rows = _as_floats([(*s.position_ned_m, *s.velocity_ned_m_s) for s in published])
-
-    def build(index: int) -> Sample:
-        x, y, z, u, v, w = rows[index]
-        return LocalPosition(_milliseconds(published[index]), (x, y, z), (u, v, w))
-
-    return build
+    rows = _as_floats((*s.position_ned_m, *s.velocity_ned_m_s) for s in published)
+    return lambda index: LocalPosition(_milliseconds(published[index]), rows[index][:3], rows[index][3:])
 
 
 def _odometry(recording: VehicleRecording) -> Builder:
     published = recording.published
-    rows = _as_floats([(*s.position_ned_m, *s.velocity_ned_m_s) for s in published])
+    rows = _as_floats((*s.position_ned_m, *s.velocity_ned_m_s) for s in published)
 
     def build(index: int) -> Sample:
-        x, y, z, u, v, w = rows[index]
         estimate = published[index]
-        return Odometry(estimate.time_boot_us, (x, y, z), (u, v, w), estimate.reset_counter & 0xFF)
+        return Odometry(estimate.time_boot_us, rows[index][:3], rows[index][3:], estimate.reset_counter & 0xFF)
 
     return build
 
 
 def _attitude(recording: VehicleRecording) -> Builder:
     samples = recording.samples
-    rows = _as_floats([(*s.attitude_wxyz, *s.angular_velocity_frd_rad_s) for s in samples])
-
-    def build(index: int) -> Sample:
-        w, x, y, z, p, q, r = rows[index]
-        return Attitude(_milliseconds(samples[index]), (w, x, y, z), (p, q, r))
-
-    return build
+    rows = _as_floats((*s.attitude_wxyz, *s.angular_velocity_frd_rad_s) for s in samples)
+    return lambda index: Attitude(_milliseconds(samples[index]), rows[index][:4], rows[index][4:])
 
 
 def _attitude_target(recording: VehicleRecording) -> Builder:
-    samples = recording.samples
-    rows = _as_floats([(s.thrust_fraction,) for s in samples])
+    samples, rows = recording.samples, _as_floats((s.thrust_fraction,) for s in recording.samples)
 
     def build(index: int) -> Sample:
         asked = quaternion_from_matrix(recording.asked_attitudes[index])
@@ -210,11 +192,11 @@ def _attitude_target(recording: VehicleRecording) -> Builder:
 
 
 def _vibration(recording: VehicleRecording) -> Builder:
-    samples, metrics, levels = recording.samples, vibration.VibrationMetrics(), []
+    samples, metrics, levels = recording.samples, vibration.VibrationMetrics(), [(0.0, 0.0)]
     for sample in samples[1:]:
         metrics.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         levels.append((metrics.gyroscope_rad_s, metrics.accelerometer_m_s2))
-    rows = _as_floats([(0.0, 0.0), *levels])
+    rows = _as_floats(levels)
 
     def build(index: int) -> Sample:
         clipped = sum(samples[index].clipping_counts)
@@ -224,12 +206,7 @@ def _vibration(recording: VehicleRecording) -> Builder:
 
 
 def _extended_state(recording: VehicleRecording) -> Builder:
-    situations = recording.situations
-
-    def build(index: int) -> Sample:
-        return ExtendedState(LandedState(situations[index].landed_state))
-
-    return build
+    return lambda index: ExtendedState(LandedState(recording.situations[index].landed_state))
 
 
 def over_link(sent: Sequence[HeardStep], recording: VehicleRecording, fault: WireFault, seed: int) -> list[HeardStep]:

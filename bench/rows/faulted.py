@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.faults.catalogue import FILES, FLOWN
-from bench.faults.files import tried
+from bench.faults.catalogue import FLOWN
 from bench.faults.injectors import Rewritten
 from bench.fly.air import FAILED, HANDED_OVER, KILLED, Fault, Injector
 from bench.fly.campaign import Json
@@ -37,16 +36,14 @@ CLIPPED_PART = 0.001
 def work_out_seed(case: tuple[int, Sequence[str]]) -> Json:
     """Each of these faults with one seed: those that act in flight from one take-off, the others each from its own."""
     number, names = case
-    branching = [FLOWN[name] for name in names if name in FLOWN and not FLOWN[name].from_the_start]
+    branching = [FLOWN[name] for name in names if not FLOWN[name].from_the_start]
     found: dict[str, Json] = {}
     if branching:
         with tempfile.TemporaryDirectory() as folder:
             quiet = Fault("none", "", lambda _: Injector())
             found = FaultedFlight(number, quiet, Path(folder)).fly_branched(branching, judged)
     for name in names:
-        if name in FILES:
-            found[name] = tried(FILES[name], number)
-        elif FLOWN[name].from_the_start:
+        if FLOWN[name].from_the_start:
             found[name] = work_out_fault(number, FLOWN[name])
     return {name: _told(found[name]) for name in names}
 
@@ -134,10 +131,6 @@ def _authority(flight: FaultedFlight) -> list[str]:
 
 def _log(flight: FaultedFlight) -> list[str]:
     """Whether the log can be read, is whole, and is decided again to the bit."""
-    if flight.recorder.writer is not None and flight.recorder.writer.loss is not None:
-        # A disk that takes nothing has no log; that it is told is the row's own affair.
-        is_told = any(event.kind == "lost" for event in flight.recorder.events)
-        return [] if is_told else ["nobody was told of the log's gaps"]
     events = (flight.recorder.folder / run_folder.EVENTS_NAME).read_text(encoding="utf-8").splitlines()
     if len(events) != len(flight.recorder.events):
         return [f"log lost: {len(flight.recorder.events) - len(events)} events"]

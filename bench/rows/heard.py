@@ -1,55 +1,23 @@
-"""What each detector reported of a hit, a hand, a healthy flight or a recorded one, beside the truth."""
+"""What each detector reported of a hit, a hand or a healthy flight, beside the truth."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
-
-import numpy as np
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from bench.cases.hits import HandCase, HitCase, vehicle_of_hit
 from bench.cases.mishaps import FlightCase
 from bench.cases.vehicles import BenchVehicle, vehicle_of
-from bench.detectors.config import BaselineConfig
-from bench.fly.cruise import FlownHealthy, fly_healthy, hit_of, hover_in_hand
-from bench.fly.recorded import (
-    DROP_STEP_S,
-    DROPS_FILE,
-    ELEVATION_MAX_DEG,
-    LOGS_FOLDER,
-    LONGEST_INTERVAL_US,
-    RECORDED_RATES,
-    SLICE_BEFORE_S,
-    HealthyCase,
-    InjectedCase,
-    drops,
-    moments_of,
-    read,
-    scaled,
-    turned,
-    with_impact,
-)
-from bench.fly.watching import (
-    ASKED_HZ,
-    FOUND_WITHIN_US,
-    SWEPT_FACTORS,
-    Found,
-    configuration,
-    streams_asked_hz,
-    watch_all,
-)
+from bench.fly.campaign import Json
+from bench.fly.cruise import fly_healthy, hit_of, hover_in_hand
+from bench.fly.watching import ASKED_HZ, FOUND_WITHIN_US, Found, configuration, streams_asked_hz, watch_all
 from bench.fly.wire import LINKS, HeardStep, VehicleRecording, Wire, over_link
 from companion.messages import ImuSample, Vector3
 from companion.reflex.impact import ImpactEstimate
-from rebound_cli.replay.watching import watch_log
 from sim_vehicle.truth import Hit
 
 # A force counts as above the noise floor from this many standard deviations of an IMU sample on: of ten hours at
 # 250 Hz on three axes, 2.7e7 numbers, noise alone takes one above six with a probability of 0.05.
 NOISE_FLOOR_SIGMAS = 6.0
-SWEPT_RATES = (50, 246)
-SWEPT_RATE = 246
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,59 +56,85 @@ def first_possible(
     return Possible(first, times)
 
 
-def score_hit(
-    recording: VehicleRecording,
-    hit: Hit,
-    vehicle: BenchVehicle,
-    seed: int,
-    detectors: Sequence[str],
-    sweeps: bool,
-    link: str | None = None,
-) -> dict[str, Any]:
-    """What the tables need of one hit, for every rate and detector."""
+def work_out_hit(case: HitCase) -> Json:
+    """Fly it once, then let every detector hear it at every rate."""
+    vehicle = vehicle_of_hit(case)
+    recording, hit = hit_of(case, vehicle.airframe)
     touch_us = hit.contact_at_boot_us
     floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
-    result: dict[str, Any] = {
+    result: Json = {
         "speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
         "off_head_on_deg": angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
         "clipped": _clipped(recording, hit),
         "contact_s": hit.contact_duration_s,
         "rates": {},
     }
-    wire = Wire(recording)
-    for rate in ASKED_HZ:
-        arrived = wire.heard(streams_asked_hz(rate), seed + rate)
-        if link is not None:
-            arrived = over_link(arrived, recording, LINKS[link], seed + rate)
+    for rate, arrived in _heard(recording, case.seed, case.link):
         possible = first_possible(recording, arrived, touch_us, floor_m_s2)
-        entries, swept = {}, {}
-        for name in detectors:
-            found, touches, blind = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
+        entries = {}
+        for name, (found, touches, blind) in _watched(case.detectors, vehicle, recording, arrived):
             told_us = [touch.impact.sample_time_boot_us for touch in touches]
             entries[name] = _entry(found, hit, possible, blind) | {"touches": sum(t >= touch_us for t in told_us)}
-            if sweeps and rate in SWEPT_RATES:
-                configs = [configuration(name, vehicle.settings, factor) for factor in SWEPT_FACTORS]
-                swept[name] = [_is_found(config, arrived, recording, touch_us) for config in configs]
         possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
-        result["rates"][str(rate)] = {"possible_ms": possible_ms, "detectors": entries, "swept": swept}
+        result["rates"][rate] = {"possible_ms": possible_ms, "detectors": entries}
     return result
 
 
-def _is_found(
-    config: BaselineConfig, arrived: Sequence[HeardStep], recording: VehicleRecording, touch_us: float
-) -> bool:
-    found, _, _ = watch_all(config, arrived, recording.situations)
-    return _first_of(found, touch_us) is not None
+def work_out_hand(case: HandCase) -> Json:
+    """Hold it once, then let every detector hear it at every rate."""
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    recording, began_us = hover_in_hand(case, vehicle.airframe)
+    rates = {}
+    for rate, arrived in _heard(recording, case.seed):
+        entries = {}
+        for name, (found, touches, _) in _watched(case.detectors, vehicle, recording, arrived):
+            told_us = [t.impact.sample_time_boot_us for t in touches if t.impact.sample_time_boot_us >= began_us]
+            kinds, late_ms = [f.final.impact.kind.value for f in found], [1e-3 * (t - began_us) for t in told_us]
+            entries[name] = {"collisions": kinds, "told_after_ms": late_ms[0] if late_ms else None}
+        rates[rate] = {"detectors": entries}
+    return {"rates": rates}
+
+
+def work_out_flight(case: FlightCase) -> Json:
+    """Fly it, let every detector hear it at every rate, list what they report."""
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    flown = fly_healthy(case, vehicle.airframe)
+    samples, rates = flown.recording.samples, {}
+    for rate, arrived in _heard(flown.recording, case.seed):
+        phase_at, entries = {step.time_boot_us: flown.phases[step.index] for step in arrived}, {}
+        for name, (found, touches, blind) in _watched(case.detectors, vehicle, flown.recording, arrived):
+            alarms = [
+                [round(1e-6 * f.time_boot_us, 3), phase_at[f.time_boot_us], f.first.impact.kind.value] for f in found
+            ]
+            entries[name] = {"alarms": alarms, "touches": len(touches), "blind": blind}
+        rates[rate] = {"detectors": entries}
+    seconds = 1e-6 * (samples[-1].time_boot_us - samples[0].time_boot_us)
+    return {"seconds": seconds, "clipped": sum(samples[-1].clipping_counts), "rates": rates}
+
+
+def _heard(recording: VehicleRecording, seed: int, link: str | None = None) -> Iterator[tuple[str, list[HeardStep]]]:
+    """By rate, as a record names it: what comes over the link."""
+    wire = Wire(recording)
+    for rate in ASKED_HZ:
+        sent = wire.heard(streams_asked_hz(rate), seed + rate)
+        yield str(rate), sent if link is None else over_link(sent, recording, LINKS[link], seed + rate)
+
+
+def _watched(
+    detectors: Sequence[str], vehicle: BenchVehicle, recording: VehicleRecording, arrived: Sequence[HeardStep]
+) -> Iterator[tuple[str, tuple[list[Found], list[ImpactEstimate], int]]]:
+    for name in detectors:
+        yield name, watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
 
 
 def _first_of(found: Sequence[Found], touch_us: float) -> Found | None:
     return next((f for f in found if touch_us <= f.time_boot_us <= touch_us + FOUND_WITHIN_US), None)
 
 
-def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> dict[str, Any]:
+def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> Json:
     """One detector's report on one hit."""
     touch_us = hit.contact_at_boot_us
-    entry: dict[str, Any] = {"false": sum(f.time_boot_us < touch_us for f in found), "blind": blind}
+    entry: Json = {"false": sum(f.time_boot_us < touch_us for f in found), "blind": blind}
     first = _first_of(found, touch_us)
     if first is None:
         return entry
@@ -189,118 +183,3 @@ def angle_deg(one: Vector3, other: Vector3) -> float:
         return 180.0
     cosine = sum(a * b for a, b in zip(one, other, strict=True)) / lengths
     return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
-
-
-def work_out_flight(case: FlightCase) -> dict[str, Any]:
-    """Fly it, let every detector hear it at every rate, list what they report."""
-    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
-    flown = fly_healthy(case, vehicle.airframe)
-    samples = flown.recording.samples
-    result: dict[str, Any] = {
-        "seconds": 1e-6 * (samples[-1].time_boot_us - samples[0].time_boot_us),
-        "clipped": sum(samples[-1].clipping_counts),
-        "rates": {},
-    }
-    wire = Wire(flown.recording)
-    for rate in ASKED_HZ:
-        result["rates"][str(rate)] = _reports(case, vehicle, flown, wire, rate)
-    return result
-
-
-def _reports(case: FlightCase, vehicle: BenchVehicle, flown: FlownHealthy, wire: Wire, rate: int) -> dict[str, Any]:
-    arrived = wire.heard(streams_asked_hz(rate), case.seed + rate)
-    situations = flown.recording.situations
-    index_at = {step.time_boot_us: step.index for step in arrived}
-    detectors: dict[str, Any] = {}
-    for name in case.detectors:
-        found, touches, blind = watch_all(configuration(name, vehicle.settings), arrived, situations)
-        entry: dict[str, Any] = {
-            "alarms": [
-                _told(f.time_boot_us, flown.phases[index_at[f.time_boot_us]], f.first.impact.kind) for f in found
-            ],
-            "touches": len(touches),
-            "blind": blind,
-        }
-        if case.sweeps and rate == SWEPT_RATE:
-            configs = [configuration(name, vehicle.settings, factor) for factor in SWEPT_FACTORS]
-            entry["swept"] = [len(watch_all(config, arrived, situations)[0]) for config in configs]
-        detectors[name] = entry
-    return detectors
-
-
-def _told(time_boot_us: int, phase: str, kind: Any) -> Sequence[Any]:
-    return [round(1e-6 * time_boot_us, 3), phase, kind.value]
-
-
-def work_out_hit(case: HitCase) -> dict[str, Any]:
-    """Fly it once, then let every detector hear it at every rate."""
-    vehicle = vehicle_of_hit(case)
-    recording, hit = hit_of(case, vehicle.airframe)
-    return score_hit(recording, hit, vehicle, case.seed, case.detectors, case.sweeps, case.link)
-
-
-def work_out_hand(case: HandCase) -> dict[str, Any]:
-    """Hold it once, then let every detector hear it at every rate."""
-    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
-    recording, began_us = hover_in_hand(case, vehicle.airframe)
-    wire = Wire(recording)
-    result: dict[str, Any] = {"rates": {}}
-    for rate in ASKED_HZ:
-        arrived = wire.heard(streams_asked_hz(rate), case.seed + rate)
-        entries: dict[str, Any] = {}
-        for name in case.detectors:
-            found, touches, _ = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
-            told_us = [t.impact.sample_time_boot_us for t in touches if t.impact.sample_time_boot_us >= began_us]
-            entries[name] = {
-                "collisions": [f.final.impact.kind.value for f in found],
-                "told_after_ms": 1e-3 * (told_us[0] - began_us) if told_us else None,
-            }
-        result["rates"][str(rate)] = {"detectors": entries}
-    return result
-
-
-def work_out_healthy(case: HealthyCase) -> dict[str, Any]:
-    """Collisions and touches that each detector reports, in seconds after the log's start."""
-    log = read(Path(case.folder) / LOGS_FOLDER / case.log)
-    if case.scale != 1.0:
-        log = replace(log, heard=tuple(scaled(log, case.scale)))
-    result: dict[str, Any] = {"seconds": log.duration_s, "rates": {}}
-    for rate, asked_hz in RECORDED_RATES.items():
-        detectors = {}
-        for name in case.detectors:
-            findings = watch_log(log, configuration(name), asked_hz)
-            detectors[name] = {
-                "collisions": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.collisions],
-                "touches": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.contacts],
-                "blind_s": sum(span.duration_s for span in findings.blind),
-            }
-        result["rates"][rate] = detectors
-    return result
-
-
-def work_out_injected(case: InjectedCase) -> dict[str, Any]:
-    """Whether and when each detector reports it, at each rate; what it reported before."""
-    rng = np.random.default_rng([case.seed, 3])
-    folder = Path(case.folder)
-    log = read(folder / LOGS_FOLDER / case.log)
-    force, elevation = drops(folder / DROPS_FILE)[case.drop], math.radians(ELEVATION_MAX_DEG)
-    side, up = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(-elevation, elevation))
-    towards = (math.cos(up) * math.cos(side), math.cos(up) * math.sin(side), math.sin(up))
-    force = turned(force, towards, float(rng.uniform(-math.pi, math.pi)))
-    moments = moments_of(folder / LOGS_FOLDER / case.log)
-    hit_us = moments[int(rng.integers(len(moments)))] + int(rng.integers(LONGEST_INTERVAL_US))
-    # When the link sends its first sample has nothing to do with when the hit comes.
-    begun_us = hit_us - round(1e6 * SLICE_BEFORE_S) - int(rng.integers(LONGEST_INTERVAL_US))
-    struck = with_impact(log, force, begun_us, hit_us)
-    result: dict[str, Any] = {"rates": {}, "impulse_m_s": float(np.linalg.norm(force.sum(axis=0)) * DROP_STEP_S)}
-    for rate, asked_hz in RECORDED_RATES.items():
-        detectors: dict[str, Any] = {}
-        for name in case.detectors:
-            collisions = watch_log(struck, configuration(name), asked_hz).collisions
-            times = [f.at_us for f in collisions]
-            late = [time - hit_us for time in times if 0 <= time - hit_us <= FOUND_WITHIN_US]
-            detectors[name] = {"false": sum(time < hit_us for time in times)}
-            if late:
-                detectors[name]["latency_ms"] = 1e-3 * late[0]
-        result["rates"][rate] = detectors
-    return result

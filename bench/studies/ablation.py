@@ -1,7 +1,4 @@
-"""`bench ablation`: what each special rule of the companion is worth, in flights of drawn vehicles and to the detector.
-
-Hits, hands and flights are of drawn vehicles; with `--data` there are recorded flights and recorded impacts, too.
-"""
+"""`bench ablation`: what each special rule of the companion is worth, in drawn flights and to the detector."""
 
 import math
 import statistics
@@ -20,15 +17,13 @@ from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
 from bench.fly.lockstep import JudgedFlight, fly_in
-from bench.fly.recorded import HealthyCase, InjectedCase
 from bench.fly.watching import FLOWN_WITH
 from bench.fly.wire import JITTERY
 from bench.rows.contacts import JudgedContact, Role, contacts_of
-from bench.rows.heard import work_out_flight, work_out_hand, work_out_healthy, work_out_hit, work_out_injected
+from bench.rows.heard import work_out_flight, work_out_hand, work_out_hit
 from bench.rows.judge import failures
 from bench.rows.recovered import recoveries
 from bench.rows.tables import Page, table
-from bench.studies.detectors import healthy_campaign, injected_campaign
 from bench.studies.rules import RULES, Rule, switched
 from sim_vehicle.truth import Hit
 
@@ -46,8 +41,6 @@ KINDS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 # One hand and one flight to so many hits.
 HANDS_EVERY, FLIGHTS_EVERY = 10, 10
-# Recorded impacts are put into so many flights each.
-ROUNDS = 1
 # What a recovery must show: past its setpoint, height lost, time to rest.
 PAST_M, LOST_M, REST_S = 0.05, 0.10, 3.5
 # What is compared of each hit, in which unit, to how many digits.
@@ -69,7 +62,7 @@ def run_ablation(options: Namespace) -> int:
     rules, failed = [rule for rule in RULES if rule.name in names], results.text(campaign)
     parts = {"Flights": flights_table(rules, list(results.results.values()))}
     if options.hits is not None:
-        heard = detections_campaign(options.hits, options.first_seed, names, options.data)
+        heard = detections_campaign(options.hits, options.first_seed, names)
         detections = run_campaign(heard, workers)
         parts["The detector alone, at each rate"] = detections_table(rules, list(detections.results.values()))
         failed += detections.text(heard)
@@ -139,12 +132,11 @@ class DetectionCase:
     """Something to hear, and the rules that are looked at."""
 
     kind: str
-    case: HitCase | HandCase | FlightCase | HealthyCase | InjectedCase
+    case: HitCase | HandCase | FlightCase
     names: tuple[str, ...]
 
 
-def detections_campaign(hits: int, first_seed: int, names: tuple[str, ...], data: Path | None) -> Campaign:
-    """`data`: the folder of recorded flights and impacts."""
+def detections_campaign(hits: int, first_seed: int, names: tuple[str, ...]) -> Campaign:
     cases: list[tuple[str, Any]] = []
     for number in range(hits):
         seed, (family, settings) = first_seed + number, KINDS[number // 2 % len(KINDS)]
@@ -155,10 +147,7 @@ def detections_campaign(hits: int, first_seed: int, names: tuple[str, ...], data
             turn = number // FLIGHTS_EVERY
             family, airframe = list(FAMILIES)[turn // 2 % len(FAMILIES)], AIRFRAMES[turn % 2]
             cases.append(("flight", FlightCase(family, seed, airframe, FLOWN_WITH, is_drawn=True)))
-    if data is not None:
-        cases += [("recorded flight", case) for case in healthy_campaign(data, FLOWN_WITH).cases]
-        cases += [("recorded impact", case) for case in injected_campaign(data, ROUNDS, FLOWN_WITH).cases]
-    parameters = {"hits": hits, "first_seed": first_seed, "rules": list(names), "recorded": data is not None}
+    parameters = {"hits": hits, "first_seed": first_seed, "rules": list(names)}
     heard = [DetectionCase(kind, case, names) for kind, case in cases]
     return Campaign("ablation-detections", parameters, heard, work_out_heard)
 
@@ -178,7 +167,7 @@ def work_out_heard(heard: DetectionCase) -> Json:
 def _said(heard: DetectionCase) -> Json:
     """By rate: hits found and when, and alarms that were none."""
     rates = _WORK[type(heard.case)](heard.case)["rates"]
-    return {rate: _of_rate(found.get("detectors", found)[FLOWN_WITH[0]]) for rate, found in rates.items()}
+    return {rate: _of_rate(found["detectors"][FLOWN_WITH[0]]) for rate, found in rates.items()}
 
 
 def _of_rate(entry: Json) -> Json:
@@ -192,8 +181,6 @@ _WORK: dict[type, Callable[[Any], Json]] = {
     HitCase: work_out_hit,
     HandCase: work_out_hand,
     FlightCase: work_out_flight,
-    HealthyCase: work_out_healthy,
-    InjectedCase: work_out_injected,
 }
 
 

@@ -1,10 +1,9 @@
-"""`bench detectors`: every collision detector on simulated and recorded hits, and on hard healthy flights."""
+"""`bench detectors`: every collision detector on simulated hits and on hard healthy flights."""
 
 import math
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -13,21 +12,16 @@ from bench.cases.hits import draw_case, draw_hand
 from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Results, Workers, run_campaign
-from bench.fly.recorded import SCALES, STRIKE_LOG, HealthyCase, InjectedCase, data_files
 from bench.fly.watching import detector_names
 from bench.fly.wire import JITTERY
-from bench.rows.heard import work_out_flight, work_out_hand, work_out_healthy, work_out_hit, work_out_injected
+from bench.rows.heard import work_out_flight, work_out_hand, work_out_hit
 from bench.rows.tables import Page, bars_text, summary_text
-from bench.studies.detector_bars import all_bars
-from bench.studies.detector_tables import all_tables, figures
+from bench.studies.detector_tables import all_bars, all_tables
 
 # Tried on everything. The others are compared on at least so many hits and flights, and on one in eight at most sizes:
 # all seven take three times as long as these two.
 THOROUGH = ("fused", "threshold")
 COMPARED_HITS, COMPARED_FLIGHTS, COMPARED_EVERY_AT_MOST = 400, 16, 8
-# Of these so many are heard at other thresholds too: seven detectors at seven thresholds take fifty times as long.
-SWEPT_HITS = 200
-
 # Beside the hits of the airframes as they are, one in so many again with more vibration, and with a worse velocity.
 VARIED_SHARE = 16
 # An IMU sample's spread on each axis; four public PX4 logs of healthy flights lie between 1.2 and 4 m/s^2.
@@ -39,17 +33,7 @@ VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
 SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
 # Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
 FLIGHT_S = AIRBORNE_S + 40.0
-OF_FOUND: tuple[str, ...] = (
-    "latency_ms",
-    "samples_late",
-    "speed_error_m_s",
-    "velocity_error_m_s",
-    "normal_error_deg",
-    "kind",
-)
-OF_FOUND += ("time_error_ms", "bound", "impulse")
-# Recorded impacts: each once for a first look, more often where the hits are many.
-HITS_PER_ROUND = 2500
+OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "velocity_error_m_s", "normal_error_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +64,11 @@ def run_detectors(options: Namespace) -> int:
         hands_campaign(options.hits, drawing),
         flights_campaign(options.hours, drawing),
     ]
-    if options.data is not None:
-        rounds = max(1, round(options.hits / HITS_PER_ROUND))
-        campaigns += [healthy_campaign(options.data), injected_campaign(options.data, rounds)]
     results = {campaign.name: run_campaign(campaign, workers) for campaign in campaigns}
     frames = {campaign.name: rows(campaign, results[campaign.name]) for campaign in campaigns}
     bars, failed = all_bars(frames), "\n".join(filter(None, (results[one.name].text(one) for one in campaigns)))
     parts = {"What must be shown": bars_text(bars), **all_tables(frames)}
-    page.write("Detection", options.typed, parts, figures(frames), frames["hits"])
+    page.write("Detection", options.typed, parts, rows=frames["hits"])
     print(f"{summary_text(bars)}\n{failed}")
     return 1 if failed else 0
 
@@ -99,9 +80,8 @@ def rows(campaign: Campaign, results: Results) -> pd.DataFrame:
         case = {name: value for name, value in asdict(campaign.cases[at]).items() if name != "detectors"}
         truth = {f"true_{name}": value for name, value in result.items() if name != "rates"}
         for rate, heard in result["rates"].items():
-            swept = heard.get("swept") or {}
-            for detector, entry in heard.get("detectors", heard).items():
-                told = {"possible_ms": heard.get("possible_ms"), "swept": swept.get(detector), **entry}
+            for detector, entry in heard["detectors"].items():
+                told = {"possible_ms": heard.get("possible_ms"), **entry}
                 found.append({"case": at, **case, **truth, "rate": int(rate), "detector": detector, **told})
     frame = pd.DataFrame(found)
     # A detector that finds nothing tells nothing of it.
@@ -111,9 +91,8 @@ def rows(campaign: Campaign, results: Results) -> pd.DataFrame:
 def hits_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
     """So many hits as the vehicles are, a sixteenth more of each variation, and some over a bad link and in hover."""
     every, first = _every(hits, COMPARED_HITS), drawing.first_seed
-    swept = every * max(1, round(hits / (every * SWEPT_HITS)))
     seeds = range(first, first + hits)
-    cases = [draw_case("plain", seed, _compared(seed, every), sweeps=_is_turn(seed, swept)) for seed in seeds]
+    cases = [draw_case("plain", seed, _compared(seed, every)) for seed in seeds]
     first += hits
     for seed in range(first, first + hits // VARIED_SHARE):
         vibration = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
@@ -146,33 +125,10 @@ def flights_campaign(hours: float, drawing: Drawing = NAMED) -> Campaign:
             seed=seed,
             airframe=AIRFRAMES[seed % 2],
             detectors=_compared(seed, every),
-            sweeps=_is_turn(seed, 2 * every),
         )
         for seed in range(drawing.first_seed, drawing.first_seed + count)
     ]
     return drawing.campaign("flights", {"hours": hours}, cases, work_out_flight)
-
-
-def healthy_campaign(folder: Path, detectors: tuple[str, ...] | None = None) -> Campaign:
-    """Every recorded flight, at half, whole and double magnitude; by all detectors, or these. Raises DataError."""
-    logs, _ = data_files(folder)
-    cases = [HealthyCase(str(folder), log, scale, detectors or detector_names()) for scale in SCALES for log in logs]
-    return Campaign("recorded-flights", {"logs": logs, "by": detectors}, cases, work_out_healthy)
-
-
-def injected_campaign(folder: Path, rounds: int, detectors: tuple[str, ...] | None = None) -> Campaign:
-    """Every recorded impact so many times, each time in another flight; the first time by all detectors, or always by
-    these. Raises DataError."""
-    logs, drops = data_files(folder)
-    healthy = [log for log in logs if log != STRIKE_LOG]
-    cases = []
-    for turn in range(rounds):
-        by = detectors or (detector_names() if turn == 0 else _thorough())
-        for number, drop in enumerate(drops):
-            log, seed = healthy[(number + turn) % len(healthy)], turn * len(drops) + number
-            cases.append(InjectedCase(str(folder), log, drop, seed, by))
-    parameters = {"logs": healthy, "rounds": rounds, "by": detectors}
-    return Campaign("recorded-impacts", parameters, cases, work_out_injected)
 
 
 def _side(hits: int, at_most: int) -> int:

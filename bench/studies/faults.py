@@ -4,15 +4,12 @@ from argparse import Namespace
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-from bench.faults.catalogue import FILES, FLOWN, GROUPS
-from bench.faults.files import FileFault
-from bench.fly.air import Fault
+from bench.faults.catalogue import FLOWN, GROUPS
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
 from bench.rows.faulted import work_out_seed
 from bench.rows.tables import Page, table
 from companion.errors import ConfigurationError
 
-NAMES = (*FLOWN, *FILES)
 GROUP_OF = {fault.name: group for group, faults in GROUPS.items() for fault in faults}
 _SHOWN = 3
 _ENDS = {
@@ -32,9 +29,7 @@ def run_faults(options: Namespace) -> int:
     results = run_campaign(campaign, Workers(options.jobs))
     found = by_name(list(results.results.values()))
     failing = [name for name, every in found.items() if any(one["complaints"] for one in every)]
-    lead = (
-        f"{len(found)} faults, {sum(map(len, found.values()))} flights and files; {len(failing)} rows not as expected."
-    )
+    lead = f"{len(found)} faults, {sum(map(len, found.values()))} flights; {len(failing)} rows not as expected."
     parts = {"": f"{lead}\n\n{faults_table(found)}", "What was not as expected": complaints(found)}
     page.write("Faults and attacks", options.typed, parts)
     print(
@@ -44,29 +39,26 @@ def run_faults(options: Namespace) -> int:
 
 
 def faults_campaign(seeds: int) -> Campaign:
-    """A case is a seed with every fault, and as many of the files as are worth their time."""
-    files = [[name for name, fault in FILES.items() if number < fault.most_tries] for number in range(seeds)]
-    cases = [(number, (*FLOWN, *files[number])) for number in range(seeds)]
+    """A case is a seed with every fault."""
+    cases = [(number, tuple(FLOWN)) for number in range(seeds)]
     # Not how many: more seeds go on where fewer ended.
     return Campaign("faults", {}, cases, work_out_seed)
 
 
 def by_name(seeds: Sequence[Json]) -> dict[str, list[Json]]:
-    return {
-        name: [seed[name] for seed in seeds if name in seed] for name in NAMES if any(name in seed for seed in seeds)
-    }
+    return {name: [seed[name] for seed in seeds] for name in FLOWN}
 
 
 def faults_table(found: Mapping[str, Sequence[Json]]) -> str:
     """A row a fault: what is injected, expected and happened, the worst of it, and the verdict."""
     rows = []
     for name, results in found.items():
-        fault: Fault | FileFault = FLOWN.get(name) or FILES[name]
+        fault = FLOWN[name]
         bad = sum(bool(result["complaints"]) for result in results)
-        happened, worst = (_files if name in FILES else _flights)(results)
+        happened, worst = _flights(results)
         rows.append(
             {
-                "kind": GROUP_OF.get(name, "hostile files"),
+                "kind": GROUP_OF[name],
                 "fault": name,
                 "injected": fault.injected,
                 "expected": fault.expected.text(),
@@ -77,11 +69,6 @@ def faults_table(found: Mapping[str, Sequence[Json]]) -> str:
             }
         )
     return table(rows)
-
-
-def _files(results: Sequence[Json]) -> tuple[str, str]:
-    longest_s = max(result["seconds"] for result in results)
-    return _counted(result["outcome"] for result in results), f"{longest_s:.1f} s of processor time"
 
 
 def _flights(results: Sequence[Json]) -> tuple[str, str]:
@@ -118,8 +105,8 @@ def _counted(names: Iterable[str]) -> str:
 
 
 def _only(name: str, seeds: int) -> int:
-    if name not in NAMES:
-        raise ConfigurationError(f"--only {name}: there is no such fault; there are {', '.join(NAMES)}.")
+    if name not in FLOWN:
+        raise ConfigurationError(f"--only {name}: there is no such fault; there are {', '.join(FLOWN)}.")
     results = [work_out_seed((number, [name]))[name] for number in range(seeds)]
     for number, result in enumerate(results):
         print(f"{number}: {result}")

@@ -29,7 +29,6 @@ from bench.rows.tables import (
     table,
     text_of,
 )
-from bench.studies.worst import FIGURES, keep, worst_campaign, worst_table
 
 # Into the surface. The detectors' bars begin at 0.5 m/s.
 BANDS_M_S = [0.0, 0.5, 1.0, 2.0, 3.0, 5.0]
@@ -58,19 +57,11 @@ def verdict_campaign(hits: int, first_seed: int, is_drawn: bool) -> Campaign:
 def run_hits(options: Namespace) -> int:
     """0 when it is written, whatever it says; 1 when a hit failed to be flown, or has another verdict flown again."""
     page, is_drawn = Page(options.out, "hits"), options.vehicles == "drawn"
-    if options.part in FIGURES:
-        campaign = worst_campaign(options.part, options.hits, options.first_seed)
-    else:
-        make = verdict_campaign if options.part == "verdicts" else flown_campaign
-        campaign = make(options.hits, options.first_seed, is_drawn)
+    make = verdict_campaign if options.verdicts else flown_campaign
+    campaign = make(options.hits, options.first_seed, is_drawn)
     results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
     failed = results.text(campaign)
-    if options.part in FIGURES:
-        parts, rows = {"The worst": worst_table(campaign, results)}, None
-        for at, numbers in results.results.items() if options.corpus is not None else ():
-            case = campaign.cases[at]
-            keep(case, numbers, options.corpus / f"{case.airframe}-{case.imu_hz}")
-    elif options.part == "verdicts":
+    if options.verdicts:
         rows = verdict_rows(campaign, results)
         parts = verdict_parts(rows, list(results.results.values()))
     else:

@@ -76,7 +76,7 @@ def test_the_table_counts_what_is_lost_without_a_rule():
 @pytest.mark.slow
 def test_a_drawn_hit_is_heard_with_and_without_each_rule():
     # Given a hit, and the rule by which alone the detector hears velocities
-    heard = detections_campaign(1, 71_003, ("trust", "hand"), None).cases
+    heard = detections_campaign(1, 71_003, ("trust", "hand")).cases
     assert {one.kind for one in heard} == {"plain", "hand", "flight"}
     said = work_out_heard(heard[0])
     assert set(said["with"]) == {"50", "100", "246"}

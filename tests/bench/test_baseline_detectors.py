@@ -5,7 +5,6 @@ import math
 import pytest
 
 from bench.detectors.config import BaselineConfig
-from bench.detectors.fuzzy import flip_deg, inclination_deg, intensity
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Situation
@@ -117,28 +116,13 @@ def test_a_push_longer_than_the_fixed_thresholds_window_is_told_once_when_it_is_
     assert impact.impact.contact_free_until_boot_us < HIT_US
 
 
-@pytest.mark.parametrize(
-    ("inputs", "response"),
-    [
-        ((0.5, 0.0, 90.0, 0.0), 0.0),  # hardly anything: level
-        ((8.0, 0.0, 90.0, 2.0), 0.5),  # hard and level, turning along the wall
-        ((8.0, 20.0, 180.0, 6.0), 0.86),  # hard, leaning towards the wall and flipping into it
-        ((8.0, -20.0, 0.0, 6.0), -0.86),  # the mirror image
-        ((8.0, 20.0, 0.0, 2.0), -0.047),  # leaning towards it, flipping away from it
-    ],
-)
-def test_the_fuzzy_response_grows_towards_the_wall_and_is_none_away_from_it(inputs, response):
-    """By the centres of the outputs; acceleration in g, degrees, rad/s."""
-    assert intensity(*inputs) == pytest.approx(response, abs=0.01)
+def test_the_horizontal_threshold_looks_sideways_alone():
+    # Given a level vehicle that is pushed up by 12 m/s^2
+    def lifted(t):
+        return (0.0, 0.0, -12.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0)
 
-
-def test_the_fuzzy_inputs_are_signed_towards_the_wall():
-    north, leaning = (1.0, 0.0, 0.0), (math.cos(0.1), 0.0, math.sin(0.1), 0.0)  # nose up: thrust to the south
-    assert inclination_deg(leaning, north) == pytest.approx(math.degrees(0.2))
-    assert inclination_deg(leaning, (-1.0, 0.0, 0.0)) == pytest.approx(-math.degrees(0.2))
-    assert flip_deg((0.0, 2.0, 0.0), north) == pytest.approx(180.0)
-    assert flip_deg((0.0, -2.0, 0.0), north) == pytest.approx(0.0)
-    assert flip_deg((2.0, 0.0, 5.0), north) == pytest.approx(90.0)
+    assert fly("fuzzy", lifted) == []
+    assert fly("fuzzy", wall(9.6)) == [] and len(fly("fuzzy", wall(10.0))) == 1
 
 
 def test_the_companion_knows_each_baseline_by_name():

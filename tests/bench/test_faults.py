@@ -2,6 +2,7 @@
 
 import math
 import random
+import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,10 +11,9 @@ from typing import Any
 
 import pytest
 
-from bench.faults.catalogue import FILES, FLOWN, GROUPS
-from bench.faults.files import tried
-from bench.faults.injectors import Rewritten, Simulated, setting
-from bench.faults.pilot import Taken
+from bench.faults.catalogue import FLOWN, GROUPS
+from bench.faults.injectors import Rewritten, setting, simulated
+from bench.faults.people import Taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.faulted import FaultedFlight
 from bench.fly.packets import ARM, IMU, SET_MODE, made, outside
@@ -22,20 +22,20 @@ from bench.rows.faulted import judged, work_out_fault, work_out_seed
 from bench.studies import faults as study
 from bench.studies.faults import faults_table
 from companion.mavlink.encode import COMPONENT_ID
-from rebound_cli.background import Background
 from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import motor_failure, other
 from sim_vehicle.scene import Scene
 from tests.companion.hostile import flight_in
+from tests.rebound_cli.command import ROOT
 
 SETPOINT = {"x": 1.0, "z": -1.5, "type_mask": 0xDF8}
 
 
 def test_every_group_has_rows_and_there_are_as_many_as_promised() -> None:
-    assert len(FLOWN) + len(FILES) >= 44 and len(GROUPS) == 9 and all(GROUPS.values())
-    assert not {*FLOWN} & {*FILES}
+    promised = re.search(r"each of (\d+) faults", (ROOT / "docs/reference/faults.md").read_text())
+    assert promised is not None and len(FLOWN) == int(promised[1]) and all(GROUPS.values())
 
 
 @pytest.mark.parametrize(
@@ -134,28 +134,14 @@ class Overruling(Taken):
         return [made("SET_POSITION_TARGET_LOCAL_NED", setpoint, ours), made("COMMAND_LONG", fields, ours)]
 
 
-class _Forgetful(Background):
-    """Writes nothing and says nothing of it."""
-
-    def give(self, call: object, *arguments: object) -> None:
-        if getattr(call, "__name__", "") == "close":
-            super().give(call, *arguments)  # type: ignore[arg-type]
-
-
-class Forgetting(Injector):
-    def writer(self) -> Background:
-        return _Forgetful("log")
-
-
 @pytest.mark.slow
 def test_a_judge_names_each_kind_of_loss() -> None:
     no_wall = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
     bad = {
         "setpoint outside: outside the fence": lambda _: Sending(),
         "the pilot was overruled": lambda _: Overruling(When("mission", 0.3)),
-        "log lost: ": lambda _: Forgetting(),
-        "tumbled: ": lambda _: Simulated(motor_failure(0), When("mission", 0.3)),
-        "1 false hits counted": lambda _: Simulated(
+        "tumbled: ": lambda _: simulated(motor_failure(0), When("mission", 0.3)),
+        "1 false hits counted": lambda _: simulated(
             other("push", force_ned_n=(0.0, 12.0, 0.0), rise_s=0.01), When("mission", 0.3, 0.1)
         ),
     }
@@ -187,29 +173,24 @@ def test_a_pilot_who_takes_over_in_the_climb_is_left_alone() -> None:
     assert result["outcome"] == "aborted" and result["complaints"] == [] and result["after_told"] == 0
 
 
-@pytest.mark.parametrize("name", ["YAML bomb", "obstacle file cut", "tlog torn", "noise as mission"])
-def test_files_that_mean_harm_are_refused_in_words(name: str) -> None:
-    assert tried(FILES[name], 3)["complaints"] == []
-
-
 def test_the_table_counts_what_was_not_as_expected() -> None:
-    good = {"complaints": [], "outcome": "read", "seconds": 0.1}
-    bad = good | {"complaints": ["taken as good"], "seconds": 2.5}
-    row = faults_table({"YAML bomb": [good, bad]}).splitlines()[-1]
+    good: dict[str, Any] = {"complaints": [], "outcome": "completed", "hit": True, "found": True}
+    good |= {"tilt_deg": 20.0, "ground_m_s": 0.7, "again_m_s": 0.0}
+    bad = good | {"complaints": ["hit not found"], "found": False, "again_m_s": 0.4}
+    row = faults_table({"gust": [good, bad]}).splitlines()[-1]
     cells = [cell.strip() for cell in row.split("|")[1:-1]]
-    assert cells[4:] == ["2", "read 2", "2.5 s of processor time", "**1 of 2 not**"]
+    assert cells[4:6] == ["2", "landed 2; hits found 1 of 2"] and cells[7] == "**1 of 2 not**"
 
 
 @pytest.mark.slow
 def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, capsys) -> None:
-    # Given one row, of which one seed has been tried before
+    # Given one row, of which one seed has been flown before
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(study, "FLOWN", {})
-    monkeypatch.setattr(study, "FILES", {"obstacle file cut": FILES["obstacle file cut"]})
+    monkeypatch.setattr(study, "FLOWN", {"SIGTERM": FLOWN["SIGTERM"]})
     words = ["faults", "--jobs", "1", "--out", str(tmp_path / "faults.md")]
     assert main([*words, "--seeds", "1"]) == 0
     # When two are asked for
     assert main([*words, "--seeds", "2"]) == 0
-    # Then only the other is tried, and the table has both
+    # Then only the other is flown, and the table has both
     assert "going on after 1 of 2 cases" in capsys.readouterr().err
-    assert "refused in one sentence within 60 s" in (tmp_path / "faults.md").read_text()
+    assert "ends, vehicle handed over" in (tmp_path / "faults.md").read_text()

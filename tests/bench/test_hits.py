@@ -1,7 +1,6 @@
 """Hits alone: the same verdicts as whole flights, the same bits twice, and honest bounds."""
 
 import itertools
-import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -10,46 +9,24 @@ import numpy as np
 import pytest
 
 from bench.cases.hits import HitCase
-from bench.fly.campaign import Campaign, Results
+from bench.fly.campaign import Results
 from bench.fly.guarded import (
     FREE_S,
     HITS_AN_APPROACH,
-    LED_PATIENCE_S,
     Approach,
     FlownHit,
     Verdict,
     again,
-    begun,
     draw_flown,
-    to_rest,
-    velocity_of,
 )
 from bench.fly.moments import Moment
-from bench.main import build_parser
-from bench.rows.hits import judged as judged_by_truth
 from bench.rows.hits import work_out_flown
 from bench.rows.tables import at_most, at_most_of_groups
-from bench.studies.corpus import work_out as work_out_bytes
 from bench.studies.hits import flown_campaign, flown_parts, flown_rows, verdict_campaign, verdict_parts, verdict_rows
-from bench.studies.laws import RecoveryCase, work_out
-from bench.studies.worst import (
-    MEETING,
-    NO_HIT,
-    VEHICLE,
-    SearchCase,
-    begun_with,
-    how_good,
-    keep,
-    margin,
-    recovery,
-    search,
-    worst_table,
-)
 from companion.companion import StepResult
+from tests.bench.test_recoveries import flown as flown_whole
 
 pytestmark = pytest.mark.slow
-
-MIDDLE = {name: 0.5 * (low + high) for name, (low, high) in {**MEETING, **VEHICLE}.items()} | {"approach": 0}
 
 
 def judged(case: FlownHit) -> dict:
@@ -62,11 +39,11 @@ def judged(case: FlownHit) -> dict:
 )
 def test_a_hit_alone_is_judged_as_the_hit_of_a_whole_mission(airframe, speed_m_s):
     # Given a square hit on a wall after a take-off and a way to it
-    whole = work_out(RecoveryCase("adaptive", airframe, 0, speed_m_s, 1))
+    outcome, whole = flown_whole(airframe, speed_m_s)
     # When the same hit is flown alone
     alone = judged(FlownHit(HitCase("flown", 1, airframe, "wall", speed_m_s, ()), 250))
     # Then both were found, neither came back or fell, and both came to rest: by the truth before the estimate shows it
-    assert whole["outcome"] == "completed" and alone["found"] and not alone["false"]
+    assert outcome == "completed" and alone["found"] and not alone["false"]
     assert alone["closing_m_s"] == pytest.approx(speed_m_s, abs=0.15)
     assert alone["again"] == whole["returned"] == 0
     assert max(alone["lost_m"], whole["lost_m"]) < 0.05
@@ -215,74 +192,6 @@ def test_a_page_of_verdicts_counts_misses_by_cell_and_names_them():
     assert "8 were flown again from the beginning, 7 have the same verdict" in parts[""]
     assert "False alarms: 1, in" in parts[""]
     assert f"{case.hit.seed}/7/" in parts["Missed at 0.5 m/s and more"]
-
-
-def test_a_margin_is_smaller_where_the_vehicle_shakes_more_and_below_one_the_hit_is_missed():
-    case = SearchCase("foldable", 50, 1, 1)
-    numbers = {**MIDDLE, "speed_m_s": 1.0}
-    quiet, shaken = (margin(case, {**numbers, "vibration_log": math.log(noise)})[0] for noise in (0.2, 1.4))
-    assert 1.0 < shaken < quiet
-    least, hit = margin(case, {**numbers, "speed_m_s": 0.45})
-    assert least == NO_HIT and hit["closing_m_s"] < 0.5
-
-
-def test_the_worst_recovery_is_a_fall_then_what_touches_again_or_never_rests_then_what_rests_late():
-    # Given what became of hits, from the worst to the best
-    one = {"found": True, "closing_m_s": 3.0, "tilt_deg": 20.0, "lost_m": 0.1, "again": 0, "rest_s": 2.0}
-    changes = (
-        {"lost_m": 8.0, "closing_m_s": 1.0, "rest_s": None},
-        {"tilt_deg": 95.0, "closing_m_s": 5.2, "rest_s": 1.0},
-        {"rest_s": None},
-        {"again": 1, "rest_s": 4.0},
-        {"again": 2, "rest_s": 1.0},
-        {"rest_s": 4.5},
-        {},
-        {"closing_m_s": 0.45, "lost_m": 8.0},
-    )
-    figures = [how_good({**one, **change}) for change in changes]
-    # Then the least figure is the worst, and a hit that is missed, too slow or never came is none
-    assert figures == sorted(set(figures)) and figures[-1] == NO_HIT
-    assert how_good({**one, "found": False, "lost_m": 8.0}) == how_good({"touched": False}) == NO_HIT
-
-
-def test_a_recovery_of_the_search_is_that_of_the_same_hit_flown_from_the_beginning():
-    case, numbers = SearchCase("rigid", 50, 1, 1, "recovery"), {**MIDDLE, "approach": 3, "speed_m_s": 3.0}
-    _, hit = recovery(case, numbers)
-    # When the obstacle is there from the first
-    approach, scene = begun_with(case, numbers)
-    flight = begun(approach.built, approach.case, velocity_of(approach.case.hit), scene, keeps_path=True)
-    while flight.vehicle.time_boot_us < approach.flight.vehicle.time_boot_us:
-        flight.step()
-    rest_us = to_rest(flight, LED_PATIENCE_S)
-    assert hit["found"] and hit == judged_by_truth(flight.vehicle, flight.guard.collisions(), rest_us)
-
-
-def test_walls_that_lean_over_the_vehicle_are_no_part_of_the_search_and_others_are():
-    case, numbers = SearchCase("foldable", 250, 1, 1, "recovery"), {**MIDDLE, "approach": 2, "speed_m_s": 1.0}
-    away, over = (recovery(case, {**numbers, "second_share": share}) for share in (0.4, 0.6))
-    assert away[1]["found"] and over == (NO_HIT, {})
-
-
-def test_a_bare_worst_is_the_margin_and_its_page_names_all_that_makes_a_hit_again():
-    parse = build_parser().parse_args
-    for words, part in ((["--worst"], "margin"), (["--worst", "recovery"], "recovery"), (["--verdicts"], "verdicts")):
-        assert parse(["hits", *words]).part == part
-    hit = {"closing_m_s": 1.234, "latency_ms": 4.0, "tilt_deg": 91.0, "lost_m": 3.0, "again": 1, "rest_s": None}
-    campaign = Campaign("worst", {}, [SearchCase("rigid", 50, 7, 60, "recovery")], search)
-    text = worst_table(campaign, Results({0: {**hit, "flown": 60, **MIDDLE}}, {}))
-    rows = {line.split("|")[1].strip(): line.split("|")[2].strip() for line in text.splitlines()}
-    assert rows["closing_m_s"] == "1.234" and rows["approach"] == "wall" and {*MIDDLE} <= {*rows}
-
-
-def test_a_hit_that_is_kept_is_judged_from_its_bytes_as_it_was_flown(tmp_path):
-    # Given a hit that a vehicle found, and one that a vehicle that shakes too much missed
-    case = SearchCase("foldable", 50, 1, 1)
-    for name, vibration_m_s2, is_found in (("found", 0.2, True), ("missed", 8.0, False)):
-        keep(case, {**MIDDLE, "speed_m_s": 1.0, "vibration_log": math.log(vibration_m_s2)}, tmp_path / name)
-        # When the corpus' judge reads its bytes, then it comes to the same
-        judgement = work_out_bytes(str(tmp_path / name))["rates"]["recorded"]
-        (hit, *_) = judgement["hits"]
-        assert ("latency_ms" in hit) is is_found and judgement["false_boot_us"] == []
 
 
 def test_a_touch_at_an_interval_s_very_end_is_no_false_alarm():

@@ -4,10 +4,9 @@ import math
 
 import pytest
 
-from bench.studies.speed.calls import calls_an_interval, held_to
-from bench.studies.speed.flight import fly
-from bench.studies.speed.latency import of_peer, recorded, spread
-from bench.studies.speed.parts import PARTS
+from bench.studies.speed.latency import recorded, spread, timed
+from bench.studies.speed.parts import PARTS, calls_an_interval, held_to
+from bench.studies.speed.study import fly
 
 # A change that costs more is looked at: it is made cheaper, or the count is renewed by `python -m bench speed --calls`.
 MOST_MORE = 1.05
@@ -16,7 +15,7 @@ MOST_MORE = 1.05
 @pytest.fixture(scope="module")
 def calls():
     fly()  # what is imported or compiled at first counts for nothing
-    return calls_an_interval()
+    return calls_an_interval(fly)
 
 
 @pytest.mark.slow
@@ -31,15 +30,13 @@ def test_no_program_calls_5_per_cent_more_functions_an_interval(calls, program):
 
 @pytest.mark.slow
 def test_the_count_is_the_same_in_every_flight(calls):
-    assert calls_an_interval() == calls
+    assert calls_an_interval(fly) == calls
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("name", ["pymavlink", "mavsdk"])
-def test_a_program_that_only_answers_is_timed_at_each_hit(name):
-    # Given a flight that is played to it until the hit, again and again
-    taken = list(of_peer(name)(recorded(0), 3))
-    # Then each answer comes after the hit, and long before PX4 would miss a setpoint (COM_OF_LOSS_T, 1 s)
+def test_each_hit_is_answered_long_before_px4_would_miss_a_setpoint():
+    # Given a flight that is played to the loop of real flights until its hit (COM_OF_LOSS_T is 1 s)
+    taken = list(timed(recorded(0), 3))
     assert all(seconds is not None and 0.0 < seconds < 0.5 for seconds in taken)
 
 

@@ -5,18 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from bench.cases.walls import CRUISE_S, approach
 from bench.rows.tables import table
-from bench.studies.paper.figures import add_legend, draw_position, new_figure
+from bench.studies.paper.claims import claim
 from bench.studies.paper.flights import StudyFlight, StudyResult
 from bench.studies.paper.study import (
-    NO_OVERSHOOT_M,
-    ClaimRow,
     StudyFindings,
-    at_least,
-    at_most,
     cells,
     is_lost,
     worst_overshoot_by_estimate_m,
@@ -70,7 +64,6 @@ CAUSES = (
     Cause(SOFT, "foldable", changes=SOFT_GAINS, companion=PATIENT),
     Cause(CLIPPED, "foldable", changes=PX4_FILTER),
 )
-DRAWN = ((AS_IT_IS, "rigid"), (LOST, "rigid"), (CLIPPED, "rigid"), (CLIPPED, "foldable"))
 
 
 def flights(seeds: int) -> list[StudyFlight]:
@@ -81,7 +74,6 @@ def flights(seeds: int) -> list[StudyFlight]:
             cause.airframe,
             seed,
             cause.changes,
-            is_drawn=seed == 1 and (cause.name, cause.airframe) in DRAWN,
         )
         for cause in CAUSES
         for seed in range(1, SEEDS + 1)
@@ -89,66 +81,21 @@ def flights(seeds: int) -> list[StudyFlight]:
 
 
 def conclude(results: Sequence[StudyResult]) -> StudyFindings:
-    return StudyFindings("Why rigid differs", _rows(results), {"causes.png": _figure(results)}, _tables(results))
+    lost, clipped = _of(results, "rigid", LOST), _of(results, "rigid", CLIPPED)
+    leaning = _of(results, "foldable", LEANING)
+    lost_again, leaning_again = (sum(result.second_hits > 0 for result in some) for some in (lost, leaning))
+    rows = (
+        claim("lost samples", lost_again, flown=len(lost), lost=sum(map(is_lost, lost))),
+        claim("clipped", worst_overshoot_m(clipped), own=worst_overshoot_by_estimate_m(clipped)),
+        claim("accelerating", leaning_again, flown=len(leaning), past=worst_overshoot_m(leaning)),
+    )
+    flown = [
+        {"airframe": cause.airframe, "changed": cause.name, **cells(some)}
+        for cause in CAUSES
+        if (some := _of(results, cause.airframe, cause.name))
+    ]
+    return StudyFindings("Why rigid differs", rows, tables={"One cause at a time, at 2 m/s": table(flown)})
 
 
 def _of(results: Sequence[StudyResult], airframe: str, name: str) -> list[StudyResult]:
     return [result for result in results if result.flight.key == (airframe, name) and result.contacts]
-
-
-def _rows(results: Sequence[StudyResult]) -> tuple[ClaimRow, ...]:
-    lost, clipped = _of(results, "rigid", LOST), _of(results, "rigid", CLIPPED)
-    again = [result for result in lost if is_lost(result)]
-    foldable = _of(results, "foldable", LEANING)
-    own_m = worst_overshoot_by_estimate_m(clipped)
-    return (
-        at_least(
-            "rigid, lost samples alone: flights that hit again",
-            "oscillation, runs into the wall again",
-            1.0,
-            sum(result.second_hits > 0 for result in lost),
-            f"of {len(lost)}",
-            f"{len(again)} lost their first hit",
-        ),
-        at_least(
-            "rigid, PX4's allowance for clipping alone: overshoot",
-            "oscillation, overshoots",
-            NO_OVERSHOOT_M,
-            worst_overshoot_m(clipped),
-            "m",
-            f"by the truth; {own_m:.2f} m by the vehicle's own estimate",
-        ),
-        at_most(
-            "foldable, hit while it accelerates: flights that hit again",
-            "none",
-            0.0,
-            sum(result.second_hits > 0 for result in foldable),
-            f"of {len(foldable)}",
-            f"leaning 12°; overshoot up to {worst_overshoot_m(foldable):.2f} m",
-        ),
-    )
-
-
-def _tables(results: Sequence[StudyResult]) -> dict[str, str]:
-    rows = [
-        {"airframe": cause.airframe, "changed": cause.name, **cells(flown)}
-        for cause in CAUSES
-        if (flown := _of(results, cause.airframe, cause.name))
-    ]
-    return {"One cause at a time, at 2 m/s": table(rows)}
-
-
-def _figure(results: Sequence[StudyResult]) -> Figure:
-    figure, axes = new_figure(1, len(DRAWN), "A hit at 2 m/s: one thing changed at a time", width=3.9)
-    titles = (
-        "rigid, as it is",
-        "rigid, samples lost (50 Hz)",
-        "rigid, PX4's allowance for clipping",
-        "foldable, PX4's allowance for clipping",
-    )
-    for axis, (name, airframe), title in zip(axes[0], DRAWN, titles, strict=True):
-        for result in _of(results, airframe, name):
-            if result.track is not None:
-                draw_position(axis, result.track, title)
-    add_legend(figure, axes)
-    return figure

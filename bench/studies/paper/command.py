@@ -1,15 +1,15 @@
 """`bench paper`: flies every study of the paper and writes its numbers beside ours, tables and pictures."""
 
 from argparse import Namespace
-from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
 from bench.fly.campaign import Workers, worked_out
 from bench.rows.tables import Page
-from bench.studies.paper import arm, causes, claims, directions, flight_tests, imu_rate, scenarios
+from bench.studies.paper import arm, causes, directions, flight_tests, imu_rate, scenarios, single
+from bench.studies.paper.claims import ClaimRow, rows_text, verdict_text
 from bench.studies.paper.flights import fly
-from bench.studies.paper.study import ClaimRow, Study, rows_text, sampling_text
+from bench.studies.paper.study import Study, sampling_text
 
 STUDIES: tuple[Study, ...] = (
     arm,
@@ -19,7 +19,7 @@ STUDIES: tuple[Study, ...] = (
     causes,
     directions,
     imu_rate,
-    claims,
+    single,
 )
 
 
@@ -41,12 +41,3 @@ def run_paper(options: Namespace) -> int:
     page.write("The paper's numbers beside ours", options.typed, parts, pictures)
     print(verdict_text(rows))
     return 0
-
-
-def verdict_text(rows: Sequence[ClaimRow]) -> str:
-    """How many rows agree, and which do not."""
-    judged = [row for row in rows if row.is_judged]
-    differing = [row for row in judged if not row.agrees]
-    lines = [f"{len(judged) - len(differing)} of {len(judged)} of the paper's numbers agree with ours."]
-    lines += [f"  differs: {row.claim}: paper {row.paper}, ours {row.ours:.3g} {row.unit}" for row in differing]
-    return "\n".join(lines)

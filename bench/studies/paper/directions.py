@@ -1,26 +1,14 @@
 """Walls from any side: 1 to 5 m/s, every direction of the wall to the vehicle's nose."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-
-import numpy as np
-from matplotlib.figure import Figure
 
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import approach
 from bench.rows.tables import table
-from bench.studies.paper.figures import finish, new_figure
+from bench.studies.paper.claims import ClaimRow, claim, number
 from bench.studies.paper.flights import StudyFlight, StudyResult
-from bench.studies.paper.study import (
-    NO_OVERSHOOT_M,
-    ClaimRow,
-    StudyFindings,
-    at_most,
-    cells,
-    number,
-    worst_overshoot_by_estimate_m,
-    worst_overshoot_m,
-)
+from bench.studies.paper.study import StudyFindings, cells, worst_overshoot_by_estimate_m, worst_overshoot_m
 
 SPEEDS_M_S = (1.0, 2.0, 3.0, 4.0, 5.0)
 # Between the flight and the wall's normal, to the left and to the right in turn; beyond the paper.
@@ -58,42 +46,28 @@ def _flight(airframe: str, slant_deg: float, speed_m_s: float, seed: int) -> Stu
 
 
 def conclude(results: Sequence[StudyResult]) -> StudyFindings:
-    foldable = _group(results, "foldable", 0.0)
-    return StudyFindings("Walls from any side", _rows(foldable), {"directions.png": _figure(results)}, _tables(results))
+    """By the strictest count, and without what ends the collision before (see `flights.StudyContact`)."""
+    rows: list[ClaimRow] = []
+    flown: list[dict[str, object]] = []
+    for airframe, slant_deg in GROUPS:
+        for speed in SPEEDS_M_S:
+            some = [r for r in results if (*r.flight.key[:2], r.flight.key[3]) == (airframe, speed, slant_deg)]
+            some = [result for result in some if result.contacts]
+            if (airframe, slant_deg) == ("foldable", 0.0):
+                rows += _rows(speed, some)
+            if some:
+                flown.append({"": f"{airframe}, slant {slant_deg:g}°", "m/s": f"{speed:g}", **cells(some)})
+    return StudyFindings("Walls from any side", rows, tables={"Walls from any side, each speed": table(flown)})
 
 
-def _group(results: Sequence[StudyResult], airframe: str, slant_deg: float) -> list[StudyResult]:
-    keys = (airframe, slant_deg)
-    return [r for r in results if (r.flight.key[0], r.flight.key[3]) == keys and r.contacts]
-
-
-def _rows(foldable: Sequence[StudyResult]) -> tuple[ClaimRow, ...]:
-    rows = []
-    for speed_m_s in SPEEDS_M_S:
-        flown = [result for result in foldable if result.flight.key[1] == speed_m_s]
-        name, count = f"foldable, {speed_m_s:g} m/s, any side", f"flights: {len(flown)}"
-        again = [result for result in flown if result.recontacts]
-        own_m = worst_overshoot_by_estimate_m(flown)
-        rows += [
-            at_most(f"{name}: second hits", "none", 0.0, sum(r.second_hits > 0 for r in flown), "flights", count),
-            at_most(
-                f"{name}: touched again",
-                "not stated",
-                0.0,
-                len(again),
-                "flights",
-                _touches_text(again) if again else count,
-            ),
-            at_most(
-                f"{name}: overshoot",
-                "none",
-                NO_OVERSHOOT_M,
-                worst_overshoot_m(flown),
-                "m",
-                f"largest, by the truth; {number(round(own_m, 3))} m by the vehicle's own estimate",
-            ),
-        ]
-    return tuple(rows)
+def _rows(speed_m_s: float, flown: Sequence[StudyResult]) -> Iterator[ClaimRow]:
+    again = [result for result in flown if result.recontacts]
+    own = number(round(worst_overshoot_by_estimate_m(flown), 3))
+    second = sum(result.second_hits > 0 for result in flown)
+    yield claim("any side again", second, speed=speed_m_s, flown=len(flown))
+    said = _touches_text(again) if again else f"flights: {len(flown)}"
+    yield claim("any side touched", len(again), speed=speed_m_s, said=said)
+    yield claim("any side overshoot", worst_overshoot_m(flown), speed=speed_m_s, own=own)
 
 
 def _touches_text(results: Sequence[StudyResult]) -> str:
@@ -111,40 +85,3 @@ def _touches_text(results: Sequence[StudyResult]) -> str:
         f"wall {sides} off the axes; another guard swings in {min(gaps_ms):.0f} to {max(gaps_ms):.0f} ms after the "
         f"last touch, with up to {peak_n:.0f} N, an arm still {min(folds_mm):.0f} to {max(folds_mm):.0f} mm folded"
     )
-
-
-def _tables(results: Sequence[StudyResult]) -> dict[str, str]:
-    """By the strictest count, and without what ends the collision before (see `flights.StudyContact`)."""
-    rows = []
-    for airframe, slant_deg in GROUPS:
-        flown = _group(results, airframe, slant_deg)
-        by_speed = {speed: [result for result in flown if result.flight.key[1] == speed] for speed in SPEEDS_M_S}
-        name = f"{airframe}, slant {slant_deg:g}°"
-        rows += [{"": name, "m/s": f"{speed:g}", **cells(some)} for speed, some in by_speed.items() if some]
-    return {"Walls from any side, each speed": table(rows)}
-
-
-def _figure(results: Sequence[StudyResult]) -> Figure:
-    figure, axes = new_figure(
-        1, 2, "Walls from any side: how far the hit makes the vehicle lean into the wall", width=6.0
-    )
-    for axis, airframe in zip(axes[0], AIRFRAMES, strict=True):
-        for speed_m_s in SPEEDS_M_S:
-            flown = [r for r in _group(results, airframe, 0.0) if r.flight.key[1] == speed_m_s]
-            sides = [off_axis_deg(result.flight.key[2]) for result in flown]
-            leans = [np.degrees(result.greatest_lean_rad) for result in flown]
-            (line,) = axis.plot(sides, leans, "o", markersize=4, label=f"{speed_m_s:g} m/s")
-            again = [(x, y) for x, y, result in zip(sides, leans, flown, strict=True) if result.recontacts]
-            if again:
-                axis.plot(*zip(*again, strict=True), "o", markersize=11, fillstyle="none", color=line.get_color())
-        axis.plot([], [], "o", markersize=11, fillstyle="none", color="0.3", label="ring: hit again")
-        axis.set_xlim(-1.0, 46.0)
-        finish(
-            axis,
-            airframe,
-            "greatest lean into the wall [°]",
-            "side of the wall: 0° two guards together, 45° one alone [°]",
-        )
-        axis.legend(fontsize=8, loc="upper center", ncols=2)
-        axis.set_ylim(0.0, 115.0)
-    return figure

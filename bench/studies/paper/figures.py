@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from bench.studies.paper.flights import StudyTrack
+from bench.studies.paper.track import StudyTrack
 
 CENTRE = {"color": "tab:blue", "linewidth": 1.8}
 ASKED = {"color": "tab:orange", "linewidth": 1.4, "linestyle": "--"}

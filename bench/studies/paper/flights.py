@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from bench.detectors.config import BaselineMission
 from bench.fly.lockstep import flown_with_log
+from bench.studies.paper.track import Floats, StudyTrack, Vector3, track_of
 from rebound_cli.inputs import with_guards
 from rebound_cli.results.flight_log import FlightLog
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
@@ -17,14 +17,9 @@ from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
 
-Floats = npt.NDArray[np.float64]
-Vector3 = tuple[float, float, float]
-
 # As the paper's (section V) the vehicle knows itself by flow, range and an extended Kalman filter.
 ESTIMATE = {"kind": "ekf"}
 
-# What is kept of a flight that is to be drawn, around its first contact.
-TRACK_BEFORE_S, TRACK_AFTER_S = 2.0, 8.0
 # Of an arm that is on its way: an arm that rests on its hysteresis is there to the last bit.
 LEAST_FOLD_M = 1e-6
 # The hit turns the vehicle, the attitude loop turns it back: all of that is over within a second.
@@ -50,16 +45,16 @@ class StudyContact:
     hit: Hit
     share_received: float
     """Share of the contact that lies in the averaging windows of the samples that were received."""
-    latency_s: float | None
-    impact_speed_estimate_m_s: float | None
-    setpoint_ned_m: Vector3 | None
-    """In the vehicle's own frame, like the next."""
-    position_estimate_ned_m: Vector3 | None
-    overshoot_m: float | None
-    """By the truth, which places the setpoint where the vehicle's own frame was at the first touch."""
-    overshoot_by_estimate_m: float | None
     fold_before_m: float
     """Greatest fold of any arm just before the first touch, beyond the hysteresis: not yet back from a hit before."""
+    latency_s: float | None = None
+    impact_speed_estimate_m_s: float | None = None
+    setpoint_ned_m: Vector3 | None = None
+    """In the vehicle's own frame, like the next."""
+    position_estimate_ned_m: Vector3 | None = None
+    overshoot_m: float | None = None
+    """By the truth, which places the setpoint where the vehicle's own frame was at the first touch."""
+    overshoot_by_estimate_m: float | None = None
 
     @property
     def impact_speed_m_s(self) -> float:
@@ -89,28 +84,6 @@ class StudyContact:
         The paper's collision is over when l <= delta l after its peak (section IV), not when the force is.
         """
         return self.fold_before_m > 0.0 and not self.is_approach
-
-
-@dataclass(frozen=True, slots=True)
-class StudyTrack:
-    """A flight along the line into the wall that it hit first. Seconds since that contact; metres, m/s.
-
-    Places count from the take-off point, into the wall positive.
-    """
-
-    time_s: Floats
-    place_m: Floats
-    speed_m_s: Floats
-    fold_m: Floats
-    setpoint_at_s: Floats
-    setpoint_m: Floats
-    touch_m: float
-    """Where the vehicle's centre was at the first touch."""
-    wall_m: float
-    contacts_s: tuple[float, ...]
-    detections_s: tuple[float, ...]
-    targets_m: tuple[float, ...]
-    """The recovery setpoint of each detection."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,42 +133,46 @@ def fly(flight: StudyFlight) -> StudyResult:
     return StudyResult(
         flight=flight,
         is_completed=flown.report.outcome == "completed",
-        contacts=_contacts(flown, truth, log, airframe, settled_duration_s),
+        contacts=tuple(_contacts(flown, truth, log, airframe, settled_duration_s)),
         recontacts=matches.recontacts,
         false_detections=matches.false_detections,
         imu_received_hz=flown.report.stream_rates_hz["HIGHRES_IMU"],
         integration_interval_us=interval_us,
         greatest_lean_rad=_greatest_lean_rad(truth),
-        track=_track(flown, truth, log, scene) if flight.is_drawn and truth.hits else None,
+        track=track_of(flown, truth, log, scene) if flight.is_drawn and truth.hits else None,
     )
 
 
 def _contacts(
-    flown: Flown, truth: FlightTruth, log: FlightLog, airframe: Airframe, settled_duration_s: float
-) -> tuple[StudyContact, ...]:
-    collisions = flown.report.collisions
-    matches = match_contacts(collisions, truth.hits, settled_duration_s)
-    entries = build_summary(flown, FlightFacts("", None, None, settled_duration_s))["collisions"]
-    number_of = {id(hit): number for number, hit in enumerate(matches.hit_of_collision) if hit is not None}
+    flown: Flown, truth: FlightTruth, log: FlightLog, airframe: Airframe, settled_s: float
+) -> list[StudyContact]:
+    collisions, interval_us = flown.report.collisions, airframe.imu.integration_interval_us
+    matches = match_contacts(collisions, truth.hits, settled_s)
+    entries = build_summary(flown, FlightFacts("", None, None, settled_s))["collisions"]
+    told = zip(matches.hit_of_collision, collisions, entries, strict=True)
+    seen = {id(hit): (collision, entry["truth"]) for hit, collision, entry in told if hit is not None}
     contacts = []
     for hit in truth.hits:
-        number = number_of.get(id(hit))
-        collision = None if number is None else collisions[number]
-        seen = None if number is None else entries[number]["truth"]
+        share = share_received(log.imu_time_boot_us, interval_us, hit)
+        fold_m = _fold_before_m(truth, hit, airframe.arms.hysteresis_m)
+        if id(hit) not in seen:
+            contacts.append(StudyContact(hit, share, fold_m))
+            continue
+        collision, entry = seen[id(hit)]
         contacts.append(
             StudyContact(
-                hit=hit,
-                share_received=share_received(log.imu_time_boot_us, airframe.imu.integration_interval_us, hit),
-                latency_s=None if seen is None else 1e-3 * seen["detection_latency_ms"],
-                impact_speed_estimate_m_s=None if collision is None else collision.impact_speed_m_s,
-                setpoint_ned_m=None if collision is None else collision.recovery_setpoint_ned_m,
-                position_estimate_ned_m=None if collision is None else collision.position_ned_m,
-                overshoot_m=None if seen is None else seen["overshoot_m"],
-                overshoot_by_estimate_m=None if collision is None else collision.overshoot_m,
-                fold_before_m=_fold_before_m(truth, hit, airframe.arms.hysteresis_m),
+                hit,
+                share,
+                fold_m,
+                latency_s=1e-3 * entry["detection_latency_ms"],
+                impact_speed_estimate_m_s=collision.impact_speed_m_s,
+                setpoint_ned_m=collision.recovery_setpoint_ned_m,
+                position_estimate_ned_m=collision.position_ned_m,
+                overshoot_m=entry["overshoot_m"],
+                overshoot_by_estimate_m=collision.overshoot_m,
             )
         )
-    return tuple(contacts)
+    return contacts
 
 
 def _fold_before_m(truth: FlightTruth, hit: Hit, hysteresis_m: float) -> float:
@@ -219,40 +196,3 @@ def _greatest_lean_rad(truth: FlightTruth) -> float:
     w, x, y, z = truth.series["attitude_wxyz"][(since_s >= 0.0) & (since_s <= LEAN_LOOKED_AT_S)].T
     thrust_ned = -np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
     return float(np.arcsin(np.clip(-np.array(hit.normal_ned) @ thrust_ned, -1.0, 1.0)).max())
-
-
-def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> StudyTrack:
-    report, hit = flown.report, truth.hits[0]
-    into_wall = -np.array(hit.normal_ned)
-    # What the vehicle was told lies in its own frame, and is drawn where that was at the first touch.
-    offset = np.array(hit.frame_offset_ned_m)
-    origin = np.array(report.origin_ned_m or (0.0, 0.0, 0.0))
-    wall = next(wall for wall in scene.walls_built() if wall.name == hit.obstacle)
-    zero_us = hit.contact_at_boot_us
-
-    def seconds(at_us: Floats) -> Floats:
-        since: Floats = 1e-6 * (at_us - truth.epoch_at_boot_us - zero_us)
-        return since
-
-    def place_m(position_ned_m: Vector3) -> float:
-        return float((np.array(position_ned_m) - origin) @ into_wall)
-
-    time_s = 1e-6 * (truth.series["time_boot_us"] - zero_us)
-    kept = (time_s >= -TRACK_BEFORE_S) & (time_s <= TRACK_AFTER_S)
-    setpoint_at_s = seconds(log.setpoint_at_us)
-    asked = (setpoint_at_s >= -TRACK_BEFORE_S) & (setpoint_at_s <= TRACK_AFTER_S)
-    return StudyTrack(
-        time_s=time_s[kept],
-        place_m=(truth.series["position_ned_m"][kept] - origin) @ into_wall,
-        speed_m_s=truth.series["velocity_ned_m_s"][kept] @ into_wall,
-        fold_m=truth.series["arm_fold_m"][kept],
-        setpoint_at_s=setpoint_at_s[asked],
-        setpoint_m=(log.setpoint_ned_m[asked] - offset - origin) @ into_wall,
-        touch_m=place_m(hit.contact_position_ned_m),
-        wall_m=place_m(wall.point_ned_m),
-        contacts_s=tuple(1e-6 * (each.contact_at_boot_us - zero_us) for each in truth.hits),
-        detections_s=tuple(1e-6 * (each.sample_time_boot_us - zero_us) for each in report.collisions),
-        targets_m=tuple(
-            place_m(each.recovery_setpoint_ned_m) - float(offset @ into_wall) for each in report.collisions
-        ),
-    )

@@ -1,14 +1,15 @@
 """The paper's sample scenario, missions/paper.yaml, and its simulation beside its experiment: v_c = 2.1 m/s."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from bench.cases.walls import GAMMA_S, approach, pinned
-from bench.rows.tables import table
+from bench.rows.tables import rms, table
 from bench.studies.paper.arm import FOLD_MAX_M
+from bench.studies.paper.claims import ClaimRow, claim
 from bench.studies.paper.figures import (
     add_legend,
     draw_fold,
@@ -19,15 +20,16 @@ from bench.studies.paper.figures import (
     mark_paper,
     new_figure,
 )
-from bench.studies.paper.flights import StudyFlight, StudyResult, StudyTrack, Vector3
-from bench.studies.paper.study import ClaimRow, StudyFindings, around, at_most
+from bench.studies.paper.flights import StudyFlight, StudyResult
+from bench.studies.paper.study import StudyFindings
+from bench.studies.paper.track import StudyTrack, Vector3
 from rebound_cli.inputs import load_mission_document
 
 MISSION_FILE = Path("missions/paper.yaml")
 SEED = 1
 
 # The paper, section IV.
-CROSSING_M_S, CONTACT_AFTER_S, IMPACT_M_S, REBOUND_M_S = 1.5, 0.2, 1.4, 0.28
+IMPACT_M_S, REBOUND_M_S = 1.4, 0.28
 
 # The paper's figure of simulation and experiment; x(t_c) of its simulation is 0.6 m, of its experiment 0.4 m.
 SPEED_M_S, BACK_M, HEIGHT_M = 2.1, 1.05, 0.5
@@ -52,7 +54,7 @@ class SampleScenario:
         assert track is not None, "the wall of the sample scenario is hit"
         return StudyFindings(
             "Sample scenario",
-            _sample_rows(result, track),
+            tuple(_sample_rows(result, track)),
             {"sample_scenario.png": _sample_figure(track)},
         )
 
@@ -77,7 +79,7 @@ class Experiment:
         rows = _experiment_rows(float(np.mean([c.impact_speed_m_s for c in detected])), known_m, true_m, errors_m_s)
         return StudyFindings(
             "Simulation against experiment",
-            rows,
+            tuple(rows),
             {"simulation_experiment.png": _experiment_figure(track)},
             {"Simulation, experiment, ours": _places_table(known_m, true_m, errors_m_s)},
         )
@@ -86,7 +88,7 @@ class Experiment:
 SAMPLE, EXPERIMENT = SampleScenario(), Experiment()
 
 
-def _sample_rows(result: StudyResult, track: StudyTrack) -> tuple[ClaimRow, ...]:
+def _sample_rows(result: StudyResult, track: StudyTrack) -> Iterator[ClaimRow]:
     contact = result.first
     # x = 0 is crossed by the guards: from there to the touch they travel to the wall's 0.3 m.
     guard_m = track.place_m + (track.wall_m - track.touch_m)
@@ -95,33 +97,13 @@ def _sample_rows(result: StudyResult, track: StudyTrack) -> tuple[ClaimRow, ...]
     if setpoint_ned_m is None:
         raise AssertionError("the sample scenario's hit was not detected")
     before_m, setpoint_m = contact.hit.contact_position_ned_m[0], setpoint_ned_m[0]
-    back_m = float(before_m - setpoint_m)
-    forward_m = float(track.place_m[(track.time_s >= 0.0) & (track.time_s < 0.3)].max() - track.touch_m)
-    speed_m_s = contact.impact_speed_m_s
-    return (
-        around("speed at x = 0 (guards)", "≈ 1.5 m/s", CROSSING_M_S, float(track.speed_m_s[crossing]), "m/s", 0.06),
-        around("from there to the contact", "≈ 0.2 s", CONTACT_AFTER_S, -float(track.time_s[crossing]), "s", 0.15),
-        around("speed before the contact", "≈ 1.4 m/s", IMPACT_M_S, speed_m_s, "m/s", 0.06),
-        around(
-            "speed after it",
-            "≈ 0.28 m/s",
-            REBOUND_M_S,
-            contact.hit.rebound_speed_m_s,
-            "m/s",
-            0.25,
-            "0.28 / 1.4 = 0.20; eq. 2 until its force is zero gives 0.22 and 0.31 m/s",
-        ),
-        around(
-            "setpoint by eq. 3, back from x(t_c)",
-            "γ v_c = 0.5 · 1.4 = 0.70 m",
-            GAMMA_S * speed_m_s,
-            back_m,
-            "m",
-            0.12,
-            f"from {before_m:.2f} to {setpoint_m:.2f} m; tolerance about γ times our own v_c",
-        ),
-        around("centre's way into the folding arms", "l, up to 0.03 m", 0.0294, forward_m, "m", 0.08),
-    )
+    speed_m_s, back_m = contact.impact_speed_m_s, float(before_m - setpoint_m)
+    yield claim("crossing", float(track.speed_m_s[crossing]))
+    yield claim("from there", -float(track.time_s[crossing]))
+    yield claim("before", speed_m_s)
+    yield claim("after", contact.hit.rebound_speed_m_s)
+    yield claim("setpoint", back_m, GAMMA_S * speed_m_s, from_m=before_m, to_m=setpoint_m)
+    yield claim("forward", float(track.place_m[(track.time_s >= 0.0) & (track.time_s < 0.3)].max() - track.touch_m))
 
 
 def _sample_figure(track: StudyTrack) -> Figure:
@@ -152,39 +134,13 @@ def _back_m(places: Sequence[tuple[Vector3 | None, Vector3 | None]]) -> float:
 
 def _experiment_rows(
     speed_m_s: float, known_m: float, true_m: float, errors_m_s: Sequence[float]
-) -> tuple[ClaimRow, ...]:
-    rms_m_s = float(np.sqrt(np.mean(np.square(errors_m_s))))
-    flown = len(errors_m_s)
-    return (
-        around("collision speed v_c", "2.1 m/s", SPEED_M_S, speed_m_s, "m/s", 0.05, f"mean of {flown} flights"),
-        around("setpoint back from x(t_c) as estimated", "1.05 m", BACK_M, known_m, "m", 0.06, "mean"),
-        around(
-            "setpoint back from the true x(t_c)",
-            "1.05 m",
-            BACK_M,
-            true_m,
-            "m",
-            0.12,
-            "the setpoint where the vehicle's frame was at the first touch",
-        ),
-        around(
-            "x_d for x(t_c) = 0.6 m",
-            "−0.45 m",
-            -0.45,
-            SIMULATED_AT_M - known_m,
-            "m",
-            0.15,
-            "our distance back, put at the paper's place",
-        ),
-        at_most(
-            "setpoint's error through that of v_c, γ · RMS",
-            "0.10 m",
-            SETPOINT_ERROR_M,
-            GAMMA_S * rms_m_s,
-            "m",
-            f"v_c is wrong by {rms_m_s:.3f} m/s RMS in {flown} flights; theirs by 0.10 m / 0.5 = 0.20 m/s",
-        ),
-    )
+) -> Iterator[ClaimRow]:
+    rms_m_s, flown = rms(errors_m_s), len(errors_m_s)
+    yield claim("v_c", speed_m_s, flown=flown)
+    yield claim("back as estimated", known_m)
+    yield claim("back in truth", true_m)
+    yield claim("x_d", SIMULATED_AT_M - known_m)
+    yield claim("error of v_c", GAMMA_S * rms_m_s, rms=rms_m_s, flown=flown)
 
 
 def _places_table(known_m: float, true_m: float, errors_m_s: Sequence[float]) -> str:

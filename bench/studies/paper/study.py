@@ -7,95 +7,13 @@ from typing import Protocol
 import numpy as np
 from matplotlib.figure import Figure
 
-from bench.rows.tables import table
+from bench.studies.paper.claims import ClaimRow, number
 from bench.studies.paper.flights import StudyFlight, StudyResult
 from rebound_cli.results.summary import BREAKING_FORCE_N
 
-PASSED, FAILED = "agrees", "**differs**"
 # A hit counts as lost on the way when less than this share of it lies in samples that arrived: a tenth of a
 # millisecond, clipped at 157 m/s^2, adds 3.9 m/s^2 to a mean over 4 ms, just below the detector's threshold.
 LOST_SHARE = 0.1
-# An overshoot below this cannot be seen in the paper's plots, nor told from the noise of an estimate.
-NO_OVERSHOOT_M = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class ClaimRow:
-    """One number. `low` and `high` are what ours may be; a row without bounds only reports."""
-
-    claim: str
-    paper: str
-    ours: float
-    unit: str
-    low: float | None
-    high: float | None
-    note: str = ""
-
-    @property
-    def is_judged(self) -> bool:
-        return self.low is not None or self.high is not None
-
-    @property
-    def agrees(self) -> bool:
-        above = self.low is None or self.ours >= self.low
-        return above and (self.high is None or self.ours <= self.high)
-
-    @property
-    def verdict(self) -> str:
-        return (PASSED if self.agrees else FAILED) if self.is_judged else "for comparison"
-
-    @property
-    def tolerance(self) -> str:
-        if self.low is not None and self.high is not None:
-            return f"{number(self.low)} to {number(self.high)}"
-        if self.high is not None:
-            return f"at most {number(self.high)}"
-        return f"at least {number(self.low)}" if self.low is not None else ""
-
-
-def around(claim: str, paper: str, expected: float, ours: float, unit: str, share: float, note: str = "") -> ClaimRow:
-    """A row whose tolerance is a share of the expected value: less than half, so that no factor of two fits."""
-    assert 0.0 < share < 0.5, "a factor of two would pass"
-    margin = share * abs(expected)
-    return ClaimRow(claim, paper, ours, unit, expected - margin, expected + margin, note)
-
-
-def within_factor(
-    claim: str, paper: str, expected: float, ours: float, unit: str, factor: float, note: str = ""
-) -> ClaimRow:
-    """A row for a number that the paper gives in round figures ("≈") and without saying how it was measured."""
-    assert 1.0 < factor < 2.0, "a factor of two would pass"
-    return ClaimRow(claim, paper, ours, unit, expected / factor, expected * factor, note)
-
-
-def at_most(claim: str, paper: str, high: float, ours: float, unit: str, note: str = "") -> ClaimRow:
-    return ClaimRow(claim, paper, ours, unit, None, high, note)
-
-
-def at_least(claim: str, paper: str, low: float, ours: float, unit: str, note: str = "") -> ClaimRow:
-    return ClaimRow(claim, paper, ours, unit, low, None, note)
-
-
-def number(value: float) -> str:
-    """Three digits that count, no exponent for what people say in full, no minus before zero."""
-    text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
-    return "0" if float(text) == 0.0 else text
-
-
-def rows_text(rows: Sequence[ClaimRow]) -> str:
-    return table(
-        [
-            {
-                "claim": row.claim,
-                "paper": row.paper,
-                "ours": f"{number(row.ours)} {row.unit}".strip(),
-                "tolerance": row.tolerance,
-                "verdict": row.verdict,
-                "remark": row.note,
-            }
-            for row in rows
-        ]
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +21,7 @@ class StudyFindings:
     """`tables` by their headings; pictures by the name of their file."""
 
     title: str
-    rows: tuple[ClaimRow, ...]
+    rows: Sequence[ClaimRow]
     pictures: Mapping[str, Figure] = field(default_factory=dict)
     tables: Mapping[str, str] = field(default_factory=dict)
 
@@ -170,8 +88,7 @@ def cells(results: Sequence[StudyResult]) -> dict[str, object]:
 
 def sampling_text(results: Sequence[StudyResult]) -> str:
     """How the inertial sensor was received: the range over these flights."""
-    rates = sorted(result.imu_received_hz for result in results)
-    intervals = sorted({result.integration_interval_us for result in results})
-    rate = f"{rates[0]:.0f}" if f"{rates[0]:.0f}" == f"{rates[-1]:.0f}" else f"{rates[0]:.0f} to {rates[-1]:.0f}"
-    lengths = " or ".join(f"{1e-3 * interval:g}" for interval in intervals)
+    rates = [f"{rate:.0f}" for rate in sorted(result.imu_received_hz for result in results)]
+    lengths = " or ".join(f"{1e-3 * us:g}" for us in sorted({result.integration_interval_us for result in results}))
+    rate = rates[0] if rates[0] == rates[-1] else f"{rates[0]} to {rates[-1]}"
     return f"`HIGHRES_IMU` as received: {rate} Hz, each sample the mean of {lengths} ms."

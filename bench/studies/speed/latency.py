@@ -1,7 +1,4 @@
-"""From a hit's datagram to the setpoint on the wire, in real time at 250 Hz, quiet and beside two busy loops.
-
-Rebound beside the least that a program can do on pymavlink and on MAVSDK (peers.py), in one run.
-"""
+"""From a hit's datagram to the setpoint on the wire, in real time at 250 Hz, quiet and beside two busy loops."""
 
 import contextlib
 import io
@@ -9,21 +6,16 @@ import math
 import os
 import signal
 import socket
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
-from bench.fly.packets import IMU, SETPOINT, decoded
-from bench.studies.speed.peers import PEERS
+from bench.fly.packets import SETPOINT, decoded
 from companion.companion import Companion
-from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
 from companion.shell.connection import udp_out
@@ -47,11 +39,7 @@ AFTER = 125
 JUMP_M = 0.2
 # POSITION_TARGET_TYPEMASK: x and y are not asked for.
 LEVEL_IGNORED = 0x003
-OURS = "Rebound"
 _FLIGHTS = 5
-# Heartbeats come once a second; MAVSDK has found the vehicle after one, and then asks for what it wants to know.
-_GREETED_S = 4.0
-_INTERVAL_S = 0.004
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +49,6 @@ class Recorded:
     number: int
     said: Sequence[bytes]
     hit: int
-
-
-Answers = Callable[[Recorded, int], Iterator[float | None]]
 
 
 class Going(Clock):
@@ -198,69 +183,13 @@ def spread(taken: Sequence[float | None]) -> Json:
     return {"found": found, "early": early, "p50": at[0], "p99": at[1], "p999": at[2], "most": sizes[-1]}
 
 
-def compared(hits: int) -> dict[str, dict[str, Json]]:
-    """By program, quiet and busy: how the milliseconds of so many hits are spread."""
-    flights = [recorded(number) for number in range(_FLIGHTS)]
-    times = -(-hits // _FLIGHTS)
-    programs: dict[str, Answers] = {OURS: timed} | {name: of_peer(name) for name in PEERS}
+def measured(hits: int) -> dict[str, Json]:
+    """Quiet and busy: how the milliseconds of so many hits are spread."""
+    flights, times = [recorded(number) for number in range(_FLIGHTS)], -(-hits // _FLIGHTS)
 
-    def measured(answers: Answers) -> Json:
-        return spread([taken for flight in flights for taken in answers(flight, times)])
+    def spread_of_all() -> Json:
+        return spread([taken for flight in flights for taken in timed(flight, times)])
 
-    found = {name: {"quiet": measured(answers)} for name, answers in programs.items()}
+    quiet = spread_of_all()
     with busy(BUSY_LOOPS):
-        for name, answers in programs.items():
-            found[name]["busy"] = measured(answers)
-    return found
-
-
-def of_peer(name: str) -> Answers:
-    """How it answers the hits of a flight: each is played to it again."""
-
-    def answers(flight: Recorded, times: int) -> Iterator[float | None]:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ours, _peer(name, flight) as theirs:
-            ours.bind(("127.0.0.1", 0))
-            _play(flight, flight.hit - LEAD - round(_GREETED_S / _INTERVAL_S), ours, theirs)
-            for _ in range(times):
-                # The answer to the hit before is over when the setpoint is the calm one again.
-                _play(flight, flight.hit - 2 * LEAD, ours, theirs)
-                yield exchanged(flight, flight.hit - LEAD, ours, theirs)
-
-    return answers
-
-
-@contextmanager
-def _peer(name: str, flight: Recorded) -> Iterator[tuple[str, int]]:
-    """Its process, and where it is heard."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "-m", "bench.studies.speed.peers", name, str(port), str(_stamp_us(flight))]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        yield "127.0.0.1", port
-    finally:
-        process.kill()
-        process.wait()
-
-
-def _stamp_us(flight: Recorded) -> int:
-    """Of the sample that comes with the hit."""
-    for frame, _ in Decoder().feed(flight.said[flight.hit]):
-        if message_id_of(frame) == IMU:
-            message = decoded(frame)
-            assert message is not None, "the vehicle's own"
-            return int(message.time_usec)
-    raise AssertionError("a hit is found in a sample of the IMU")
-
-
-def _play(flight: Recorded, start: int, ours: socket.socket, theirs: tuple[str, int]) -> None:
-    """What the vehicle said up to shortly before the hit, at its pace; what comes back is passed over."""
-    began_s = time.monotonic()
-    for number, interval in enumerate(range(max(start, 0), flight.hit - LEAD)):
-        time.sleep(max(began_s + number * _INTERVAL_S - time.monotonic(), 0.0))
-        ours.sendto(flight.said[interval], theirs)
-    ours.setblocking(False)
-    with suppress(BlockingIOError):
-        while True:
-            ours.recv(65_536)
+        return {"quiet": quiet, "busy": spread_of_all()}

@@ -1,24 +1,61 @@
 """`bench speed`: how many times real time, and the budget of an interval; or the calls, or the latency, alone."""
 
+import gc
 import os
+import statistics
+import tempfile
 from argparse import Namespace
+from pathlib import Path
+from time import perf_counter_ns, process_time
 
+from pymavlink.dialects.v20 import development as dialect
+
+from bench.fly.lockstep import flown_in
 from bench.rows.tables import Page, table
-from bench.stamps import FLOWN
-from bench.studies.speed.budget import measured_budget
-from bench.studies.speed.calls import calls_an_interval, hold_to
-from bench.studies.speed.flight import fly, parse_us
-from bench.studies.speed.latency import compared
-from bench.studies.speed.parts import PARTS
+from bench.stamps import FLOWN, ROOT
+from bench.studies.speed.latency import measured
+from bench.studies.speed.parts import PARTS, calls_an_interval, hold_to, measured_budget
+from rebound_cli.inputs import load_mission_document, mission_from, world_from
 
 CODE = (*FLOWN, "rebound_cli")
+MISSION = ROOT / "missions" / "wall.yaml"
+_REPEATS = 2000
+
+
+def fly() -> tuple[float, float]:
+    """One flight as `rebound fly wall --lockstep` flies it, with its log: virtual time over wall clock, and over what
+    this process had of a processor.
+    """
+    document = load_mission_document(MISSION, [], None, None)
+    world = world_from(document)
+    with tempfile.TemporaryDirectory() as folder:
+        # What flights before have left is not this one's.
+        gc.collect()
+        mission, begun_s = mission_from(document, world), process_time()
+        flown, _, _ = flown_in(Path(folder), mission, world.scene, world.airframe)
+        processor_s = process_time() - begun_s
+    virtual_s = (flown.report.ended_at_us - flown.report.started_at_us) * 1e-6
+    return virtual_s / flown.wall_clock_s, virtual_s / processor_s
+
+
+def parse_us(repeats: int = _REPEATS) -> float:
+    """One HIGHRES_IMU through pymavlink's own parser, whose checksum is fastcrc's: median microseconds."""
+    link = dialect.MAVLink(None, 1, 1)
+    force, rates, field, air = (0.1, -0.2, -9.8), (0.01, 0.02, -0.03), (0.2, 0.0, 0.4), (950.0, 0.0, 490.0, 20.0)
+    packet = bytes(dialect.MAVLink_highres_imu_message(12_345_678, *force, *rates, *field, *air, 0x3F, 0).pack(link))
+    spent = []
+    for _ in range(repeats):
+        begun = perf_counter_ns()
+        link.parse_buffer(packet)
+        spent.append(perf_counter_ns() - begun)
+    return statistics.median(spent) / 1e3
 
 
 def run_speed(options: Namespace) -> int:
     """0 when it is measured, whatever it says."""
     if options.calls:
         fly()  # what is imported or compiled at first counts for nothing
-        calls = calls_an_interval()
+        calls = calls_an_interval(fly)
         hold_to(calls)
         print(f"{sum(calls.values()):.1f} calls an interval: {calls}")
         return 0
@@ -56,7 +93,7 @@ def flights_table(flights: int) -> str:
 
 
 def budget_table(flights: int) -> str:
-    budget, calls = measured_budget(flights), calls_an_interval()
+    budget, calls = measured_budget(fly, flights), calls_an_interval(fly)
     spent = {part.name: (budget.mean_us[part.name], calls[part.name]) for part in PARTS}
     spent["together"] = (budget.total_us, sum(calls.values()))
     return table(
@@ -71,9 +108,7 @@ def latency_table(hits: int) -> str:
     """Milliseconds."""
     columns = {"p50": "p50", "p99": "p99", "p999": "p99.9", "most": "most"}
     rows = [
-        {"program": name, "beside it": state, "setpoints": row["found"]}
-        | {label: f"{row[key]:.2f}" for key, label in columns.items()}
-        for name, states in compared(hits).items()
-        for state, row in states.items()
+        {"beside it": state, "setpoints": row["found"]} | {label: f"{row[key]:.2f}" for key, label in columns.items()}
+        for state, row in measured(hits).items()
     ]
     return table(rows)

@@ -5,13 +5,11 @@ import json
 import pytest
 
 from bench.cases.missions import MissionCase
-from bench.fly.campaign import Campaign, Results
+from bench.fly.campaign import Results
 from bench.main import main
-from bench.rows.judge import work_out_mission
-from bench.rows.tables import MET, MISSED, REPORTED
+from bench.rows.tables import MET, MISSED
 from bench.studies import campaign as command
-from bench.studies.campaign import changes, failures_table, hit_rows, mission_rows, missions_campaign, tables
-from bench.studies.mission_bars import mission_bars
+from bench.studies.campaign import failures_table, hit_rows, mission_bars, mission_rows, missions_campaign, tables
 
 pytestmark = pytest.mark.slow
 
@@ -56,15 +54,6 @@ def made_up(count=200, failing=(), **changes):
             "hits": [{**HIT, **changes} if case.seed == 1 else dict(HIT)],
         }
     return campaign, results
-
-
-def losing(without_m, with_m):
-    """What the first hit of every fifth mission loses without and with the feed-forward of the height."""
-    campaign, results = made_up(count=20)
-    for number, case in enumerate(campaign.cases):
-        if case.seed % 5 == 0:
-            results[number]["hits"][0]["lost_m"] = with_m if case.feed_forward else without_m
-    return bars_of((campaign, results))
 
 
 def frames(flown):
@@ -116,15 +105,6 @@ def test_guards_that_swing_in_and_hits_that_pin_the_vehicle_are_reported_apart()
     assert "50.0 cm" not in next(bar.measured for bar in bars if "tip it" in bar.what)
 
 
-def test_the_feed_forward_halves_what_is_lost_without_it():
-    assert verdicts(losing(0.2, 0.09), "without the feed-forward") == [MET, MET]
-    assert verdicts(losing(0.2, 0.11), "without the feed-forward") == [MISSED, MISSED]
-    # those flown again for that count in no other bar
-    assert "5 missions, 1 not" in bars_of(made_up(count=5, failing=[5]))[0].of
-    # less than 5 cm is not looked at
-    assert verdicts(losing(0.04, 0.04), "without the feed-forward") == [REPORTED, REPORTED]
-
-
 def test_every_failure_is_listed_with_seed_cause_and_the_command_to_see_it_again():
     flights, hits = frames(made_up(failing=[17]))
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in failures_table(flights).splitlines()]
@@ -134,32 +114,18 @@ def test_every_failure_is_listed_with_seed_cause_and_the_command_to_see_it_again
     assert "fell" in tables(flights, hits)["Missions that did not end as they say"]
 
 
-def test_a_mission_that_fails_in_one_of_two_versions_is_told():
-    before, now = (frames(made_up(count=4, failing=[seed]))[0] for seed in (2, 3))
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in changes(now, before).splitlines()[2:]]
-    assert [(row[0], row[3], row[4]) for row in rows] == [
-        *[("2", "mended", "fell")] * 2,
-        *[("3", "new", "fell")] * 2,
-    ]
-    assert changes(now, now) == "None.\n"
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The command on one mission; no hits with the laws, which have a campaign of their own."""
+    """The command on one mission."""
     folder = tmp_path_factory.mktemp("campaign")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command, "laws_campaign", lambda seeds: Campaign("recoveries", {}, [], work_out_mission))
-        patch.setattr(command, "law_rows", lambda *_: None)
-        patch.setattr(command, "law_bars", lambda *_: [])
-        patch.setattr(command, "law_table", lambda *_: "")
         patch.chdir(folder)
         words = ["--missions", "1", "--first-seed", SEED, "--jobs", "1", "--out", str(folder / "docs")]
         code = main(["campaign", *words])
     return code, folder
 
 
-def test_the_command_writes_a_page_its_rows_and_a_record_to_go_on_from(written, monkeypatch):
+def test_the_command_writes_a_page_its_rows_and_a_record_to_go_on_from(written):
     code, folder = written
     assert code == 0
     text = (folder / "docs" / "campaign.md").read_text()
@@ -169,19 +135,6 @@ def test_the_command_writes_a_page_its_rows_and_a_record_to_go_on_from(written, 
     assert [(flight["seed"], flight["airframe"]) for flight in flights] == [(4, "foldable"), (4, "rigid")]
     (record,) = folder.rglob("missions-*.jsonl")
     assert len(record.read_text().splitlines()) == 1 + 2
-    # When the record is looked at, beside itself
-    monkeypatch.chdir(folder)
-    assert main(["campaign", "page", "--against", str(record), "--out", "page.md"]) == 0
-    # Then nothing has changed, and its worst hits are named with the command that flies them again
-    page = (folder / "page.md").read_text()
-    assert "## What has changed\n\nNone." in page and f"`python -m bench campaign --only {SEED}`" in page
-
-
-@pytest.mark.parametrize("text", ["", "nonsense\n", '{"campaign":"hits","version":"1","parameters":{}}\n'])
-def test_another_file_is_no_record(tmp_path, capsys, text):
-    (tmp_path / "record.jsonl").write_text(text)
-    assert main(["campaign", "page", str(tmp_path / "record.jsonl")]) == 1
-    assert len(capsys.readouterr().err.strip().splitlines()) == 1
 
 
 def test_a_single_mission_again_is_the_same_flight_with_its_whole_folder(written, tmp_path, capsys):
@@ -213,5 +166,4 @@ def test_cases_are_seeds_in_turn_with_both_airframes():
     both = ("foldable", "rigid")
     assert missions_campaign(2, first_seed=9).cases == [
         *[MissionCase(seed, name) for seed in (9, 10) for name in both],
-        *[MissionCase(10, name, feed_forward=False) for name in both],
     ]

@@ -7,11 +7,11 @@ import time
 import pytest
 from pymavlink import mavutil
 
-from bench.studies.cable import Cable
 from companion.mavlink.delivery import Delivery
 from companion.shell.tlog import read_tlog
 from sim_vehicle.testing import start_vehicle
 from tests.rebound_cli.command import HOP, QUICK, SQUARE, assert_comes_again, events_of, run, start, wait_for_event
+from tests.rebound_cli.live.cable import Cable
 
 pytestmark = pytest.mark.realtime
 
