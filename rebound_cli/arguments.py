@@ -219,9 +219,9 @@ def add_sim(commands: Commands) -> None:
     _option(sim, "--link", text, "URL", action="append", default=[])
     _option(sim, "--instance", "adds N to the UDP ports and to the system's number", "N", type=instance, default=0)
     _option(sim, "--truth", "write what really happened to this .npz file at the end", "FILE")
-    text = "how it is given a key of message signing: by SETUP_SIGNING on any link, or as PX4 1.17"
-    _option(sim, "--signing", text, choices=("any-link", "px4-1.17"), default="any-link")
-    _option(sim, "--signing-key", "it has this key, and MAV_SIGN_CFG is 1", "FILE")
+    # Of earlier versions.
+    _option(sim, "--signing", argparse.SUPPRESS, choices=("any-link", "px4-1.17"))
+    _option(sim, "--signing-key", "it has this key and signs as PX4 1.17 does; MAV_SIGN_CFG is 1", "FILE")
     _flag(sim, "--stop-with-stdin", "end when standard input ends")
 
 

@@ -51,7 +51,7 @@ class SimulatedVehicle:
 
         ``epoch_at_boot_us``: Unix time when the vehicle's clock was at zero, which it tells who asks for the time.
         ``parameters``: values in place of PX4's defaults and the airframe's.
-        ``signing``: the key that it has from the start, and how it is given another.
+        ``signing``: the key that it has.
 
         Raises SceneError where a wall passes through the start position.
         """
