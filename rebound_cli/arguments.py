@@ -114,6 +114,17 @@ def _option(parser: Parser | Group, name: str, text: str, metavar: str | None = 
     parser.add_argument(name, metavar=metavar, help=text, **more)
 
 
+class _Gone(argparse.Action):
+    """An option of earlier versions: whoever gives it is told in a sentence what there is now."""
+
+    def __call__(self, parser: Parser, *_: object) -> None:
+        parser.error(f"{self.option_strings[0]} is gone: {self.const}.")
+
+
+def _gone(parser: Parser, name: str, instead: str) -> None:
+    parser.add_argument(name, nargs="?", action=_Gone, const=instead, help=argparse.SUPPRESS)
+
+
 def _flag(parser: Parser, name: str, text: str) -> None:
     parser.add_argument(name, action="store_true", help=text)
 
@@ -352,8 +363,9 @@ def add_replay(commands: Commands) -> None:
     replay.add_argument("--any-mode", action="store_true", help=text)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
-    text = "PX4's own log of a run: write a copy of it with the run's events, hits and setpoints"
-    _option(replay, "--merge", text, "FILE")
+    _gone(
+        replay, "--merge", "`rebound logs export RUN --format ulg` writes a log with a flight's events and hits"
+    )
     _option(replay, "--out", "folder of the pictures (default: runs/replay-<name of the log>)", "DIR")
     _add_json(replay, "findings")
 

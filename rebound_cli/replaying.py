@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from companion.errors import ConfigurationError
 from companion.guard.config import GuardConfig
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
@@ -28,15 +27,12 @@ def run_replay(options: Namespace) -> int:
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
     folder = options.out or RUNS_FOLDER / f"replay-{slug}"
     pictures = _draw(replay, folder)
-    merged = _merged(options, replay, shown, folder)
     if options.json:
         print(json.dumps(report_data(replay, pictures), indent=2))
     else:
         console.print(report_text(replay, pictures).rstrip())
     if pictures:
         console.print(f"page: {write_page(shown(), folder / REPORT_NAME)}")
-    if merged is not None:
-        console.print(merged)
     return _exit_code(replay, options.expect, options.least_watched, console)
 
 
@@ -67,20 +63,6 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     modes = None if options.any_mode else GuardConfig().modes
     replay = replay_log(log, config, options.rate, listener.listen, modes)
     return replay, partial(replayed_flight, replay, config, listener)
-
-
-def _merged(options: Namespace, replay: Replay, shown: Callable[[], ShownFlight], folder: Path) -> str | None:
-    """Where the log is to which the flight was added, and how well the two go together."""
-    if options.merge is None:
-        return None
-    if replay.reproduction is None:
-        raise ConfigurationError("--merge goes with a run's folder, and without what makes another flight of it.")
-    from rebound_cli.export.merging import merge
-
-    out = folder / f"{options.merge.stem}-merged.ulg"
-    folder.mkdir(parents=True, exist_ok=True)
-    fit = merge(shown(), replay.log, options.merge, out)
-    return f"{options.merge}: {fit.text()}\nmerged: {out}"
 
 
 def _draw(replay: Replay, folder: Path) -> Sequence[str]:

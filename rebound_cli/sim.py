@@ -65,9 +65,7 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
     parameters = {"MAV_SYS_ID": options.instance + 1, **time_outs_at(options.speed)}
     parameters |= {} if key is None else {"MAV_SIGN_CFG": 1.0}
     epoch_us = time.time_ns() // 1000
-    vehicle = SimulatedVehicle(
-        world.airframe, world.scene, world.seed, True, epoch_us, parameters, Signing(key)
-    )
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed, True, epoch_us, parameters, Signing(key))
     vehicle.truth.on_hit = partial(_tell_of, console)
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)
