@@ -70,16 +70,6 @@ def _expected(text: str) -> int:
     return 0 if text == "none" else int(text)
 
 
-def _home(text: str) -> tuple[float, float, float]:
-    try:
-        latitude_deg, longitude_deg, altitude_m = map(float, (text if text.count(",") > 1 else f"{text},0").split(","))
-    except ValueError:
-        latitude_deg = longitude_deg = altitude_m = math.nan
-    if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0 and math.isfinite(altitude_m)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not LAT,LON or LAT,LON,ALT, such as 47.3977,8.5456,488")
-    return latitude_deg, longitude_deg, altitude_m
-
-
 def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
@@ -333,20 +323,14 @@ def add_check(commands: Commands) -> None:
 
 
 def add_plan(commands: Commands) -> None:
-    text = "Reads and writes QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
-    plan = commands.add_parser("plan", help="missions from and for QGroundControl", description=text)
-    ways = plan.add_subparsers(required=True, metavar="import|export")
+    text = "Reads QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
+    plan = commands.add_parser("plan", help="missions from QGroundControl", description=text)
+    ways = plan.add_subparsers(required=True, metavar="import")
     text = "Makes a mission of a .plan."
     reading = _command(ways, "import", "plan.command:run_import", "a mission file from a .plan", text)
     _option(reading, "plan", "QGroundControl's file", "PLAN", type=Path)
     _option(reading, "--name", "name of the mission (default: the file's)")
-    text = "Makes a .plan of a mission."
-    writing = _command(ways, "export", "plan.command:run_export", "a .plan from a mission file", text)
-    writing.add_argument("mission", type=mission_file, metavar="MISSION")
-    text = "where the vehicle will be armed: degrees, and metres above sea level (default 0)"
-    _option(writing, "--home", text, "LAT,LON[,ALT]", type=_home, required=True)
-    for parser in (reading, writing):
-        _option(parser, "--out", "default: standard output", "FILE")
+    _option(reading, "--out", "default: standard output", "FILE")
 
 
 def add_replay(commands: Commands) -> None:
@@ -363,9 +347,7 @@ def add_replay(commands: Commands) -> None:
     replay.add_argument("--any-mode", action="store_true", help=text)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
-    _gone(
-        replay, "--merge", "`rebound logs export RUN --format ulg` writes a log with a flight's events and hits"
-    )
+    _gone(replay, "--merge", "`rebound logs export RUN --format ulg` writes a log with a flight's events and hits")
     _option(replay, "--out", "folder of the pictures (default: runs/replay-<name of the log>)", "DIR")
     _add_json(replay, "findings")
 

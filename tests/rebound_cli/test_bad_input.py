@@ -110,7 +110,6 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
         (("sim", "--sensor-rate", "333"), "--sensor-rate"),
         (("sim", "--autopilot", "apm"), "--autopilot"),
         (("identify", "hit.csv", "--mass", "nan"), "'nan' is not a mass"),
-        (("plan", "export", "missions/hover.yaml", "--home", "nan,8"), "'nan,8' is not LAT,LON"),
     ],
 )
 def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):
