@@ -368,7 +368,14 @@ def add_identify(commands: Commands) -> None:
     text = "Fits stiffness, damping and restitution to hits on a wall; see docs/how-to/airframes.md."
     summary = "find an airframe's springs in recorded hits"
     identify = _command(commands, "identify", "identification.command:run_identify", summary, text)
-    _option(identify, "data", "a CSV file, a .tlog or a run's folder: one hit each", "DATA", type=Path, nargs="+")
+    _option(
+        identify,
+        "data",
+        "a CSV file, or a log or run's folder as replay reads it: one hit each",
+        "DATA",
+        type=Path,
+        nargs="+",
+    )
     _option(identify, "--mass", "of the vehicle; known for simulated runs", "KG", type=mass_kg)
     _option(identify, "--axis", "CSV: it is square to the wall (default: by the turn)", choices=("x", "y"))
     _option(identify, "--out", "write an airframe file", "FILE")

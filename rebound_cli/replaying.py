@@ -10,14 +10,13 @@ from pathlib import Path
 from companion.guard.config import GuardConfig
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
-from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.listening import Listener
-from rebound_cli.replay.recording import is_run_folder, read_recording, settings_file
+from rebound_cli.replay.recording import is_run_folder, log_file, read_recording, settings_file
 from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
 from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
 from rebound_cli.report.writer import write_page
-from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, TLOG_NAME, versions
+from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
 
 
 def run_replay(options: Namespace) -> int:
@@ -38,10 +37,8 @@ def run_replay(options: Namespace) -> int:
 
 def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], ShownFlight]]:
     """What was found, and all that a page shows of it."""
-    listener = Listener()
+    listener, file = Listener(), log_file(options.log)
     folder = options.log if is_run_folder(options.log) else None
-    if options.log.is_dir() and folder is None:
-        raise LogError(f"{options.log}: no {TLOG_NAME} in this folder; give a run's folder or a file.")
     # Options under which a flight is no longer the one that was flown.
     changing = ("detector", "rate", "companion", "set", "any_mode")
     changed = [f"--{name.replace('_', '-')}" for name in changing if getattr(options, name) not in (None, [], False)]
@@ -51,7 +48,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
         other = [f"{name} {then[name]}, now {now.get(name)}" for name in then if now.get(name) != then[name]]
         if other:
             console.print(f"flown with other versions, so bits may differ: {'; '.join(other)}")
-        replay = replay_flight(read_telemetry(folder / TLOG_NAME), recording, listener)
+        replay = replay_flight(read_telemetry(file), recording, listener)
         assert replay.reproduction is not None, "a flight of our own is decided again"
         return replay, partial(decided_again, folder, recording, replay.reproduction, listener)
     settings = options.companion
@@ -59,7 +56,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
         console.print(f"with {', '.join(changed)} the flight's own decisions cannot come again and are not compared")
         settings = settings_file(folder)
     config = companion_settings(settings, options.set, options.detector)
-    log = read_log(options.log if folder is None else folder / TLOG_NAME)
+    log = read_log(file)
     modes = None if options.any_mode else GuardConfig().modes
     replay = replay_log(log, config, options.rate, listener.listen, modes)
     return replay, partial(replayed_flight, replay, config, listener)

@@ -10,6 +10,8 @@ from rebound_cli.identification.capture import find_hit, read_table
 from rebound_cli.identification.fit import Identified, Number, Spring, identify
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
+from rebound_cli.logs.reader import read_log
+from rebound_cli.replay.recording import log_file
 from rebound_cli.results import run_folder
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 
@@ -37,12 +39,7 @@ def run_identify(options: Namespace) -> int:
 
 
 def _hit(path: Path, axis: int | None) -> Hit:
-    if path.is_dir():
-        path = path / run_folder.TLOG_NAME
-        if not path.exists():
-            text = f"no {run_folder.TLOG_NAME} in this folder; give a run's folder or a file"
-            raise IdentificationError(f"{path.parent}: {text}.")
-    return flight_hit(path) if path.suffix == ".tlog" else find_hit(read_table(path), axis)
+    return find_hit(read_table(path), axis) if path.suffix.lower() == ".csv" else flight_hit(read_log(log_file(path)))
 
 
 def _mass_kg(options: Namespace) -> float | None:
