@@ -198,7 +198,7 @@ def add_init(commands: Commands) -> None:
 
 def add_sim(commands: Commands) -> None:
     text = "A simulated PX4 quadrotor for any MAVLink client."
-    sim = _command(commands, "sim", "sim:run_sim", "run the simulated vehicle alone", text)
+    sim = _command(commands, "sim", "simulation.command:run_sim", "run the simulated vehicle alone", text)
     _option(sim, "--mission", "mission file whose sim: part describes the world", "FILE")
     _add_world_options(sim)
     text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/how-to/px4.md"

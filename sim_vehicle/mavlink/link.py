@@ -17,10 +17,10 @@ from sim_vehicle.mavlink.services.mission_service import MissionService
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
 from sim_vehicle.mavlink.services.service import BusyService, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
+from sim_vehicle.mavlink.services.texts import TextLink
 from sim_vehicle.mavlink.signing import OPTIONAL
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
-from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.parameters.store import Parameters
 
 # Of a serial line's buffer, for the streams between the packets of a long answer.

@@ -12,9 +12,9 @@ from sim_vehicle.autopilot.messages import CommandAck, Identity, Result, Severit
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
+from sim_vehicle.mavlink.services.texts import TextLink
 from sim_vehicle.mavlink.streams import condition
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, PASSED
-from sim_vehicle.physics.surroundings import Surroundings
+from sim_vehicle.physics.touching.proximity import IN_FRONT, INSIDE, PASSED
+from sim_vehicle.physics.touching.surroundings import Surroundings
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Motion, Obstacle, Pole, Wall, build_world
 
 STEP_US = 4000
