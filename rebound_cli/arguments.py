@@ -70,16 +70,6 @@ def _expected(text: str) -> int:
     return 0 if text == "none" else int(text)
 
 
-def _home(text: str) -> tuple[float, float, float]:
-    try:
-        latitude_deg, longitude_deg, altitude_m = map(float, (text if text.count(",") > 1 else f"{text},0").split(","))
-    except ValueError:
-        latitude_deg = longitude_deg = altitude_m = math.nan
-    if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0 and math.isfinite(altitude_m)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not LAT,LON or LAT,LON,ALT, such as 47.3977,8.5456,488")
-    return latitude_deg, longitude_deg, altitude_m
-
-
 def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
@@ -112,6 +102,17 @@ def _option(parser: Parser | Group, name: str, text: str, metavar: str | None = 
     if metavar in _PATHS:
         more = {"type": Path, **more}
     parser.add_argument(name, metavar=metavar, help=text, **more)
+
+
+class _Gone(argparse.Action):
+    """An option of earlier versions: whoever gives it is told in a sentence what there is now."""
+
+    def __call__(self, parser: Parser, *_: object) -> None:
+        parser.error(f"{self.option_strings[0]} is gone: {self.const}.")
+
+
+def _gone(parser: Parser, name: str, instead: str) -> None:
+    parser.add_argument(name, nargs="?", action=_Gone, const=instead, help=argparse.SUPPRESS)
 
 
 def _flag(parser: Parser, name: str, text: str) -> None:
@@ -197,7 +198,7 @@ def add_init(commands: Commands) -> None:
 
 def add_sim(commands: Commands) -> None:
     text = "A simulated PX4 quadrotor for any MAVLink client."
-    sim = _command(commands, "sim", "sim:run_sim", "run the simulated vehicle alone", text)
+    sim = _command(commands, "sim", "simulation.command:run_sim", "run the simulated vehicle alone", text)
     _option(sim, "--mission", "mission file whose sim: part describes the world", "FILE")
     _add_world_options(sim)
     text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/how-to/px4.md"
@@ -219,9 +220,9 @@ def add_sim(commands: Commands) -> None:
     _option(sim, "--link", text, "URL", action="append", default=[])
     _option(sim, "--instance", "adds N to the UDP ports and to the system's number", "N", type=instance, default=0)
     _option(sim, "--truth", "write what really happened to this .npz file at the end", "FILE")
-    text = "how it is given a key of message signing: by SETUP_SIGNING on any link, or as PX4 1.17"
-    _option(sim, "--signing", text, choices=("any-link", "px4-1.17"), default="any-link")
-    _option(sim, "--signing-key", "it has this key, and MAV_SIGN_CFG is 1", "FILE")
+    # Of earlier versions.
+    _option(sim, "--signing", argparse.SUPPRESS, choices=("any-link", "px4-1.17"))
+    _option(sim, "--signing-key", "it has this key and signs as PX4 1.17 does; MAV_SIGN_CFG is 1", "FILE")
     _flag(sim, "--stop-with-stdin", "end when standard input ends")
 
 
@@ -322,20 +323,14 @@ def add_check(commands: Commands) -> None:
 
 
 def add_plan(commands: Commands) -> None:
-    text = "Reads and writes QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
-    plan = commands.add_parser("plan", help="missions from and for QGroundControl", description=text)
-    ways = plan.add_subparsers(required=True, metavar="import|export")
+    text = "Reads QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
+    plan = commands.add_parser("plan", help="missions from QGroundControl", description=text)
+    ways = plan.add_subparsers(required=True, metavar="import")
     text = "Makes a mission of a .plan."
     reading = _command(ways, "import", "plan.command:run_import", "a mission file from a .plan", text)
     _option(reading, "plan", "QGroundControl's file", "PLAN", type=Path)
     _option(reading, "--name", "name of the mission (default: the file's)")
-    text = "Makes a .plan of a mission."
-    writing = _command(ways, "export", "plan.command:run_export", "a .plan from a mission file", text)
-    writing.add_argument("mission", type=mission_file, metavar="MISSION")
-    text = "where the vehicle will be armed: degrees, and metres above sea level (default 0)"
-    _option(writing, "--home", text, "LAT,LON[,ALT]", type=_home, required=True)
-    for parser in (reading, writing):
-        _option(parser, "--out", "default: standard output", "FILE")
+    _option(reading, "--out", "default: standard output", "FILE")
 
 
 def add_replay(commands: Commands) -> None:
@@ -352,8 +347,7 @@ def add_replay(commands: Commands) -> None:
     replay.add_argument("--any-mode", action="store_true", help=text)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
-    text = "PX4's own log of a run: write a copy of it with the run's events, hits and setpoints"
-    _option(replay, "--merge", text, "FILE")
+    _gone(replay, "--merge", "`rebound logs export RUN --format ulg` writes a log with a flight's events and hits")
     _option(replay, "--out", "folder of the pictures (default: runs/replay-<name of the log>)", "DIR")
     _add_json(replay, "findings")
 
@@ -374,7 +368,14 @@ def add_identify(commands: Commands) -> None:
     text = "Fits stiffness, damping and restitution to hits on a wall; see docs/how-to/airframes.md."
     summary = "find an airframe's springs in recorded hits"
     identify = _command(commands, "identify", "identification.command:run_identify", summary, text)
-    _option(identify, "data", "a CSV file, a .tlog or a run's folder: one hit each", "DATA", type=Path, nargs="+")
+    _option(
+        identify,
+        "data",
+        "a CSV file, or a log or run's folder as replay reads it: one hit each",
+        "DATA",
+        type=Path,
+        nargs="+",
+    )
     _option(identify, "--mass", "of the vehicle; known for simulated runs", "KG", type=mass_kg)
     _option(identify, "--axis", "CSV: it is square to the wall (default: by the turn)", choices=("x", "y"))
     _option(identify, "--out", "write an airframe file", "FILE")

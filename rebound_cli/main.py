@@ -17,18 +17,24 @@ _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 # Whoever ends these at once leaves a vehicle to itself.
 COMMANDING = ("fly", "guard")
 
-# Studies that were commands of the drone's program once, and what they are in the laboratory.
-MOVED = {name: name for name in ("paper", "detectors", "campaign")}
-MOVED |= {"results": "paper results", "recoveries": "campaign recoveries"}
+# Commands of earlier versions, and what there is in their place. Studies are in the laboratory now.
+GONE = {
+    name: f"is now 'python -m bench {study}', run in a checkout of Rebound"
+    for name, study in (
+        *((name, name) for name in ("paper", "detectors", "campaign")),
+        *(("results", "paper results"), ("recoveries", "campaign recoveries")),
+    )
+}
+GONE["plan export"] = "is gone: what follows a hit has no place in a .plan; fly the mission with 'rebound fly'"
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = _with_plain_sim(sys.argv[1:] if words is None else words)
-    if words and words[0] in MOVED:
-        text = f"'rebound {words[0]}' is now 'python -m bench {MOVED[words[0]]}', run in a checkout of Rebound"
-        print(f"rebound: {text}.", file=sys.stderr)
-        return exit_codes.ERROR
+    for command in (" ".join(words[:1]), " ".join(words[:2])):
+        if command in GONE:
+            print(f"rebound: 'rebound {command}' {GONE[command]}.", file=sys.stderr)
+            return exit_codes.ERROR
     return run(build_parser().parse_args(words), "rebound")
 
 

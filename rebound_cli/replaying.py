@@ -7,18 +7,16 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from companion.errors import ConfigurationError
 from companion.guard.config import GuardConfig
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
-from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.listening import Listener
-from rebound_cli.replay.recording import is_run_folder, read_recording, settings_file
+from rebound_cli.replay.recording import is_run_folder, log_file, read_recording, settings_file
 from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
 from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
 from rebound_cli.report.writer import write_page
-from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, TLOG_NAME, versions
+from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
 
 
 def run_replay(options: Namespace) -> int:
@@ -28,24 +26,19 @@ def run_replay(options: Namespace) -> int:
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
     folder = options.out or RUNS_FOLDER / f"replay-{slug}"
     pictures = _draw(replay, folder)
-    merged = _merged(options, replay, shown, folder)
     if options.json:
         print(json.dumps(report_data(replay, pictures), indent=2))
     else:
         console.print(report_text(replay, pictures).rstrip())
     if pictures:
         console.print(f"page: {write_page(shown(), folder / REPORT_NAME)}")
-    if merged is not None:
-        console.print(merged)
     return _exit_code(replay, options.expect, options.least_watched, console)
 
 
 def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], ShownFlight]]:
     """What was found, and all that a page shows of it."""
-    listener = Listener()
+    listener, file = Listener(), log_file(options.log)
     folder = options.log if is_run_folder(options.log) else None
-    if options.log.is_dir() and folder is None:
-        raise LogError(f"{options.log}: no {TLOG_NAME} in this folder; give a run's folder or a file.")
     # Options under which a flight is no longer the one that was flown.
     changing = ("detector", "rate", "companion", "set", "any_mode")
     changed = [f"--{name.replace('_', '-')}" for name in changing if getattr(options, name) not in (None, [], False)]
@@ -55,7 +48,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
         other = [f"{name} {then[name]}, now {now.get(name)}" for name in then if now.get(name) != then[name]]
         if other:
             console.print(f"flown with other versions, so bits may differ: {'; '.join(other)}")
-        replay = replay_flight(read_telemetry(folder / TLOG_NAME), recording, listener)
+        replay = replay_flight(read_telemetry(file), recording, listener)
         assert replay.reproduction is not None, "a flight of our own is decided again"
         return replay, partial(decided_again, folder, recording, replay.reproduction, listener)
     settings = options.companion
@@ -63,24 +56,10 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
         console.print(f"with {', '.join(changed)} the flight's own decisions cannot come again and are not compared")
         settings = settings_file(folder)
     config = companion_settings(settings, options.set, options.detector)
-    log = read_log(options.log if folder is None else folder / TLOG_NAME)
+    log = read_log(file)
     modes = None if options.any_mode else GuardConfig().modes
     replay = replay_log(log, config, options.rate, listener.listen, modes)
     return replay, partial(replayed_flight, replay, config, listener)
-
-
-def _merged(options: Namespace, replay: Replay, shown: Callable[[], ShownFlight], folder: Path) -> str | None:
-    """Where the log is to which the flight was added, and how well the two go together."""
-    if options.merge is None:
-        return None
-    if replay.reproduction is None:
-        raise ConfigurationError("--merge goes with a run's folder, and without what makes another flight of it.")
-    from rebound_cli.export.merging import merge
-
-    out = folder / f"{options.merge.stem}-merged.ulg"
-    folder.mkdir(parents=True, exist_ok=True)
-    fit = merge(shown(), replay.log, options.merge, out)
-    return f"{options.merge}: {fit.text()}\nmerged: {out}"
 
 
 def _draw(replay: Replay, folder: Path) -> Sequence[str]:

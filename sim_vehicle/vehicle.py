@@ -8,6 +8,7 @@ from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Identity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.hil.slow_sensors import SlowSensors
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.services.board import Board
@@ -22,7 +23,6 @@ from sim_vehicle.physics.layout import PlantState
 from sim_vehicle.plant.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
 from sim_vehicle.setpoint import TrajectorySetpoint
-from sim_vehicle.slow_sensors import SlowSensors
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Vector3
 
@@ -51,7 +51,7 @@ class SimulatedVehicle:
 
         ``epoch_at_boot_us``: Unix time when the vehicle's clock was at zero, which it tells who asks for the time.
         ``parameters``: values in place of PX4's defaults and the airframe's.
-        ``signing``: the key that it has from the start, and how it is given another.
+        ``signing``: the key that it has.
 
         Raises SceneError where a wall passes through the start position.
         """

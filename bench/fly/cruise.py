@@ -27,8 +27,8 @@ from bench.fly.wire import VehicleRecording
 from companion.messages import LandedState
 from companion.reflex.detector import Situation
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.cruise import Cruise
 from sim_vehicle.physics.layout import HIT_ACTIVE
+from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit

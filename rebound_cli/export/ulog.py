@@ -1,21 +1,19 @@
-"""Flights as PX4's own logs (.ulg), and more in a log that PX4 wrote: docs.px4.io, ULog File Format.
+"""Flights as PX4's own logs (.ulg): docs.px4.io, ULog File Format.
 
 Topics and fields are PX4's own, with what its link has carried of them: `rebound_cli.logs.ulog` reads them back.
 """
 
 import math
 import struct
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from companion import messages
-from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample
+from rebound_cli.logs.log import Demand, Log, LoggedSample
 from rebound_cli.logs.ulog import NAV_STATES
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.shown_flight import ShownFlight
@@ -26,8 +24,7 @@ Floats = npt.NDArray[np.float64]
 
 _MAGIC = b"ULog\x01\x12\x35\x01"
 _HEAD = struct.Struct("<HB")
-_KINDS = b"BFIMPQARDLCSO"
-_FLAG_BITS_SIZE, _OFFSETS_AT = 40, 16
+_FLAG_BITS_SIZE = 40
 _LETTERS = {"float": "f", "double": "d", "uint8_t": "B", "uint32_t": "I", "uint64_t": "Q", "bool": "?"}
 # Of a logged message: Linux's levels, as digits.
 _WARNING, _INFO = b"4", b"6"
@@ -158,7 +155,7 @@ def positions_us(log: Log) -> list[int]:
     return [heard.at_us for heard in log.heard if isinstance(heard.sample, messages.LocalPosition)]
 
 
-def own_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
+def _own_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
     """What the companion knew and PX4 did not: its events, its hits, its setpoints."""
     texts = [(float(e["time_us"]), _WARNING if e["kind"] in HIT_KINDS else _INFO, e) for e in flight.events]
     for time_us, (_, level, event) in zip(boot_us(log, [at for at, *_ in texts]), texts, strict=True):
@@ -197,7 +194,7 @@ def new_ulog(flight: ShownFlight, log: Log) -> bytes:
     said = flight.log.texts
     times_us = boot_us(log, [at_us for at_us, _ in said])
     rows += [Row(int(time_us), None, (_INFO, text)) for time_us, (_, text) in zip(times_us, said, strict=True)]
-    rows += own_rows(flight, log)
+    rows += _own_rows(flight, log)
     rows += _true_rows(flight, log)
     started_us = min(row.boot_us for row in rows)
     head = _MAGIC + struct.pack("<Q", started_us) + _message("B", bytes(_FLAG_BITS_SIZE))
@@ -205,7 +202,7 @@ def new_ulog(flight: ShownFlight, log: Log) -> bytes:
     kinds = (one.sample.vehicle_type for one in heard if isinstance(one.sample, messages.Heartbeat))
     kind = next(kinds, _QUADROTOR)
     head += _keyed("P", "int32_t MAV_TYPE", struct.pack("<i", kind))
-    return with_rows(head, rows)
+    return _with_rows(head, rows)
 
 
 def _with_modes(log: Log) -> Iterator[LoggedSample]:
@@ -230,60 +227,14 @@ def _true_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
         yield Row(time_us, _TRUE_ATTITUDE, series["attitude_wxyz"][row].tolist())
 
 
-def with_rows(content: bytes, rows: Sequence[Row]) -> bytes:
-    """A log with these in it, each before what is later. Raises LogError for one without a whole head."""
-    parts = list(_parts(content))
-    if not parts or parts[0][1] != "B":
-        raise LogError("the log's head is damaged, or older than PX4 v1.8: nothing can be added to it")
-    logged = [content[at + _HEAD.size : _end(content, at)] for at, kind in parts if kind == "A"]
-    ids, before = [int.from_bytes(one[1:3], "little") for one in logged], Counter(one[3:].decode() for one in logged)
+def _with_rows(head: bytes, rows: Sequence[Row]) -> bytes:
+    """A log that begins so, with these in the order of time."""
     topics = list(dict.fromkeys(row.topic for row in rows if row.topic is not None))
-    numbers = {topic: max(ids, default=-1) + 1 + number for number, topic in enumerate(topics)}
-    begins = next((at for at, kind in parts if kind in "ADL"), len(content))
-    added = [(begins, b"".join(map(_format, topics)))]
-    for topic, number in numbers.items():
-        # A second run's are PX4's second instance of the topic.
-        added.append((begins, _message("A", struct.pack("<BH", before[topic[0]], number) + topic[0].encode())))
-    waiting = sorted(rows, key=lambda row: row.boot_us)
-    taken = 0
-    for at, kind in parts:
-        if kind == "D" and at >= begins:
-            (time_us,) = struct.unpack_from("<Q", content, at + _HEAD.size + 2)
-            while taken < len(waiting) and waiting[taken].boot_us < time_us:
-                added.append((at, _written(waiting[taken], numbers)))
-                taken += 1
-    # Behind the last whole message: one that is cut off would swallow what comes after it.
-    ends = _end(content, parts[-1][0])
-    added += [(ends, _written(row, numbers)) for row in waiting[taken:]]
-    return _spliced(content, added)
-
-
-def _spliced(content: bytes, added: Sequence[tuple[int, bytes]]) -> bytes:
-    """The bytes at their places; offsets of what PX4 has appended after a crash move with them."""
-    places = [0, *(at for at, _ in added), len(content)]
-    pieces = [content[start:end] for start, end in pairwise(places)]
-    out = bytearray(pieces[0] + b"".join(new + piece for (_, new), piece in zip(added, pieces[1:], strict=True)))
-    at = len(_MAGIC) + 8 + _HEAD.size + _OFFSETS_AT
-    offsets = struct.unpack_from("<3Q", content, at)
-    moved = [offset and offset + sum(len(new) for place, new in added if place < offset) for offset in offsets]
-    struct.pack_into("<3Q", out, at, *moved)
-    return bytes(out)
-
-
-def _parts(content: bytes) -> Iterator[tuple[int, str]]:
-    """Place and kind of each message, up to where the log is cut off or damaged."""
-    at = len(_MAGIC) + 8
-    while at + _HEAD.size <= len(content):
-        kind = content[at + 2]
-        if kind not in _KINDS or _end(content, at) > len(content):
-            return
-        yield at, chr(kind)
-        at = _end(content, at)
-
-
-def _end(content: bytes, at: int) -> int:
-    size, _ = _HEAD.unpack_from(content, at)
-    return int(at + _HEAD.size + size)
+    numbers = {topic: number for number, topic in enumerate(topics)}
+    formats = map(_format, topics)
+    added = (_message("A", struct.pack("<BH", 0, number) + name.encode()) for (name, _), number in numbers.items())
+    written = (_written(row, numbers) for row in sorted(rows, key=lambda row: row.boot_us))
+    return b"".join([head, *formats, *added, *written])
 
 
 def _message(kind: str, content: bytes) -> bytes:

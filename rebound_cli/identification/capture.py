@@ -1,4 +1,4 @@
-"""A hit in a CSV file of motion capture, and of a force sensor if it has one."""
+"""A hit in a CSV file of motion capture."""
 
 import csv
 import itertools
@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rebound_cli.identification.hit import Floats, Force, Hit, IdentificationError, Track, guards_at
+from rebound_cli.identification.hit import Floats, Hit, IdentificationError, Track, guards_at
 
 # A column is known by the end of its name: the plain names of docs/how-to/airframes.md, then what a ROS bag
 # becomes in CSV. Columns of other topics are ignored.
 _TIME = ("time_s", "__time")
 _POSITION = ("position_{}_m", "position/{}")
 _YAW = ("yaw_rad", "orientation/yaw")
-_FORCE = ("force_{}_n", "wrench/force/{}")
 # A hit needs a few samples before and after it; below this a file is a fragment.
 _FEWEST_POSITIONS = 20
 
@@ -40,21 +39,15 @@ _AROUND_S = 0.3
 # eq. 2, 38 ms from touch to turn and 63 ms from turn to release. More would take in the autopilot's doing.
 _BEFORE_TURN_S, _AFTER_TURN_S = 0.07, 0.11
 
-# The ringing after a hit is part of the impulse; half a second holds that of a mounting down to 10 Hz.
-_RINGING_S, _BEFORE_RINGING_S = 0.5, 0.1
-# A hit stands out of the force sensor's noise by at least this.
-_LEAST_PEAK_SIGMAS = 10.0
-
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Positions (n, 2) on the horizontal axes of the file's own frame, in the order of time, and the sensor's hit."""
+    """Positions (n, 2) on the horizontal axes of the file's own frame, in the order of time."""
 
     name: str
     time_s: Floats
     position_m: Floats
     yaw_rad: Floats | None
-    force: Force | None
 
 
 def read_table(path: Path) -> Table:
@@ -87,13 +80,11 @@ def read_table(path: Path) -> Table:
     # Rows of several topics are often written out of order.
     order = np.flatnonzero(sound)[np.argsort(poses[sound, 0], kind="stable")]
     yaw = column(_YAW, is_needed=False)
-    forces = [values for axis in "xyz" if (values := column(_FORCE, axis, is_needed=False)) is not None]
     return Table(
         name=path.stem,
         time_s=poses[order, 0] - poses[order[0], 0],
         position_m=poses[order, 1:],
         yaw_rad=yaw[order] if yaw is not None and np.isfinite(yaw[order]).all() else None,
-        force=_force(poses[:, 0], np.column_stack(forces)) if len(forces) == 3 else None,
     )
 
 
@@ -103,21 +94,6 @@ def _number(line: list[str], index: int) -> float:
         return float(line[index])
     except (ValueError, IndexError):
         return math.nan
-
-
-def _force(time_s: Floats, force_n: Floats) -> Force | None:
-    """The largest force (n, 3) in the file less its resting value, on the sensor's own clock; None without a push."""
-    sound = np.isfinite(time_s) & np.isfinite(force_n).all(axis=1)
-    if sound.sum() < 2:
-        return None
-    time_s, force_n = time_s[sound], force_n[sound] - np.median(force_n[sound], axis=0)
-    size = np.linalg.norm(force_n, axis=1)
-    at = int(np.argmax(size))
-    if size[at] < _LEAST_PEAK_SIGMAS * float(np.median(size)):
-        return None
-    near = (time_s > time_s[at] - _BEFORE_RINGING_S) & (time_s < time_s[at] + _RINGING_S)
-    along = force_n[near] @ (force_n[at] / size[at])
-    return Force(float(along.max()), float(max(0.0, -along.min())), float(np.trapezoid(along, time_s[near])))
 
 
 def find_hit(table: Table, axis: int | None = None) -> Hit:
@@ -224,7 +200,6 @@ def _measured(table: Table, span: slice, axis: int, towards: float, at_s: float)
         along_in_m_s=float(along[start]),
         along_out_m_s=float(along[end]),
         guards=2 if table.yaw_rad is None else guards_at(float(table.yaw_rad[near[start]]) - axis * math.pi / 2),
-        force=table.force,
         track=Track(time_s[used] - time_s[start], position[used], interval_s),
     )
 

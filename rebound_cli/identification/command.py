@@ -3,7 +3,6 @@
 import json
 import math
 from argparse import Namespace
-from collections.abc import Sequence
 from pathlib import Path
 
 from rebound_cli.documents import load_document, parse_document, validated, write_text
@@ -11,6 +10,8 @@ from rebound_cli.identification.capture import find_hit, read_table
 from rebound_cli.identification.fit import Identified, Number, Spring, identify
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
+from rebound_cli.logs.reader import read_log
+from rebound_cli.replay.recording import log_file
 from rebound_cli.results import run_folder
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 
@@ -22,7 +23,7 @@ def run_identify(options: Namespace) -> int:
         raise IdentificationError(f"{out} exists already: give --out another name.")
     found = identify([_hit(path, {"x": 0, "y": 1}.get(options.axis)) for path in options.data])
     mass_kg = _mass_kg(options)
-    print(report_text(found, mass_kg), end="")
+    print(report_text(found), end="")
     if out is None:
         return 0
     if mass_kg is None:
@@ -38,12 +39,7 @@ def run_identify(options: Namespace) -> int:
 
 
 def _hit(path: Path, axis: int | None) -> Hit:
-    if path.is_dir():
-        path = path / run_folder.TLOG_NAME
-        if not path.exists():
-            text = f"no {run_folder.TLOG_NAME} in this folder; give a run's folder or a file"
-            raise IdentificationError(f"{path.parent}: {text}.")
-    return flight_hit(path) if path.suffix == ".tlog" else find_hit(read_table(path), axis)
+    return find_hit(read_table(path), axis) if path.suffix.lower() == ".csv" else flight_hit(read_log(log_file(path)))
 
 
 def _mass_kg(options: Namespace) -> float | None:
@@ -55,30 +51,16 @@ def _mass_kg(options: Namespace) -> float | None:
     return float(mass_kg) if isinstance(mass_kg, int | float) else None
 
 
-def report_text(found: Identified, mass_kg: float | None) -> str:
-    """Markdown: the hits, the force sensor, the numbers."""
+def report_text(found: Identified) -> str:
+    """Markdown: the hits and the numbers."""
     rows = [
         f"{hit.name} | {hit.at_s:.2f} s | {hit.guards} | {hit.speed_in_m_s:.3f} m/s | {hit.speed_out_m_s:.3f} ± "
         f"{hit.speed_sigma_m_s:.3f} m/s | {hit.ratio:.2f} | {hit.along_in_m_s:.2f}, {hit.along_out_m_s:.2f} m/s"
         for hit in found.hits
     ]
-    table = _table("hit | at | guards | in | out | ratio | along the wall, in and out", rows)
-    return "\n".join([*table, *_forces(found.hits, mass_kg), *_numbers(found)]) + "\n"
-
-
-def _table(head: str, rows: Sequence[str]) -> list[str]:
-    return [f"| {head} |", "|" + "---|" * (head.count("|") + 1), *(f"| {row} |" for row in rows), ""]
-
-
-def _forces(hits: Sequence[Hit], mass_kg: float | None) -> list[str]:
-    """The sensor beside the momentum: the fit does not use it, and here a reader sees whether it could."""
-    rows = [
-        f"{hit.name} | {hit.force.peak_n:.0f} N | {hit.force.pull_n:.0f} N | {hit.force.impulse_n_s:.2f} N s | "
-        + ("give --mass" if mass_kg is None else f"{mass_kg * hit.normal_change_m_s:.2f} N s")
-        for hit in hits
-        if hit.force is not None
-    ]
-    return _table("force sensor | peak | pull | impulse | mass times change of speed", rows) if rows else []
+    head = "hit | at | guards | in | out | ratio | along the wall, in and out"
+    table = [f"| {head} |", "|" + "---|" * (head.count("|") + 1), *(f"| {row} |" for row in rows), ""]
+    return "\n".join([*table, *_numbers(found)]) + "\n"
 
 
 def _numbers(found: Identified) -> list[str]:

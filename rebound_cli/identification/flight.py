@@ -1,14 +1,15 @@
-"""A hit in a flight's log: the wall's push from HIGHRES_IMU, the speeds from LOCAL_POSITION_NED."""
+"""A hit in a flight's log: the wall's push from the IMU, the speeds from the vehicle's estimate."""
 
 from collections import deque
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from companion.motion.strapdown import Strapdown
 from rebound_cli.identification.hit import Floats, Hit, IdentificationError, Push, guards_at
-from rebound_cli.results.flight_log import FlightLog, read_flight_log
+from rebound_cli.logs.log import Log
+from rebound_cli.results.flight_log import FlightLog, flight_log_of_log
+from rebound_cli.results.run_folder import TLOG_NAME
 
 # A touch: above the lateral specific force of the detector's default, so that drag and vibration are none.
 _TOUCH_M_S2 = 4.0
@@ -40,12 +41,12 @@ _MAY_BE_CLIPPED_M_S2 = _CLIPPED_M_S2 / 3
 _STOP_RISE = 1.3
 
 
-def flight_hit(path: Path) -> Hit:
-    """The hardest hit of a log of MAVLink 2 packets. Raises IdentificationError."""
-    log = read_flight_log(path)
-    if len(log.imu_at_us) == 0 or len(log.position_at_us) == 0:
-        raise IdentificationError(f"{path}: no HIGHRES_IMU and LOCAL_POSITION_NED in it; both are needed.")
-    name = path.parent.name if path.name == "flight.tlog" else path.stem
+def flight_hit(recorded: Log) -> Hit:
+    """The hardest hit of a log. Raises IdentificationError."""
+    log, path = flight_log_of_log(recorded), recorded.path
+    if len(log.position_at_us) == 0:
+        raise IdentificationError(f"{path}: no position in it; the speeds before and after a hit are needed.")
+    name = path.parent.name if path.name == TLOG_NAME else path.stem
     lateral = np.hypot(log.specific_force_frd_m_s2[:, 0], log.specific_force_frd_m_s2[:, 1])
     touching = np.flatnonzero(lateral > _TOUCH_M_S2)
     # First and last sample of every contact.

@@ -35,15 +35,6 @@ class Push:
 
 
 @dataclass(frozen=True, slots=True)
-class Force:
-    """What a force sensor in the wall showed, along the direction of its greatest push."""
-
-    peak_n: float
-    pull_n: float  # the greatest force the other way: a wall cannot pull, this is the mounting, ringing
-    impulse_n_s: float  # over the whole ringing: mass times the change of speed, if the sensor misses nothing
-
-
-@dataclass(frozen=True, slots=True)
 class Hit:
     """One hit. Speeds are of the centre of mass; `along` is the horizontal component in the wall's face."""
 
@@ -57,7 +48,6 @@ class Hit:
     guards: int  # that meet the wall: 2 head-on, 1 with the nose turned by 45 degrees
     track: Track | None = None
     push: Push | None = None
-    force: Force | None = None
     stop_m: float | None = None  # depth at which the stop of the arms was met, if it was
 
     @property

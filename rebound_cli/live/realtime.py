@@ -21,7 +21,7 @@ from rebound_cli.live.console import Console, state_fields
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.status import StatusServer
 from rebound_cli.results.run_folder import FlightRecorder
-from rebound_cli.timing import LinkRate, Timing, undisturbed
+from rebound_cli.results.timing import LinkRate, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05

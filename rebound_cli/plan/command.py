@@ -1,4 +1,4 @@
-"""`rebound plan import` and `rebound plan export`: the file goes to standard output, the notes beside it."""
+"""`rebound plan import`: the file goes to standard output, the notes beside it."""
 
 import json
 import re
@@ -12,10 +12,8 @@ import yaml
 
 from companion.errors import ConfigurationError
 from rebound_cli.documents import parse_document, write_text
-from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.inputs import mission_from
 from rebound_cli.plan.reading import mission_of_plan
-from rebound_cli.plan.writing import plan_of_mission
-from sim_vehicle.geography import Place
 
 
 def run_import(options: Namespace) -> int:
@@ -33,13 +31,6 @@ def run_import(options: Namespace) -> int:
     # What is written can be flown: a plan that leaves its own fence is refused here and not at the field.
     mission_from(parse_document(text, f"the mission from {path}"))
     _write(options.out, text, notes)
-    return 0
-
-
-def run_export(options: Namespace) -> int:
-    mission = mission_from(load_mission_document(options.mission, ()))
-    plan, notes = plan_of_mission(mission, Place(*options.home))
-    _write(options.out, json.dumps(plan, indent=4) + "\n", notes)
     return 0
 
 

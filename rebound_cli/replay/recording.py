@@ -59,6 +59,15 @@ def is_run_folder(path: Path) -> bool:
     return path.is_dir() and (path / run_folder.TLOG_NAME).exists()
 
 
+def log_file(path: Path) -> Path:
+    """A run's folder stands for its packets. Raises LogError for any other folder."""
+    if not path.is_dir():
+        return path
+    if not is_run_folder(path):
+        raise LogError(f"{path}: no {run_folder.TLOG_NAME} in this folder; give a run's folder or a file.")
+    return path / run_folder.TLOG_NAME
+
+
 def read_recording(folder: Path) -> Recording:
     """Raises LogError, DocumentError, RunFolderError."""
     inputs_file, tlog = folder / run_folder.INPUTS_NAME, folder / run_folder.TLOG_NAME

@@ -16,21 +16,32 @@ from rebound_cli.flights.archive import without_places
 from rebound_cli.replay.listening import PHASES
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
+from rebound_cli.report.series import (
+    FOLD_M,
+    FORCE_M_S2,
+    NED,
+    PLACE_M,
+    SPEED_M_S,
+    TIME_S,
+    TURN,
+    UNIT,
+    VELOCITY,
+    Columns,
+    series,
+    times,
+    vector,
+)
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
 
 Floats = npt.NDArray[np.float64]
 
-# How fine numbers are kept: finer than any of the sensors, so that two bytes hold most.
-TIME_S, PLACE_M, SPEED_M_S, UNIT, FORCE_M_S2, RATE_RAD_S, FOLD_M = 1e-5, 1e-3, 1e-3, 1e-4, 1e-2, 1e-3, 1e-4
 # All rows of half a minute at 250 Hz, and ten a second more of what is longer: below 2 MB for minutes, 5 MB for half an
 # hour.
 _ROWS, _ROWS_PER_S = 7_000, 10.0
 # Around a moment all rows are kept: the microscope's 150 ms, and the slow motion's way there and back.
 AROUND_S = 1.0
-
-NED = ("n", "e", "d")
 
 
 def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
@@ -95,42 +106,25 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment], no_position: bool) -
         tested["side"] / tested["side_threshold"],
         tested["beyond"] / tested["beyond_threshold"],
     )
-    boot_s = log.imu_time_boot_us[0] if len(log.imu_time_boot_us) else 0.0
-    imu = {
-        **_times(flight, log.imu_at_us, (log.imu_time_boot_us - boot_s) * 1e-6),
-        **_vector(("fx", "fy", "fz"), log.specific_force_frd_m_s2, FORCE_M_S2),
-        **_vector(("p", "q", "r"), log.angular_velocity_frd_rad_s, RATE_RAD_S),
-        **{name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()},
-    }
-    path = {
-        **_times(flight, log.position_at_us, (log.position_time_boot_us - boot_s) * 1e-6),
-        **_vector(NED, log.position_ned_m, PLACE_M),
-        **_vector(("vn", "ve", "vd"), log.velocity_ned_m_s, SPEED_M_S),
-    }
-    attitude = {**_times(flight, log.attitude_at_us), **_vector(("qw", "qx", "qy", "qz"), log.attitude_wxyz, UNIT)}
-    setpoint = {**_times(flight, log.setpoint_at_us), **_vector(NED, log.setpoint_ned_m, PLACE_M)}
-    tables = {"imu": (imu, loud), "path": (path, None), "attitude": (attitude, None), "setpoint": (setpoint, None)}
+    first_us = log.imu_time_boot_us[0] if len(log.imu_time_boot_us) else 0.0
+    columns = series(log, flight.started_at_us)
+    columns["imu"] |= {"boot": ((log.imu_time_boot_us - first_us) * 1e-6, TIME_S)}
+    columns["imu"] |= {name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()}
+    columns["path"] |= {"boot": ((log.position_time_boot_us - first_us) * 1e-6, TIME_S)}
     if truth is not None:
-        series = truth.series
-        boot_us = series["time_boot_us"]
-        true = {
-            **_times(flight, truth.at_us(boot_us), (boot_us - boot_s) * 1e-6),
-            **_vector(NED, series["position_ned_m"], PLACE_M),
-            **_vector(("vn", "ve", "vd"), series["velocity_ned_m_s"], SPEED_M_S),
-            **_vector(("qw", "qx", "qy", "qz"), series["attitude_wxyz"], UNIT),
-            **_vector(("fold1", "fold2", "fold3", "fold4"), series["arm_fold_m"], FOLD_M),
-        }
-        tables["truth"] = (true, None)
-    return {name: _packed(columns, loudness, near_s, most, no_position) for name, (columns, loudness) in tables.items()}
-
-
-def _times(flight: ShownFlight, at_us: Floats, boot_s: Floats | None = None) -> dict[str, tuple[Floats, float]]:
-    times = {"t": ((at_us - flight.started_at_us) * 1e-6, TIME_S)}
-    return times if boot_s is None else {**times, "boot": (boot_s, TIME_S)}
-
-
-def _vector(names: Sequence[str], rows: Floats, resolution: float) -> dict[str, tuple[Floats, float]]:
-    return {name: (rows[:, number], resolution) for number, name in enumerate(names)}
+        true, boot_us = truth.series, truth.series["time_boot_us"]
+        columns["truth"] = (
+            times(truth.at_us(boot_us), flight.started_at_us)
+            | {"boot": ((boot_us - first_us) * 1e-6, TIME_S)}
+            | vector(NED, true["position_ned_m"], PLACE_M)
+            | vector(VELOCITY, true["velocity_ned_m_s"], SPEED_M_S)
+            | vector(TURN, true["attitude_wxyz"], UNIT)
+            | vector(("fold1", "fold2", "fold3", "fold4"), true["arm_fold_m"], FOLD_M)
+        )
+    return {
+        name: _packed(table, loud if name == "imu" else None, near_s, most, no_position)
+        for name, table in columns.items()
+    }
 
 
 def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
@@ -155,7 +149,7 @@ def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
 
 
 def _packed(
-    columns: Mapping[str, tuple[Floats, float]],
+    columns: Columns,
     loudness: Floats | None,
     near_s: Floats,
     most: int,

@@ -28,7 +28,7 @@ from rebound_cli.replay.recording import (
 from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
 from rebound_cli.results import run_folder
-from rebound_cli.results.flight_log import FlightLog, flight_log_of, read_flight_log
+from rebound_cli.results.flight_log import FlightLog, flight_log_of, flight_log_of_log, read_flight_log
 from rebound_cli.results.truth_match import FlightTruth, Time, index_of_hit
 from sim_vehicle.scene import Scene
 
@@ -153,7 +153,7 @@ def replayed_flight(replay: Replay, config: CompanionConfig, listener: Listener)
     return ShownFlight(
         name=log.path.name,
         started_at_us=log.started_at_us,
-        log=flight_log_of((heard.at_us, heard.sample) for heard in log.heard),
+        log=flight_log_of_log(log),
         config=config,
         findings=replay.findings,
         listener=listener,

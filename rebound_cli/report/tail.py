@@ -13,14 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.shell.tlog import packets_in
+from rebound_cli.report.series import NED, TURN, VELOCITY, series
 from rebound_cli.results import run_folder
 from rebound_cli.results.flight_log import FlightLog, flight_log_of_packets
 
 # Columns of each table of the page, in the order of a row.
 COLUMNS = {
-    "path": ("t", "n", "e", "d", "vn", "ve", "vd"),
-    "attitude": ("t", "qw", "qx", "qy", "qz"),
-    "setpoint": ("t", "n", "e", "d"),
+    "path": ("t", *NED, *VELOCITY),
+    "attitude": ("t", *TURN),
+    "setpoint": ("t", *NED),
     "force": ("t", "peak"),
 }
 # As often as a person's eyes can follow, as `rebound status`.
@@ -74,27 +75,26 @@ class Tail:
         return round((at_us - (self._started_us or 0)) * 1e-6, 6)
 
     def _rows(self, log: FlightLog) -> dict[str, list[list[float | None]]]:
-        side = np.hypot(log.specific_force_frd_m_s2[:, 0], log.specific_force_frd_m_s2[:, 1])
-        return {
-            "path": self._thinned("path", log.position_at_us, np.hstack([log.position_ned_m, log.velocity_ned_m_s])),
-            "attitude": self._thinned("attitude", log.attitude_at_us, log.attitude_wxyz),
-            "setpoint": self._thinned("setpoint", log.setpoint_at_us, log.setpoint_ned_m),
-            "force": self._thinned("force", log.imu_at_us, side[:, None], peaks=True),
+        columns = series(log, self._started_us or 0)
+        side = np.hypot(columns["imu"]["fx"][0], columns["imu"]["fy"][0])
+        rows = {
+            name: self._thinned(name, np.column_stack([columns[name][column][0] for column in shown]))
+            for name, shown in COLUMNS.items()
+            if name in columns
         }
+        return {**rows, "force": self._thinned("force", np.column_stack([columns["imu"]["t"][0], side]), peaks=True)}
 
-    def _thinned(
-        self, name: str, at_us: npt.NDArray[np.float64], values: npt.NDArray[np.float64], peaks: bool = False
-    ) -> list[list[float | None]]:
+    def _thinned(self, name: str, table: npt.NDArray[np.float64], peaks: bool = False) -> list[list[float | None]]:
         """A row each tenth of a second; of `peaks` the largest since the row before."""
         rows: list[list[float | None]] = []
         since = 0
-        for index, time_us in enumerate(at_us):
-            seconds = self._seconds(float(time_us))
+        for index, (exactly_s, *values) in enumerate(table.tolist()):
+            seconds = round(exactly_s, 6)
             if seconds - self._row_s[name] < ROW_S:
                 continue
-            row = values[since : index + 1].max(axis=0) if peaks else values[index]
+            shown = table[since : index + 1, 1:].max(axis=0).tolist() if peaks else values
             self._row_s[name], since = seconds, index + 1
-            rows.append([seconds, *(round(float(one), _DIGITS) if math.isfinite(one) else None for one in row)])
+            rows.append([seconds, *(round(one, _DIGITS) if math.isfinite(one) else None for one in shown)])
         return rows
 
 

@@ -9,8 +9,8 @@ from companion.errors import ReboundError
 from companion.memory.stored import as_data
 from companion.report import FlightReport
 from companion.shell.connection import LinkCounts
+from rebound_cli.results.timing import Timing
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
-from rebound_cli.timing import Timing
 
 if TYPE_CHECKING:
     from sim_vehicle.truth import Hit

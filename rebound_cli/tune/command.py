@@ -21,9 +21,9 @@ from rebound_cli.live.console import console_for, with_progress
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
-from rebound_cli.replay.recording import is_run_folder
+from rebound_cli.replay.recording import log_file
 from rebound_cli.replay.watching import Findings, watch_log
-from rebound_cli.results.run_folder import SUMMARY_NAME, TLOG_NAME
+from rebound_cli.results.run_folder import SUMMARY_NAME
 from rebound_cli.tune.hits import SPEEDS_M_S, HitSensitivity, hit_moments, sensitivity
 from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
@@ -97,7 +97,7 @@ class Tuning:
 
 def read_healthy(path: Path, config: CompanionConfig) -> Healthy:
     """Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing."""
-    log = read_log(path / TLOG_NAME if is_run_folder(path) else path)
+    log = read_log(log_file(path))
     hits = _told_hits(path)
     wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else crash(log)
     if wrong is not None:

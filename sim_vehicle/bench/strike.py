@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.layout import FEET, Constants, PlantState
-from sim_vehicle.physics.meeting import deepest_point
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
+from sim_vehicle.physics.touching.meeting import deepest_point
 from sim_vehicle.world import Motion, Wall
 
 Floats = npt.NDArray[np.float64]

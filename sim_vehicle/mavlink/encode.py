@@ -65,10 +65,10 @@ class Encoder:
         link.seq = (link.seq + 1) & 0xFF
         return packet
 
-    def sign(self, key: bytes | None, link_number: int, time_stamp: int) -> None:
-        """From now on sign with this key and no earlier time stamp; None for no more signing."""
+    def sign(self, key: bytes, link_number: int, time_stamp: int) -> None:
+        """From now on sign with this key and no earlier time stamp."""
         signing = self._link.signing
-        signing.secret_key, signing.sign_outgoing = key, key is not None
+        signing.secret_key, signing.sign_outgoing = key, True
         signing.link_id, signing.timestamp = link_number, max(signing.timestamp, time_stamp)
 
 

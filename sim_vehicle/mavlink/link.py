@@ -17,10 +17,10 @@ from sim_vehicle.mavlink.services.mission_service import MissionService
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
 from sim_vehicle.mavlink.services.service import BusyService, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
-from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, is_optional
+from sim_vehicle.mavlink.services.texts import TextLink
+from sim_vehicle.mavlink.signing import OPTIONAL
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
-from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.parameters.store import Parameters
 
 # Of a serial line's buffer, for the streams between the packets of a long answer.
@@ -39,15 +39,11 @@ SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class LinkOptions:
-    """What a link is for, what lies under it, and whether it passes on what is meant for others (MAV_n_FORWARD).
-
-    ``is_usb``: it stands for the autopilot's USB port, which needs hands at the vehicle; see `signing`.
-    """
+    """What a link is for, what lies under it, and whether it passes on what is meant for others (MAV_n_FORWARD)."""
 
     kind: LinkKind
     line: Line = FAST_LINE
     forwards: bool = True
-    is_usb: bool = False
 
 
 class Link:
@@ -67,7 +63,6 @@ class Link:
         self._board = board
         self._signing = board.signing.of_link()
         self._encoder = Encoder(board.identity)
-        self._signed_with: bytes | None = None
         self._outbox = Outbox(self._encoder, line, self.now_us)
         self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, line)
         self._texts = TextLink()
@@ -77,7 +72,6 @@ class Link:
             HEARTBEAT_ID: self._hear_heartbeat,
             4: self._answer_ping,
             111: self._answer_timesync,
-            SETUP_SIGNING_ID: self._set_up_signing,
         }
         for service in self._services:
             self.handlers.update(service.handlers)
@@ -138,7 +132,7 @@ class Link:
         data, self._waiting = self._waiting, b""
         decoder, parameters = self._decoder, self._board.parameters
         decoder.foreign = [] if collects_foreign and self.options.forwards else None
-        decoder.signing_is_optional = is_optional(parameters["MAV_SIGN_CFG"], self.options.is_usb)
+        decoder.signing_is_optional = parameters["MAV_SIGN_CFG"] == OPTIONAL
         for packet in decoder.push(data):
             self.handlers[packet.get_msgId()](packet)
         return decoder.foreign or []
@@ -155,8 +149,8 @@ class Link:
         """Send what is due at the end of the interval."""
         self.now_us = now_us
         self._outbox.advance(now_us)
-        if self._signing.key is not self._signed_with or self._signed_with is not None:
-            self._sign()
+        if self._signing.key is not None:
+            self._encoder.sign(self._signing.key, self._number, self._signing.next_stamp)
         for text in texts:
             self._texts.add(text, now_us)
         if self._texts.heard_us is not None:
@@ -171,12 +165,6 @@ class Link:
         if system == EVERY_ID:
             return bool(sources)
         return any(source[0] == system and component in (EVERY_ID, source[1]) for source in sources)
-
-    def _sign(self) -> None:
-        signing = self._signing
-        key = self._signed_with = signing.key
-        stamp = signing.next_stamp(self._board.telemetry.epoch_at_boot_us + self.now_us)
-        self._encoder.sign(key, self._number, stamp)
 
     # --- what concerns the link alone --------------------------------------------------------------------
 
@@ -197,6 +185,3 @@ class Link:
             # Bytes arrive anywhere in the interval since the last sample: on average in its middle.
             heard_at_us = self.now_us + self._board.interval_us // 2
             self.send(dialect.MAVLink_timesync_message(heard_at_us * 1000, packet.ts1))
-
-    def _set_up_signing(self, packet: dialect.MAVLink_setup_signing_message) -> None:
-        self._signing.hear_setup(bytes(packet.secret_key), packet.initial_timestamp, self.options.is_usb)

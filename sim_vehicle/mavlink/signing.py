@@ -1,24 +1,20 @@
 """Message signing: packets of the vehicle signed, others' packets accepted only if they are.
 
-Source: MAVLink 2's message signing and PX4's mavlink/mavlink_sign_control.cpp. Two ways to be given a key:
-
-    any link   SETUP_SIGNING on every link gives all of them the key at once; time stamps follow the vehicle's clock
-    PX4 1.17   SETUP_SIGNING over USB alone, and the other links read it from the SD card when the vehicle starts; each
-               link has a time stamp of its own, which begins at the card's and goes on with what is sent and heard
+Source: MAVLink 2's message signing and PX4 1.17's mavlink/mavlink_sign_control.cpp. The key is on the SD card when the
+vehicle starts. Each link has a time stamp of its own, which begins at the card's and goes on with what is sent and
+heard. SETUP_SIGNING is ignored: PX4 obeys it over USB alone, and no link here is USB.
 """
 
 import hashlib
 import hmac
 from dataclasses import dataclass, field
 
-# MAV_SIGN_CFG: where unsigned packets are accepted although there is a key.
-_OPTIONAL, _OPTIONAL_OVER_USB = 0, 1
+# MAV_SIGN_CFG: unsigned packets are accepted although there is a key; with 1 over USB alone.
+OPTIONAL = 0
 # Accepted unsigned in any case: RADIO_STATUS, ADSB_VEHICLE, COLLISION.
 ALWAYS_ACCEPTED = frozenset({109, 246, 247})
-SETUP_SIGNING_ID = 256
 
-# Time stamps count ten microseconds since the first of January 2015; a new stream may be a minute behind.
-_UNIX_AT_2015_US = 1_420_070_400_000_000
+# Time stamps count ten microseconds; a new stream may be a minute behind.
 _MAY_LAG = 60 * 100_000
 # Link number, time stamp and signature at the end of a packet.
 _BLOCK, _STAMP, _SIGNATURE = 13, slice(-12, -6), 6
@@ -37,50 +33,27 @@ class Refused:
 
 @dataclass(slots=True)
 class Signing:
-    """The key and what was accepted with it; nothing is signed or asked for while there is no key.
+    """The key and what was accepted with it; without a key nothing is signed or asked for.
 
-    The vehicle's own; of PX4 1.17 it is what the SD card holds, and each link has its own besides.
+    The vehicle's own is what the SD card holds; each link has its own besides.
     """
 
     key: bytes | None = None
-    is_px4_1_17: bool = False
     refused: Refused = field(default_factory=Refused)
-    _newest: int = 0
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
-    _card: "Signing | None" = None
+    _newest: int = 0
 
     def boot(self) -> None:
-        """Before the links are; what PX4 1.17 has heard it has no memory of."""
-        if self.is_px4_1_17:
-            self._streams.clear()
-
-    def of_link(self) -> "Signing":
-        """For a link that is started now."""
-        if not self.is_px4_1_17:
-            return self
-        return Signing(self.key, True, self.refused, self._newest, self._streams, self)
-
-    def hear_setup(self, key: bytes, time_stamp: int, is_usb: bool) -> None:
-        """SETUP_SIGNING has come over a link."""
-        if self._card is None:
-            self.set_up(key, time_stamp)
-        elif is_usb:
-            for each in (self, self._card):
-                each.set_up(key, time_stamp)
-
-    def set_up(self, key: bytes, time_stamp: int) -> None:
-        """SETUP_SIGNING: a key of zeros with a time of zero ends signing."""
-        self.key = key if any(key) or time_stamp else None
-        self._newest = time_stamp
+        """Before the links are; PX4 has no memory of what it has heard."""
         self._streams.clear()
 
-    def next_stamp(self, unix_us: int) -> int:
-        """What the next packet of a link has at least: later than all that was heard, and by the clock if there is one.
+    def of_link(self) -> "Signing":
+        """For a link that is started now. What all links have heard counts for each."""
+        return Signing(self.key, self.refused, self._streams)
 
-        A link that has used it goes on after it by itself.
-        """
-        if not self.is_px4_1_17:
-            self._newest = max(self._newest, (unix_us - _UNIX_AT_2015_US) // 10)
+    @property
+    def next_stamp(self) -> int:
+        """What the next packet of a link has at least. A link that has used it goes on after it by itself."""
         return self._newest + 1
 
     def accepts(self, packet: bytes, is_signed: bool, source: tuple[int, int], message_id: int, optional: bool) -> bool:
@@ -108,8 +81,3 @@ class Signing:
         self._streams[stream] = stamp
         self._newest = max(self._newest, stamp)
         return True
-
-
-def is_optional(mav_sign_cfg: float, is_usb: bool) -> bool:
-    """Whether unsigned packets are accepted on a link although there is a key."""
-    return mav_sign_cfg == _OPTIONAL or (mav_sign_cfg == _OPTIONAL_OVER_USB and is_usb)

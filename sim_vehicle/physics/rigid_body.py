@@ -4,7 +4,6 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import ARMS
-from sim_vehicle.physics.contact import contact_wrench
 from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of, times
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import (
@@ -19,6 +18,7 @@ from sim_vehicle.physics.layout import (
     Scratch,
 )
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise
+from sim_vehicle.physics.touching.contact import contact_wrench
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]

@@ -14,9 +14,7 @@ from sim_vehicle.control.attitude import (
     take_thrust,
 )
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
-from sim_vehicle.physics.contact import relax_arms, settle_arms
 from sim_vehicle.physics.estimate import update_estimate, update_slope
-from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
 from sim_vehicle.physics.jit import borrowed, inlined, njit
 from sim_vehicle.physics.layout import (
@@ -30,10 +28,12 @@ from sim_vehicle.physics.layout import (
     Scratch,
     SetpointRows,
 )
-from sim_vehicle.physics.proximity import find_close, find_near, wake_faces
 from sim_vehicle.physics.report import write_report
 from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
+from sim_vehicle.physics.touching.contact import relax_arms, settle_arms
+from sim_vehicle.physics.touching.hits import close_old_hit, note_contact
+from sim_vehicle.physics.touching.proximity import find_close, find_near, wake_faces
 from sim_vehicle.world import FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]

@@ -14,10 +14,10 @@ from sim_vehicle.faults.spec import Fault
 from sim_vehicle.physics.asked import AskedSetpoint
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
-from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import Floats, boxed, new_record
 from sim_vehicle.physics.report import HITS_ENDED, KNOWN, REPORT_COLUMNS, SENSED, TRUTH, report_estimate
-from sim_vehicle.physics.surroundings import Surroundings
+from sim_vehicle.physics.touching.proximity import points_behind
+from sim_vehicle.physics.touching.surroundings import Surroundings
 from sim_vehicle.physics.trim import trim
 from sim_vehicle.plant.interval import (
     FINE_STEPS,

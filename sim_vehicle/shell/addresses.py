@@ -5,8 +5,7 @@ udpin://0.0.0.0:14551             waits for clients, as many as come
 tcpin://0.0.0.0:5760              the same on TCP
 serial:///dev/ttyUSB0:57600       a serial line
 
-With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins with. With `?usb`, or `&usb` after a set:
-it stands for the autopilot's USB port, the only one on which PX4 1.17 takes the key of message signing.
+With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins with.
 """
 
 import re
@@ -25,7 +24,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 COMPANION_LISTEN_PORT, COMPANION_PORT = 14580, 14540
 GROUND_LISTEN_PORT, GROUND_PORT = 18570, 14550
 
-_ADDRESS = re.compile(r"^(?P<scheme>\w+)://(?P<rest>[^?]+)(\?set=(?P<set>\w+))?(?P<usb>[?&]usb)?$")
+_ADDRESS = re.compile(r"^(?P<scheme>\w+)://(?P<rest>[^?]+)(\?set=(?P<set>\w+))?$")
 _HIGHEST_PORT = 65_535
 _FORMS = "udpout://HOST:PORT, udpin://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
@@ -35,12 +34,12 @@ def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
     found = _ADDRESS.match(address)
     if found is None:
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
-    scheme, rest, is_usb = found["scheme"], found["rest"], found["usb"] is not None
+    scheme, rest = found["scheme"], found["rest"]
     if scheme == "serial":
         device, baud = _split(address, rest)
-        options = LinkOptions(_kind(address, found["set"], LinkKind.ONBOARD), Line(baud), forwards=False, is_usb=is_usb)
+        options = LinkOptions(_kind(address, found["set"], LinkKind.ONBOARD), Line(baud), forwards=False)
         return SerialPort(vehicle, options, device, baud)
-    options = LinkOptions(_kind(address, found["set"], LinkKind.GROUND), is_usb=is_usb)
+    options = LinkOptions(_kind(address, found["set"], LinkKind.GROUND))
     host, port = _host_and_port(address, rest)
     if scheme == "udpout":
         return UdpPeerPort(vehicle, options, 0, (host, port))

@@ -10,12 +10,11 @@ from sim_vehicle.hil.exchange import Exchange, ExchangePhase
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
 from sim_vehicle.shell.port import bound_socket
+from sim_vehicle.shell.realtime import RealtimePace
 from sim_vehicle.shell.truth_file import save_truth
 
 PX4_SIMULATOR_PORT = 4560
 
-# Lateness up to this is caught up; after a longer stop the flight goes on where it stood.
-MOST_CAUGHT_UP_US = 500_000
 # Ctrl-C and the clock are looked at this often while PX4 says nothing.
 _LONGEST_WAIT_S = 0.1
 _RECEIVE_BYTES = 65_536
@@ -56,7 +55,8 @@ class _Session:
         self._vehicle = vehicle
         self._link = link
         self._tell = tell
-        self._pace = HilPace(speed)
+        self._speed = speed
+        self._pace = RealtimePace(vehicle.time_boot_us, speed)
         self._exchange = Exchange()
         self._encoder, self._decoder = HilEncoder(), HilDecoder()
         self._lockstep_from: tuple[int, int] | None = None
@@ -90,7 +90,7 @@ class _Session:
         else:
             self._tell("PX4 went away before it answered.")
         if truth_path is not None:
-            save_truth(truth_path, self._vehicle.truth, self._pace.epoch_at_boot_us(time_us), self._pace.stalls)
+            save_truth(truth_path, self._vehicle.truth, self._pace.epoch_at_boot_us(), self._pace.stalls)
 
     def _send_if_due(self, now_us: int) -> int:
         """Send the next sample if it may go; how long, in microseconds, the vehicle's clock has to wait."""
@@ -100,8 +100,10 @@ class _Session:
             return 0
         if exchange.phase is ExchangePhase.READY:
             if self._lockstep_from is None:
+                # What PX4 took to boot is not caught up.
                 self._lockstep_from = (now_us, vehicle.time_boot_us)
-            allowed_us = self._pace.due_us(vehicle.time_boot_us + vehicle.interval_us, now_us)
+                self._pace = RealtimePace(vehicle.time_boot_us, self._speed)
+            allowed_us = now_us + round(1e6 * self._pace.early_s(vehicle.time_boot_us + vehicle.interval_us))
         if allowed_us > now_us:
             return allowed_us - now_us
         messages = vehicle.step(exchange.motor_fractions)
@@ -127,36 +129,6 @@ class _Session:
         for notice in self._exchange.notices:
             self._tell(notice)
         self._exchange.notices.clear()
-
-
-class HilPace:
-    """Keeps the vehicle's clock on the machine's, times a speed."""
-
-    def __init__(self, speed: float) -> None:
-        self._speed = speed
-        self._boot_us: int | None = None
-        self.stalls: list[tuple[int, int]] = []
-        """Boot times at which the vehicle's clock stood while the machine's went on, and for how long, microseconds."""
-
-    def due_us(self, time_us: int, now_us: int) -> int:
-        """The machine's time at which the vehicle's clock should show ``time_us``."""
-        if self._speed == 0:
-            return now_us
-        since_boot_us = round(time_us / self._speed)
-        if self._boot_us is None:
-            self._boot_us = now_us - since_boot_us
-        late_us = now_us - self._boot_us - since_boot_us
-        if late_us > MOST_CAUGHT_UP_US:
-            self._boot_us += late_us
-            self.stalls.append((time_us, late_us))
-        return self._boot_us + since_boot_us
-
-    def epoch_at_boot_us(self, time_us: int) -> int:
-        """Wall clock at the vehicle's boot time 0; at another speed than 1 the last moments fit best."""
-        wall_us, now_us = time.time_ns() // 1000, _now_us()
-        if self._speed == 1 and self._boot_us is not None:
-            return wall_us - now_us + self._boot_us
-        return wall_us - time_us
 
 
 def _now_us() -> int:

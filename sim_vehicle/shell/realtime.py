@@ -90,16 +90,20 @@ class RealtimePace:
 
     def wait_until(self, time_boot_us: int) -> None:
         """Return when the vehicle's clock may show that; at once when it is late."""
+        if (early_s := self.early_s(time_boot_us)) > 0.0:
+            self._sleep_s(early_s)
+
+    def early_s(self, time_boot_us: int) -> float:
+        """How long it is until the vehicle's clock may show that; 0 when it is late."""
         self._time_boot_us = time_boot_us
         if self._ns_per_us == 0.0:
-            return
+            return 0.0
         now_ns = self._monotonic_ns()
         assert self._boot_ns is not None, "restart begins it"
-        due_ns = self._boot_ns + round(self._ns_per_us * time_boot_us)
-        if due_ns > now_ns:
-            self._sleep_s(1e-9 * (due_ns - now_ns))
-        elif now_ns - due_ns > MOST_CAUGHT_UP_NS:
-            self._begin(self._boot_ns + now_ns - due_ns)
+        late_ns = now_ns - self._boot_ns - round(self._ns_per_us * time_boot_us)
+        if late_ns > MOST_CAUGHT_UP_NS:
+            self._begin(self._boot_ns + late_ns)
+        return 1e-9 * max(-late_ns, 0)
 
     def epoch_at_boot_us(self) -> int:
         """Wall clock at the vehicle's boot time 0, as its clock stands now."""

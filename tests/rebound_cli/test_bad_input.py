@@ -27,27 +27,6 @@ def test_a_missing_mission_file():
     assert_one_clear_sentence(result, "missions/wal.yaml: no such file", "did you mean missions/wall.yaml?")
 
 
-def test_bad_yaml(tmp_path):
-    mission = tmp_path / "bad.yaml"
-    mission.write_text("name: bad\nitems: [\n")
-    assert_one_clear_sentence(run_here("fly", mission, "--sim"), f"{mission}:", "not valid YAML")
-
-
-def test_an_unknown_key(tmp_path):
-    mission = tmp_path / "typo.yaml"
-    mission.write_text(WALL.read_text().replace("on_collision", "on_colision"))
-    result = run_here("fly", mission, "--sim")
-    line = mission.read_text().splitlines().index("on_colision: {then: hold, hold_s: 3}") + 1
-    assert_one_clear_sentence(result, f"{mission}:{line}: ", "did you mean 'on_collision'?")
-
-
-@pytest.mark.parametrize("how", ["--sim", "--lockstep"])
-def test_a_wall_through_the_start_position(tmp_path, how):
-    result = run_here("fly", WALL, how, "--set", "sim.walls.0.point_ned_m=[0.1, 0, 0]", "--out", tmp_path / "run")
-    assert_one_clear_sentence(result, "start position", "--set sim.walls.0.point_ned_m")
-    assert not (tmp_path / "run").exists()
-
-
 def test_a_port_in_use(tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
@@ -110,7 +89,6 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
         (("sim", "--sensor-rate", "333"), "--sensor-rate"),
         (("sim", "--autopilot", "apm"), "--autopilot"),
         (("identify", "hit.csv", "--mass", "nan"), "'nan' is not a mass"),
-        (("plan", "export", "missions/hover.yaml", "--home", "nan,8"), "'nan,8' is not LAT,LON"),
     ],
 )
 def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):

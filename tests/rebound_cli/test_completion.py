@@ -22,7 +22,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
         (["fl"], {"fly"}),
         (["fly", "--lo"], {"--lockstep"}),
         (["guard", "--then", ""], {"previous", "hold"}),
-        (["plan", "export", "missions/wal"], {"missions/wall.yaml"}),
+        (["fly", "missions/wal"], {"missions/wall.yaml"}),
         (["guard", "--config", "CHANGELO"], {"CHANGELOG.md"}),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.cruise import Cruise
+from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import quiet

@@ -8,11 +8,6 @@ from sim_vehicle.errors import AirframeError, SceneError
 from sim_vehicle.scene import Scene, check_start_is_free
 
 
-def test_an_empty_part_is_the_foldable_vehicle_alone() -> None:
-    assert Scene.model_validate({}) == Scene(airframe="foldable", seed=1)
-    assert Scene().world().names == ("ground",)
-
-
 @pytest.mark.parametrize(
     ("part", "words"),
     [
@@ -48,21 +43,6 @@ def test_every_built_in_airframe_loads_and_is_named_as_its_file() -> None:
     assert built_in_airframes() == ("foldable", "rigid")
     for name in built_in_airframes():
         assert load_built_in(name).name == name
-
-
-def test_the_rigid_vehicle_differs_in_its_arms_and_in_how_hard_a_hit_its_filter_expects_alone() -> None:
-    foldable, rigid = load_built_in("foldable").model_dump(), load_built_in("rigid").model_dump()
-    assert {key for key in foldable if foldable[key] != rigid[key]} == {"name", "description", "arms", "estimator"}
-    assert {key for key in foldable["estimator"] if foldable["estimator"][key] != rigid["estimator"][key]} == {
-        "clipped_excess_m_s2"
-    }
-
-
-def test_the_papers_lengths() -> None:
-    """Motor to motor: 290 mm with the arms out, 230 mm with both folded by l_max."""
-    airframe = load_built_in("foldable")
-    assert 2 * airframe.geometry.motor_radius_m == pytest.approx(0.290)
-    assert 2 * (airframe.geometry.motor_radius_m - airframe.arms.fold_max_m) == pytest.approx(0.230)
 
 
 def test_an_unknown_airframe_is_refused_with_the_known_ones() -> None:

@@ -26,10 +26,6 @@ def command_int(client: Client, number: int, x: int, y: int, z: float = 0.0, par
     return client.results(number)
 
 
-def texts(client: Client) -> list[str]:
-    return [message.text for message in client.all("STATUSTEXT")]
-
-
 @pytest.fixture
 def client() -> Client:
     client = Client(system=255, component=190)
@@ -86,39 +82,12 @@ def test_answers_on_the_ground(client, number, params, answers):
     assert results(client, number, *params) == answers
 
 
-@pytest.mark.parametrize(
-    ("number", "target", "answers"),
-    [
-        (ARM_DISARM, (0, 0), 1),
-        (ARM_DISARM, (1, 100), 0),
-        (ARM_DISARM, (7, 1), 0),
-        (520, (1, 100), 1),
-        (520, (7, 1), 0),
-    ],
-)
-def test_commands_for_others_are_not_answered(client, number, target, answers):
-    assert len(results(client, number, 0 if number == ARM_DISARM else 1, target=target)) == answers
-
-
-def test_the_answer_names_whoever_asked(client):
-    results(client, ARM_DISARM, 0)
-    ack = client.last("COMMAND_ACK")
-    assert (ack.target_system, ack.target_component) == (255, 190)
-
-
 def test_set_mode_the_message_is_answered_once(client):
     client.send(dialect.MAVLink_set_mode_message(1, 1, 0x06040000))
     client.run(0.02)
     assert client.results(SET_MODE) == [ACCEPTED]
     client.run(1.0)
     assert client.last("HEARTBEAT").custom_mode == 0x06040000
-
-
-def test_a_senseless_arming_parameter_is_named(client):
-    results(client, ARM_DISARM, 5)
-    client.heartbeat(kind=6)
-    client.run(0.3)
-    assert "Unsupported ARM_DISARM param: 5.000\t" in texts(client)
 
 
 def test_a_place_that_is_none_in_the_other_commands_way_is_denied(client):

@@ -113,23 +113,15 @@ def test_a_udp_server_answers_each_client_at_its_address():
         assert "AUTOPILOT_VERSION" not in read_socket(second, {"HIGHRES_IMU", "HEARTBEAT"}).kinds()
 
 
-@pytest.mark.parametrize(
-    ("words", "kind", "is_usb"),
-    [
-        ("", None, False),
-        ("?usb", None, True),
-        ("?set=normal", LinkKind.NORMAL, False),
-        ("?set=normal&usb", LinkKind.NORMAL, True),
-    ],
-)
-def test_an_address_says_whose_streams_it_has_and_whether_it_stands_for_usb(words, kind, is_usb):
+@pytest.mark.parametrize(("words", "kind"), [("", None), ("?set=normal", LinkKind.NORMAL)])
+def test_an_address_says_whose_streams_it_has(words, kind):
     ours, theirs = pty.openpty()
     addresses = {"udpout://127.0.0.1:9": LinkKind.GROUND, f"serial://{os.ttyname(theirs)}:57600": LinkKind.ONBOARD}
     for address, default in addresses.items():
         vehicle = new_vehicle()
         open_port(vehicle, address + words).close()
         (link,) = vehicle._links
-        assert (link.options.kind, link.options.is_usb) == (kind or default, is_usb)
+        assert link.options.kind == (kind or default)
     os.close(ours)
     os.close(theirs)
 

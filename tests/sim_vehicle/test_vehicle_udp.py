@@ -144,9 +144,10 @@ def test_lateness_is_caught_up_unless_the_machine_was_away(hangs_ms: int, lost_m
     assert pace.stalls == ([(104_000, 1000 * lost_ms)] if lost_ms else [])
 
 
-def test_an_interval_is_never_flown_before_it_has_passed():
+@pytest.mark.parametrize(("speed", "lasts_ns"), [(0.5, 8_000_000), (1.0, 4_000_000), (4.0, 1_000_000), (0.0, 0)])
+def test_an_interval_is_never_flown_before_it_has_passed_at_the_asked_speed(speed: float, lasts_ns: int):
     machine = Machine()
-    pace = RealtimePace(4_000, 1.0, machine.monotonic_ns, machine.sleep_s)
+    pace = RealtimePace(4_000, speed, machine.monotonic_ns, machine.sleep_s)
     begun_ns = machine.now_ns
     pace.wait_until(8_000)
-    assert machine.now_ns - begun_ns == 4_000_000
+    assert machine.now_ns - begun_ns == lasts_ns

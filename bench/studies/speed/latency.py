@@ -24,8 +24,8 @@ from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop
 from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.results.timing import undisturbed
 from rebound_cli.simulation.lockstep import EPOCH_US
-from rebound_cli.timing import undisturbed
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle

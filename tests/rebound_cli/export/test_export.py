@@ -1,13 +1,10 @@
-"""A flight as MCAP and as ULog, read back by the formats' own readers; PX4's log with a run's events in it."""
+"""A flight as MCAP and as ULog, read back by the formats' own readers."""
 
 import json
 import math
-import os
-import struct
 import xml.etree.ElementTree
 from dataclasses import replace
 from io import BytesIO
-from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -17,16 +14,15 @@ from pyulog import ULog
 
 from companion.messages import Attitude, GlobalPosition, Heartbeat, ImuSample, LocalPosition, Sticks
 from rebound_cli.export.foxglove import write_mcap
-from rebound_cli.export.merging import merge
-from rebound_cli.export.ulog import Row, boot_us, new_ulog, with_rows
-from rebound_cli.logs.log import LogError, LoggedSample
+from rebound_cli.export.ulog import boot_us, new_ulog
+from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
 from rebound_cli.replay.watching import Findings
 from rebound_cli.report.shown_flight import recorded_flight
 from sim_vehicle.scene import Scene
 from tests.docs.pages import ROOT
-from tests.rebound_cli.logs.ulog_file import every, message, sensor_combined, ulog
+from tests.rebound_cli.logs.ulog_file import every
 
 SIDE = math.sqrt(0.5)
 
@@ -281,117 +277,6 @@ def test_places_are_not_left_out_of_a_file_full_of_them(wall_flight, tmp_path, c
     words = ["logs", "export", str(wall_flight[0]), "--format", "mcap", "--no-position", "--out", str(out)]
     assert main(words) == 1
     assert "--no-position" in capsys.readouterr().err and not out.exists()
-
-
-# --- merged -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["battery_brownout", "corrupt_unregistered", "ground_strike", "mission_rtl"])
-@pytest.mark.skipif(
-    "REBOUND_DATA" not in os.environ, reason="REBOUND_DATA does not name the folder of real flight logs"
-)
-def test_nothing_of_a_real_log_is_changed_by_what_is_added(name):
-    content = (Path(os.environ["REBOUND_DATA"]) / "px4_logs" / f"{name}.ulg").read_bytes()
-    before = ULog(BytesIO(content))
-    middle_us = (before.start_timestamp + before.last_timestamp) // 2
-    added = [
-        Row(middle_us, None, (b"4", "[rebound] hit")),
-        Row(middle_us, ("rebound_hit", "bool is_collision"), [True]),
-    ]
-    after = ULog(BytesIO(with_rows(content, added)))
-    for data in before.data_list:
-        for field, values in data.data.items():
-            np.testing.assert_array_equal(after.get_dataset(data.name, data.multi_id).data[field], values)
-    assert len(after.logged_messages) == len(before.logged_messages) + 1
-    assert after.changed_parameters == before.changed_parameters
-    assert after.get_dataset("rebound_hit").data["timestamp"].tolist() == [middle_us]
-
-
-def px4_log(log, tail=b"", moved_us=0, turned=lambda rates: rates):
-    """What PX4 would have written of a flight: the same samples under the same stamps, in another program's bytes."""
-    fields, _ = sensor_combined([])
-    rows = [
-        (
-            sample.time_boot_us + moved_us,
-            turned(sample.angular_velocity_frd_rad_s),
-            *(4000, 0, sample.specific_force_frd_m_s2, 4000, 0),
-        )
-        for _, sample in log.imu()
-    ]
-    text = message("L", b"6" + struct.pack("<Q", rows[0][0]) + b"PX4's own")
-    return ulog({"sensor_combined": (fields, rows)}, started_us=rows[0][0]) + text + tail
-
-
-def merged(flight, tmp_path, content):
-    path, out = tmp_path / "px4.ulg", tmp_path / "merged.ulg"
-    path.write_bytes(content)
-    shown, log = flight
-    merge(shown, log, path, out)
-    return out
-
-
-def test_a_runs_events_are_put_into_px4s_own_log_by_its_clock(wall_flight, flight, tmp_path, capsys):
-    shown, log = flight
-    (tmp_path / "px4.ulg").write_bytes(px4_log(log))
-    words = ["replay", str(wall_flight[0]), "--merge", str(tmp_path / "px4.ulg"), "--out", str(tmp_path)]
-    assert main(words) == 0
-    path = tmp_path / "px4-merged.ulg"
-    assert "100.0 % of their angular rates, and fits best moved by +0.0 ms" in capsys.readouterr().out
-    found = ULog(str(path))
-    # PX4's own is untouched, and the hit stands at the sample that showed it
-    assert len(found.get_dataset("sensor_combined").data["timestamp"]) == len(log.imu())
-    assert "PX4's own" in [one.message for one in found.logged_messages]
-    said = {one.message: one.timestamp for one in found.logged_messages}
-    (hit,) = [event for event in shown.events if event["kind"] == "detection"]
-    assert said[f"[rebound] {hit['text']}"] == hit["data"]["sample_time_boot_us"]
-    assert found.get_dataset("rebound_hit").data["timestamp"][0] == hit["data"]["sample_time_boot_us"]
-    # A second run's go in beside the first one's
-    again = merged(flight, tmp_path, path.read_bytes())
-    assert len(ULog(str(again)).get_dataset("rebound_hit", 1).data["timestamp"]) == 2
-
-
-def test_a_log_that_power_ended_takes_them_before_its_cut(flight, tmp_path):
-    # Given a log of the first half whose last message is cut off
-    _, log = flight
-    half = replace(log, heard=log.heard[: len(log.heard) // 3])
-    found = ULog(str(merged(flight, tmp_path, px4_log(half, tail=message("D", bytes(40))[:20]))))
-    assert len(found.get_dataset("sensor_combined").data["timestamp"]) == len(half.imu())
-    assert any("landed and disarmed" in one.message for one in found.logged_messages)
-
-
-def test_what_px4_appended_after_a_crash_is_found_again(flight, tmp_path):
-    # Given a log whose head says where, after a fault, PX4 has added to it
-    _, log = flight
-    content = bytearray(px4_log(log))
-    added = message("L", b"2" + struct.pack("<Q", 5) + b"hardfault")
-    head = 16 + 3
-    content[head + 8] = 1
-    struct.pack_into("<Q", content, head + 16, len(content))
-    path = merged(flight, tmp_path, bytes(content) + added)
-    (offset,) = struct.unpack_from("<Q", path.read_bytes(), head + 16)
-    assert path.read_bytes()[offset : offset + len(added)] == added
-    assert "hardfault" in [one.message for one in ULog(str(path)).logged_messages]
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        # Another flight by the same clock, the same flight after another boot, another time, another program's file
-        ({"turned": lambda rates: (rates[1], rates[2], -rates[0])}, "of their angular rates"),
-        ({"moved_us": 300_000}, "moved by -300.0 ms"),
-        ({"moved_us": 3_600_000_000}, "by PX4's clock since boot"),
-    ],
-)
-def test_what_is_not_of_one_flight_is_refused(flight, tmp_path, change, words):
-    with pytest.raises(LogError, match="are not of one flight") as refused:
-        merged(flight, tmp_path, px4_log(flight[1], **change))
-    assert words in str(refused.value) and not (tmp_path / "merged.ulg").exists()
-
-
-def test_only_a_runs_folder_has_events_to_merge(exported, tmp_path, capsys):
-    log = str(exported / "wall.ulg")
-    assert main(["replay", log, "--merge", log, "--out", str(tmp_path)]) == 1
-    assert "--merge goes with a run's folder" in capsys.readouterr().err
 
 
 def test_an_event_stands_at_the_newest_sample_that_was_heard_by_then(flight):

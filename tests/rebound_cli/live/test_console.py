@@ -10,9 +10,9 @@ import pytest
 from companion.report import Event, Status
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.timing import LinkRate
 from rebound_cli.simulation.compiling import compiling_shown
 from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
-from rebound_cli.timing import LinkRate
 from tests.rebound_cli.command import ROOT
 
 EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))
@@ -91,7 +91,7 @@ def test_only_what_is_compiled_has_a_progress():
     def kernel(value):
         return value + 1
 
-    kernel.__module__ = "sim_vehicle.physics.contact"
+    kernel.__module__ = "sim_vehicle.physics.touching.contact"
     kernel = numba.njit(kernel)
     stream = io.StringIO()
     console = Console(stream)

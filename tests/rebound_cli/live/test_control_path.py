@@ -34,7 +34,7 @@ from rebound_cli.live.realtime import (
 )
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
-from rebound_cli.timing import TOO_LATE_US, Timing, undisturbed
+from rebound_cli.results.timing import TOO_LATE_US, Timing, undisturbed
 from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event
 from tests.rebound_cli.live.flying import EPOCH_US, HOP_SETS, fly
 

@@ -35,7 +35,7 @@ class SignedWorld(World):
             scene.scene,
             scene.seed,
             parameters={"MAV_SIGN_CFG": 1},
-            signing=Signing(KEY, is_px4_1_17=True),
+            signing=Signing(KEY),
         )
         self._forges, self._heard, self._count = forges, b"", 0
 

@@ -22,7 +22,7 @@ def signed(tmp_path: Path):
     """The key, a port for the companion, and a vehicle that has the key."""
     key = tmp_path / "key"
     assert run("key", "new", key).returncode == 0
-    with vehicle_on_air("--signing", "px4-1.17", "--signing-key", key) as port:
+    with vehicle_on_air("--signing-key", key) as port:
         yield key, port
 
 

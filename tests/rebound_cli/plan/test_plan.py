@@ -1,4 +1,4 @@
-"""Missions from and for QGroundControl: places, order, repeats and fences survive both ways."""
+"""Missions from QGroundControl: places, order, repeats and fences survive."""
 
 import contextlib
 import copy
@@ -13,7 +13,6 @@ import yaml
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
 from rebound_cli.plan.reading import mission_of_plan
-from rebound_cli.plan.writing import plan_of_mission
 from sim_vehicle.geography import Place
 from tests.rebound_cli.command import run_here as rebound
 
@@ -170,51 +169,17 @@ def test_a_fence_keeps_its_shape():
         read(TAKEOFF, item(20, *[0] * 7), fence={"circles": [{**around_home, "inclusion": False}], "polygons": []})
 
 
-FLOWN = {
-    "name": "t",
-    "items": [
-        {"takeoff": {"height_m": 3}},
-        {"set_speed": {"speed_m_s": 1.5}},
-        {"go_to": {"position_ned_m": [4, -3, -3], "yaw_deg": 30}},
-        {"repeat": {"times": 2, "items": [{"path": {"points_ned_m": [[1, 2, -2], [3, 4, -2.5]], "speed_m_s": 2}}]}},
-        {"hold": {"duration_s": 2}},
-        {"orbit": {"centre_ned_m": [3, 0, -3], "radius_m": 2}},
-        {"velocity": {"velocity_ned_m_s": [0, 1, 0], "duration_s": 2}},
-        {"set_yaw": {"yaw_deg": 120}},
-        {"expect": {"no_collision": {}}},
-        {"land": {}},
-    ],
-    "fence": {"polygon_ne_m": [[-9, -9], [9, -9], [9, 9], [-9, 9]]},
-}
-
-
-def test_a_mission_comes_back_from_a_plan_to_the_millimetre():
-    mission = Mission.model_validate(FLOWN)
-    written, notes = plan_of_mission(mission, HOME)
-    data, _ = mission_of_plan(json.loads(json.dumps(written)), "t")
-    again = Mission.model_validate(data)
-    places = [step.go_to.position_ned_m for step in again.items if step.go_to]
-    assert places[0] == pytest.approx((4, -3, -3), abs=1e-3)
-    assert places[1:5] == [pytest.approx(p, abs=1e-3) for p in [(1, 2, -2), (3, 4, -2.5)] * 2]
-    round_the_centre = places[5:30]
-    assert [math.dist(place[:2], (3, 0)) for place in round_the_centre] == pytest.approx([2.0] * 25, abs=1e-3)
-    assert again.items[2].set_speed.speed_m_s == 1.5
-    assert again.fence.polygon_ne_m[2] == pytest.approx((9, 9), abs=1e-3)
-    assert [step.name for step in again.items][-2:] == ["go_to", "land"]
-    assert any("expect" in note for note in notes)
-
-
-def test_both_ways_on_the_command_line(tmp_path):
-    mission, made, back = tmp_path / "m.yaml", tmp_path / "made.plan", tmp_path / "back.yaml"
-    mission.write_text(yaml.safe_dump(FLOWN))
-    result = rebound("plan", "export", mission, "--home", "47.3977,8.5456,488", "--out", made)
-    assert result.returncode == 0, result.stderr
-    result = rebound("plan", "import", made, "--out", back)
-    assert result.returncode == 0, result.stderr
-    assert Mission.model_validate(yaml.safe_load(back.read_text())).name == "made"
-    nowhere = tmp_path / "none" / "made.plan"
-    result = rebound("plan", "export", mission, "--home", "47.3977,8.5456,488", "--out", nowhere)
+def test_a_plan_becomes_a_mission_file_on_the_command_line(tmp_path):
+    path, out = tmp_path / "round the house.plan", tmp_path / "house.yaml"
+    path.write_text(json.dumps(plan(TAKEOFF, waypoint(north=0.05), item(20, *[0] * 7))))
+    result = rebound("plan", "import", path, "--out", out)
+    assert result.returncode == 0 and "note: the plan has no fence" in result.stderr
+    assert Mission.model_validate(yaml.safe_load(out.read_text())).name == "round-the-house"
+    nowhere = tmp_path / "none" / "house.yaml"
+    result = rebound("plan", "import", path, "--out", nowhere)
     assert result.returncode == 1 and f"{nowhere}: cannot be written: No such file" in result.stderr
+    result = rebound("plan", "export", "square")
+    assert result.returncode == 1 and "'rebound plan export' is gone" in result.stderr
 
 
 @pytest.mark.parametrize(

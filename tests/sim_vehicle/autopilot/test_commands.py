@@ -67,10 +67,6 @@ def test_do_set_mode_is_accepted_before_anyone_has_looked_at_it():
     assert commands.receive(command(DO_SET_MODE, 1, 99), StreamsThatKnow105()) == (Result.ACCEPTED, True)
 
 
-def test_everything_else_goes_to_the_commander_unanswered():
-    assert commands.receive(command(COMPONENT_ARM_DISARM, 1), StreamsThatKnow105()) == (None, True)
-
-
 @pytest.mark.parametrize(
     ("target", "ours"),
     [((1, 1), True), ((0, 0), True), ((0, 1), True), ((1, 0), True), ((2, 1), False), ((1, 191), False)],
@@ -133,7 +129,3 @@ def test_modes_that_do_not_exist(params, text):
     flight = Flight()
     assert flight.ask(DO_SET_MODE, *params) is Result.TEMPORARILY_REJECTED
     assert flight.autopilot.texts[-1].text == text
-
-
-def test_a_command_that_nobody_knows():
-    assert Flight().ask(31_999) is Result.UNSUPPORTED

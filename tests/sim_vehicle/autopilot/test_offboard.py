@@ -149,16 +149,6 @@ def test_setpoints_that_come_back_put_it_into_offboard_again():
     assert flight.autopilot.system_status == 4
 
 
-@pytest.mark.parametrize("rate_hz", [2.0, 1.2])
-def test_a_slow_stream_holds_offboard(rate_hz):
-    flight = hovering()
-    shown = set()
-    for _ in range(10):
-        flight.fly(1 / rate_hz, UP_THERE, rate_hz)
-        shown.add(flight.autopilot.modes.flown)
-    assert shown == {Mode.OFFBOARD}
-
-
 def test_too_slow_a_stream_flips_to_and_fro():
     flight = hovering()
     shown = []

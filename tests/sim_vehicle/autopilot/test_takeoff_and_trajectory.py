@@ -53,18 +53,6 @@ def test_nothing_leaves_the_ground_before_the_motors_are_up_to_speed():
     assert left_after_s == pytest.approx(1.0 + 1.35 + 0.2, abs=0.03)
 
 
-def test_offboard_is_held_back_by_the_same_ramp():
-    flight = Flight()
-    climbing = target(position=(0.0, 0.0, -10.0))
-    flight.fly(0.5, climbing)
-    flight.ask(176, 1, 6)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    assert flight.fly_until(lambda: flight.height_m > 0.01, 5.0, climbing) == pytest.approx(2.55, abs=0.03)
-    flight.fly(0.5, climbing)
-    # The ramp now allows (0.2 + 0.5) s * (3 + 2.45) / 3 s, and the vehicle follows 0.2 s behind
-    assert -flight.state.velocity_ned_m_s[2] == pytest.approx(1.82 * 0.5, abs=0.1)
-
-
 def test_armed_and_left_alone_it_stays_on_the_ground_and_disarms():
     for mode_command in (None, NAV_LAND, NAV_RETURN_TO_LAUNCH):
         flight = Flight()
@@ -180,11 +168,6 @@ def test_hold_stops_where_braking_ends_and_stays():
     assert flight.state.position_ned_m[0] == pytest.approx(expected, abs=0.1)
     assert 1.0 < flight.state.position_ned_m[0] - place < 2.5
     assert math.hypot(*flight.state.velocity_ned_m_s) < 0.02
-
-
-def test_the_stop_point_allows_for_speed_and_for_the_build_up_of_acceleration():
-    # v (v / 2a + 0.6 s) with a = 3 m/s^2
-    assert stop_point((1.0, 2.0, -3.0), (0.0, 3.0, 1.0), DEFAULTS) == pytest.approx((1.0, 2.0 + 3 * (0.5 + 0.6), -3.0))
 
 
 def test_a_smoothed_setpoint_keeps_its_limits_and_does_not_run_past():

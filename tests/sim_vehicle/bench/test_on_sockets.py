@@ -66,15 +66,6 @@ def test_it_is_there_at_its_addresses_and_gone_afterwards() -> None:
     assert vehicle.truth.time_boot_s > 0
 
 
-def test_two_vehicles_beside_one_another_are_two_systems() -> None:
-    with start_vehicle(parameters={"MAV_SYS_ID": 2}) as second, start_vehicle() as first:
-        for vehicle, system in ((first, 1), (second, 2)):
-            with connected(vehicle) as client:
-                parser = dialect.MAVLink(None)
-                messages = parser.parse_buffer(client.recv(65_536)) or []
-            assert {message.get_srcSystem() for message in messages} == {system}
-
-
 def test_it_ends_with_an_error_in_the_test() -> None:
     with pytest.raises(ZeroDivisionError), start_vehicle():
         _ = 1 / 0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.errors import AirframeError, ConditionNotMet, ParameterError, SceneError
-from sim_vehicle.testing import Box, LockstepVehicle, Motion, Pole, Wall, faults
+from sim_vehicle.testing import LockstepVehicle, Motion, Pole, Wall, faults
 from tests.sim_vehicle.bench.pilot import Pilot
 
 HOVER_M = 2.5
@@ -48,16 +48,6 @@ def test_a_wall_that_was_removed_is_flown_through() -> None:
     pushed_north(pilot)
     pilot.vehicle.advance_until(lambda truth: truth.position_ned_m[0] > 0.6, 3.0)
     assert pilot.vehicle.truth.hits == ()
-
-
-@pytest.mark.parametrize(
-    "obstacle", [Pole(point_ned_m=(0.6, 0, 0)), Box(centre_ned_m=(0.9, 0, -HOVER_M), size_m=(0.4, 1, 1))]
-)
-def test_poles_and_boxes_too(obstacle: Pole | Box) -> None:
-    pilot = hovering()
-    with pilot.vehicle.place(obstacle):
-        pushed_north(pilot)
-        pilot.vehicle.advance_until(lambda truth: truth.hits, 3.0)
 
 
 def test_a_second_obstacle_during_a_contact_leaves_the_contact_what_it_is() -> None:

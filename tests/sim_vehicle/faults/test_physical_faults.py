@@ -8,8 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.cruise import Cruise
 from sim_vehicle.faults.wind import Dryden, risen, strengths_and_lengths
+from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.physics.throwing import quiet

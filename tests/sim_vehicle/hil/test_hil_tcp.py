@@ -13,7 +13,7 @@ from sim_vehicle.errors import NotInLockstep, PortInUse
 from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
-from sim_vehicle.shell.hil_tcp import HilPace, serve_px4
+from sim_vehicle.shell.hil_tcp import serve_px4
 from sim_vehicle.shell.truth_file import load_stalls, load_truth
 from tests.sim_vehicle.hil.px4_client import HOVER, TIMEOUT_S, Px4Client
 
@@ -105,17 +105,6 @@ def test_px4_boots_on_samples_that_it_does_not_answer_and_then_gets_one_an_answe
         assert all(step[-1].get_type() == "HIL_SENSOR" for step in steps)
 
 
-def test_time_stands_still_until_the_answer_comes():
-    with served() as server, connected(server) as px4:
-        boot(px4)
-        list(px4.fly(20, HOVER))
-        px4.next_step()
-        assert px4.hears_nothing_for(0.3)
-        px4.answer(HOVER)
-        px4.next_step()
-        assert px4.times_us[-1] - px4.times_us[-2] == 4_000
-
-
 def test_a_lost_answer_costs_a_second_and_not_the_flight(tmp_path):
     path = tmp_path / "truth.npz"
     with served(1.0, path) as server, connected(server) as px4:
@@ -138,39 +127,6 @@ def test_motor_commands_move_the_vehicle():
         steps = list(px4.fly(300, [0.9] * 4))
         heights = [message.alt for step in steps for message in step if message.get_type() == "HIL_STATE_QUATERNION"]
         assert heights[-1] - heights[0] > 300  # mm
-
-
-def test_disarmed_it_stays_on_the_ground_whatever_the_controls_say():
-    with served() as server, connected(server) as px4:
-        boot(px4)
-        heights = []
-        for _ in range(200):
-            heights += [m.alt for m in px4.next_step() if m.get_type() == "HIL_STATE_QUATERNION"]
-            px4.answer([0.9] * 4, armed=False)
-        assert abs(heights[-1] - heights[0]) < 10
-
-
-@pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])
-def test_the_vehicles_clock_runs_at_the_asked_speed(speed):
-    pace = HilPace(speed)
-    booted_us = pace.due_us(0, 7_000_000)
-    assert booted_us == 7_000_000
-    assert pace.due_us(2_000_000, booted_us) == booted_us + round(2_000_000 / speed)
-
-
-def test_as_fast_as_px4_answers_is_always_due():
-    pace = HilPace(0)
-    assert [pace.due_us(time_us, 7_000_000) for time_us in (0, 4_000, 9_000_000)] == [7_000_000] * 3
-
-
-def test_a_machine_that_was_away_does_not_hurry_after_the_lost_time():
-    pace = HilPace(1.0)
-    booted_us = pace.due_us(0, 7_000_000)
-    assert pace.due_us(1_000_000, booted_us + 1_100_000) == booted_us + 1_000_000, "a little late is caught up"
-    away_us = booted_us + 60_000_000
-    assert pace.due_us(2_000_000, away_us) == away_us
-    assert pace.stalls == [(2_000_000, 58_000_000)]
-    assert pace.due_us(3_000_000, away_us) == away_us + 1_000_000
 
 
 def test_the_next_px4_gets_a_new_vehicle_and_the_truth_of_each_is_written(tmp_path):

@@ -205,10 +205,8 @@ def signed(end: End, time_stamp: int = 10**15, key: bytes = KEY) -> None:
 @pytest.fixture
 def guarded() -> Vehicle:
     """A vehicle that has a key."""
-    vehicle = Vehicle(ONBOARD, GROUND)
-    key_message = dialect.MAVLink_setup_signing_message(1, 1, KEY, 10**14)
-    vehicle.ends[0].send(key_message)
-    vehicle.run(0.02)
+    vehicle = Vehicle(ONBOARD, GROUND, signing=Signing(KEY))
+    vehicle.vehicle.parameters.set("MAV_SIGN_CFG", 1)
     return vehicle
 
 
@@ -276,96 +274,38 @@ def test_a_new_sender_may_not_be_a_minute_late(guarded):
     assert refused(guarded).replayed == 1
 
 
-def test_signing_may_be_left_to_the_sender(guarded):
-    guarded.vehicle.parameters.set("MAV_SIGN_CFG", 0)
+@pytest.mark.parametrize(("sign_cfg", "heard"), [(0, True), (1, False), (2, False)])
+def test_unsigned_packets_are_taken_where_the_parameter_says(guarded, sign_cfg, heard):
+    guarded.vehicle.parameters.set("MAV_SIGN_CFG", sign_cfg)
     guarded.ends[1].command(400, 0)
     guarded.run(0.05)
-    assert len(guarded.ends[1].all("COMMAND_ACK")) == 1
-
-
-def test_a_key_is_taken_away_only_by_somebody_who_has_it(guarded):
-    end = guarded.ends[1]
-    no_key = dialect.MAVLink_setup_signing_message(1, 1, bytes(32), 0)
-    end.send(no_key)
-    guarded.run(0.02)
-    assert guarded.vehicle._signing.key == KEY
-    signed(end)
-    end.send(no_key)
-    guarded.run(0.02)
-    assert guarded.vehicle._signing.key is None
-    end.packets.clear()
-    guarded.run(0.2)
-    assert all(not raw[2] & 1 for raw in end.packets)
-
-
-USB = LinkOptions(LinkKind.GROUND, is_usb=True)
-SETUP = dialect.MAVLink_setup_signing_message(1, 1, KEY, 10**14)
-
-
-def restarted(vehicle: Vehicle) -> None:
-    vehicle.ends[0].command(246, 1)
-    vehicle.run(3.0)
-    for end in vehicle.ends:
-        end.packets.clear()
-
-
-def are_signed(end: End) -> set[bool]:
-    return {bool(raw[2] & 1) for raw in end.packets}
+    assert bool(guarded.ends[1].all("COMMAND_ACK")) == heard
 
 
 def stamps(end: End) -> list[int]:
     return [int.from_bytes(raw[-12:-6], "little") for raw in end.packets]
 
 
-def test_px4_1_17_takes_a_key_over_usb_alone_and_other_links_read_it_at_the_next_start():
-    # Given a vehicle whose links are a companion's and USB
-    vehicle = Vehicle(ONBOARD, USB, signing=Signing(is_px4_1_17=True))
-    companion, usb = vehicle.ends
-    # When a key comes over the companion's, nothing follows
-    companion.send(SETUP)
-    vehicle.run(0.2)
-    assert are_signed(companion) == are_signed(usb) == {False}
-    # When it comes over USB, that link signs, and the other after a restart
-    usb.send(SETUP)
-    vehicle.run(0.02)
-    for end in vehicle.ends:
-        end.packets.clear()
-    vehicle.run(0.2)
-    assert (are_signed(companion), are_signed(usb)) == ({False}, {True})
-    restarted(vehicle)
-    vehicle.run(0.2)
-    assert are_signed(companion) == are_signed(usb) == {True}
-
-
-@pytest.mark.parametrize(("sign_cfg", "heard"), [(0, [True, True]), (1, [False, True]), (2, [False, False])])
-def test_px4_1_17_takes_unsigned_packets_where_its_parameter_says(sign_cfg, heard):
-    vehicle = Vehicle(ONBOARD, USB, signing=Signing(KEY, is_px4_1_17=True))
-    vehicle.vehicle.parameters.set("MAV_SIGN_CFG", sign_cfg)
-    for end in vehicle.ends:
-        end.command(400, 0)
-        vehicle.run(0.05)
-    assert [bool(end.all("COMMAND_ACK")) for end in vehicle.ends] == heard
-
-
-def test_px4_1_17_has_the_time_stamp_of_its_card_until_it_hears_a_later_one_on_that_link():
-    vehicle = Vehicle(ONBOARD, USB, signing=Signing(KEY, is_px4_1_17=True))
-    companion, usb = vehicle.ends
-    vehicle.run(0.5)
+def test_time_stamps_begin_at_the_cards_until_a_later_one_is_heard_on_that_link(guarded):
+    companion, other = guarded.ends
+    guarded.run(0.5)
     assert stamps(companion)[:3] == [1, 2, 3]
     # When the companion is heard with the clock's
     companion.packets.clear()
     signed(companion, time_stamp=10**14)
     companion.heartbeat()
-    vehicle.run(0.5)
+    guarded.run(0.5)
     later = [stamp for stamp in stamps(companion) if stamp > 10**14]
-    assert later[:2] == [10**14 + 1, 10**14 + 2] and max(stamps(usb)) < 10**6
+    assert later[:2] == [10**14 + 1, 10**14 + 2] and max(stamps(other)) < 10**6
     # And after a restart it begins again, with no memory of what was heard
-    restarted(vehicle)
-    vehicle.run(0.5)
+    companion.command(246, 1)
+    guarded.run(3.0)
+    companion.packets.clear()
+    guarded.run(0.5)
     assert stamps(companion)[0] < 10**6
     signed(companion, time_stamp=10**13)
     companion.command(400, 0)
-    vehicle.run(0.05)
+    guarded.run(0.05)
     assert companion.all("COMMAND_ACK")
 
 

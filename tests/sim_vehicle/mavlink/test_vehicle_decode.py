@@ -145,11 +145,6 @@ def test_a_setpoint_for_another_is_dropped(system, component, ours):
     assert bool(decoder().push(raw)) is ours
 
 
-def test_a_vehicle_of_another_number_hears_what_is_meant_for_it():
-    raw = packet(dialect.MAVLink_set_position_target_local_ned_message(7, 5, 1, 1, 0xDF8, *NUMBERS))
-    assert decoder(Identity(5, 1)).push(raw) and not decoder(Identity(4, 1)).push(raw)
-
-
 def test_many_packets_cut_anywhere():
     raw = b"".join(packet(message) for message in MESSAGES)
     wanted = [number for number in ids(MESSAGES) if number in READ]

@@ -12,9 +12,9 @@ from sim_vehicle.autopilot.messages import CommandAck, Identity, Result, Severit
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
+from sim_vehicle.mavlink.services.texts import TextLink
 from sim_vehicle.mavlink.streams import condition
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
@@ -133,14 +133,6 @@ def test_each_message_reads_back(build, expected):
     message = read_back(build(telemetry()))
     for field, value in expected.items():
         assert getattr(message, field) == pytest.approx(value, rel=1e-6), field
-
-
-def test_odometrys_covariances_stand_on_the_diagonal():
-    message = read_back(encode.odometry(telemetry()))
-    diagonal = [0, 6, 11, 15, 18, 20]
-    assert [message.pose_covariance[i] for i in diagonal] == pytest.approx([1e-4] * 3 + [9e-4] * 3)
-    assert [message.velocity_covariance[i] for i in diagonal] == pytest.approx([4e-4] * 3 + [0.0] * 3)
-    assert sum(message.pose_covariance) == pytest.approx(3e-4 + 27e-4)
 
 
 def test_pitching_up_is_positive_and_right_wing_down_rolls_positive():

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, PASSED
-from sim_vehicle.physics.surroundings import Surroundings
+from sim_vehicle.physics.touching.proximity import IN_FRONT, INSIDE, PASSED
+from sim_vehicle.physics.touching.surroundings import Surroundings
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Motion, Obstacle, Pole, Wall, build_world
 
 STEP_US = 4000
@@ -44,13 +44,3 @@ def test_one_that_moves_is_where_its_motion_has_brought_it() -> None:
     front = rows_of(around, moving)[0]
     assert around.faces[front, FACE_POINT] == 3.0
     assert np.allclose(around.faces[front, FACE_VELOCITY : FACE_VELOCITY + 3], (-1.0, 0.0, 0.0))
-
-
-def test_the_same_obstacle_is_the_same_object() -> None:
-    """Two that are alike are two."""
-    one, other = wall(1.0), wall(1.0)
-    before, after = build_world((one,)), build_world((other, one))
-    rows = after.rows_in(before)
-    assert list(rows[after.owners == 0]) == [-1] * int((after.owners == 0).sum())
-    assert list(rows[after.owners == 1]) == list(np.flatnonzero(before.owners == 0))
-    assert rows[after.owners == -1] == [0]

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.layout import POINTS
-from sim_vehicle.physics.proximity import points_behind
+from sim_vehicle.physics.touching.proximity import points_behind
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Vector3, World
 
 Floats = npt.NDArray[np.float64]

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import FEET, POINTS, ContactSprings, Scratch
-from sim_vehicle.physics.meeting import deepest_point, depth_in, meet, nearest_on_line, part_centre, within
+from sim_vehicle.physics.touching.meeting import deepest_point, depth_in, meet, nearest_on_line, part_centre, within
 from sim_vehicle.world import FACE_MEETS_FEET, FACE_NORMAL, FACE_POINT, FACE_RADIUS, FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]

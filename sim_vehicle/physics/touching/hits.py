@@ -27,8 +27,8 @@ from sim_vehicle.physics.layout import (
     PlantState,
     Scratch,
 )
-from sim_vehicle.physics.meeting import meet
-from sim_vehicle.physics.proximity import NEAR
+from sim_vehicle.physics.touching.meeting import meet
+from sim_vehicle.physics.touching.proximity import NEAR
 from sim_vehicle.world import FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]

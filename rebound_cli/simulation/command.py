@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from argparse import Namespace
 from functools import partial
 from pathlib import Path
@@ -58,12 +59,13 @@ def _check_place(truth: Path) -> None:
 
 
 def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:
-    signing, sign_cfg = _signing(options)
-    parameters = {"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)}
+    if options.signing is not None:
+        warnings.warn("--signing is not needed: with --signing-key the vehicle signs as PX4 1.17 does", stacklevel=1)
+    key = None if options.signing_key is None else read_key(options.signing_key)
+    parameters = {"MAV_SYS_ID": options.instance + 1, **time_outs_at(options.speed)}
+    parameters |= {} if key is None else {"MAV_SIGN_CFG": 1.0}
     epoch_us = time.time_ns() // 1000
-    vehicle = SimulatedVehicle(
-        world.airframe, world.scene, world.seed, epoch_at_boot_us=epoch_us, parameters=parameters, signing=signing
-    )
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed, True, epoch_us, parameters, Signing(key))
     vehicle.truth.on_hit = partial(_tell_of, console)
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)
@@ -75,13 +77,6 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
   mavutil         udpin:0.0.0.0:{port}
   Rebound         --connect udpin://0.0.0.0:{port}""")
     serve(vehicle, ports, options.truth, stopped.is_set, options.speed)
-
-
-def _signing(options: Namespace) -> tuple[Signing, dict[str, float]]:
-    """Of the vehicle, and MAV_SIGN_CFG where it is not the vehicle's default."""
-    is_px4_1_17, file = options.signing == "px4-1.17", options.signing_key
-    signing = Signing(None if file is None else read_key(file), is_px4_1_17)
-    return signing, {"MAV_SIGN_CFG": int(file is not None)} if is_px4_1_17 or file is not None else {}
 
 
 def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:

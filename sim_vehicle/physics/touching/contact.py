@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GUARDS, HUB, ContactSprings, PlantState, Scratch
-from sim_vehicle.physics.meeting import meet
-from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, NEAR, points_at
 from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.physics.touching.meeting import meet
+from sim_vehicle.physics.touching.proximity import IN_FRONT, INSIDE, NEAR, points_at
 from sim_vehicle.world import FACE_RADIUS, FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]

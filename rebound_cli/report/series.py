@@ -1,0 +1,41 @@
+"""The columns of a flight that its page shows, live or afterwards, each with how fine it is kept.
+
+Finer than any of the sensors, so that two bytes hold most numbers.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rebound_cli.results.flight_log import FlightLog
+
+Floats = npt.NDArray[np.float64]
+# Values and their resolution, by the column's name.
+Columns: TypeAlias = dict[str, tuple[Floats, float]]
+
+TIME_S, PLACE_M, SPEED_M_S, UNIT, FORCE_M_S2, RATE_RAD_S, FOLD_M = 1e-5, 1e-3, 1e-3, 1e-4, 1e-2, 1e-3, 1e-4
+NED, VELOCITY, TURN = ("n", "e", "d"), ("vn", "ve", "vd"), ("qw", "qx", "qy", "qz")
+
+
+def times(at_us: Floats, since_us: float) -> Columns:
+    return {"t": ((at_us - since_us) * 1e-6, TIME_S)}
+
+
+def vector(names: Sequence[str], rows: Floats, resolution: float) -> Columns:
+    return {name: (rows[:, number], resolution) for number, name in enumerate(names)}
+
+
+def series(log: FlightLog, started_us: float) -> dict[str, Columns]:
+    """Of each stream that every flight has; `t` is seconds since the flight began."""
+    return {
+        "imu": times(log.imu_at_us, started_us)
+        | vector(("fx", "fy", "fz"), log.specific_force_frd_m_s2, FORCE_M_S2)
+        | vector(("p", "q", "r"), log.angular_velocity_frd_rad_s, RATE_RAD_S),
+        "path": times(log.position_at_us, started_us)
+        | vector(NED, log.position_ned_m, PLACE_M)
+        | vector(VELOCITY, log.velocity_ned_m_s, SPEED_M_S),
+        "attitude": times(log.attitude_at_us, started_us) | vector(TURN, log.attitude_wxyz, UNIT),
+        "setpoint": times(log.setpoint_at_us, started_us) | vector(NED, log.setpoint_ned_m, PLACE_M),
+    }
