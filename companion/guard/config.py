@@ -30,6 +30,9 @@ class GuardConfig(StrictModel):
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
     """Of one flight; after this one the vehicle is given back to hold, whatever `then` says. With `then: previous` a
     mission flies into the same wall again. Three hits in one flight are no accident."""
+    between: tuple[str, ...] = ()
+    """Where programs reach the vehicle through the guard, such as udpin://0.0.0.0:14540. While the guard recovers it,
+    what would move the vehicle is kept out."""
     beside_program: Literal["tell", "reposition"] = "tell"
     """What follows a hit in another program's OFFBOARD: a report, or one DO_REPOSITION. A hit while a program on a link
     of its own sends setpoints. `reposition` leads the vehicle clear by a command; a real PX4 that gets it while the

@@ -1,6 +1,5 @@
 """The guard beside a pilot, a mission or a program on another link: whole wire, virtual time."""
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -13,7 +12,7 @@ from companion.link.streams import StreamMonitor
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Phase
-from tests.guard.flying import FACE_NORTH_M, HOLD, LAND, MANUAL_POSITION, MISSION, OFFBOARD, AttachedFlight
+from tests.guard.flying import FACE_NORTH_M, HOLD, LAND, MANUAL_POSITION, OFFBOARD, AttachedFlight, fly_a_mission
 from tests.guard.flying import GuardedFlight as Air
 
 CLEAR_M = 0.3
@@ -21,20 +20,8 @@ REBOOT = 246
 
 
 def mission_into_the_wall(air: Air) -> None:
-    """One waypoint 8 m north, by the mission protocol, and the mission mode."""
     air.take_off()
-    air.send(dialect.MAVLink_mission_count_message(1, 1, 1, 0))
-    air.run_until(lambda: "MISSION_REQUEST_INT" in air.others_last or "MISSION_REQUEST" in air.others_last, 2.0)
-    place = air.others_last["GLOBAL_POSITION_INT"]
-    north_1e7_deg = round(8.0 / 6_371_000.0 * 1e7 * 180.0 / math.pi)
-    air.send(
-        dialect.MAVLink_mission_item_int_message(
-            *(1, 1, 0, 6, 16, 1, 1, 0.0, 0.0, 0.0, math.nan), place.lat + north_1e7_deg, place.lon, 2.5, 0
-        )
-    )
-    air.run_until(lambda: "MISSION_ACK" in air.others_last, 2.0)
-    assert air.others_last["MISSION_ACK"].type == 0
-    air.set_mode(MISSION)
+    fly_a_mission(air)
 
 
 def recovering(**changes) -> Air:
