@@ -11,7 +11,7 @@ from companion.guard.states import HOLDING, State
 from companion.guard.watching import GuardConnect, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import GlobalPosition, PositionTarget, Sample, Sticks, TimeSyncRequest
+from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
 from companion.reflex.monitor import start_monitor
 
 
@@ -58,9 +58,6 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         elif sticks and guard.sticks is None:
             # Nobody had a stick in hand before the hit.
             guard.sticks = sticks[0]
-        places = [sample for sample in samples if isinstance(sample, GlobalPosition)]
-        if places:
-            guard.global_position = places[-1]
         echoes = [sample for sample in samples if isinstance(sample, PositionTarget)]
         inputs = inputs._replace(echoes=echoes, sticks=sticks, is_enabled=self.is_enabled)
         self.is_enabled = False

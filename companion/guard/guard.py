@@ -10,7 +10,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.states import State
 from companion.guard.watching import OWN_STREAMS
-from companion.mavlink.readers import LONE_GUARD_READERS
+from companion.mavlink.readers import GUARD_READERS
 from companion.messages import SendCommand, SetMessageInterval
 from companion.report import CollisionReport, RoundTripReport
 
@@ -21,7 +21,7 @@ class Guard(Stepped[GuardCore]):
     _first_state: ClassVar = State.CONNECTING.value
 
     def __init__(self, config: GuardConfig) -> None:
-        super().__init__(LONE_GUARD_READERS)
+        super().__init__(GUARD_READERS)
         self._config = config
 
     def _begun(self, now_us: int) -> GuardCore:
