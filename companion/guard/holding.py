@@ -6,7 +6,6 @@ from companion.flight.context import Inputs, Target
 from companion.flight.recovering import Recover
 from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
-from companion.link.round_trip import MOST_US as ROUND_TRIP_US
 from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand, SetMode
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, mode_name
 
@@ -67,10 +66,10 @@ class Recovering:
         return self._recover.target(now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode. Asked
-        # for it, PX4 tells at once of a mode that has changed, and nothing of one that has not.
+        # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode: only
+        # a later report that says OFFBOARD makes them a program's.
         vehicle, asked_us = guard.vehicle, self._asked_us
-        if vehicle.is_mode_known and asked_us is not None and now_us - asked_us > ROUND_TRIP_US:
+        if asked_us is not None and vehicle.mode_received_us > asked_us and vehicle.is_mode_known:
             guard.program_elsewhere = True
             return GuardTransition(
                 Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own"
@@ -79,7 +78,7 @@ class Recovering:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES and asked_us is None:
             self._asked_us = now_us
-            guard.outbox.append(SendCommand(RequestMessage(MessageId.CURRENT_MODE), 0))
+            guard.outbox.append(SendCommand(RequestMessage(MessageId.HEARTBEAT), 0))
         return GuardTransition(Trigger.SETTLED) if recovered(guard, self._recover, inputs, now_us) else None
 
 
