@@ -180,6 +180,10 @@ def add_guard(commands: Commands) -> None:
     text = "Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/how-to/guard.md."
     guard = _command(commands, "guard", "guard:run_guard", "protect a flight that something else commands", text)
     _add_connect(guard, required=True)
+    text = (
+        "be the link: programs and ground stations come here, e.g. udpin://0.0.0.0:14540; give it once for each address"
+    )
+    _option(guard, "--between", text, "URL", action="append", default=[])
     _add_wait(guard)
     _add_peer_and_key(guard)
     _option(guard, "--config", "settings, as in docs/how-to/guard.md", "FILE")

@@ -5,11 +5,14 @@ from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 
+from companion.companion import StepResult
 from companion.errors import ReboundError
+from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
+from companion.shell.clients import SharedConnection, carried_bytes_s
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection
+from companion.shell.connection import Connection, Selectable
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.documents import Document, apply_overrides, load_document, validated
@@ -30,10 +33,17 @@ def run_guard(options: Namespace) -> int:
     run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-        connection = open_signed(options, config.companion.link.wait)
+        between = None
+        if config.between:
+            between = Between(carried_bytes_s(options.connect), options.signing_key is not None)
+
+        def shared(opened: Selectable) -> Connection:
+            return opened if between is None else SharedConnection(opened, config.between, between)
+
+        connection = open_signed(options, config.companion.link.wait, shared)
         manager = service_manager()
         with closing(connection), Interrupts() as interrupts:
-            while not (outcome := _recorded(config, options.out, connection, console, interrupts, manager)):
+            while not (outcome := _recorded(config, options.out, connection, console, interrupts, manager, between)):
                 pass
         if interrupts.reason is None:
             raise ReboundError(outcome[:1].upper() + outcome[1:] + ("" if outcome.endswith("?") else "."))
@@ -47,6 +57,7 @@ def _recorded(
     console: Console,
     interrupts: Interrupts,
     manager: ServiceManager | None,
+    between: Between | None,
 ) -> str:
     """One folder: until the end, which is returned, or, then empty, until it is long and the vehicle disarmed."""
     make_room_for_next(out, config.companion.disk)
@@ -64,8 +75,15 @@ def _recorded(
             clock = Clock()
             started_us = clock.now_us()
             loop = Loop(guard, connection, clock, recorder, console, interrupts, server, computer, manager=manager)
+
+            def beside(now_us: int, result: StepResult) -> None:
+                console.events(result.events, started_us)
+                if between is not None:
+                    for kind, said in guard.look_at(between, now_us):
+                        recorder.record_input(now_us, kind, **said)
+
             loop.run(
-                lambda _, result: console.events(result.events, started_us),
+                beside,
                 lambda: ring is not None and ring.is_long and guard.armed is False and interrupts.reason is None,
             )
     finally:
@@ -75,6 +93,7 @@ def _recorded(
             "outcome": guard.outcome or "goes on in the next folder",
             "collisions": hits,
             "left_alone": guard.left_alone(),
+            "kept_out": 0 if between is None else between.kept_out,
             "round_trip_ms": guard.round_trip().summary(),
             **asdict(connection.counts),
             "refused_packets": refused_packets(connection),
@@ -96,6 +115,8 @@ def guard_config(options: Namespace) -> GuardConfig:
         document.put_option("--modes", ("modes",), modes, options.modes)
     if options.wait:
         document.put_option("--wait", ("companion", "link", "wait"), True)
+    if options.between:
+        document.put_option("--between", ("between",), options.between)
     if options.then is not None:
         document.put_option("--then", ("then",), options.then)
     return validated(GuardConfig, document, document.data)

@@ -11,19 +11,11 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.encode import Encoder
+from companion.mavlink.moves import SETPOINTS
 from companion.mavlink.readers import sample_from
-from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk, TimeSyncReply
+from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk
 from companion.report import Event
 
-# Whatever PX4 flies by in OFFBOARD (MavlinkReceiver's handlers).
-SETPOINTS = frozenset(
-    {
-        "SET_POSITION_TARGET_LOCAL_NED",
-        "SET_POSITION_TARGET_GLOBAL_INT",
-        "SET_ATTITUDE_TARGET",
-        "SET_ACTUATOR_CONTROL_TARGET",
-    }
-)
 # Own setpoints that are remembered until they pass the gate; more than a few were lost before.
 _MOST_ON_THE_WAY = 32
 
@@ -74,7 +66,7 @@ class AttachedGuard:
         self._arrived.clear()
         sent: list[tuple[str, Mapping[str, Any]]] = []
         for message in outputs.messages:
-            if not isinstance(message, OnboardHeartbeat | TimeSyncAsk | TimeSyncReply):
+            if not isinstance(message, OnboardHeartbeat | TimeSyncAsk):
                 sent += self._encoder.fields(message)
         for name, fields in sent:
             if name in SETPOINTS:

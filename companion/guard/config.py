@@ -23,6 +23,8 @@ DEFAULT_MODES = (
 class GuardConfig(StrictModel):
     """The file of `rebound guard --config`; a mission's parts of the same name mean the same."""
 
+    retired = frozenset({"beside_program"})
+
     modes: Annotated[tuple[str, ...], Field(min_length=1)] = DEFAULT_MODES
     """PX4's modes that the guard may take over."""
     then: Literal["previous", "hold"] = "hold"
@@ -30,10 +32,9 @@ class GuardConfig(StrictModel):
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
     """Of one flight; after this one the vehicle is given back to hold, whatever `then` says. With `then: previous` a
     mission flies into the same wall again. Three hits in one flight are no accident."""
-    beside_program: Literal["tell", "reposition"] = "tell"
-    """What follows a hit in another program's OFFBOARD: a report, or one DO_REPOSITION. A hit while a program on a link
-    of its own sends setpoints. `reposition` leads the vehicle clear by a command; a real PX4 that gets it while the
-    contact lasts flies off backwards (see guard.holding): not done unasked."""
+    between: tuple[str, ...] = ()
+    """Where programs reach the vehicle through the guard, e.g. udpin://0.0.0.0:14540. While the guard recovers it, what
+    would move it is kept out (see moves.KEPT_OUT)."""
     confirm_within_s: Annotated[Positive, Field(ge=0.2)] = 1.0
     """How long OFFBOARD may take; then the vehicle is asked to hold. The answer takes 10 ms, CURRENT_MODE at 10 Hz 100
     ms; a command lost on the way is repeated after 500 ms."""

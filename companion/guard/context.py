@@ -8,7 +8,7 @@ from companion.flight.context import FlightContext, Inputs, Target
 from companion.guard.config import GuardConfig
 from companion.guard.descent import Descent
 from companion.guard.states import Trigger
-from companion.messages import GlobalPosition, Sticks, Vector3
+from companion.messages import Sticks, Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,6 @@ class GuardContext(FlightContext):
     others_setpoint_us: int | None = None  # when one was last seen on its way
     sticks: Sticks | None = None
     descent: Descent = field(default_factory=Descent)
-    global_position: GlobalPosition | None = None
     # When, and to where; PX4 echoes no attitude.
     sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
 

@@ -11,7 +11,7 @@ from companion.guard.states import HOLDING, State
 from companion.guard.watching import GuardConnect, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import GlobalPosition, PositionTarget, Sample, Sticks
+from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
 from companion.reflex.monitor import start_monitor
 
 
@@ -45,6 +45,9 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         return not self.machine.holds and self.flight.descent.is_meant(self.flight.vehicle, self.now_us)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
+        if self.flight.keeps_others_out:
+            # A program behind the guard answers, by its own clock: two answers are two times.
+            samples = [sample for sample in samples if not isinstance(sample, TimeSyncRequest)]
         return samples, observe(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
@@ -52,9 +55,9 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         sticks = [sample for sample in samples if isinstance(sample, Sticks)]
         if sticks and self.machine.state not in HOLDING:
             guard.sticks = sticks[-1]
-        places = [sample for sample in samples if isinstance(sample, GlobalPosition)]
-        if places:
-            guard.global_position = places[-1]
+        elif sticks and guard.sticks is None:
+            # Nobody had a stick in hand before the hit.
+            guard.sticks = sticks[0]
         echoes = [sample for sample in samples if isinstance(sample, PositionTarget)]
         inputs = inputs._replace(echoes=echoes, sticks=sticks, is_enabled=self.is_enabled)
         self.is_enabled = False

@@ -1,26 +1,62 @@
 """The guard as a step function: bytes and the time in, bytes and events out."""
 
+from collections.abc import Iterator
+from dataclasses import asdict
 from typing import ClassVar
 
 from companion.companion import Stepped
+from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.states import State
-from companion.mavlink.readers import LONE_GUARD_READERS
+from companion.guard.watching import OWN_STREAMS
+from companion.mavlink.readers import GUARD_READERS
+from companion.messages import SendCommand, SetMessageInterval
 from companion.report import CollisionReport, RoundTripReport
 
 
 class Guard(Stepped[GuardCore]):
-    """On a link of its own: what others send to the vehicle does not pass through here."""
+    """On a link of its own, or between the vehicle and its clients, whose packets pass it (see guard.between)."""
 
     _first_state: ClassVar = State.CONNECTING.value
 
     def __init__(self, config: GuardConfig) -> None:
-        super().__init__(LONE_GUARD_READERS)
+        super().__init__(GUARD_READERS)
         self._config = config
 
     def _begun(self, now_us: int) -> GuardCore:
-        return GuardCore(self._config, False, now_us)
+        return GuardCore(self._config, bool(self._config.between), now_us)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the vehicle flies by the guard's setpoints."""
+        return self._core is not None and self._core.machine.holds
+
+    def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, int]]]:
+        """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
+        between.is_closed = self.holds
+        if between.has_setpoint(now_us):
+            self.hear_setpoint()
+            yield "setpoint", {}
+        for asked in between.intervals:
+            self.hear_interval(asked)
+            yield "interval", asdict(asked)
+        between.intervals.clear()
+
+    def hear_setpoint(self) -> None:
+        """A client's setpoint has passed since the last step."""
+        if self._core is not None:
+            self._core.flight.others_setpoint_us = self._core.now_us
+
+    def hear_interval(self, asked: SetMessageInterval) -> None:
+        """A client has asked the vehicle for a stream. What the guard needs more often it asks for again."""
+        if self._core is None:
+            return
+        flight = self._core.flight
+        for request in (*[stream.request() for stream in flight.streams.streams], *OWN_STREAMS):
+            is_enough = 0 < asked.interval_us <= request.interval_us
+            if request.message_id == asked.message_id and not is_enough:
+                flight.outbox.append(SendCommand(request, 0))
 
     @property
     def outcome(self) -> str:

@@ -6,7 +6,7 @@ from companion.flight.context import Inputs, Target
 from companion.flight.recovering import Recover
 from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
-from companion.messages import GlobalPosition, PositionTarget, Reposition, SetMode, Vector3
+from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand, SetMode
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, mode_name
 
 # The vehicle reports its setpoint. Further than this from all that was sent, it is somebody else's: at 12 m/s a moving
@@ -18,15 +18,6 @@ CROSSED_TIMES = 3
 ECHO_AGE_US = 400_000
 # The first echoes may still be of the mode before.
 ECHO_STALE_US = 200_000
-# Mean radius: over the metre in question any earth is a ball.
-EARTH_RADIUS_M = 6_371_000.0
-# PX4's AUTO modes begin with the acceleration that the estimator shows at that moment (FlightTaskAuto::activate) and
-# change it by MPC_JERK_AUTO = 4 m/s^3. Requested at the hit itself, a real PX4 began with -64 m/s^2 and flew off
-# backwards at its highest speed. Requested 0.3 s later, the program's setpoints had pushed it into the wall again. So
-# it is requested when the contact is over: no external force for 40 ms, ten samples of a fast IMU stream.
-CONTACT_OVER_US = 40_000
-# Bound for a contact that does not end.
-LONGEST_WAIT_US = 300_000
 # PX4 answers in 10 ms; when it does not take the mode its own action for lost setpoints is the next best.
 HAND_OVER_US = 500_000
 
@@ -69,19 +60,25 @@ class Recovering:
         self._recover = recover
         self._began_us = now_us
         self._foreign = 0
+        self._asked_us: int | None = None  # whether the mode is still ours
 
     def target(self, now_us: int) -> Target | None:
         return self._recover.target(now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        # In a mode that somebody else has commanded PX4 flies to its own places.
-        if now_us - self._began_us > ECHO_STALE_US and guard.vehicle.is_mode_known:
-            self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
-        if self._foreign >= CROSSED_TIMES:
+        # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode: only
+        # a later report that says OFFBOARD makes them a program's.
+        vehicle, asked_us = guard.vehicle, self._asked_us
+        if asked_us is not None and vehicle.mode_received_us > asked_us and vehicle.is_mode_known:
             guard.program_elsewhere = True
             return GuardTransition(
                 Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own"
             )
+        if vehicle.is_mode_known and now_us - self._began_us > ECHO_STALE_US:
+            self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
+        if self._foreign >= CROSSED_TIMES and asked_us is None:
+            self._asked_us = now_us
+            guard.outbox.append(SendCommand(RequestMessage(MessageId.HEARTBEAT), 0))
         return GuardTransition(Trigger.SETTLED) if recovered(guard, self._recover, inputs, now_us) else None
 
 
@@ -103,70 +100,23 @@ def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
     return place is None or all(math.dist(sent, place) > CROSSED_M for sent in recent)
 
 
-class StepAside:
-    """AUTO.LOITER alone would hold where the vehicle, going at the hit's speed, could have stopped: behind the wall."""
-
-    def __init__(self, now_us: int) -> None:
-        self._due_us = now_us + LONGEST_WAIT_US
-        self._is_begun = self.is_over = False
-
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> None:
-        """Until the vehicle has answered, one way or the other; over at once where nothing is known of the place."""
-        here = guard.global_position
-        latest = guard.vehicle.history.latest()
-        if now_us < self._due_us and not self._is_begun and not _is_free(guard):
-            return
-        if self._is_begun:
-            self.is_over = guard.command_outcome(inputs, False, now_us) is not None
-        elif here is None or latest is None or not guard.collisions:
-            self.is_over = True
-        else:
-            self._is_begun = True
-            goal = guard.collisions[-1].setpoint_ned_m
-            guard.command_client.begin(place_of(here, latest.position_ned_m, goal))
-            guard.command_outcome(Inputs(), False, now_us)
-
-
-def _is_free(guard: GuardContext) -> bool:
-    latest = guard.vehicle.history.latest()
-    if latest is None or not guard.collisions:
-        return True
-    return latest.time_boot_us - guard.collisions[-1].estimator.pushed_boot_us >= CONTACT_OVER_US
-
-
-def place_of(here: GlobalPosition, here_ned_m: Vector3, goal_ned_m: Vector3) -> Reposition:
-    """The goal, a few metres from here, on the globe."""
-    north, east, down = (g - h for g, h in zip(goal_ned_m, here_ned_m, strict=True))
-    parallel_m = EARTH_RADIUS_M * math.cos(math.radians(here.latitude_deg))
-    return Reposition(
-        here.latitude_deg + math.degrees(north / EARTH_RADIUS_M),
-        here.longitude_deg + math.degrees(east / parallel_m),
-        here.altitude_m - down,
-    )
-
-
 class GiveBack:
     """Ask for one mode after the other until one is seen; setpoints go on meanwhile.
 
     The first is asked for straight after a report of the present one: a person's own request that shows there is not
     overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
 
-    A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on
-    another link nothing is streamed; the vehicle is asked to hold clear of what it hit. When no mode is taken the
-    setpoints stop, and PX4's action for lost setpoints follows.
+    A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on another link
+    nothing is streamed. When no mode is taken the setpoints stop, and PX4's action for lost setpoints follows.
     """
 
-    def __init__(self, guard: GuardContext, beside_program: bool, now_us: int) -> None:
+    def __init__(self, guard: GuardContext, is_crossed: bool, now_us: int) -> None:
         previous = guard.previous_mode
         self._wishes: list[int] = []
         if guard.config.then == "previous" and not guard.then_hold and previous is not None:
             self._wishes.append(previous)
         self._wishes += [AUTO_LOITER, AUTO_LAND]
-        self._target = guard.target.at_rest() if guard.target else None
-        self._aside: StepAside | None = None
-        if beside_program:
-            self._target = None
-            self._aside = StepAside(now_us)
+        self._target = guard.target.at_rest() if guard.target and not is_crossed else None
         self._began_us = now_us
         self._is_asked = False
 
@@ -182,14 +132,6 @@ class GiveBack:
             guard.command_client.begin(SetMode(self.wish))
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        if self._aside is not None and not self._aside.is_over:
-            self._aside.step(guard, inputs, now_us)
-            if not self._aside.is_over:
-                return None
-            # It asked for the first of these modes, too.
-            self._is_asked = True
-            self._ask(guard)
-            inputs = Inputs()
         if not self._is_asked:
             if not guard.is_time_to_give_away(self._began_us, now_us):
                 return None

@@ -35,12 +35,9 @@ _KINDS = {
 STICKS = "the pilot moved the sticks"
 # PX4's COM_RC_STICK_OV, 30 %.
 MOVED = 0.3
-# In these cases a program sends setpoints on a link of its own.
-_BESIDE_PROGRAM = (Trigger.HIT_BESIDE_PROGRAM, Trigger.CROSSED)
 # After these the vehicle is given back to hold whatever is configured.
 _TO_HOLD = (
     Trigger.STOPPED,
-    Trigger.HIT_BESIDE_PROGRAM,
     Trigger.NOT_CONFIRMED,
     Trigger.POSITION_SILENT,
     Trigger.CROSSED,
@@ -71,17 +68,16 @@ class GuardMachine(StateMachine):
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over
-            trigger = self._trigger_of_hit()
-            if trigger is Trigger.HIT_BESIDE_PROGRAM and self.flight.config.beside_program == "tell":
+            if self._is_beside_program():
                 self.flight.left_alone += 1
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
                 self.flight.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
-            elif TABLE.moves(self.state, trigger):
+            elif TABLE.moves(self.state, Trigger.HIT):
                 self._remember_hit(now_us)
                 is_first = self.state is State.WATCHING
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
-                self._take(GuardTransition(trigger), now_us)
+                self._take(GuardTransition(Trigger.HIT), now_us)
         transition = self.handler.step(self.flight, inputs, now_us)
         while transition is not None and TABLE.moves(self.state, transition.trigger):
             self._take(transition, now_us)
@@ -99,13 +95,11 @@ class GuardMachine(StateMachine):
     def _release(self, text: str) -> None:
         self.state, self.handler, self.outcome = State.ENDED, Released(), text
 
-    def _trigger_of_hit(self) -> Trigger:
+    def _is_beside_program(self) -> bool:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
-        guard = self.flight
-        beside = guard.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out
-        beside = guard.program_elsewhere or (beside and self.state is State.WATCHING)
-        beside = beside and TABLE.moves(self.state, Trigger.HIT_BESIDE_PROGRAM)
-        return Trigger.HIT_BESIDE_PROGRAM if beside else Trigger.HIT
+        guard, is_watching = self.flight, self.state is State.WATCHING
+        flies = is_watching and guard.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out
+        return flies or (guard.program_elsewhere and (is_watching or self.state is State.GIVING_BACK))
 
     def _remember_hit(self, now_us: int) -> None:
         guard = self.flight
@@ -202,7 +196,7 @@ class GuardMachine(StateMachine):
                 limit = guard.config.max_hits
                 if guard.hits >= limit and not guard.then_hold:
                     guard.then_hold = f"hit {guard.hits} of at most {limit}"
-                return GiveBack(guard, transition.trigger in _BESIDE_PROGRAM, now_us)
+                return GiveBack(guard, transition.trigger is Trigger.CROSSED, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)
             case State.ENDED:

@@ -26,7 +26,6 @@ class Trigger(Enum):
     REFUSED = "no vehicle that can be guarded"
     STOPPED = "asked to stop"
     HIT = "hit detected"
-    HIT_BESIDE_PROGRAM = "hit detected, another link's setpoints cannot be kept out"
     CONNECTED = "identified, streams fast enough"
     WORTH_GUARDING = "armed, off the ground, in a mode that may be taken over"
     NOT_TO_GUARD = "landing, or in a mode that may not be taken over"
@@ -59,7 +58,6 @@ TABLE = StateTable[State, Trigger](
             Trigger.DISARMED: State.STANDING_BY,
             Trigger.STOPPED: State.ENDED,
             Trigger.HIT: State.TAKING_OVER,
-            Trigger.HIT_BESIDE_PROGRAM: State.GIVING_BACK,
             Trigger.NOT_TO_GUARD: State.STANDING_BY,
         },
         State.TAKING_OVER: {
@@ -81,7 +79,6 @@ TABLE = StateTable[State, Trigger](
         State.GIVING_BACK: {
             **_RELEASED,
             Trigger.HIT: State.TAKING_OVER,
-            Trigger.HIT_BESIDE_PROGRAM: State.GIVING_BACK,
             Trigger.GIVEN_BACK: State.WATCHING,
         },
         State.STOOD_DOWN: {

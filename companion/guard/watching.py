@@ -16,6 +16,10 @@ from companion.reflex.detector import ON_THE_GROUND
 ECHO_HZ = 50.0
 # The pilot is noticed within a twentieth of a second.
 STICKS_HZ = 20.0
+OWN_STREAMS = (
+    SetMessageInterval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
+    SetMessageInterval(MessageId.MANUAL_CONTROL, round(1e6 / STICKS_HZ)),
+)
 # MAVSDK repeats its setpoint at 20 Hz, others at 2 Hz at least: after this somebody has stopped.
 OTHERS_STOPPED_US = 1_000_000
 # A vehicle that was restarted has forgotten what it was asked for; three of its heartbeats tell that it is up again.
@@ -75,11 +79,7 @@ class GuardConnect(Meet[GuardTransition]):
         self._is_first = is_first
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
-        return [
-            *super()._commands(flight),
-            SetMessageInterval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
-            SetMessageInterval(MessageId.MANUAL_CONTROL, round(1e6 / STICKS_HZ)),
-        ]
+        return [*super()._commands(flight), *OWN_STREAMS]
 
     def _refused(self, text: str) -> GuardTransition:
         return GuardTransition(Trigger.REFUSED, text)

@@ -223,12 +223,6 @@ def _position_target(type_mask: int, x: float, y: float, z: float, vz: float) ->
     return messages.PositionTarget((x, y, z) if known else None, vz if is_speed else None)
 
 
-def _global_position(lat: int, lon: int, alt: int) -> Sample:
-    if not (abs(lat) <= 90e7 and abs(lon) <= 180e7):
-        return Refused("GLOBAL_POSITION_INT", f"latitude {lat}, longitude {lon} (1e-7 deg)")
-    return messages.GlobalPosition(lat * 1e-7, lon * 1e-7, alt * 1e-3)
-
-
 def _sticks(x: int, y: int, z: int, r: int) -> Sample:
     # The throttle goes from 0 to 1000 (PX4's streams/MANUAL_CONTROL.hpp).
     if not (max(abs(x), abs(y), abs(r)) <= 1000 and 0 <= z <= 1000):
@@ -267,8 +261,6 @@ GUARD_READERS = READERS | _readers(
         dialect.MAVLink_manual_control_message: _sticks,
     }
 )
-# And one on a link of its own, which cannot always send setpoints: where on earth that is.
-LONE_GUARD_READERS = GUARD_READERS | _readers({dialect.MAVLink_global_position_int_message: _global_position})
 
 _BY_NAME = {reader.name: reader for reader in GUARD_READERS.values()}
 # Names of the messages that become samples.

@@ -14,7 +14,7 @@ import socket
 from collections.abc import Callable
 
 from companion.errors import AddressError, ConnectionSetupError
-from companion.shell.connection import ANY_HOST, Connection, resolve, udp_in, udp_out
+from companion.shell.connection import ANY_HOST, Selectable, resolve, udp_in, udp_out
 from companion.shell.peer import Peer
 from companion.shell.streams import TcpInConnection, serial_port, tcp_out
 
@@ -31,20 +31,20 @@ def open_connection(
     is_genuine: Callable[[bytes], bool] = lambda packet: True,
     has_key: Callable[[bytes], bool] = lambda packet: True,
     waits: bool = False,
-) -> Connection:
+) -> Selectable:
     """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin, and only genuine packets pin it.
 
     `waits`: a port that is not there, or a server that does not answer, is looked for until it is.
     Raises ConnectionSetupError with one clear sentence.
     """
-    scheme, rest = _scheme_and_rest(url)
+    scheme, rest = scheme_and_rest(url)
     if scheme == "udp":
-        scheme = "udpin" if _host_and_port(url, rest)[0] in ("", "0.0.0.0", "[::]") else "udpout"
+        scheme = "udpin" if host_and_port(url, rest)[0] in ("", "0.0.0.0", "[::]") else "udpout"
     if peer is not None and scheme != "udpin":
         raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     if scheme == "serial":
         return serial_port(*_device_and_baud(url, rest), waits)
-    host, port = _host_and_port(url, rest)
+    host, port = host_and_port(url, rest)
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     if scheme in ("udpout", "tcpout"):
@@ -60,14 +60,14 @@ def open_connection(
 
 def serial_device(url: str) -> tuple[str, int] | None:
     """Device and baud rate of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
-    scheme, rest = _scheme_and_rest(url)
+    scheme, rest = scheme_and_rest(url)
     if scheme == "serial":
         return _device_and_baud(url, rest)
-    _host_and_port(url, rest)
+    host_and_port(url, rest)
     return None
 
 
-def _scheme_and_rest(url: str) -> tuple[str, str]:
+def scheme_and_rest(url: str) -> tuple[str, str]:
     scheme, separator, rest = url.partition("://")
     if not separator:
         meant = _meant(url)
@@ -130,7 +130,7 @@ def _device_and_baud(url: str, rest: str) -> tuple[str, int]:
     return device, int(baud)
 
 
-def _host_and_port(url: str, rest: str) -> tuple[str, int]:
+def host_and_port(url: str, rest: str) -> tuple[str, int]:
     match = _HOST_PORT.match(rest)
     if match is None:
         raise AddressError(f"{url!r} names no host and port: use {_FORMS}.")

@@ -47,6 +47,13 @@ class Connection(Protocol):
     def close(self) -> None: ...
 
 
+class Selectable(Connection, Protocol):
+    """One that can be waited for together with others."""
+
+    def fileno(self) -> int | None:
+        """None while there is nothing that bytes could come from."""
+
+
 class UdpConnection:
     """A UDP socket on which one peer is heard (see `peer`) and answered."""
 
@@ -71,10 +78,13 @@ class UdpConnection:
                 return datagram
         return b""
 
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
     def send(self, frame: bytes) -> None:
         remote = self._remote or self._peer.answered
         if remote is not None:
-            _send_datagram(self._socket, frame, remote)
+            send_datagram(self._socket, frame, remote)
 
     def news(self) -> str | None:
         return self._peer.news()
@@ -134,7 +144,7 @@ def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket
     return bound
 
 
-def _send_datagram(sender: socket.socket, frame: bytes, remote: Any) -> None:
+def send_datagram(sender: socket.socket, frame: bytes, remote: Any) -> None:
     try:
         sender.sendto(frame, remote)
     except OSError:

@@ -12,9 +12,10 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
-from companion.guard.attached import SETPOINTS, AttachedGuard, AttachedStep
+from companion.guard.attached import AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
+from companion.mavlink.moves import SETPOINTS
 from companion.mavlink.readers import HEARD
 from companion.report import CollisionReport, Event
 from companion.shell.clock import Clock

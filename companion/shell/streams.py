@@ -75,6 +75,9 @@ class Stream:
                 return content
         return b""
 
+    def fileno(self) -> int:
+        return self._descriptor
+
     def send(self, frame: bytes) -> None:
         remaining = memoryview(frame)
         while remaining and not self.broken:
@@ -166,6 +169,9 @@ class StreamConnection:
                 # Whatever the system or a driver raises, the next attempt may find the other end.
                 self._closed.wait(RETRY_S)
 
+    def fileno(self) -> int | None:
+        return None if self._stream is None else self._stream.fileno()
+
     def send(self, frame: bytes) -> None:
         """Send one packet; it is dropped while there is no stream."""
         if self._stream is not None:
@@ -207,7 +213,7 @@ def _connected(host: str, port: int, timeout_s: float) -> Stream:
     if connected.getpeername() == connected.getsockname():
         connected.close()
         raise ConnectionRefusedError("connection refused")
-    _set_up(connected)
+    set_up(connected)
     return Stream(connected, f"{host}:{port}")
 
 
@@ -226,7 +232,7 @@ class TcpInConnection(StreamConnection):
 
     def _client(self) -> Stream:
         client, address = self._listener.accept()
-        _set_up(client)
+        set_up(client)
         return Stream(client, f"{address[0]}:{address[1]}")
 
     def close(self) -> None:
@@ -234,7 +240,7 @@ class TcpInConnection(StreamConnection):
         self._listener.close()
 
 
-def _set_up(connected: socket.socket) -> None:
+def set_up(connected: socket.socket) -> None:
     # Packets are small and each is due now: Nagle's algorithm would hold setpoints back.
     connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)

@@ -1,11 +1,12 @@
 """The connection to a vehicle that signs, with the key of --signing-key; a plain one without."""
 
 from argparse import Namespace
+from collections.abc import Callable
 
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import MOST_DATAGRAMS, Connection, LinkCounts
+from companion.shell.connection import MOST_DATAGRAMS, Connection, LinkCounts, Selectable
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 
@@ -52,13 +53,18 @@ class SignedConnection:
         self._writer.close()
 
 
-def open_signed(options: Namespace, waits: bool = False) -> Connection:
-    """To the vehicle at --connect. Raises ConnectionSetupError, SigningFileError."""
+def open_signed(
+    options: Namespace, waits: bool = False, shared: Callable[[Selectable], Connection] = lambda opened: opened
+) -> Connection:
+    """To the vehicle at --connect; `shared` makes of it one that others have, too, with signatures of their own.
+
+    Raises ConnectionSetupError, SigningFileError.
+    """
     if options.signing_key is None:
-        return open_connection(options.connect, options.peer, waits=waits)
+        return shared(open_connection(options.connect, options.peer, waits=waits))
     clock, stamps = Clock(), StampFile(options.signing_key)
     signing = Signing(read_key(options.signing_key), stamps.first(clock.now_us()))
-    connection = open_connection(options.connect, options.peer, signing.is_genuine, signing.is_signed, waits)
+    connection = shared(open_connection(options.connect, options.peer, signing.is_genuine, signing.is_signed, waits))
     try:
         return SignedConnection(connection, signing, stamps, clock)
     except Exception:

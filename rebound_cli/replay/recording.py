@@ -17,7 +17,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
-from companion.messages import ComputerStatus
+from companion.messages import ComputerStatus, SetMessageInterval
 from companion.mission.model import Mission
 from companion.reflex.detector import Situation
 from companion.reflex.monitor import CollisionMonitor
@@ -216,6 +216,10 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
             stepped.stop(reason)
         case {"kind": "note", "event": event, "text": text}, _:
             stepped.note(str(event), str(text))
+        case {"kind": "setpoint"}, Guard():
+            stepped.hear_setpoint()
+        case {"kind": "interval", "message_id": int(message_id), "interval_us": int(interval_us)}, Guard():
+            stepped.hear_interval(SetMessageInterval(message_id, interval_us))
         case {"kind": "computer"}, _:
             try:
                 status = ComputerStatus(**record["status"] | {"cpu_percent": tuple(record["status"]["cpu_percent"])})

@@ -155,7 +155,7 @@ class FlightRecorder:
 
     def record_input(self, now_us: int, kind: str, **data: Any) -> None:
         """What the companion was told besides, after its step at `now_us`: `file` (the one it waits for exists), `note`
-        (an event and its text), `computer` (its status).
+        (an event and its text), `computer` (its status), `setpoint` and `interval` (what a client has sent).
         """
         self._do(self._inputs_file.write, json.dumps({"time_us": now_us, "kind": kind, **data}) + "\n")
 

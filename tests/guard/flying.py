@@ -13,6 +13,7 @@ from typing import Any
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.guard.attached import AttachedGuard, AttachedStep
+from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.guard.states import State
@@ -266,3 +267,70 @@ def message_of(name: str, fields: dict[str, Any]) -> Any:
     kind = getattr(dialect, f"MAVLink_{name.lower()}_message")
     values = [math.nan if fields[field] is None else fields[field] for field in kind.fieldnames]
     return kind(*[value.encode() if isinstance(value, str) else value for value in values])
+
+
+class BetweenFlight(Commanded):
+    """The guard is the link; whoever commands comes as clients of it, each by a name."""
+
+    def __init__(self, config: GuardConfig | None = None, airframe: str = "foldable", **scene: Any) -> None:
+        super().__init__(airframe, None, **scene)
+        between = {"between": ("udpin://127.0.0.1:14540",)}
+        self.guard = Guard((config or GuardConfig()).model_copy(update=between))
+        self.between = Between(2_000_000, signs=False)
+        self.link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
+        self._mavlinks: dict[str, dialect.MAVLink] = {}
+        self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
+        self._guards: list[bytes] = []
+        self._clients: list[tuple[str, bytes]] = []
+        self.others_last: dict[str, Any] = {}
+        self.texts_heard: list[tuple[float, str]] = []
+        self.told_by_clients: list[Any] = []
+        self.on_heard: Callable[[Any], None] = lambda message: None
+
+    def send(self, message: Any, client: str = "program", source: tuple[int, int] = (255, 190)) -> None:
+        mavlink = self._mavlinks.setdefault(client, dialect.MAVLink(None, *source))
+        self._clients.append((client, message.pack(mavlink)))
+        mavlink.seq = (mavlink.seq + 1) % 256
+
+    @property
+    def mode(self) -> str:
+        return str(self.guard.status().vehicle_mode)
+
+    def _exchange(self) -> None:
+        for client, packet in self._clients:
+            self.between.hear(client, packet, self.now_us)
+        self._clients = []
+        for sender, packets in (("guard", self._guards), ("program", self.between.to_vehicle(self.now_us))):
+            for packet in packets:
+                self.on_wire.append((self.time_s, sender, self._parser.decode(bytearray(packet))))
+                self.link.push(packet)
+        self.vehicle.advance()
+        received = b"".join(self.link.take())
+        heard = self.between.to_clients(received)
+        result = self.guard.step(received, self.now_us)
+        heard += [packet for packet in result.sent_frames if self.between.sends(packet)]
+        self._guards = list(result.sent_frames)
+        self.events += result.events
+        self.told_by_clients += self.guard.look_at(self.between, self.now_us)
+        for packet in heard:
+            message = self._reader.decode(bytearray(packet))
+            self.others_last[message.get_type()] = message
+            self.on_heard(message)
+            if message.get_type() == "STATUSTEXT":
+                self.texts_heard.append((self.time_s, message.text))
+
+
+def fly_a_mission(air: Any) -> None:
+    """One waypoint 8 m north, behind the wall, by the mission protocol; and the mission mode."""
+    air.send(dialect.MAVLink_mission_count_message(1, 1, 1, 0))
+    air.run_until(lambda: "MISSION_REQUEST_INT" in air.others_last or "MISSION_REQUEST" in air.others_last, 2.0)
+    place = air.others_last["GLOBAL_POSITION_INT"]
+    north_1e7_deg = round(8.0 / 6_371_000.0 * 1e7 * 180.0 / math.pi)
+    air.send(
+        dialect.MAVLink_mission_item_int_message(
+            *(1, 1, 0, 6, 16, 1, 1, 0.0, 0.0, 0.0, math.nan), place.lat + north_1e7_deg, place.lon, 2.5, 0
+        )
+    )
+    air.run_until(lambda: "MISSION_ACK" in air.others_last, 2.0)
+    assert air.others_last["MISSION_ACK"].type == 0
+    air.set_mode(MISSION)

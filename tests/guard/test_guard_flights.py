@@ -1,6 +1,5 @@
 """The guard beside a pilot, a mission or a program on another link: whole wire, virtual time."""
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -12,8 +11,9 @@ from companion.guard.watching import observe
 from companion.link.streams import StreamMonitor
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
+from companion.px4_mode import AUTO_LAND
 from companion.reflex.detector import Phase
-from tests.guard.flying import FACE_NORTH_M, HOLD, LAND, MANUAL_POSITION, MISSION, OFFBOARD, AttachedFlight
+from tests.guard.flying import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, AttachedFlight, fly_a_mission
 from tests.guard.flying import GuardedFlight as Air
 
 CLEAR_M = 0.3
@@ -21,20 +21,8 @@ REBOOT = 246
 
 
 def mission_into_the_wall(air: Air) -> None:
-    """One waypoint 8 m north, by the mission protocol, and the mission mode."""
     air.take_off()
-    air.send(dialect.MAVLink_mission_count_message(1, 1, 1, 0))
-    air.run_until(lambda: "MISSION_REQUEST_INT" in air.others_last or "MISSION_REQUEST" in air.others_last, 2.0)
-    place = air.others_last["GLOBAL_POSITION_INT"]
-    north_1e7_deg = round(8.0 / 6_371_000.0 * 1e7 * 180.0 / math.pi)
-    air.send(
-        dialect.MAVLink_mission_item_int_message(
-            *(1, 1, 0, 6, 16, 1, 1, 0.0, 0.0, 0.0, math.nan), place.lat + north_1e7_deg, place.lon, 2.5, 0
-        )
-    )
-    air.run_until(lambda: "MISSION_ACK" in air.others_last, 2.0)
-    assert air.others_last["MISSION_ACK"].type == 0
-    air.set_mode(MISSION)
+    fly_a_mission(air)
 
 
 def recovering(**changes) -> Air:
@@ -280,27 +268,28 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
     assert air.guard.left_alone() == len(air.told("left_alone"))
 
 
-def test_beside_a_program_on_another_link_the_vehicle_is_led_clear_by_a_command_where_that_is_wanted():
-    air = flown_by_a_program(beside_program="reposition")
-    air.run_until(lambda: air.told("detection") != [], 20.0)
-    hit_s = air.time_s
-    air.run_for(0.4)
-    assert air.mode == "AUTO.LOITER" and air.setpoints("guard", hit_s - 0.5) == []
-    assert {(m.param2, m.param3) for m in air.sent_by("guard", "COMMAND_LONG", hit_s)} <= {HOLD}
-    # by one command, which a program's setpoints do not undo, it is led away from the wall
-    (led_s,) = [at for at, who, m in air.on_wire if who == "guard" and m.get_type() == "COMMAND_INT"]
-    assert [m.command for m in air.sent_by("guard", "COMMAND_INT")] == [192]
-    # once nothing has pushed for 40 ms, and before the program's setpoints push it into the wall again
-    assert 0.02 < led_s - 1e-6 * air.vehicle.truth.hits[0].ended_at_boot_us < 0.1
-    air.run_for(5.0)
-    assert air.mode == "AUTO.LOITER" and air.position[0] < FACE_NORTH_M - CLEAR_M and air.position[2] < -2.0
-
-
 def test_a_second_stream_that_appears_while_the_guard_holds_is_noticed_and_not_fought():
     air = recovering()
     air.every(0.05, lambda: air.velocity(0.0, 0.5))
     assert air.run_until(lambda: air.told("crossed") != [], 1.0) < 0.8
     air.run_until(lambda: air.mode == "AUTO.LOITER", 1.0)
+
+
+def test_a_pilot_whose_setpoints_are_told_before_his_mode_is_no_second_stream():
+    """The vehicle tells its own setpoints fifty times a second, and its mode with the next report."""
+    # Given a guard that holds, and a pilot's mode that flies elsewhere
+    air, vehicle = recovering(), dialect.MAVLink(None, 1, 1)
+    air.run_for(0.3)
+    elsewhere = dialect.MAVLink_position_target_local_ned_message(0, 1, 0xDF8, 9.0, 9.0, -2.0, *[0.0] * 8)
+    for _ in range(6):
+        air.guard_hears(elsewhere.pack(vehicle))
+    assert air.state is State.RECOVERING
+    # When the reports say so
+    for _ in range(2):
+        air.guard_hears(dialect.MAVLink_current_mode_message(0, AUTO_LAND, AUTO_LAND).pack(vehicle))
+    # Then it is his, and no program's; where they say that OFFBOARD goes on it is a program's
+    assert air.state is State.STOOD_DOWN and air.told("crossed") == []
+    assert not air.guard.core.flight.program_elsewhere
 
 
 # --- when it is not to act

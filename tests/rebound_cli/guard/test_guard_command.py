@@ -17,7 +17,15 @@ from rebound_cli.guard import run_guard
 from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
-from tests.rebound_cli.command import assert_comes_again, events_of, run, start, vehicle_on_air, wait_for_event
+from tests.rebound_cli.command import (
+    assert_comes_again,
+    events_of,
+    free_port,
+    run,
+    start,
+    vehicle_on_air,
+    wait_for_event,
+)
 
 pytestmark = pytest.mark.realtime
 
@@ -31,6 +39,7 @@ QUICK = ("--set", "companion.streams.window_s=0.5", "--set", "companion.link.hea
         (("--connect", "udpin://127.0.0.1:0", "--modes", "POSCTL,WARP"), "'WARP' is no mode of PX4"),
         (("--connect", "udpin://127.0.0.1:0", "--set", "max_hits=0"), "max_hits"),
         (("--connect", "udpin://127.0.0.1:0", "--config", "no.yaml"), "no.yaml"),
+        (("--connect", "udpin://127.0.0.1:0", "--between", "serial:///dev/ttyS0:9600"), "clients come by udpin://"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(arguments, says):
@@ -99,6 +108,37 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     written = GuardConfig.model_validate(yaml.safe_load((tmp_path / "guard.yaml").read_text()))
     assert written.then == "previous"
     assert written.companion.streams.window_s == 0.5
+
+
+def test_as_the_link_it_passes_what_a_client_asks_and_is_repeated_to_the_bit(tmp_path):
+    between = free_port()
+    with vehicle_on_air() as port:
+        link = ("--connect", f"udpin://127.0.0.1:{port}", "--between", f"udpin://127.0.0.1:{between}")
+        guard = start("guard", *link, "--out", tmp_path, *QUICK)
+        try:
+            client = mavutil.mavlink_connection(f"udpout:127.0.0.1:{between}", source_system=254)
+            wait_for_event(tmp_path, "standing_by")
+            # A client that asks for a slow stream, which the guard needs fast, for a parameter, and sends a setpoint
+            client.mav.heartbeat_send(6, 8, 0, 0, 4)
+            client.mav.command_long_send(1, 1, 511, 0, 31, 1_000_000, *[0] * 5)
+            assert client.recv_match(type="COMMAND_ACK", blocking=True, timeout=10).result == 0
+            client.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
+            value = client.recv_match(type="PARAM_VALUE", blocking=True, timeout=10)
+            client.mav.set_position_target_local_ned_send(0, 1, 1, 1, 0xDF8, *[0.0] * 11)
+            told = [client.recv_match(type="ATTITUDE_QUATERNION", blocking=True, timeout=10) for _ in range(20)]
+            client.close()
+            guard.send_signal(signal.SIGTERM)
+            _, stderr = guard.communicate(timeout=20)
+        finally:
+            guard.kill()
+    assert guard.returncode == 0, stderr
+    assert value.param_id == "MIS_TAKEOFF_ALT"
+    # Then the stream is fast again
+    assert told[-1].time_boot_ms - told[0].time_boot_ms < 3_000
+    assert json.loads((tmp_path / "summary.json").read_text())["kept_out"] == 0
+    inputs = [json.loads(line)["kind"] for line in (tmp_path / "inputs.jsonl").read_text().splitlines()]
+    assert {"interval", "setpoint"} <= {*inputs}
+    assert_comes_again(tmp_path)
 
 
 def test_a_vehicle_at_rest_fills_one_record_after_the_other_and_one_that_is_armed_a_single_one(

@@ -1,0 +1,192 @@
+"""The guard as the link: whole packets of the vehicle's and of its clients', bytes in and bytes out.
+
+While `is_closed` what would move the vehicle is kept out (see moves.KEPT_OUT). All else passes unchanged and in the
+order of its sender. Packets of different senders take turns, so that no sender's bytes come inside another's packet: an
+unfinished packet stays here, and so do bytes that begin none.
+"""
+
+import struct
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from companion.mavlink.decode import Decoder, checksum_holds
+from companion.mavlink.moves import SETPOINT_IDS, interval_asked, would_move
+from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, has_signature, message_id_of, payload_of, source_of
+from companion.messages import SetMessageInterval
+
+# Of a client, still to be sent: a download of all parameters or a long mission is less.
+MOST_WAITING_BYTES = 64_000
+# After a pause so much may go at once: a quarter of a setpoint's interval. A driver holds more, and whatever waits
+# there is in the guard's own way.
+BURST_S = 0.005
+# A short packet costs this computer as much as one of so many bytes.
+LEAST_COST_BYTES = 64
+# The guard looks for a program's setpoints of the last second.
+TOLD_EVERY_US = 250_000
+# Senders with one number are two, and not one that has come back from another port, when both speak in this time.
+AT_ONCE_US = 1_000_000
+
+# Of the guard's own messages these are for people, who are behind it now.
+_FOR_PEOPLE = frozenset({250, 251, 253, 390})  # DEBUG_VECT, NAMED_VALUE_FLOAT, STATUSTEXT, ONBOARD_COMPUTER_STATUS
+_TIMESYNC = 111
+# When the vehicle answered, 0 in a question; and the stamp of the question.
+_TIMES = struct.Struct("<2q")
+# Questions of the guard's that may still be answered: one a second.
+_MOST_ASKED = 64
+
+
+@dataclass(slots=True)
+class _Client:
+    framer: Decoder
+    waiting: deque[bytes] = field(default_factory=deque)
+    waiting_bytes: int = 0
+    is_flood_told: bool = False
+    is_signing_told: bool = False
+    is_gone: bool = False
+
+
+class Between:
+    """Clients are called by their addresses. Times are microseconds, any epoch."""
+
+    def __init__(self, bytes_per_s: float, signs: bool) -> None:
+        """`bytes_per_s`: what the link to the vehicle carries. `signs`: the guard has the vehicle's key."""
+        self.is_closed = False
+        self.kept_out = 0  # packets
+        self.intervals: list[SetMessageInterval] = []  # asked for by clients, and not yet told to the guard
+        self._has_setpoint = False
+        self._told_us = 0
+        self._rate, self._signs = bytes_per_s, signs
+        self._clients: dict[str, _Client] = {}
+        self._speakers: dict[tuple[int, int], tuple[str, int]] = {}  # client and time, by system and component
+        self._told: set[tuple[int, int]] = set()
+        self._vehicle = Decoder({}, _is_whole)
+        self._asked: deque[int] = deque(maxlen=_MOST_ASKED)
+        self._news: deque[str] = deque()
+        self._budget_bytes, self._budget_us = 0.0, 0
+
+    def has_room(self, client: str) -> bool:
+        """Whether more of it can be taken; what is heard in spite of it is dropped."""
+        return client not in self._clients or self._clients[client].waiting_bytes < MOST_WAITING_BYTES
+
+    @property
+    def waits(self) -> bool:
+        """Whether there is something still to be sent to the vehicle."""
+        return any(client.waiting for client in self._clients.values())
+
+    def hear(self, name: str, received: bytes, now_us: int) -> None:
+        """Bytes of a client's."""
+        if name not in self._clients:
+            self._clients[name] = _Client(Decoder({}, _is_whole))
+        client = self._clients[name]
+        if not self.has_room(name):
+            if not client.is_flood_told:
+                client.is_flood_told = True
+                self._news.append(f"{name} sends more than the link to the vehicle carries: the rest of it is lost")
+            return
+        for packet, _ in client.framer.feed(received):
+            if not isinstance(packet, Stray):
+                client.waiting.append(packet)
+                client.waiting_bytes += len(packet)
+                self._look_at(name, client, packet, now_us)
+
+    def forget(self, name: str) -> None:
+        """A client has gone; what it has said still goes."""
+        if name in self._clients:
+            self._clients[name].is_gone = True
+
+    def to_vehicle(self, now_us: int) -> list[bytes]:
+        """What goes now: a packet of each client in turn, as far as the link carries them."""
+        since_s, self._budget_us = (now_us - self._budget_us) * 1e-6, now_us
+        self._budget_bytes = min(self._budget_bytes + self._rate * since_s, self._rate * BURST_S)
+        going: list[bytes] = []
+        while self._budget_bytes > 0.0 and self.waits:
+            for client in self._clients.values():
+                if client.waiting:
+                    packet = client.waiting.popleft()
+                    client.waiting_bytes -= len(packet)
+                    if self._lets_pass(packet):
+                        self._budget_bytes -= max(len(packet), LEAST_COST_BYTES)
+                        going.append(packet)
+        self._clients = {name: one for name, one in self._clients.items() if one.waiting or not one.is_gone}
+        return going
+
+    def to_clients(self, received: bytes) -> list[bytes]:
+        """Bytes of the vehicle's: packets, and whatever is between them."""
+        return [packet for packet, _ in self._vehicle.feed(received) if not self._is_answer_to_guard(packet)]
+
+    def sends(self, packet: bytes) -> bool:
+        """The guard sends one to the vehicle; whether the clients get it, too."""
+        self._budget_bytes -= len(packet)
+        message_id = message_id_of(packet)
+        if message_id == _TIMESYNC:
+            self._asked.append(_times(packet)[1])
+        return message_id in _FOR_PEOPLE
+
+    def has_setpoint(self, now_us: int) -> bool:
+        """Whether a client's has been on its way since this was last true; four times a second at most."""
+        if not self._has_setpoint or now_us - self._told_us < TOLD_EVERY_US:
+            return False
+        self._has_setpoint, self._told_us = False, now_us
+        return True
+
+    def note(self, text: str) -> None:
+        """Something that whoever has the sockets knows of a client."""
+        self._news.append(text)
+
+    def news(self) -> str | None:
+        """Something about a client that a person should know, once."""
+        return self._news.popleft() if self._news else None
+
+    def _lets_pass(self, packet: bytes) -> bool:
+        self._has_setpoint |= message_id_of(packet) in SETPOINT_IDS
+        if self.is_closed and would_move(packet):
+            self.kept_out += 1
+            return False
+        if (asked := interval_asked(packet)) is not None:
+            self.intervals.append(asked)
+        return True
+
+    def _look_at(self, name: str, client: _Client, packet: bytes, now_us: int) -> None:
+        source = source_of(packet)
+        before, said_us = self._speakers.get(source, (name, now_us))
+        self._speakers[source] = name, now_us
+        if before != name and now_us - said_us < AT_ONCE_US and source not in self._told:
+            self._told.add(source)
+            text = f"{before} and {name} both speak as system {source[0]}, component {source[1]}"
+            self._news.append(f"{text}: each of them gets the answers to the other")
+        if has_signature(packet) != self._signs and not client.is_signing_told:
+            client.is_signing_told = True
+            if self._signs:
+                self._news.append(f"{name} does not sign what it sends: a vehicle that signs does not obey it")
+            else:
+                self._news.append(f"{name} signs, and the guard has no --signing-key: a vehicle may not obey the guard")
+
+    def _is_answer_to_guard(self, packet: bytes) -> bool:
+        """A program would take it for one to its own question, by another clock."""
+        if isinstance(packet, Stray) or message_id_of(packet) != _TIMESYNC:
+            return False
+        answered_ns, asked_ns = _times(packet)
+        return answered_ns != 0 and asked_ns in self._asked
+
+
+def datagrams(packets: Sequence[bytes], most_bytes: int) -> list[bytes]:
+    """As few as hold them, each of whole packets."""
+    grouped: list[bytes] = []
+    for packet in packets:
+        if grouped and len(grouped[-1]) + len(packet) <= most_bytes:
+            grouped[-1] += packet
+        else:
+            grouped.append(packet)
+    return grouped
+
+
+def _times(packet: bytes) -> tuple[int, int]:
+    answered_ns, asked_ns = _TIMES.unpack_from(payload_of(packet).ljust(_TIMES.size, b"\0"))
+    return answered_ns, asked_ns
+
+
+def _is_whole(data: bytes, start: int, length: int) -> bool:
+    """Also one of another dialect, where a next one begins at its end. Its checksum is for the vehicle to check."""
+    end = start + length
+    return end == len(data) or data[end] in (MAGIC_V1, MAGIC_V2) or checksum_holds(data, start, length)

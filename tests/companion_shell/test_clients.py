@@ -1,0 +1,218 @@
+"""The clients of a guard in between, over real sockets: each gets all of the vehicle's, and none is waited for."""
+
+import socket
+import time
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.errors import AddressError, ConnectionSetupError
+from companion.guard.between import Between
+from companion.shell.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
+from companion.shell.connection import bound_socket, udp_out
+
+HEARTBEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+LOOPBACK = "127.0.0.1"
+
+
+def packet(system: int = 255, message=HEARTBEAT) -> bytes:
+    return message.pack(dialect.MAVLink(None, system, 1))
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+class Bench:
+    """A vehicle's end, and the guard's connection to it shared with whoever comes."""
+
+    def __init__(self, *schemes: str):
+        self.vehicle = bound_socket(socket.SOCK_DGRAM, LOOPBACK, 0)
+        self.vehicle.settimeout(2.0)
+        self.ports = [free_port(socket.SOCK_STREAM if "tcp" in scheme else socket.SOCK_DGRAM) for scheme in schemes]
+        urls = [f"{scheme}://{LOOPBACK}:{port}" for scheme, port in zip(schemes, self.ports, strict=True)]
+        self.between = Between(carried_bytes_s("udpout://127.0.0.1:1"), signs=False)
+        self._ends: list[socket.socket] = [self.vehicle]
+        remote = udp_out(LOOPBACK, self.vehicle.getsockname()[1])
+        self.shared = SharedConnection(remote, urls, self.between)
+        self.shared.send(packet(1))
+        _, self.guard = self.vehicle.recvfrom(300)
+
+    def udp(self, index: int = 0, is_bound: bool = False) -> socket.socket:
+        """A client that sends to an address of the guard's, or waits at one."""
+        opened = bound_socket(socket.SOCK_DGRAM, LOOPBACK, self.ports[index] if is_bound else 0)
+        if not is_bound:
+            opened.connect((LOOPBACK, self.ports[index]))
+        opened.settimeout(2.0)
+        self._ends.append(opened)
+        return opened
+
+    def tcp(self, index: int = 0) -> socket.socket:
+        opened = socket.create_connection((LOOPBACK, self.ports[index]), 2.0)
+        self._ends.append(opened)
+        self.run()
+        return opened
+
+    def run(self, seconds: float = 0.0) -> bytes:
+        """What the guard hears meanwhile."""
+        received, until_s = b"", time.monotonic() + seconds
+        while True:
+            received += self.shared.receive(0.05)
+            if time.monotonic() >= until_s:
+                return received
+
+    def says(self, content: bytes) -> bytes:
+        """The vehicle; what the guard hears."""
+        self.vehicle.sendto(content, self.guard)
+        return self.run()
+
+    def close(self) -> None:
+        self.shared.close()
+        for end in self._ends:
+            end.close()
+
+
+@pytest.fixture
+def bench(request):
+    opened = Bench(*request.param)
+    yield opened
+    opened.close()
+
+
+@pytest.mark.parametrize("bench", [("udpin", "udpin", "tcpin")], indirect=True)
+def test_every_client_hears_the_vehicle_and_each_of_them_is_heard_by_it(bench):
+    clients = [bench.udp(0), bench.udp(0), bench.udp(1), bench.tcp(2), bench.tcp(2)]
+    for number, client in enumerate(clients):
+        client.sendall(packet(10 + number))
+        bench.run()
+        assert bench.vehicle.recv(300) == packet(10 + number)
+    assert bench.says(packet(1)) == packet(1)
+    assert [client.recv(300) for client in clients] == [packet(1)] * len(clients)
+    # The guard's own: texts reach both ends, requests the vehicle alone
+    text, ask = packet(1, dialect.MAVLink_statustext_message(4, b"hit")), packet(1)
+    for sent in (text, ask):
+        bench.shared.send(sent)
+        assert bench.vehicle.recv(300) == sent
+    assert [client.recv(300) for client in clients] == [text] * len(clients)
+    for client in clients:
+        client.settimeout(0.0)
+        with pytest.raises(BlockingIOError):
+            client.recv(300)
+
+
+@pytest.mark.parametrize("bench", [("udpout",)], indirect=True)
+def test_a_client_that_waits_is_sent_to_first_and_nobody_else_is_heard_there(bench):
+    waits = bench.udp(is_bound=True)
+    bench.says(packet(1))
+    assert waits.recvfrom(300)[0] == packet(1)
+
+
+@pytest.mark.parametrize("bench", [("tcpin",)], indirect=True)
+def test_a_client_that_goes_makes_room_and_its_last_words_arrive(bench):
+    client = bench.tcp()
+    client.sendall(packet(10))
+    client.close()
+    bench.run(0.1)
+    assert bench.vehicle.recv(300) == packet(10)
+    assert bench.says(packet(1)) == packet(1)
+    again = bench.tcp()
+    bench.says(packet(1))
+    assert again.recv(300) == packet(1)
+
+
+@pytest.mark.parametrize("bench", [("tcpin", "udpin")], indirect=True)
+def test_a_client_that_never_reads_is_named_and_only_it_misses_anything(bench):
+    # Given two clients, one of which reads nothing
+    deaf, hears = bench.tcp(0), bench.udp(1)
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    hears.sendall(packet(10))
+    bench.run()
+    # When the vehicle sends more than the system and the guard hold for it
+    content, heard, sent = packet(1) * 1_400, 0, 0
+    news = None
+    while news is None and sent < 100 * UNREAD_BYTES:
+        bench.vehicle.sendto(content, bench.guard)
+        assert bench.shared.receive(0.5) == content, "the guard hears on"
+        sent += len(content)
+        while heard < sent:
+            heard += len(hears.recv(65_536))
+        news = bench.shared.news()
+    # Then one sentence says so
+    assert news is not None and "does not read what it is sent" in news
+    assert heard == sent and bench.shared.news() is None
+    # And what it reads in the end are whole packets
+    deaf.setblocking(False)
+    got = b""
+    while len(got) < UNREAD_BYTES:
+        bench.says(content)
+        try:
+            got += deaf.recv(65_536)
+        except BlockingIOError:
+            continue
+    got = got[: len(got) - len(got) % len(packet(1))]
+    assert got == packet(1) * (len(got) // len(packet(1)))
+
+
+@pytest.mark.parametrize("bench", [("udpin", "tcpin")], indirect=True)
+@pytest.mark.parametrize("floods", ["udp", "tcp"])
+def test_a_client_that_floods_is_named_and_the_vehicle_is_heard_at_once(bench, floods):
+    flooding = bench.udp(0) if floods == "udp" else bench.tcp(1)
+    flooding.setblocking(False)
+    content, news = packet(10) * 60, []
+    for _ in range(400):
+        for _ in range(20):
+            try:
+                flooding.send(content)
+            except BlockingIOError:
+                break
+        assert bench.says(packet(1)) == packet(1)
+        bench.shared.send(packet(1))
+        news += filter(None, [bench.shared.news()])
+    if floods == "udp":
+        assert len(news) == 1 and "sends more than the link to the vehicle carries" in news[0]
+    else:
+        # It is not read meanwhile, so it waits and loses nothing
+        assert news == []
+
+
+@pytest.mark.parametrize("bench", [("udpin",)], indirect=True)
+def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
+    clients = [bench.udp() for _ in range(MOST_CLIENTS + 1)]
+    for number, client in enumerate(clients):
+        client.sendall(packet(10 + number))
+        bench.run()
+    news = bench.shared.news()
+    assert news is not None and f":{clients[-1].getsockname()[1]} sends to the clients' port, too" in news
+
+
+@pytest.mark.parametrize(
+    ("url", "says"),
+    [
+        ("serial:///dev/ttyUSB0:57600", "clients come by udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"),
+        ("udpout://0.0.0.0", "names no host and port"),
+        ("udpout://:14540", "names no remote host and port"),
+        ("14540", "did you mean udpin://0.0.0.0:14540?"),
+    ],
+)
+def test_an_address_that_is_none_for_clients_is_one_sentence(url, says):
+    vehicle = udp_out(LOOPBACK, 1)
+    with pytest.raises(AddressError, match=says.replace("?", "[?]")):
+        SharedConnection(vehicle, [url], Between(1.0, signs=False))
+
+
+@pytest.mark.parametrize(("scheme", "kind"), [("udpin", socket.SOCK_DGRAM), ("tcpin", socket.SOCK_STREAM)])
+def test_a_port_that_another_has_is_one_sentence(scheme, kind):
+    with socket.socket(socket.AF_INET, kind) as other:
+        other.bind((LOOPBACK, 0))
+        if kind is socket.SOCK_STREAM:
+            other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(ConnectionSetupError, match=f"port {port} is already in use"):
+            SharedConnection(udp_out(LOOPBACK, 1), [f"{scheme}://{LOOPBACK}:{port}"], Between(1.0, signs=False))
+
+
+def test_what_a_serial_line_carries_follows_from_its_baud_rate():
+    assert carried_bytes_s("serial:///dev/ttyAMA0:921600") == 92_160
+    assert carried_bytes_s("udpin://0.0.0.0:14540") > 1_000_000

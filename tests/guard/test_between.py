@@ -1,0 +1,375 @@
+"""The guard as the link: whoever flies, by whatever message, is recovered, and nothing else is lost or changed."""
+
+import math
+import random
+from collections.abc import Callable
+
+import pytest
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.guard.between import BURST_S, Between, datagrams
+from companion.guard.config import GuardConfig
+from companion.guard.states import State
+from companion.mavlink.moves import SETPOINT_IDS, would_move
+from companion.mavlink.packet import message_id_of, packet_length
+from companion.mavlink.signing import Signing
+from tests.guard.flying import ARM, FACE_NORTH_M, HOLD, LAND, MANUAL_POSITION, OFFBOARD, BetweenFlight, fly_a_mission
+
+PLACE_ONLY = 0xDF8
+ATTITUDE_ONLY = 0x07
+TOO_LATE_S = 0.15
+LINK_BYTES_S = 2_000_000
+
+
+def by_places(air: BetweenFlight) -> None:
+    """Along the first side of a square, which the wall crosses: the place moves on at 1 m/s and waits for nobody."""
+    began_s = air.time_s
+    away = [0.0] * 8
+
+    def place() -> None:
+        north = min(air.time_s - began_s, 5.0)
+        boot_ms = round(1e3 * air.time_s)
+        air.send(
+            dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, PLACE_ONLY, north, 0, -2.5, *away)
+        )
+
+    air.every(0.052, place)
+    air.run_for(0.3)
+    air.set_mode(OFFBOARD)
+
+
+def by_attitudes(air: BetweenFlight) -> None:
+    """Nose down by 3 degrees, the height held by the thrust."""
+    hover = air.others_last["ATTITUDE_TARGET"].thrust
+    nose_down = [math.cos(math.radians(1.5)), 0.0, -math.sin(math.radians(1.5)), 0.0]
+
+    def attitude() -> None:
+        position = air.others_last["LOCAL_POSITION_NED"]
+        thrust = hover + 0.1 * (position.z + 2.5) + 0.1 * position.vz
+        boot_ms = round(1e3 * air.time_s)
+        air.send(dialect.MAVLink_set_attitude_target_message(boot_ms, 1, 1, ATTITUDE_ONLY, nose_down, 0, 0, 0, thrust))
+
+    air.every(0.02, attitude)
+    air.run_for(0.3)
+    air.set_mode(OFFBOARD)
+
+
+def by_sticks(air: BetweenFlight) -> None:
+    sticks(air, 0.3)
+    air.run_for(0.2)
+    air.set_mode(MANUAL_POSITION)
+
+
+def sticks(air: BetweenFlight, forward: float) -> Callable[[], None]:
+    message = dialect.MAVLink_manual_control_message(1, round(1000 * forward), 0, 500, 0, 0)
+    return air.every(0.05, lambda: air.send(message, "pilot", (254, 190)))
+
+
+def hit(flies: Callable[[BetweenFlight], None], **changes) -> BetweenFlight:
+    """Taken over at the wall."""
+    air = BetweenFlight(GuardConfig(**changes))
+    air.take_off()
+    flies(air)
+    air.run_until(lambda: air.guard.holds, 20.0)
+    return air
+
+
+@pytest.mark.parametrize("flies", [by_places, by_attitudes, fly_a_mission, by_sticks])
+def test_whoever_flies_into_the_wall_is_recovered_and_nothing_of_his_moves_the_vehicle_meanwhile(flies):
+    air = hit(flies)
+    taken_s = air.time_s
+    air.run_to(State.WATCHING, 10.0)
+    back_s = air.time_s
+    air.run_for(2.0)
+    assert air.mode == "AUTO.LOITER" and len(air.told("detection")) == 1
+    assert air.guard.status().position_ned_m[0] < FACE_NORTH_M - 0.3
+    assert air.event("recovered").data["settled_after_s"] <= 4.0
+    # Not one setpoint between the step that shows the hit and the step that gives it back
+    assert air.sent_by("program", "SET_", taken_s + 0.001, back_s - 0.001) == []
+    if flies in (by_places, by_attitudes):
+        assert air.between.kept_out > 20
+        assert len(air.sent_by("program", "SET_", back_s + 0.1, back_s + 1.1)) > 15, "let through again"
+    # Its program sees it in OFFBOARD, and is told when it begins and when it ends
+    told = [text for at_s, text in air.texts_heard if at_s >= taken_s - 0.01]
+    assert any(text.startswith("Taking over") for text in told) and told[-1].startswith("Given back to AUTO.LOITER")
+
+
+def test_in_a_recovery_a_stick_is_obeyed_at_once():
+    air = hit(by_places)
+    pilot = sticks(air, 0.0)
+    air.run_for(0.5)
+    pilot()
+    sticks(air, -0.6)
+    assert air.state is State.RECOVERING
+    assert air.run_until(lambda: air.mode == "POSCTL", 1.0) < TOO_LATE_S
+    assert air.state is State.STOOD_DOWN
+
+
+@pytest.mark.parametrize("mode", [HOLD, LAND, MANUAL_POSITION])
+def test_in_a_recovery_a_mode_that_is_asked_for_is_taken_at_once_and_stays(mode):
+    air = hit(by_places)
+    sticks(air, 0.0)
+    air.run_for(0.4)
+    asked_s = air.time_s
+    air.set_mode(mode)
+    air.run_for(0.01)
+    assert air.sent_by("program", "COMMAND_LONG", asked_s) != []
+    air.run_to(State.STOOD_DOWN, 1.5)
+    air.run_for(1.0)
+    main, sub = mode
+    assert air.others_last["HEARTBEAT"].custom_mode == main << 16 | sub << 24
+
+
+def test_in_a_recovery_a_request_for_offboard_does_not_arrive_and_a_disarm_does():
+    air = hit(by_places)
+    air.run_for(0.4)
+    asked_s = air.time_s
+    air.set_mode(OFFBOARD)
+    air.command(ARM, 0, 21196)
+    air.run_for(0.5)
+    assert [message.command for message in air.sent_by("program", "COMMAND_LONG", asked_s)] == [ARM]
+    assert air.guard.armed is False and air.state is State.STANDING_BY
+
+
+def test_a_stream_that_a_program_slows_down_is_asked_for_again_and_one_that_it_speeds_up_is_not():
+    air = BetweenFlight()
+    air.run_to(State.STANDING_BY, 10.0)
+    asked_s = air.time_s
+    for message_id, interval_us in ((31, 1_000_000), (32, 10_000), (105, -1), (30, 1_000_000)):
+        air.command(511, message_id, interval_us)
+    air.run_for(0.1)
+    again = [(round(m.param1), m.param2) for m in air.sent_by("guard", "COMMAND_LONG", asked_s)]
+    assert [message_id for message_id, _ in again] == [31, 105]
+    assert all(0 < interval_us <= 20_000 for _, interval_us in again)
+    assert [kind for kind, _ in air.told_by_clients] == ["interval"] * 4
+
+
+def test_beside_a_programs_setpoints_the_guard_sends_none_of_its_own():
+    air = BetweenFlight()
+    air.take_off()
+    air.run_for(0.5)
+    assert air.setpoints("guard", air.time_s - 0.5) != []
+    air.every(0.052, lambda: air.velocity(0.0))
+    air.run_for(0.5)
+    began_s = air.time_s
+    air.run_for(1.0)
+    assert air.setpoints("guard", began_s) == []
+
+
+def test_the_vehicles_questions_of_the_time_are_the_programs_to_answer_and_the_guards_answers_are_its_own():
+    air = BetweenFlight()
+    heard = []
+    air.on_heard = lambda message: heard.append(message) if message.get_type() == "TIMESYNC" else None
+    theirs = 8_000_000
+    air.run_to(State.STANDING_BY, 10.0)
+    air.send(dialect.MAVLink_timesync_message(0, theirs))
+    air.run_for(1.5)
+    sent = air.sent_by("guard", "TIMESYNC")
+    assert sent and all(message.tc1 == 0 for message in sent), "the guard asks, and does not answer"
+    assert {message.ts1 for message in heard if message.tc1} == {theirs}
+    assert any(message.tc1 == 0 for message in heard)
+    assert air.guard.round_trip().median_us is not None
+
+
+# --- the table
+
+
+def packet_of(message, source=(255, 190)) -> bytes:
+    return message.pack(dialect.MAVLink(None, *source))
+
+
+def long(command, *params) -> bytes:
+    return packet_of(dialect.MAVLink_command_long_message(1, 1, command, 0, *params, *[0.0] * (7 - len(params))))
+
+
+NAN, NO_INT = math.nan, 0x7FFFFFFF
+ANY_STICKS = dialect.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("packet", "is_kept_out"),
+    [
+        (packet_of(ANY_STICKS), False),
+        (packet_of(ANY_STICKS, (1, 190)), False),
+        (packet_of(ANY_STICKS, (1, 191)), True),
+        (packet_of(dialect.MAVLink_rc_channels_override_message(1, 1, *[1500] * 8), (1, 195)), True),
+        (packet_of(dialect.MAVLink_set_mode_message(1, 1, 6 << 16)), True),
+        (packet_of(dialect.MAVLink_set_mode_message(1, 1, 3 << 16)), False),
+        (long(176, 1, 6), True),
+        (long(176, 1, 4, 6), False),
+        (long(92, 1), True),
+        (long(92, 0), False),
+        (long(192, -1, 1, 0, NAN, 47.3, 8.5, 490), True),
+        (long(192, -1, 1, 0, NAN, NAN, NAN, 490), True),
+        (long(192, -1, 1, 0, NAN, NAN, NAN, NAN), False),
+        (packet_of(dialect.MAVLink_command_int_message(1, 1, 0, 192, 0, 0, -1, 1, 0, NAN, NO_INT, NO_INT, NAN)), False),
+        (packet_of(dialect.MAVLink_command_int_message(1, 1, 0, 192, 0, 0, -1, 1, 0, NAN, 473000000, 1, NAN)), True),
+        (long(34, 5, 1, 0, 0, NAN, NAN, NAN), True),
+        (long(20), False),
+        (long(21), False),
+        (long(185, 1), False),
+        (long(400, 0, 21196), False),
+    ],
+)
+def test_of_commands_sticks_and_modes_only_what_would_move_the_vehicle_is_kept_out(packet, is_kept_out):
+    assert would_move(packet) is is_kept_out
+
+
+# --- bytes
+
+
+def random_packet(chance: random.Random) -> bytes:
+    """Of any message of the dialect, or of another one, in either version, perhaps signed; fields at random."""
+    number = chance.choice(IDS) if chance.random() < 0.9 else chance.randrange(60_000, 61_000)
+    message = dialect.mavlink_map.get(number)
+    flags = chance.choice((0, 1))
+    payload = chance.randbytes(chance.randrange(256) if message is None else chance.randint(1, message.unpacker.size))
+    numbers = bytes(chance.randrange(256) for _ in range(3))  # sequence, system, component
+    if number < 256 and chance.random() < 0.2:
+        packet, flags = bytes((0xFE, len(payload))) + numbers + bytes((number,)) + payload, 0
+    else:
+        packet = bytes((0xFD, len(payload), flags, 0)) + numbers + number.to_bytes(3, "little") + payload
+    extra = b"" if message is None else bytes((message.crc_extra,))
+    return packet + mcrf4xx(packet[1:] + extra).to_bytes(2, "little") + chance.randbytes(13 * flags)
+
+
+IDS = sorted(dialect.mavlink_map)
+
+
+def pieces(content: bytes, chance: random.Random) -> list[bytes]:
+    """Cut anywhere."""
+    cuts = sorted(chance.sample(range(1, len(content)), len(content) // 200))
+    return [content[start:end] for start, end in zip([0, *cuts], [*cuts, len(content)], strict=True)]
+
+
+def test_packets_of_every_message_pass_both_ways_byte_by_byte_in_each_senders_order():
+    # Given two clients and a vehicle, each with its own packets, cut anywhere
+    chance = random.Random(1)
+    said = {name: [random_packet(chance) for _ in range(10_000)] for name in ("a", "b", "vehicle")}
+    between, now_us = Between(LINK_BYTES_S, signs=False), 0
+    passed, heard = list[bytes](), list[bytes]()
+    cut = {name: iter(pieces(b"".join(packets), chance)) for name, packets in said.items()}
+    # When they come as fast as the link carries them
+    while cut or between.waits:
+        now_us += 2_000
+        for name in [*cut]:
+            piece = next(cut[name], None)
+            if piece is None:
+                del cut[name]
+            elif name == "vehicle":
+                heard += between.to_clients(piece)
+            else:
+                between.hear(name, piece, now_us)
+        passed += between.to_vehicle(now_us)
+    # Then every byte is there, and a packet is never begun before another is at its end
+    assert heard == said["vehicle"]
+    theirs = iter(said["a"])
+    mine = iter(said["b"])
+    want_a, want_b = next(theirs, None), next(mine, None)
+    for packet in passed:
+        if packet == want_a:
+            want_a = next(theirs, None)
+        else:
+            assert packet == want_b
+            want_b = next(mine, None)
+    assert (want_a, want_b) == (None, None)
+    assert {number for number in IDS if number not in {message_id_of(packet) for packet in passed}} == set()
+
+
+def test_what_of_the_vehicle_is_no_packet_passes_too_and_of_a_client_it_stays():
+    chance = random.Random(2)
+    noise = bytes(byte for byte in chance.randbytes(300) if byte not in (0xFD, 0xFE))
+    packet = packet_of(ANY_STICKS)
+    between = Between(LINK_BYTES_S, signs=False)
+    assert b"".join(between.to_clients(noise + packet + noise + packet)) == noise + packet + noise + packet
+    between.hear("a", noise + packet + noise + packet[:9], 0)
+    assert between.to_vehicle(100_000) == [packet]
+    # Neither the beginning of a packet that never ends holds up what others say
+    between.hear("b", packet, 0)
+    assert between.to_vehicle(200_000) == [packet]
+
+
+def test_hostile_bytes_break_nothing_and_no_setpoint_passes_while_it_is_closed():
+    chance = random.Random(3)
+    between = Between(LINK_BYTES_S, signs=False)
+    between.is_closed = True
+    for number in range(5_000):
+        packet = bytearray(random_packet(chance))
+        if chance.random() < 0.5:
+            packet[chance.randrange(len(packet))] ^= 1 << chance.randrange(8)
+        cut = bytes(packet[: chance.randrange(1, len(packet) + 1)]) if chance.random() < 0.2 else bytes(packet)
+        between.hear("hostile", cut, 2_000 * number)
+        between.to_clients(cut)
+        for passed in between.to_vehicle(2_000 * number):
+            assert packet_length(passed) == len(passed), "whole, as PX4 frames it"
+            assert message_id_of(passed) not in SETPOINT_IDS
+    assert between.kept_out > 20
+
+
+# --- several clients
+
+
+def test_a_client_that_floods_takes_no_turn_from_another_and_is_named():
+    # Given a UART of 921,600 baud, and a client that sends a hundred times as much
+    between, flood = Between(92_160, signs=False), long(400, 1) * 30
+    quiet = packet_of(ANY_STICKS, (1, 191))
+    passed, waited_us, said_us = list[bytes](), list[int](), 0
+    for now_us in range(0, 3_000_000, 1_000):
+        for _ in range(8):
+            between.hear("flood", flood, now_us)
+        if now_us % 50_000 == 0:
+            between.hear("quiet", quiet, now_us)
+            said_us = now_us
+        going = between.to_vehicle(now_us)
+        if quiet in going:
+            waited_us.append(now_us - said_us)
+        passed += going
+    # Then the link carries what it can, the other's sticks wait for a packet at most, and one sentence tells
+    assert 0.5 * 3 * 92_160 < sum(map(len, passed)) <= 3 * 92_160 * (1 + BURST_S) + 1_000
+    assert len(waited_us) == 60 and max(waited_us) <= 2_000
+    assert between.news() == "flood sends more than the link to the vehicle carries: the rest of it is lost"
+    assert between.news() is None and not between.has_room("flood") and between.has_room("quiet")
+    between.forget("flood")
+    for now_us in range(3_000_000, 5_000_000, 1_000):
+        between.to_vehicle(now_us)
+    assert not between.waits and between.has_room("flood")
+
+
+def test_the_guards_own_packets_count_and_need_not_wait():
+    between = Between(92_160, signs=False)
+    between.to_vehicle(0)
+    assert not between.sends(long(176, 1, 6)) and between.sends(
+        packet_of(dialect.MAVLink_statustext_message(4, b"hit"))
+    )
+
+
+def test_two_clients_that_speak_as_one_are_told_of_once_and_one_that_comes_back_is_not():
+    between, packet = Between(LINK_BYTES_S, signs=False), packet_of(ANY_STICKS)
+    between.hear("a", packet, 0)
+    between.hear("b", packet, 2_000_000)
+    assert between.news() is None
+    between.hear("a", packet, 2_100_000)
+    between.hear("b", packet, 2_200_000)
+    assert (
+        between.news() == "b and a both speak as system 255, component 190: each of them gets the answers to the other"
+    )
+    assert between.news() is None
+
+
+@pytest.mark.parametrize(("signs", "says"), [(True, "does not sign"), (False, "has no --signing-key")])
+def test_a_client_that_signs_alone_and_one_that_does_not_are_told_of(signs, says):
+    between, plain = Between(LINK_BYTES_S, signs), packet_of(ANY_STICKS)
+    signed = Signing(b"k" * 32, 1).signed(plain, 0)
+    for time_us in range(0, 6_000_000, 2_000_000):
+        between.hear("a", plain if signs else signed, time_us)
+        between.hear("b", signed if signs else plain, time_us + 1_000_000)
+    news = between.news()
+    assert news is not None and news.startswith("a ") and says in news
+    assert between.news() is None
+    assert len(between.to_vehicle(6_000_000)) == 6, "they pass all the same"
+
+
+def test_a_datagram_holds_whole_packets_and_no_more_than_a_frame():
+    packets = [b"a" * 280] * 11
+    assert [len(datagram) for datagram in datagrams(packets, 1_452)] == [1_400, 1_400, 280]
