@@ -66,7 +66,7 @@ def events(replay: Replay) -> Iterator[Event]:
 
 
 def mistakes(found: Sequence[Event], labels: Mapping[float, str]) -> Iterator[str]:
-    """Each event that a label contradicts, each collision that none explains, each label that nothing was told of."""
+    """Each event that a label contradicts, each hit that none explains, each label that nothing was told of."""
     near = {at_s: [e for e in found if _is_near(e, at_s)] for at_s in labels}
     labelled = [event for told in near.values() for event in told]
     for at_s, what in labels.items():
@@ -74,8 +74,8 @@ def mistakes(found: Sequence[Event], labels: Mapping[float, str]) -> Iterator[st
             told = ", ".join(event.told for event in near[at_s]) or "nothing"
             yield f"{what} at {at_s:.1f} s told as {told}"
     for event in found:
-        if event.told == "collision" and event not in labelled:
-            yield f"{event.findings[0].first.impact.kind.value} at {event.at_s:.1f} s, where nothing was"
+        if event.told != "touchdown" and event not in labelled:
+            yield f"{event.told} at {event.at_s:.1f} s, where nothing was"
 
 
 def _is_near(event: Event, at_s: float) -> bool:
@@ -119,7 +119,7 @@ def table(rows: Sequence[Row]) -> str:
         lines.append(
             f"{len(seen)} logs, {sum(row.flown_h for row in seen):.2f} h flown, {watched_h:.2f} h watched: "
             f"{sum(row.collisions for row in seen)} collisions, {sum(row.touchdowns for row in seen)} touchdowns, "
-            f"{sum(row.crashes for row in seen)} crashes. {false} collisions where nothing was: "
+            f"{sum(row.crashes for row in seen)} crashes. {false} collisions and crashes where nothing was: "
             f"{false / watched_h:.1f} an hour, at most {at_most_an_hour(false, watched_h):.1f} with 95 % confidence; "
             f"{sum(row.promised for row in seen):.2g} in these hours promised by Gaussian noise."
         )

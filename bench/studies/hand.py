@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.cases.mishaps import FAMILIES
-from bench.cases.vehicles import AIRFRAMES, vehicle_of
+from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.stick_logs import LoggedSticks, logs_with_sticks
 from bench.fly.by_hand.watched import (
@@ -17,6 +17,7 @@ from bench.fly.by_hand.watched import (
     STICKS_S,
     GuardedFlight,
     Row,
+    Watcher,
     at_most_an_hour,
     rows_of,
 )
@@ -42,7 +43,6 @@ class HandCase:
     """One flight; everything that is not here is drawn from the seed. Sticks that are not logged are drawn, too."""
 
     seed: int
-    imu_hz: int
     mode: str
     logged: LoggedSticks | None = None
 
@@ -53,42 +53,47 @@ def run_hand(options: Namespace) -> int:
     cases = []
     for seed in range(options.first_seed, options.first_seed + options.flights):
         logged = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
-        cases += [HandCase(seed, imu_hz, HAND_MODES[seed % len(HAND_MODES)], logged) for imu_hz in IMU_HZ]
+        cases.append(HandCase(seed, HAND_MODES[seed % len(HAND_MODES)], logged))
     rows = rows_of(fly_by_hand, cases, options.jobs, options.out, "flights by hand")
-    print("\n".join(table(rows)))
-    return 1 if any(_in_the_air(row) for row in rows) else 0
+    watched = by_rate(rows)
+    print("\n".join(table(watched)))
+    return 1 if any(_in_the_air(row) for row in watched) else 0
 
 
 # --- the vehicle
 
 
 def fly_by_hand(case: HandCase) -> Row:
-    """Take-off by hand, a minute of vigorous flight, and all that was reported in it."""
+    """Take-off by hand, a minute of vigorous flight, and all that guards at every IMU rate reported in it."""
     rng = np.random.default_rng([case.seed, 11])
     built = vehicle_of(AIRFRAMES[case.seed // 4 % 2], case.seed)
     airframe, parameters = agile(built.airframe, rng)
     air = str(rng.choice(AIR))
     scene = Scene.model_validate({"faults": FAMILIES[air](rng).faults})
     vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
-    settings = {**built.settings, "streams": {"highres_imu_hz": float(case.imu_hz)}}
-    config = {"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings}
-    guard = Guard(GuardConfig.model_validate(config))
-    flight = GuardedFlight(vehicle, guard)
-    tilts = Pilot(flight, airframe, parameters, wishes(case.logged, rng), case.mode, guard).fly()
+    guards = [Guard(_config(built, imu_hz)) for imu_hz in IMU_HZ]
+    flight = GuardedFlight(vehicle, [Watcher(guard) for guard in guards])
+    tilts = Pilot(flight, airframe, parameters, wishes(case.logged, rng), case.mode, guards).fly()
     return {
         "seed": case.seed,
-        "imu_hz": case.imu_hz,
         "airframe": airframe.name,
         "mode": case.mode,
         "estimate": airframe.estimate.kind,
         "air": air,
         "sticks": "drawn" if case.logged is None else case.logged.log,
         "flown_s": round(len(tilts) * STICKS_S, 1),
-        "watched_s": round(flight.watched_s, 1),
         "tilt_deg": [round(float(np.percentile(tilts, at)), 1) for at in (50, 90, 100)] if tilts else [],
         "touched": flight.touched_us is not None,
-        "reported": flight.reported,
+        "watched": [
+            {"imu_hz": imu_hz, "watched_s": round(watcher.watched_s, 1), "reported": watcher.reported}
+            for imu_hz, watcher in zip(IMU_HZ, flight.watchers, strict=True)
+        ],
     }
+
+
+def _config(built: BenchVehicle, imu_hz: int) -> GuardConfig:
+    settings = {**built.settings, "streams": {"highres_imu_hz": float(imu_hz)}}
+    return GuardConfig.model_validate({"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings})
 
 
 def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[str, float]]:
@@ -126,6 +131,11 @@ def by_filter(airframe: Airframe) -> dict[str, object]:
 # --- the table
 
 
+def by_rate(rows: Sequence[Row]) -> list[Row]:
+    """A row for each of the guards of each flight."""
+    return [{**row, **watched} for row in rows for watched in row["watched"]]
+
+
 def table(rows: Sequence[Row]) -> Iterator[str]:
     """By IMU rate and by mode what was reported in the air, then every report. The bar: 0."""
     names = f"{'':<16}{'flights':>8}{'watched, h':>12}{'reported':>10}{'an hour, at most':>18}"
@@ -138,7 +148,7 @@ def table(rows: Sequence[Row]) -> Iterator[str]:
         as_what = ", ".join(f"{kind} {number}" for kind, number in kinds.most_common())
         most = at_most_an_hour(false, hours)
         yield f"{name:<16}{len(chosen):>8}{hours:>12.2f}{false:>10}{most:>18.2f}{tilt:>20}  {as_what}"
-    touched = sum(row["touched"] for row in rows)
+    touched = len({row["seed"] for row in rows if row["touched"]})
     yield f"{touched} flights touched the ground; reports from then on do not count. Bar: 0 reported."
     for row in rows:
         for one in _in_the_air(row):

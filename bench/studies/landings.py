@@ -33,7 +33,8 @@ def fly_to_the_ground(case: GroundCase) -> Row:
     """What was reported, and what it should have been."""
     flown = flown_to_the_ground(case)
     flight = flown.flight
-    outcome, wrong = judged(case.is_fall, flight.touched_us, flight.hardest_us, flight.reported)
+    reported = flight.watchers[0].reported
+    outcome, wrong = judged(case.is_fall, flight.touched_us, flight.hardest_us, reported)
     touched_us, hardest_us = flight.touched_us, flight.hardest_us
     return {
         "seed": case.seed,
@@ -50,7 +51,7 @@ def fly_to_the_ground(case: GroundCase) -> Row:
         "hardest_s": None if hardest_us is None else round(1e-6 * hardest_us, 3),
         "outcome": outcome,
         "wrong": wrong,
-        "reported": flight.reported,
+        "reported": reported,
     }
 
 

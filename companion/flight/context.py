@@ -194,9 +194,11 @@ class FlightContext:
 
     @property
     def height_m(self) -> float | None:
-        """Above the arming position; None before that, or where nothing is heard."""
+        """Above the arming position; None before that, or without a position of late."""
         latest, origin = self.vehicle.history.latest(), self.origin_ned_m
-        return None if latest is None or origin is None else origin[2] - latest.position_ned_m[2]
+        if latest is None or origin is None or self.vehicle.is_position_old:
+            return None
+        return origin[2] - latest.position_ned_m[2]
 
     def note_touchdown(self) -> None:
         """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""

@@ -10,7 +10,7 @@ from companion.link.vehicle import identify, is_autopilot
 from companion.messages import MessageId, Sample
 from companion.px4_mode import is_by_hand, mode_name
 from companion.reflex.config import HELD_S
-from companion.reflex.detector import Situation
+from companion.reflex.detector import NO_POSITION, Situation
 
 
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
@@ -119,13 +119,15 @@ def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
 
 def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool) -> Situation:
     """The detector's situation of a vehicle that somebody else flies."""
-    least_m = flight.mission.companion.min_detection_height_m
+    height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m
+    # Lift-off, ground effect and skids shake and push.
+    below = NO_POSITION if height_m is None else f"below {least_m:g} m"
     return Situation(
-        # Lift-off, ground effect and skids shake and push.
-        off_reason=off_state or (None if flight.has_climbed else f"below {least_m:g} m"),
+        off_reason=off_state or (None if flight.has_climbed else below),
         armed=flight.vehicle.armed,
         landed_state=flight.vehicle.landed,
-        height_m=flight.height_m,
+        height_m=height_m,
         descent_commanded=goes_down,
         flown_by_hand=is_by_hand(flight.vehicle.custom_mode or 0),
+        has_climbed=flight.has_climbed,
     )

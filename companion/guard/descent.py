@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.messages import LandedState, PositionTarget, Sample, Sticks
+from companion.motion.config import SAME_M_S
 from companion.px4_mode import AUTO_LAND, AUTO_PRECLAND, by_hand_alone, by_sticks
 
-# From this downward speed asked for PX4's land detector takes a descent to be meant: 1.1 x LNDMC_Z_VEL_MAX, 0.25 m/s
-# (land_detector/MulticopterLandDetector.cpp).
-DESCENT_M_S = 0.275
 # Stick deflection around the middle that asks for no climb: PX4's MPC_HOLD_DZ.
 STICK_DEADZONE = 0.1
 THROTTLE = 2
@@ -19,14 +17,14 @@ THROTTLE = 2
 class Descent:
     """Changed only by `update`. Receive times are on the companion's clock."""
 
-    velocity_down_m_s: float | None = None
+    velocity_down_m_s: float = 0.0
     setpoint_us: int | None = None
     throttle: float | None = None
 
     def update(self, samples: Sequence[Sample], now_us: int) -> None:
         for sample in samples:
             if isinstance(sample, PositionTarget):
-                self.velocity_down_m_s, self.setpoint_us = sample.velocity_down_m_s, now_us
+                self.velocity_down_m_s, self.setpoint_us = sample.velocity_down_m_s or 0.0, now_us
             elif isinstance(sample, Sticks):
                 self.throttle = sample.deflections[THROTTLE]
 
@@ -41,4 +39,4 @@ class Descent:
         if by_sticks(mode) and (self.setpoint_us is None if self.throttle is None else self.throttle < -STICK_DEADZONE):
             return True
         is_current = self.setpoint_us is not None and now_us - self.setpoint_us < OLD_NEWS_US
-        return is_current and self.velocity_down_m_s is not None and self.velocity_down_m_s >= DESCENT_M_S
+        return is_current and self.velocity_down_m_s > SAME_M_S

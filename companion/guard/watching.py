@@ -10,7 +10,7 @@ from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, Sample, SetMessageInterval, VehicleCommand
 from companion.px4_mode import OFFBOARD, mode_name
-from companion.reflex.detector import ON_THE_GROUND
+from companion.reflex.detector import NO_POSITION, ON_THE_GROUND
 
 # Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
 ECHO_HZ = 50.0
@@ -53,8 +53,7 @@ def not_flying(guard: GuardContext) -> str | None:
         return "disarmed"
     if vehicle.landed is LandedState.ON_GROUND:
         return ON_THE_GROUND
-    is_known = vehicle.custom_mode is not None and vehicle.history.latest() is not None
-    return None if is_known and guard.origin_ned_m is not None else "no position yet"
+    return None if vehicle.custom_mode is not None and guard.height_m is not None else NO_POSITION
 
 
 def why_not(guard: GuardContext) -> str | None:

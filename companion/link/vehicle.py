@@ -92,6 +92,11 @@ class Vehicle:
     conflicts: int = 0
 
     @property
+    def is_position_old(self) -> bool:
+        """Whether no position came lately, while other messages do; a vehicle whose estimator fails sends none."""
+        return self.last_position_us is None or self.last_received_us - self.last_position_us >= OLD_NEWS_US
+
+    @property
     def is_mode_known(self) -> bool:
         """Whether the vehicle may be commanded: its mode is new and not contradicted."""
         is_new = self.mode_received_us > self.unsure_since_us

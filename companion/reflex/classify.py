@@ -36,20 +36,23 @@ class Touch:
         return height_m is None or height_m < GROUND_M
 
     @property
-    def on_ground(self) -> bool:
-        """The place of arming may lie higher or lower than the ground here: a force from below is the ground's."""
-        return self.near_ground or self.upward > STEEP
-
-    @property
     def comes_down(self) -> bool:
         """Whether the ground is what the vehicle moves towards, rather than something beside it."""
         north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s or ZERO
         return down_m_s > math.hypot(north_m_s, east_m_s)
 
     @property
-    def comes_to_ground(self) -> bool:
-        """High up, a tilted vehicle that is pushed along its thrust has met a wall, unless it comes down."""
-        return self.near_ground or (self.upward > STEEP and self.comes_down)
+    def is_let_down(self) -> bool:
+        return self.situation.flown_by_hand and self.situation.descent_commanded
+
+    @property
+    def meets_ground(self) -> bool:
+        """The place of arming may lie higher or lower than the ground here: what comes down meets it at any height."""
+        return self.near_ground or (self.comes_down and (self.is_pushed_up or self.is_let_down))
+
+    @property
+    def is_pushed_up(self) -> bool:
+        return self.upward > STEEP
 
     @property
     def is_upright(self) -> bool:
@@ -57,15 +60,16 @@ class Touch:
 
     @property
     def is_slow(self) -> bool:
-        return self.velocity_ned_m_s is None or self.velocity_ned_m_s[2] < FASTEST_LANDING_M_S
+        """What has not climbed since it stood on the ground cannot have fallen, whatever its climb rate says."""
+        is_fast = self.velocity_ned_m_s is not None and self.velocity_ned_m_s[2] >= FASTEST_LANDING_M_S
+        return not (is_fast and self.situation.has_climbed)
 
     @property
     def has_landed(self) -> bool:
         """A vehicle on its way down meets the ground; one that is as low as its feet stands on it or scrapes along."""
         height_m = self.situation.height_m
         is_as_low_as_feet = height_m is not None and height_m < SCRAPING_M
-        meets_ground = self.on_ground or (self.situation.flown_by_hand and self.comes_down)
-        return is_as_low_as_feet or (self.situation.descent_commanded and meets_ground)
+        return is_as_low_as_feet or (self.situation.descent_commanded and (self.meets_ground or self.is_pushed_up))
 
     @property
     def is_struck(self) -> bool:
@@ -85,8 +89,9 @@ class Row:
 TABLE = (
     Row(
         ImpactKind.CRASH,
-        "near the ground, or coming down and pushed from below; tilted by over 45 degrees, or sinking at over 3.1 m/s",
-        lambda touch: touch.comes_to_ground and not (touch.is_upright and touch.is_slow),
+        "near the ground, or coming down and pushed from below or flown down by hand; "
+        "tilted by over 45 degrees, or sinking at over 3.1 m/s after a climb",
+        lambda touch: touch.meets_ground and not (touch.is_upright and touch.is_slow),
     ),
     Row(
         ImpactKind.LANDING,
@@ -101,7 +106,7 @@ TABLE = (
     Row(
         ImpactKind.FLOOR,
         "pushed from below",
-        lambda touch: touch.upward > STEEP,
+        lambda touch: touch.is_pushed_up,
     ),
     Row(
         ImpactKind.CEILING,

@@ -34,7 +34,7 @@ class ImpactKind(Enum):
 
 
 # Why a detector is off that nobody switched off.
-ON_THE_GROUND = "on the ground"
+ON_THE_GROUND, NO_POSITION = "on the ground", "no position"
 
 
 class Evidence(Enum):
@@ -47,7 +47,8 @@ class Evidence(Enum):
 class Situation(NamedTuple):
     """What the flight knows when samples arrive; None where it does not. A tuple: one is made in every step.
 
-    `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming. The
+    `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming;
+    `has_climbed`: the vehicle has been higher than a take-off reaches since it stood on the ground or touched it. The
     setpoint is the one last sent, local NED. `descent_commanded`: the vehicle goes down because it was told to, or by
     the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks. The
     monitor fills in `validity` of the vehicle's velocity, which lacks a part of a hit that was clipped, and
@@ -63,6 +64,7 @@ class Situation(NamedTuple):
     validity: VelocityValidity | None = None
     strapdown: Strapdown | None = None
     flown_by_hand: bool = False
+    has_climbed: bool = True
 
     @property
     def why_off(self) -> str | None:

@@ -14,22 +14,22 @@ from tests.rebound_cli.replay.flying import HIT_US, flight
 
 
 def event(at_s, told):
-    impact = SimpleNamespace(kind=SimpleNamespace(value="wall"))
-    return Event(at_s, told, [SimpleNamespace(at_us=at_s * 1e6, first=SimpleNamespace(impact=impact))])
+    return Event(at_s, told, [SimpleNamespace(at_us=at_s * 1e6)])
 
 
 def test_a_label_is_met_by_an_event_of_its_class_near_it():
     found = [event(10.0, "touchdown"), event(20.0, "crash")]
     assert list(mistakes(found, {10.4: "touchdown", 20.9: "crash"})) == []
-    assert list(mistakes(found, {10.0: "crash"})) == ["crash at 10.0 s told as touchdown"]
-    assert list(mistakes(found, {40.0: "crash"})) == ["crash at 40.0 s told as nothing"]
+    assert list(mistakes(found[:1], {10.0: "crash"})) == ["crash at 10.0 s told as touchdown"]
+    assert list(mistakes(found[:1], {40.0: "crash"})) == ["crash at 40.0 s told as nothing"]
 
 
-def test_a_collision_without_a_label_is_one_where_nothing_was():
-    assert list(mistakes([event(10.0, "collision")], {})) == ["wall at 10.0 s, where nothing was"]
-    assert list(mistakes([event(10.0, "collision")], {10.2: "collision"})) == []
-    # A touchdown or a crash is not held against a log that nobody has looked at
-    assert list(mistakes([event(10.0, "touchdown"), event(20.0, "crash")], {})) == []
+@pytest.mark.parametrize("told", ["collision", "crash"])
+def test_a_collision_or_a_crash_without_a_label_is_one_where_nothing_was(told):
+    assert list(mistakes([event(10.0, told)], {})) == [f"{told} at 10.0 s, where nothing was"]
+    assert list(mistakes([event(10.0, told)], {10.2: told})) == []
+    # Landings are many, and nobody labels them all
+    assert list(mistakes([event(10.0, "touchdown")], {})) == []
 
 
 def test_what_follows_within_two_seconds_is_one_event():

@@ -17,9 +17,9 @@ def tilted(degrees):
     return (math.cos(half), math.sin(half), 0.0, 0.0)
 
 
-def kind(force, velocity=FORWARD, tilt_deg=0.0, height_m=5.0, descends=False, by_hand=False):
+def kind(force, velocity=FORWARD, tilt_deg=0.0, height_m=5.0, descends=False, by_hand=False, has_climbed=True):
     situation = Situation(armed=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
-    return kind_of(force, velocity, tilted(tilt_deg), situation)
+    return kind_of(force, velocity, tilted(tilt_deg), situation._replace(has_climbed=has_climbed))
 
 
 def sinking(speed_m_s):
@@ -72,6 +72,20 @@ def test_ground_met_fast_or_tilted_is_a_crash_whatever_was_asked(tilt_deg, speed
 @pytest.mark.parametrize("height_m", [1.0, 2.0, 3.0])
 def test_a_fall_from_a_metre_is_faster_than_a_landing(height_m):
     assert kind(UP, sinking(math.sqrt(2.0 * 9.81 * height_m)), height_m=0.1) is ImpactKind.CRASH
+
+
+def test_what_has_not_climbed_since_it_stood_on_the_ground_cannot_have_fallen():
+    # Given a climb rate that vibration has made wrong
+    gone_astray = {"velocity": sinking(9.0), "height_m": -3.0, "descends": True}
+    # Then skids that touch in a take-off, or a bounce, are no crash by their speed; a vehicle that tips over is one
+    assert kind(UP, **gone_astray) is ImpactKind.CRASH
+    assert kind(UP, **gone_astray, has_climbed=False) is ImpactKind.LANDING
+    assert kind(UP, **gone_astray, has_climbed=False, tilt_deg=60.0) is ImpactKind.CRASH
+
+
+def test_who_is_flown_down_by_hand_and_is_too_fast_has_crashed_whatever_a_barometer_says_of_the_height():
+    assert kind(BACK, sinking(9.0), descends=True, by_hand=True) is ImpactKind.CRASH
+    assert kind(BACK, sinking(9.0), descends=True) is ImpactKind.WALL
 
 
 def test_a_wall_met_at_a_steep_tilt_high_up_is_no_crash():

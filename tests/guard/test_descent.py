@@ -2,9 +2,10 @@
 
 import pytest
 
-from companion.guard.descent import DESCENT_M_S, STICK_DEADZONE, Descent
+from companion.guard.descent import STICK_DEADZONE, Descent
 from companion.link.vehicle import ModeReport, Vehicle
 from companion.messages import LandedState, PositionTarget, Sticks
+from companion.motion.config import SAME_M_S
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
 
 SECOND = 1_000_000
@@ -36,7 +37,7 @@ def test_a_vehicle_that_says_it_lands_is_meant_to():
 
 @pytest.mark.parametrize("mode", [AUTO_LOITER, OFFBOARD, POSCTL])
 def test_a_setpoint_that_sinks_means_it_while_it_is_renewed(mode):
-    assert is_meant(mode, down(DESCENT_M_S)) and not is_meant(mode, down(0.9 * DESCENT_M_S))
+    assert is_meant(mode, down(1.1 * SAME_M_S)) and not is_meant(mode, down(SAME_M_S))
     assert not is_meant(mode, down(None)) and not is_meant(mode, down(2.0), down(0.0))
     # PX4 keeps a setpoint for COM_OF_LOSS_T, 1 s
     assert is_meant(mode, down(2.0), now_us=SECOND - 1) and not is_meant(mode, down(2.0), now_us=SECOND)

@@ -1,14 +1,13 @@
 """A pilot who flies hard by sticks: takes off, strokes or a log's deflections, and back before it is too far or low."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from bench.fly.by_hand.stick_logs import Floats, LoggedSticks
 from bench.fly.by_hand.watched import STICKS_S, GuardedFlight, Sticks
 from companion.guard.guard import Guard
-from companion.guard.states import State
 from sim_vehicle.airframe import Airframe
 
 FLOWN_S = 60.0
@@ -33,9 +32,9 @@ class Pilot:
         parameters: dict[str, float],
         wished: Iterator[Sticks],
         mode: str,
-        guard: Guard,
+        guards: Sequence[Guard],
     ) -> None:
-        self._flight, self._wished, self._mode, self._guard = flight, wished, mode, guard
+        self._flight, self._wished, self._mode, self._guards = flight, wished, mode, guards
         self._body = flight.vehicle.state.body
         self._hover, self._climb_m_s = airframe.hover_fraction, airframe.control.climb_max_m_s
         self._speed_m_s = parameters["MPC_VEL_MANUAL"]
@@ -53,7 +52,7 @@ class Pilot:
 
     def _decide(self) -> Sticks:
         """What to ask for, and where the sticks are."""
-        flight, status, now_s = self._flight, self._guard.status(), self._flight.time_s
+        flight, status, now_s = self._flight, self._flight.status, self._flight.time_s
         if status.vehicle_mode != self._chosen and now_s >= self._ask_mode_s:
             flight.ask_mode(self._chosen)
             self._ask_mode_s = now_s + ASK_AGAIN_S
@@ -67,9 +66,9 @@ class Pilot:
             flight.watch_for_ground()
         if self._next == self._vigorous:
             self._tilts_deg.append(flight.tilt_deg)
-        core = self._guard.core
-        if core is not None and core.machine.state is State.STOOD_DOWN:
-            core.is_enabled = True  # moving sticks take the vehicle back, and the next impact counts, too
+        for guard in self._guards:
+            if guard.core is not None:
+                guard.core.flight.program_elsewhere = True  # a hit is reported, and nobody takes the vehicle over
         return self._next()
 
     def _idle(self) -> Sticks:
@@ -97,7 +96,7 @@ class Pilot:
         return self._in_mode(Sticks(roll, pitch, throttle, wish.yaw))
 
     def _in_mode(self, wish: Sticks) -> Sticks:
-        if self._flight.mode != "STABILIZED":
+        if self._flight.status.vehicle_mode != "STABILIZED":
             return wish
         climbs_m_s = -self._flight.velocity_ned_m_s[2]
         asked_m_s2 = CLIMB_P_PER_S * (wish.throttle * self._climb_m_s - climbs_m_s)

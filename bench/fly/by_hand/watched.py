@@ -15,9 +15,10 @@ from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, made
 from companion.companion import Companion
 from companion.guard.guard import Guard
 from companion.reflex.detector import Impact, Phase
+from companion.report import Status
 from rebound_cli.live.console import with_progress
 from rebound_cli.simulation.lockstep import EPOCH_US
-from sim_vehicle.mavlink.link import LinkOptions
+from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -49,13 +50,27 @@ class Sticks:
 
 
 @dataclass
+class Watcher:
+    """Who watches, on a link of its own, and what was reported."""
+
+    program: Guard | Companion
+    reported: list[Row] = field(default_factory=list)
+    watched_s: float = 0.0
+    impact: Impact | None = None  # the newest
+
+    def step(self, link: Link, now_us: int) -> None:
+        """Only where there is something to hear or to send."""
+        heard = b"".join(link.take())
+        if heard or now_us >= self.program.next_deadline_us():
+            link.push(b"".join(self.program.step(heard, now_us).sent_frames))
+
+
+@dataclass
 class GuardedFlight:
     """One interval after the other, all bytes both ways. The world is the level ground alone."""
 
     vehicle: SimulatedVehicle
-    watcher: Guard | Companion
-    reported: list[Row] = field(default_factory=list)
-    watched_s: float = 0.0
+    watchers: Sequence[Watcher]
     touched_us: int | None = None  # first touch of the ground since the latest `watch_for_ground`
     last_touch_us: int | None = None
     hardest_m_s2: float = 0.0  # since that touch: the largest specific force, mean over an interval
@@ -64,11 +79,11 @@ class GuardedFlight:
     sink_at_touch_m_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self._link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
+        self._links = [self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD)) for _ in self.watchers]
         self._station = self.vehicle.add_link(LinkOptions(LinkKind.NORMAL))
-        self._link.introduce()
+        for link in self._links:
+            link.introduce()
         self._body, self._depth_m = self.vehicle.state.body, self.vehicle.state.depth_m
-        self._impact: Impact | None = None
         self._sent, self._sticks_s, self._beat_s = 0, 0.0, 0.0
         self._before = np.zeros(3)
         self.looks_for_ground = False
@@ -78,8 +93,9 @@ class GuardedFlight:
         return 1e-6 * self.vehicle.time_boot_us
 
     @property
-    def mode(self) -> str:
-        return self.watcher.status().vehicle_mode
+    def status(self) -> Status:
+        """As the first watcher sees it."""
+        return self.watchers[0].program.status()
 
     @property
     def height_m(self) -> float:
@@ -127,11 +143,12 @@ class GuardedFlight:
         self._before[:] = self._body[3:6]
         self.vehicle.advance()
         self._station.take()
-        result = self.watcher.step(b"".join(self._link.take()), EPOCH_US + self.vehicle.time_boot_us)
-        self._link.push(b"".join(result.sent_frames))
+        for watcher, link in zip(self.watchers, self._links, strict=True):
+            watcher.step(link, EPOCH_US + self.vehicle.time_boot_us)
         if self.looks_for_ground:
             self._note_ground()
-        self._note_impact()
+        for watcher in self.watchers:
+            self._note_impact(watcher)
 
     def _note_ground(self) -> None:
         """A contact with a stiff frame may begin and end within an interval: its force shows it then."""
@@ -147,19 +164,19 @@ class GuardedFlight:
         if self.touched_us is not None and force_m_s2 > self.hardest_m_s2:
             self.hardest_m_s2, self.hardest_us = force_m_s2, now_us
 
-    def _note_impact(self) -> None:
-        core = self.watcher.core
+    def _note_impact(self, watcher: Watcher) -> None:
+        core = watcher.program.core
         if core is None:
             return
         monitor = core.monitor
         if monitor.state.phase is not Phase.OFF:
-            self.watched_s += 1e-6 * self.vehicle.interval_us
+            watcher.watched_s += 1e-6 * self.vehicle.interval_us
         estimate = monitor.estimator.estimate
-        if estimate is None or estimate.impact is self._impact:
+        if estimate is None or estimate.impact is watcher.impact:
             return
-        self._impact = impact = estimate.impact
+        watcher.impact = impact = estimate.impact
         now_us = self.vehicle.time_boot_us
-        self.reported.append(
+        watcher.reported.append(
             {
                 "kind": impact.kind.value,
                 "evidence": impact.evidence.value,
@@ -172,7 +189,7 @@ class GuardedFlight:
                 "height_m": round(self.height_m, 2),
                 "force_frd_m_s2": [round(value, 1) for value in impact.specific_force_frd_m_s2],
                 "threshold_m_s2": round(monitor.state.threshold_m_s2, 1),
-                "mode": self.mode,
+                "mode": self.status.vehicle_mode,
             }
         )
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
-from bench.fly.by_hand.watched import GRAVITY_M_S2, GuardedFlight, Sticks
+from bench.fly.by_hand.watched import GRAVITY_M_S2, GuardedFlight, Sticks, Watcher
 from companion.companion import Companion
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
@@ -110,7 +110,7 @@ def begun(
         data = {"name": "landing", "items": [{"takeoff": {"height_m": MISSION_M}}, {"land": {}}], "companion": settings}
         companion = Companion(Mission.model_validate(data))
         companion.confirm_plan()
-        return GuardedFlight(vehicle, companion), error_m
+        return GuardedFlight(vehicle, (Watcher(companion),)), error_m
     low_m, high_m = FALLS_FROM_M if case.is_fall else LANDS_FROM_M
     # The vehicle corrects what it takes for an error of its height before it falls.
     height_m = float(rng.uniform(low_m + max(error_m, 0.0), high_m + min(error_m, 0.0)))
@@ -118,7 +118,7 @@ def begun(
     place = (away_m * math.cos(side_rad), away_m * math.sin(side_rad), -height_m)
     vehicle.begin_in_flight(place, (0.0, 0.0, 0.0))
     config = GuardConfig.model_validate({"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings})
-    return GuardedFlight(vehicle, Guard(config)), error_m
+    return GuardedFlight(vehicle, (Watcher(Guard(config)),)), error_m
 
 
 def falling(way: str, at_s: float, rng: np.random.Generator) -> list[dict[str, Any]]:
@@ -133,7 +133,7 @@ def falling(way: str, at_s: float, rng: np.random.Generator) -> list[dict[str, A
 def to_the_end(flight: GuardedFlight) -> None:
     """Until a while after the first touch of the ground; the one before take-off is none."""
     end_s = LONGEST_S
-    while flight.time_s < end_s and not flight.watcher.finished:
+    while flight.time_s < end_s and not flight.watchers[0].program.finished:
         flight.step()
         if flight.height_m > UP_M and not flight.looks_for_ground:
             flight.watch_for_ground()
@@ -149,7 +149,7 @@ def land(flight: GuardedFlight, way: str, airframe: Airframe, sink_m_s: float, r
     while flight.time_s < end_s:
         if way in BY_STICKS:
             flight.fly_sticks(sticks)
-        if flight.time_s > asked_s and flight.touched_us is None and flight.mode != way:
+        if flight.time_s > asked_s and flight.touched_us is None and flight.status.vehicle_mode != way:
             flight.ask_mode(way)
             asked_s = flight.time_s + 0.5
         flight.step()
@@ -173,7 +173,7 @@ def lowering(
         # It began with its nose to the north.
         leans = (-DRIFT_P_S_M * east_m_s, DRIFT_P_S_M * (drift_m_s - north_m_s))
         is_lowered = flight.time_s > BEGINS_S
-        if flight.mode != "STABILIZED":
+        if flight.status.vehicle_mode != "STABILIZED":
             return Sticks(*leans, throttle=-down if is_lowered else 0.0)
         share = SINK_P_PER_S * (down_m_s - sink_m_s * is_lowered) / GRAVITY_M_S2
         # MPC_THR_CURVE has hovering in the middle.
