@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import development as mav
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.packet import payload_of
-from companion.mavlink.readers import LONE_GUARD_READERS, Reader
+from companion.mavlink.readers import GUARD_READERS, Reader
 from companion.messages import (
     Attitude,
     AttitudeSetpoint,
@@ -336,7 +336,7 @@ def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs
 
 
 @pytest.mark.parametrize("kept", [0, 1, 3, 100])
-@pytest.mark.parametrize("reader", LONE_GUARD_READERS.values(), ids=lambda reader: reader.name)
+@pytest.mark.parametrize("reader", GUARD_READERS.values(), ids=lambda reader: reader.name)
 def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
     """Zeros at the end of a payload, which are not sent, included."""
     # Given a message whose fields are zero but for the first on the wire
