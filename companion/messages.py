@@ -309,11 +309,12 @@ class PositionSetpoint(Outgoing):
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSetpoint(Outgoing):
-    """SET_ATTITUDE_TARGET: attitude in the vehicle's own frame, collective thrust as a share of the most."""
+    """SET_ATTITUDE_TARGET: attitude in the vehicle's own frame, collective thrust as a share of the most, turn."""
 
     time_us: int
     attitude_wxyz: Quaternion
     thrust_fraction: float
+    yaw_rate_rad_s: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,8 +30,8 @@ IGNORE_VELOCITY = 0x038
 IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
-# ATTITUDE_TARGET_TYPEMASK: the body rates.
-IGNORE_RATES = 0x07
+# ATTITUDE_TARGET_TYPEMASK.
+IGNORE_ROLL_AND_PITCH_RATE = 0x03
 
 NAN = math.nan
 
@@ -178,9 +178,10 @@ class Encoder:
         return (*head, *setpoint.position_ned_m, *velocity, *acceleration, yaw, NAN)
 
     def _attitude_fields(self, setpoint: AttitudeSetpoint) -> tuple[Any, ...]:
-        """The same. Its rates are ignored: PX4's attitude loop makes its own."""
-        head = (_time_ms(setpoint.time_us), *self._target, IGNORE_RATES)
-        return (*head, list(setpoint.attitude_wxyz), 0.0, 0.0, 0.0, setpoint.thrust_fraction)
+        """The same. PX4's attitude loop makes the rates of roll and pitch."""
+        head = (_time_ms(setpoint.time_us), *self._target, IGNORE_ROLL_AND_PITCH_RATE)
+        rates_rad_s = (0.0, 0.0, setpoint.yaw_rate_rad_s)
+        return (*head, list(setpoint.attitude_wxyz), *rates_rad_s, setpoint.thrust_fraction)
 
 
 def _time_ms(time_us: int) -> int:

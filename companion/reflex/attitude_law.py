@@ -92,10 +92,7 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     lifts_m_s2 = GRAVITY_M_S2 - acceleration_ned_m_s2[2]
     least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), reflex.HOVER_MARGIN * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
-    most_thrust = 1.0
-    if turns_rad_s > reflex.SPIN_RAD_S:
-        # The lean lags behind the turn, and full thrust leaves nothing to brake the turn with.
-        most_m_s2, most_thrust = most_m_s2 * reflex.SPIN_RAD_S / turns_rad_s, reflex.SPIN_THRUST
+    most_m_s2 *= reflex.SPIN_RAD_S / max(turns_rad_s, reflex.SPIN_RAD_S)
     n, e, d = acceleration_ned_m_s2
     n, e, _ = limited((n, e, 0.0), most_m_s2)
     force = (n, e, d - GRAVITY_M_S2)
@@ -107,7 +104,7 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     upright = -up[2]
     by_axis = along(force, up)
     thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
-    thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), most_thrust)
+    thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
     asked = plus((n, e, -lifts_m_s2), -1.0, belief.level_m_s2)
     return tilted(asked, lean.yaw_rad), thrust
 

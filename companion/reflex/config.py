@@ -152,9 +152,11 @@ HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 16.0, 8.0, 4.0
 MOST_TILT_RAD = 0.61
 # Thrust that the tilt leaves for the height, over what hovers at it.
 HOVER_MARGIN = 1.1
-# A vehicle that turns faster about its yaw axis than this, rad/s, leans less, and keeps a tenth of its thrust to brake
-# the turn with: at full thrust the motors have no moment about that axis left.
-SPIN_RAD_S, SPIN_THRUST = 3.0, 0.9
+# A vehicle that turns faster about its yaw axis than this, rad/s, leans less: the lean lags behind the turn.
+SPIN_RAD_S = 3.0
+# To brake a turn PX4's mixer takes up to 0.15 of all thrust from the motors that lift (mixYaw). So the heading asked for
+# is the present one, and this share of the turn is asked for, too.
+TURN_KEPT = 0.9
 # The rotors keep turning: PX4's MPC_THR_MIN.
 LEAST_THRUST = 0.12
 # The thrust gain is good enough to fly by after so long: 15 reports of the thrust at 30 Hz.

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from companion.flight.context import Target
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, turned, yaw_rad
 from companion.motion.strapdown import LEVEL, ZERO
 from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, held_off, tilted, wanted
-from companion.reflex.config import HELD_S, LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S, SPIN_THRUST
+from companion.reflex.config import HELD_S, LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S
 from companion.reflex.halfspace import Surface, along, plus
 
 HERE, FULL_M_S2 = (0.0, 0.0, -2.0), 16.0
@@ -114,12 +115,14 @@ def test_a_vehicle_with_little_thrust_to_spare_leans_less():
     assert -up_of(weak)[2] == pytest.approx(1.1 / 1.25), "hover's share of the thrust, and a tenth to spare"
 
 
-def test_a_vehicle_that_spins_leans_less_and_keeps_thrust_to_brake_the_turn_with():
+def test_a_vehicle_that_spins_leans_less_and_brakes_the_turn_little_by_little():
     still = Belief(HERE, (-4.0, 0.0, 0.0))
+    spinning = lean(replace(still, yaw_rate_rad_s=-12.0))
     slow, _ = attitude_and_thrust((9.0, 0.0, -4.0), lean(still))
-    spun, thrust = attitude_and_thrust((9.0, 0.0, -4.0), lean(replace(still, yaw_rate_rad_s=-12.0)))
+    spun, _ = attitude_and_thrust((9.0, 0.0, -4.0), spinning)
     assert up_of(spun)[0] < 0.5 * up_of(slow)[0]
-    assert thrust <= SPIN_THRUST
+    sent = Target(HERE, 0.0, None, (9.0, 0.0, -4.0), spinning).setpoint(0)
+    assert -12.0 < sent.yaw_rate_rad_s < -10.0
 
 
 def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():

@@ -319,7 +319,7 @@ def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
         PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), 1.0, (0.5, 0.0, -0.5), (0.0, 2.0, 0.0)),
         PositionSetpoint(0, (0.0, 0.0, 0.0), None, None, None),
         PositionSetpoint(5_000_000_000_000, (-1e4, 1e-9, 0.1), -3.0, (0.0, 0.0, 0.0), None),
-        AttitudeSetpoint(5_000_000_000_000, (1.0, 0.0, 0.0, 0.0), 0.5),
+        AttitudeSetpoint(5_000_000_000_000, (1.0, 0.0, 0.0, 0.0), 0.5, 0.25),
     ],
 )
 def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs_it(setpoint, sequence):
@@ -363,11 +363,11 @@ def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
             assert value == (tuple(found) if isinstance(found := getattr(heard, name), list) else found), name
 
 
-def test_an_attitude_leaves_the_body_rates_to_the_vehicle():
-    m = sent(AttitudeSetpoint(2_000_000, (0.5, 0.5, -0.5, 0.5), 0.625))
+def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
+    m = sent(AttitudeSetpoint(2_000_000, (0.5, 0.5, -0.5, 0.5), 0.625, 1.5))
     assert m.get_type() == "SET_ATTITUDE_TARGET"
-    assert (m.type_mask, m.target_system, m.target_component, m.time_boot_ms) == (0x07, 7, 1, 2000)
-    assert (m.q, m.thrust) == ([0.5, 0.5, -0.5, 0.5], 0.625)
+    assert (m.type_mask, m.target_system, m.target_component, m.time_boot_ms) == (0x03, 7, 1, 2000)
+    assert (m.q, m.thrust, m.body_yaw_rate) == ([0.5, 0.5, -0.5, 0.5], 0.625, 1.5)
 
 
 @pytest.mark.parametrize(
