@@ -154,7 +154,7 @@ MOST_TILT_RAD = 0.61
 HOVER_MARGIN = 1.1
 # A vehicle that turns faster about its yaw axis than this, rad/s, leans less: the lean lags behind the turn.
 SPIN_RAD_S = 3.0
-# To brake a turn PX4's mixer takes up to 0.15 of all thrust from the motors that lift (mixYaw). So the heading asked for
+# To brake a turn PX4's mixer takes up to 0.15 of all thrust from what lifts (mixYaw). So the heading that is asked for
 # is the present one, and this share of the turn is asked for, too.
 TURN_KEPT = 0.9
 # The rotors keep turning: PX4's MPC_THR_MIN.
