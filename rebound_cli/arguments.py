@@ -352,7 +352,7 @@ def add_replay(commands: Commands) -> None:
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
     _gone(replay, "--merge", "`rebound logs export RUN --format ulg` writes a log with a flight's events and hits")
-    _option(replay, "--out", "folder of the pictures (default: runs/replay-<name of the log>)", "DIR")
+    _option(replay, "--out", "folder of the page (default: runs/replay-<name of the log>)", "DIR")
     _add_json(replay, "findings")
 
 

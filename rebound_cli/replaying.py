@@ -3,9 +3,8 @@
 import json
 import re
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 from companion.guard.config import GuardConfig
 from rebound_cli.inputs import companion_settings
@@ -20,17 +19,17 @@ from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
 
 
 def run_replay(options: Namespace) -> int:
-    """Print the findings and draw them. 1 when they are not what was expected, or a flight did not come again."""
+    """Print the findings, write their page. 1 when they are not what was expected, or a flight did not come again."""
     console = console_for(options.json)
     replay, shown = _replay(options, console)
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
     folder = options.out or RUNS_FOLDER / f"replay-{slug}"
-    pictures = _draw(replay, folder)
     if options.json:
-        print(json.dumps(report_data(replay, pictures), indent=2))
+        print(json.dumps(report_data(replay), indent=2))
     else:
-        console.print(report_text(replay, pictures).rstrip())
-    if pictures:
+        console.print(report_text(replay).rstrip())
+    if replay.findings.impacts:
+        folder.mkdir(parents=True, exist_ok=True)
         console.print(f"page: {write_page(shown(), folder / REPORT_NAME)}")
     return _exit_code(replay, options.expect, options.least_watched, console)
 
@@ -60,19 +59,6 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     modes = None if options.any_mode else GuardConfig().modes
     replay = replay_log(log, config, options.rate, listener.listen, modes)
     return replay, partial(replayed_flight, replay, config, listener)
-
-
-def _draw(replay: Replay, folder: Path) -> Sequence[str]:
-    """A picture for each impact, named in their order."""
-    if not replay.findings.impacts:
-        return []
-    from rebound_cli.replay.picture import draw_impact
-
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"impact-{number}.png" for number in range(1, len(replay.findings.impacts) + 1)]
-    for finding, path in zip(replay.findings.impacts, paths, strict=True):
-        draw_impact(replay, finding, path)
-    return [str(path) for path in paths]
 
 
 def _exit_code(replay: Replay, expected: int | None, least_watched: float, console: Console) -> int:

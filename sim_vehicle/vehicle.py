@@ -220,7 +220,7 @@ class SimulatedVehicle:
         slow, faults, now_us = self._slow, self._plant.faults, telemetry.sample.time_boot_us
         positioning = self._positioning
         if faults is not None:
-            positioning.gps_is_jammed = faults.is_lost("gps", self.time_boot_us / 1e6)
+            positioning.gps_is_jammed = faults.gps_is_lost(self.time_boot_us / 1e6)
             self._autopilot.battery.supply_share = faults.voltage_share
         if now_us < slow.due_us:
             return

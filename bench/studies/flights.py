@@ -1,7 +1,7 @@
 """`python -m bench flights`: every recorded flight of some folders through the detector, and what it told of each.
 
 A corpus of real flights gives the rate of false alarms. Its logs are not committed; labels of them are, made by
-looking at the pictures that this study draws.
+looking at the pages that this study writes.
 """
 
 from argparse import Namespace
@@ -15,15 +15,17 @@ from bench.rows.tables import at_most_an_hour
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
-from rebound_cli.replay.picture import draw_impact
+from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import Finding
+from rebound_cli.report.shown_flight import replayed_flight
+from rebound_cli.report.writer import write_page
 
 SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
 LABELS = Path(__file__).with_name("flights.yaml")
 # A contact bounces and tumbles: ArduPilot's crash check waits for so long, too (crash_check.cpp, 2 s).
 ONE_EVENT_US = 2_000_000
-# A label is read off a picture.
+# A label is read off a page.
 LABEL_S = 1.0
 
 
@@ -134,15 +136,15 @@ def run_flights(options: Namespace) -> int:
     rows, refused = [], []
     for path in sorted(p for folder in options.folders for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES):
         name = f"{path.parent.name}/{path.name}"
+        config, listener = CompanionConfig(), Listener()
         try:
-            replay = replay_log(read_log(path), CompanionConfig(), options.rate)
+            replay = replay_log(read_log(path), config, options.rate, listener.listen)
         except LogError as error:
             refused.append(str(error))
             continue
         rows.append(row_of(name, replay, labels.get(name, {})))
-        for event in events(replay):
-            if event.told == "collision":
-                draw_impact(replay, event.findings[0], out / f"{path.parent.name}-{path.stem}-{event.at_s:.1f}s.png")
+        if rows[-1].collisions:
+            write_page(replayed_flight(replay, config, listener), out / f"{path.parent.name}-{path.stem}.html")
         print(f"{name}: {rows[-1].watched_h * 60:.1f} min watched, {rows[-1].collisions} collisions")
     text = table(rows) + "".join(f"\n\nNot replayed: {sentence}" for sentence in refused) + "\n"
     (out / "flights.md").write_text(text)

@@ -87,8 +87,8 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
     return (*log.losses, *missing)
 
 
-def report_text(replay: Replay, pictures: Sequence[str]) -> str:
-    """The whole report, with a picture of each impact; times in seconds since the log's start."""
+def report_text(replay: Replay) -> str:
+    """The whole report; times in seconds since the log's start."""
     log, rate_hz = replay.log, replay.shaking.rate_hz
     recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
     headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
@@ -98,8 +98,7 @@ def report_text(replay: Replay, pictures: Sequence[str]) -> str:
         # Each interval in which a guard would have left a hit to whoever flies.
         spans = replay.findings.off
         told += [(s.start_us, [f"not watched for {s.duration_s:.2f} s: {s.reason}"]) for s in spans]
-    for finding, picture in zip(replay.findings.impacts, pictures, strict=True):
-        told.append((finding.at_us, [*_finding_rows(replay, finding), f"picture: {picture}"]))
+    told += [(finding.at_us, list(_finding_rows(replay, finding))) for finding in replay.findings.impacts]
     timeline = [_entry(log.seconds(at_us), texts) for at_us, texts in sorted(told, key=lambda row: row[0])]
     parts = [f"{headline}, detector '{replay.detector}'", *(["\n".join(timeline)] if timeline else [])]
     parts.append("\n".join(_wrapped(fact, "", "  ") for fact in _facts(replay)))
@@ -194,7 +193,7 @@ def _vector(vector: Sequence[float]) -> str:
     return "({})".format(", ".join(f"{round(value, 2) + 0.0:.2f}" for value in vector))
 
 
-def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
+def report_data(replay: Replay) -> dict[str, Any]:
     """The same for a program; vectors NED unless named FRD, SI units, times in seconds since the log's start."""
     log, findings, again = replay.log, replay.findings, replay.reproduction
     count, how = clipped(log)
@@ -210,10 +209,7 @@ def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
         "recorded_imu_rate_hz": round(replay.recorded_rate_hz, 2),
         "collisions": len(findings.collisions),
         "crashes": len(findings.crashes),
-        "impacts": [
-            {**_finding_data(replay, finding), "picture": name}
-            for finding, name in zip(findings.impacts, pictures, strict=True)
-        ],
+        "impacts": [_finding_data(replay, finding) for finding in findings.impacts],
         "happenings": [{"at_s": _seconds(replay, h.at_us), "text": h.text} for h in findings.happenings],
         "watched_share": findings.watched_share,
         **{name: [_span_data(replay, span) for span in getattr(findings, name)] for name in ("blind", "off")},

@@ -66,11 +66,9 @@ _HAPPEN_ONCE = ("clock_jump", "estimator_reset", "payload_drop")
 _HAVE_TO_END = ("gust", "battery_sag", "push", "hand_catch")
 
 
-def sensor_dropout(
-    sensor: Literal["imu", "optical_flow", "range_finder", "compass", "motion_capture", "gps"] = "imu",
-) -> FaultRequest:
-    """A sensor gives nothing. `imu`: no inertial message is sent; the others: the estimate goes without them."""
-    return other("imu_dropout") if sensor == "imu" else other("aiding_loss", sensor=sensor)
+def sensor_dropout(sensor: Literal["imu", "gps"] = "imu") -> FaultRequest:
+    """A sensor gives nothing. `imu`: no inertial message is sent; `gps`: as `gps_loss`."""
+    return other("imu_dropout") if sensor == "imu" else gps_loss()
 
 
 def gps_loss(drift_m_s2: float = 0.1) -> FaultRequest:

@@ -58,12 +58,6 @@ class OnboardEstimator:
         self._range_sensor = RangeSensor(sensors.range_finder, interval_us, rng)
         self._compass = CompassSensor(sensors.compass, interval_us, rng)
         self._cameras = CaptureSensor(sensors.motion_capture, interval_us, rng)
-        self._schedules = {
-            "optical_flow": self.flow_sensor.schedule,
-            "range_finder": self._range_sensor.schedule,
-            "compass": self._compass.schedule,
-            "motion_capture": self._cameras.schedule,
-        }
         self._has_cameras = sensors.motion_capture.fitted
         self._rest = RestDetector(interval_us)
         # At least one sample behind, so that the output predictor always has one to go by.
@@ -99,19 +93,6 @@ class OnboardEstimator:
         """Camera and beam see another world from now on."""
         self._faces = faces
         self.flow_sensor.look_at(faces)
-
-    def lose(self, sensor: str, window_s: tuple[float, float]) -> None:
-        """A sensor, by its name in the airframe, gives nothing between two times since boot."""
-        self._schedules[sensor].lose(window_s)
-
-    def find(self, sensor: str, window_s: tuple[float, float]) -> None:
-        """It does, after all."""
-        self._schedules[sensor].find(window_s)
-
-    def lose_as(self, other: "OnboardEstimator") -> None:
-        """The same sensors are lost at the same times."""
-        for name, schedule in self._schedules.items():
-            schedule.lost_us = other._schedules[name].lost_us
 
     def update(
         self,

@@ -37,18 +37,8 @@ class Schedule:
         self._period_us = round(1e6 / aid.rate_hz)
         self._interval_us = interval_us
         self._share_lost = aid.share_lost
-        self.lost_us: list[tuple[float, float]] = []
+        self._lost_us = [(1e6 * start_s, 1e6 * end_s) for start_s, end_s in aid.lost_between_s]
         self._rng = rng
-        for window_s in aid.lost_between_s:
-            self.lose(window_s)
-
-    def lose(self, window_s: tuple[float, float]) -> None:
-        """Every sample between two times since boot is lost."""
-        self.lost_us.append((1e6 * window_s[0], 1e6 * window_s[1]))
-
-    def find(self, window_s: tuple[float, float]) -> None:
-        """They are not, from now on."""
-        self.lost_us.remove((1e6 * window_s[0], 1e6 * window_s[1]))
 
     def is_due(self, time_us: int) -> bool:
         """Whether the interval just ended contains a multiple of the period."""
@@ -56,7 +46,7 @@ class Schedule:
 
     def is_lost(self, time_us: int) -> bool:
         """Whether the sample of this moment is lost, by the file's plan or by chance."""
-        if any(start <= time_us < end for start, end in self.lost_us):
+        if any(start <= time_us < end for start, end in self._lost_us):
             return True
         return self._share_lost > 0 and self._rng.random() < self._share_lost
 

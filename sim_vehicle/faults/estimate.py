@@ -80,21 +80,12 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
         losses = [fault for fault in self._faults if isinstance(fault, AidingLoss)]
         acting = [fault for fault in losses if fault.window_s[0] <= time_s < fault.window_s[1]]
         for fault in acting:
-            axes = _STRAYING.get(fault.sensor, slice(0, 0))
+            # North and east: the barometer keeps the height.
             walk = fault.drift_m_s2 * np.sqrt(self._step_s) * self._rng.standard_normal(3)
-            self._drift[3:6][axes] += walk[axes]
-            self._drift[0:3][axes] += self._step_s * self._drift[3:6][axes]
+            self._drift[3:5] += walk[:2]
+            self._drift[0:2] += self._step_s * self._drift[3:5]
         over = [fault for fault in self._straying if not any(fault is still for still in acting)]
         if over:
             self._drift[:] = 0.0
             self.reset_counter += len(over)
         self._straying = acting
-
-
-# Which axes of velocity and position nobody watches any more.
-_STRAYING = {
-    "optical_flow": slice(0, 2),
-    "gps": slice(0, 2),
-    "motion_capture": slice(0, 3),
-    "range_finder": slice(2, 3),
-}

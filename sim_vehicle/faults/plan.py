@@ -3,7 +3,7 @@
 from bisect import insort
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 
@@ -114,10 +114,10 @@ class Faults:
         for act in self._acts:
             act(time_s, state, disturbance)
 
-    def is_lost(self, sensor: str, time_s: float) -> bool:
-        """Whether an aiding sensor is lost at a time."""
+    def gps_is_lost(self, time_s: float) -> bool:
+        """At that time."""
         return any(
-            isinstance(fault, AidingLoss) and fault.sensor == sensor and fault.window_s[0] <= time_s < fault.window_s[1]
+            isinstance(fault, AidingLoss) and fault.window_s[0] <= time_s < fault.window_s[1]
             for fault in self._faults.values()
         )
 
@@ -139,21 +139,3 @@ class Faults:
 def _turns_s(fault: Fault) -> tuple[float, ...]:
     """When a fault begins and, if it does, ends."""
     return fault.window_s[:1] if isinstance(fault, Moment) else fault.window_s
-
-
-def is_of_filter(fault: Fault) -> TypeGuard[AidingLoss]:
-    """Whether it takes a sensor away from the vehicle's own filter, which does without GPS."""
-    return isinstance(fault, AidingLoss) and fault.sensor != "gps"
-
-
-def with_losses(airframe: Airframe, faults: Sequence[Fault]) -> Airframe:
-    """The airframe whose own filter goes without the sensors that faults take away, while they do."""
-    losses = [fault for fault in faults if is_of_filter(fault)]
-    if not losses:
-        return airframe
-    sensors = airframe.sensors
-    for loss in losses:
-        aid = getattr(sensors, loss.sensor)
-        planned = aid.model_copy(update={"lost_between_s": (*aid.lost_between_s, loss.window_s)})
-        sensors = sensors.model_copy(update={loss.sensor: planned})
-    return airframe.model_copy(update={"sensors": sensors})

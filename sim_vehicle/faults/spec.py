@@ -203,11 +203,11 @@ class EstimatorAfterClipping(Timed):
 
 
 class AidingLoss(Timed):
-    """A sensor that aids the estimate is lost; without a filter of its own the vehicle drifts until it is back."""
+    """The GPS is lost: the estimate drifts until it is back."""
 
     kind: Literal["aiding_loss"]
-    sensor: Literal["optical_flow", "range_finder", "compass", "motion_capture", "gps"]
-    """Which one."""
+    sensor: Literal["gps"]
+    """What is lost."""
     drift_m_s2: NotNegative = 0.1
     """Velocity gone astray per root second, for an estimate of kind markov; half a degree of tilt is 0.09 m/s2."""
 

@@ -4,7 +4,6 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe, Imu
-from sim_vehicle.estimator.samples import FlowSample
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.downward import DownwardSensors
 from sim_vehicle.hil.earth import air_at
@@ -79,14 +78,11 @@ class HilVehicle:
         attitude_wxyz: Quadruple = (qw, qx, qy, qz)
         messages: list[ToPx4] = []
         faults = self._plant.faults
-        if self._is_due(GPS_PERIOD_US) and not (faults is not None and faults.is_lost("gps", now_us / 1e6)):
+        if self._is_due(GPS_PERIOD_US) and not (faults is not None and faults.gps_is_lost(now_us / 1e6)):
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
         if self._is_due(MOTION_CAPTURE_PERIOD_US):
             messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
-        for sample in self._downward.observe(now_us, self._body, self._plant.seen_faces):
-            sensor = "optical_flow" if isinstance(sample, FlowSample) else "range_finder"
-            if faults is None or not faults.is_lost(sensor, now_us / 1e6):
-                messages.append(sample)
+        messages += self._downward.observe(now_us, self._body, self._plant.seen_faces)
         if self._is_due(STATE_PERIOD_US):
             place = self._origin.place_at(position_ned_m)
             messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))

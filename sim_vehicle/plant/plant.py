@@ -9,7 +9,7 @@ import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.gains import PositionGains
-from sim_vehicle.faults.plan import Faults, is_of_filter, with_losses
+from sim_vehicle.faults.plan import Faults
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.physics.asked import AskedSetpoint
 from sim_vehicle.physics.estimate import estimate_errors
@@ -77,7 +77,6 @@ class Plant:
         keeps_path: bool = True,
         fine_steps: int = FINE_STEPS,
     ) -> None:
-        airframe = with_losses(airframe, scene.faults)
         self._rng = np.random.default_rng(seed)
         self._constants = constants_from(airframe, self._rng)
         self.disturbance = calm(scene.wind_ned_m_s)
@@ -135,7 +134,6 @@ class Plant:
         np.copyto(self._disturbance_box, other._disturbance_box)
         if self.onboard is not None and other.onboard is not None:
             self.onboard.look_at(self.seen_faces)
-            self.onboard.lose_as(other.onboard)
             self.onboard.start(self.state.body, self.state.time_us)
 
     @property
@@ -174,15 +172,11 @@ class Plant:
             self._begin_faults(())
         assert self.faults is not None
         self.faults.add(fault)
-        if self.onboard is not None and is_of_filter(fault):
-            self.onboard.lose(fault.sensor, fault.window_s)
 
     def remove_fault(self, fault: Fault) -> None:
         """The very fault that was added is over."""
         assert self.faults is not None
         self.faults.remove(fault, int(self.state.time_us))
-        if self.onboard is not None and is_of_filter(fault):
-            self.onboard.find(fault.sensor, fault.window_s)
 
     def _begin_faults(self, faults: Sequence[Fault]) -> None:
         self.faults = self._new_faults(faults)

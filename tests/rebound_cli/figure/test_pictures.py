@@ -46,11 +46,3 @@ def test_a_flight_with_a_hit_and_one_without(drawn, tmp_path, changes, parts):
     (figure,) = drawn
     assert len(figure.axes) == parts
     assert_legible(figure)
-
-
-def test_a_hit_of_a_log(drawn, wall_flight, tmp_path):
-    folder, _ = wall_flight
-    assert run_here("replay", folder, "--out", tmp_path).returncode == 0
-    hit, touchdown = drawn
-    assert len(hit.axes) == len(touchdown.axes) == 3
-    assert_legible(hit)

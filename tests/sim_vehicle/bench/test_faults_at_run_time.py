@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import FaultError
 from sim_vehicle.testing import FaultRequest, LockstepVehicle, Truth, faults
 from tests.sim_vehicle.bench.pilot import Pilot
@@ -167,20 +167,6 @@ def test_a_reset_that_is_taken_back_before_it_happens_never_does() -> None:
     pilot.vehicle.inject(faults.ekf_reset((1.0, 0.0, 0.0)), after_s=1.0, for_s=1.0).remove()
     pilot.fly(3.0)
     assert {message.reset_counter for message in pilot.of("ODOMETRY")} == {0}
-
-
-def test_a_camera_that_is_lost_is_missed_by_the_vehicles_own_filter() -> None:
-    pilot = hovering(airframe=with_filter())
-    lost = pilot.vehicle.inject(faults.sensor_dropout("optical_flow"))
-    pilot.fly(1.0)
-    assert pilot.of("OPTICAL_FLOW_RAD")[-1].quality == 0
-    lost.remove()
-    pilot.fly(1.0)
-    assert pilot.of("OPTICAL_FLOW_RAD")[-1].quality > 0
-
-
-def with_filter() -> Airframe:
-    return Airframe.model_validate(with_base({"based_on": "foldable", "estimate": {"kind": "ekf"}}))
 
 
 def acts(truth: Truth) -> bool:

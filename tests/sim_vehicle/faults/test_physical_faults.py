@@ -259,8 +259,8 @@ def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: st
     assert bool(max(errors) > 0.2) is disturbed
 
 
-def test_an_estimate_without_its_sensor_drifts_and_jumps_back() -> None:
-    cruise = hover({"kind": "aiding_loss", "sensor": "optical_flow", "between_s": [0.5, 3.0], "drift_m_s2": 0.3})
+def test_an_estimate_without_gps_drifts_and_jumps_back() -> None:
+    cruise = hover({"kind": "aiding_loss", "sensor": "gps", "between_s": [0.5, 3.0], "drift_m_s2": 0.3})
     outputs = fly(cruise, 3.0)
     off_m = np.linalg.norm(np.array(outputs[-1].position_ned_m[:2]) - cruise.plant.state.body[:2])
     assert off_m > 0.05 and outputs[-1].reset_counter == 0
