@@ -146,6 +146,14 @@ class PositionTarget(Sample):
 
 
 @dataclass(frozen=True, slots=True)
+class Asked:
+    """Where a program's setpoint leads, local NED; None where it does not say."""
+
+    place_ned_m: Vector3 | None = None
+    velocity_ned_m_s: Vector3 | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class GlobalPosition(Sample):
     """GLOBAL_POSITION_INT; altitude above mean sea level."""
 
