@@ -283,17 +283,7 @@ class RequestMessage:
     message_id: int
 
 
-@dataclass(frozen=True, slots=True)
-class Reposition:
-    """MAV_CMD_DO_REPOSITION with a change to AUTO.LOITER: hold there. Altitude above mean sea level."""
-
-    command_id: ClassVar[int] = 192
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
-
-
-VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage | Reposition
+VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage
 
 
 @dataclass(frozen=True, slots=True)
