@@ -146,6 +146,14 @@ class PositionTarget(Sample):
 
 
 @dataclass(frozen=True, slots=True)
+class Asked:
+    """Where a program's setpoint leads, local NED; None where it does not say."""
+
+    place_ned_m: Vector3 | None = None
+    velocity_ned_m_s: Vector3 | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class GlobalPosition(Sample):
     """GLOBAL_POSITION_INT; altitude above mean sea level."""
 
@@ -275,17 +283,7 @@ class RequestMessage:
     message_id: int
 
 
-@dataclass(frozen=True, slots=True)
-class Reposition:
-    """MAV_CMD_DO_REPOSITION with a change to AUTO.LOITER: hold there. Altitude above mean sea level."""
-
-    command_id: ClassVar[int] = 192
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
-
-
-VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage | Reposition
+VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage
 
 
 @dataclass(frozen=True, slots=True)

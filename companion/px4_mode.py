@@ -24,6 +24,11 @@ _AUTO_NAMES = {
 }
 
 
+def is_auto(custom_mode: int) -> bool:
+    """Whether PX4 flies it by itself."""
+    return custom_mode >> 16 & 0xFF == AUTO_LOITER >> 16 & 0xFF
+
+
 def by_hand_alone(custom_mode: int) -> bool:
     """Whether the pilot's hand has the thrust."""
     return custom_mode >> 16 & 0xFF in _BY_HAND_ALONE

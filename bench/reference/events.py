@@ -41,6 +41,7 @@ MEANINGS = {
     "item": "The next mission item begins.",
     "landing": "The vehicle was asked to land.",
     "late": "A step of the real-time loop came late.",
+    "not_back": "The guard does not give back what would hit again.",
     "left_alone": "The guard left a hit to another program.",
     "let_go": "The guard stood down: a pilot, a failsafe or another program has the vehicle.",
     "link": "The link or a stream was lost, returned, or is too slow for detection.",

@@ -11,7 +11,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.encode import Encoder
-from companion.mavlink.moves import SETPOINTS
+from companion.mavlink.moves import SETPOINTS, asked_of
 from companion.mavlink.readers import sample_from
 from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk
 from companion.report import Event
@@ -85,7 +85,7 @@ class AttachedGuard:
         """Whether a message on its way to the vehicle may go on: all but others' setpoints while the guard holds."""
         if name not in SETPOINTS or self._gate.is_own(fields):
             return True
-        self.core.flight.others_setpoint_us = now_us
+        self.core.flight.hear_setpoint(asked_of(name, fields), now_us)
         if not self.core.machine.holds:
             return True
         self.kept_out += 1

@@ -30,8 +30,8 @@ class GuardConfig(StrictModel):
     then: Literal["previous", "hold"] = "hold"
     """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
-    """Of one flight; after this one the vehicle is given back to hold, whatever `then` says. With `then: previous` a
-    mission flies into the same wall again. Three hits in one flight are no accident."""
+    """Of one flight; after this one the vehicle is given back to hold, whatever `then` says. Three hits in one
+    flight are no accident."""
     between: tuple[str, ...] = ()
     """Where programs reach the vehicle through the guard, e.g. udpin://0.0.0.0:14540. While the guard recovers it, what
     would move it is kept out (see moves.KEPT_OUT)."""

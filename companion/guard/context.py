@@ -8,7 +8,10 @@ from companion.flight.context import FlightContext, Inputs, Target
 from companion.guard.config import GuardConfig
 from companion.guard.descent import Descent
 from companion.guard.states import Trigger
-from companion.messages import Sticks, Vector3
+from companion.messages import Asked, Sticks, Vector3
+
+# PX4 takes setpoints for lost when there is none for so long (COM_OF_LOSS_T).
+LONGEST_BETWEEN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +38,22 @@ class GuardContext(FlightContext):
     hits: int = 0  # since it was armed
     left_alone: int = 0  # hits told, and left to the program that flies
     others_setpoint_us: int | None = None  # when one was last seen on its way
+    asked: Asked | None = None  # where it leads
     sticks: Sticks | None = None
     descent: Descent = field(default_factory=Descent)
     # When, and to where; PX4 echoes no attitude.
     sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
+
+    def hear_setpoint(self, asked: Asked, now_us: int) -> None:
+        """A program's is on its way. A place without a velocity moves as it has moved since the one before."""
+        before, before_us = self.asked, self.others_setpoint_us
+        self.asked, self.others_setpoint_us = asked, now_us
+        if before is None or before.place_ned_m is None or asked.place_ned_m is None or before_us is None:
+            return
+        since_s = (now_us - before_us) * 1e-6
+        if asked.velocity_ned_m_s is None and 0.0 < since_s < LONGEST_BETWEEN_S:
+            north, east, down = ((p - b) / since_s for p, b in zip(asked.place_ned_m, before.place_ned_m, strict=True))
+            self.asked = Asked(asked.place_ned_m, (north, east, down))
 
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""

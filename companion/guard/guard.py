@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from companion.companion import Stepped
 from companion.guard.between import Between
@@ -11,7 +11,7 @@ from companion.guard.core import GuardCore
 from companion.guard.states import State
 from companion.guard.watching import OWN_STREAMS
 from companion.mavlink.readers import GUARD_READERS
-from companion.messages import SendCommand, SetMessageInterval
+from companion.messages import Asked, SendCommand, SetMessageInterval
 from companion.report import CollisionReport, RoundTripReport
 
 
@@ -32,21 +32,21 @@ class Guard(Stepped[GuardCore]):
         """Whether the vehicle flies by the guard's setpoints."""
         return self._core is not None and self._core.machine.holds
 
-    def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, int]]]:
+    def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
         between.is_closed = self.holds
-        if between.has_setpoint(now_us):
-            self.hear_setpoint()
-            yield "setpoint", {}
+        if (setpoint := between.new_setpoint(now_us)) is not None:
+            self.hear_setpoint(setpoint)
+            yield "setpoint", asdict(setpoint)
         for asked in between.intervals:
             self.hear_interval(asked)
             yield "interval", asdict(asked)
         between.intervals.clear()
 
-    def hear_setpoint(self) -> None:
-        """A client's setpoint has passed since the last step."""
+    def hear_setpoint(self, asked: Asked) -> None:
+        """A client's has been on its way since the last step."""
         if self._core is not None:
-            self._core.flight.others_setpoint_us = self._core.now_us
+            self._core.flight.hear_setpoint(asked, self._core.now_us)
 
     def hear_interval(self, asked: SetMessageInterval) -> None:
         """A client has asked the vehicle for a stream. What the guard needs more often it asks for again."""

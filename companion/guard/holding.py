@@ -3,9 +3,12 @@
 import math
 
 from companion.flight.context import Inputs, Target
+from companion.flight.ending import silent_position
 from companion.flight.recovering import Recover
 from companion.guard.context import GuardContext, GuardTransition
+from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
+from companion.guard.watching import OTHERS_STOPPED_US
 from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand, SetMode
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, mode_name
 
@@ -106,6 +109,9 @@ class GiveBack:
     The first is asked for straight after a report of the present one: a person's own request that shows there is not
     overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
 
+    What flew before has it back where it does not lead into what was hit (see onward.leads_into). For a program's next
+    setpoint the guard waits, holding; in any other case the vehicle is given back to hold.
+
     A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on another link
     nothing is streamed. When no mode is taken the setpoints stop, and PX4's action for lost setpoints follows.
     """
@@ -118,10 +124,28 @@ class GiveBack:
         self._wishes += [AUTO_LOITER, AUTO_LAND]
         self._target = guard.target.at_rest() if guard.target and not is_crossed else None
         self._began_us = now_us
-        self._is_asked = False
+        self._is_asked = self._is_told = False
+        self._is_doubted = self.wish == previous  # whether it would hit again
 
     def target(self, now_us: int) -> Target | None:
         return self._target
+
+    def _waits(self, guard: GuardContext, inputs: Inputs, now_us: int) -> bool:
+        """Whether a program's next setpoints are waited for. A mode that would hit again is given up."""
+        reason = leads_into(guard, self.wish) if self._is_doubted else None
+        if reason is None:
+            self._is_doubted = False
+            return False
+        if not self._is_told:
+            self._is_told = True
+            guard.report(now_us, "not_back", f"not given back: {reason}")
+        heard_us = guard.others_setpoint_us
+        streams = heard_us is not None and now_us - heard_us < OTHERS_STOPPED_US
+        if self.wish == OFFBOARD and streams and inputs.stop_reason is None and silent_position(guard) is None:
+            return True
+        self._wishes.pop(0)
+        self._began_us, self._is_doubted = now_us, False
+        return False
 
     @property
     def wish(self) -> int:
@@ -132,6 +156,8 @@ class GiveBack:
             guard.command_client.begin(SetMode(self.wish))
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+        if self._waits(guard, inputs, now_us):
+            return None
         if not self._is_asked:
             if not guard.is_time_to_give_away(self._began_us, now_us):
                 return None

@@ -12,9 +12,10 @@ from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
 from companion.guard.descent import THROTTLE
 from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
+from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import GuardConnect, StandBy, Watching
-from companion.messages import Sticks
+from companion.messages import Asked, Sticks
 from companion.motion.rotation import yaw_rad
 from companion.px4_mode import OFFBOARD, mode_name
 from companion.reflex.detector import ImpactKind
@@ -25,6 +26,7 @@ _KINDS = {
     Trigger.NOT_CONFIRMED: "refused",
     Trigger.POSITION_SILENT: "link",
     Trigger.CROSSED: "crossed",
+    Trigger.LEADS_BACK: "take_over",
     Trigger.WORTH_GUARDING: "watching",
     Trigger.NOT_TO_GUARD: "watching",
     Trigger.ENABLED: "enabled",
@@ -53,6 +55,7 @@ class GuardMachine(StateMachine):
     handler: GuardStateHandler
     state: State = State.CONNECTING
     outcome: str = ""  # why it ended
+    judged: Asked | None = None  # the program's setpoint that was last looked at
 
     @property
     def holds(self) -> bool:
@@ -78,7 +81,7 @@ class GuardMachine(StateMachine):
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
                 self._take(GuardTransition(Trigger.HIT), now_us)
-        transition = self.handler.step(self.flight, inputs, now_us)
+        transition = self._led_back() or self.handler.step(self.flight, inputs, now_us)
         while transition is not None and TABLE.moves(self.state, transition.trigger):
             self._take(transition, now_us)
             # The answers and positions of this step belong to the state that asked for them.
@@ -101,11 +104,26 @@ class GuardMachine(StateMachine):
         flies = is_watching and guard.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out
         return flies or (guard.program_elsewhere and (is_watching or self.state is State.GIVING_BACK))
 
+    def _led_back(self) -> GuardTransition | None:
+        """A program that was given back to, and would hit the same again."""
+        guard, asked = self.flight, self.flight.asked
+        was_given = guard.config.then == "previous" and guard.hits and guard.vehicle.custom_mode == OFFBOARD
+        if self.state is not State.WATCHING or not was_given or asked is None or asked is self.judged:
+            return None
+        self.judged = asked
+        if not lead_into(guard, asked):
+            return None
+        self._remember_mode()
+        guard.target = stop(guard)
+        return GuardTransition(Trigger.LEADS_BACK, "taking over: the program's setpoints lead into what was hit")
+
     def _remember_hit(self, now_us: int) -> None:
+        self.flight.hits += 1
+        if self.state is State.WATCHING:
+            self._remember_mode()
+
+    def _remember_mode(self) -> None:
         guard = self.flight
-        guard.hits += 1
-        if self.state is not State.WATCHING:
-            return
         guard.previous_mode = guard.expected_mode = guard.vehicle.custom_mode
         guard.then_hold, guard.target = "", None
         attitude = guard.vehicle.attitude

@@ -26,6 +26,7 @@ class Trigger(Enum):
     REFUSED = "no vehicle that can be guarded"
     STOPPED = "asked to stop"
     HIT = "hit detected"
+    LEADS_BACK = "a program's setpoints lead into what was hit"
     CONNECTED = "identified, streams fast enough"
     WORTH_GUARDING = "armed, off the ground, in a mode that may be taken over"
     NOT_TO_GUARD = "landing, or in a mode that may not be taken over"
@@ -58,6 +59,7 @@ TABLE = StateTable[State, Trigger](
             Trigger.DISARMED: State.STANDING_BY,
             Trigger.STOPPED: State.ENDED,
             Trigger.HIT: State.TAKING_OVER,
+            Trigger.LEADS_BACK: State.GIVING_BACK,
             Trigger.NOT_TO_GUARD: State.STANDING_BY,
         },
         State.TAKING_OVER: {

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from companion import messages
 from companion.messages import CommandResult
-from companion.px4_mode import AUTO_LOITER, mode_name
+from companion.px4_mode import mode_name
 
 # PX4 answers in 2 to 10 ms on UDP; a telemetry radio's round trip stays below half a second.
 ACK_TIMEOUT_US = 500_000
@@ -51,8 +51,6 @@ def describe(command: messages.VehicleCommand) -> str:
             return f"message {message_id} every {interval_us / 1000:g} ms"
         case messages.RequestMessage(message_id):
             return f"message {message_id}"
-        case messages.Reposition():
-            return "reposition"
 
 
 def needs_confirmation(command: messages.VehicleCommand) -> bool:
@@ -84,9 +82,7 @@ class CommandClient:
     def requested_mode(self) -> int | None:
         """The requested mode that is not confirmed yet."""
         command = None if self._pending is None else self._pending.command
-        if isinstance(command, messages.SetMode):
-            return command.custom_mode
-        return AUTO_LOITER if isinstance(command, messages.Reposition) else None
+        return command.custom_mode if isinstance(command, messages.SetMode) else None
 
     @property
     def is_unsaid(self) -> bool:

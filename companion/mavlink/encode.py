@@ -16,7 +16,6 @@ from companion.messages import (
     ComputerStatus,
     Outgoing,
     PositionSetpoint,
-    Reposition,
     SendCommand,
     StatusText,
 )
@@ -127,8 +126,6 @@ class Encoder:
                 return _PLACE(*self._position_fields(outgoing))
             case AttitudeSetpoint():
                 return _ATTITUDE(*self._attitude_fields(outgoing))
-            case SendCommand(Reposition() as command, _):
-                return self._reposition(command)
             case SendCommand(command, confirmation):
                 return dialect.MAVLink_command_long_message(
                     *self._target, command.command_id, confirmation, *_parameters(command)
@@ -152,14 +149,6 @@ class Encoder:
                 return dialect.MAVLink_param_request_read_message(*self._target, name.encode(), -1)
             case messages.SetParameter(name, value):
                 return dialect.MAVLink_param_set_message(*self._target, name.encode(), *_as_float(value))
-
-    def _reposition(self, command: Reposition) -> Any:
-        """COMMAND_INT: single precision would be off by metres. No speed, radius or heading of its own."""
-        place = (round(command.latitude_deg * 1e7), round(command.longitude_deg * 1e7), command.altitude_m)
-        asked = (-1.0, dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0.0, NAN)
-        return dialect.MAVLink_command_int_message(
-            *self._target, dialect.MAV_FRAME_GLOBAL, command.command_id, 0, 0, *asked, *place
-        )
 
     def _position_fields(self, setpoint: PositionSetpoint) -> tuple[Any, ...]:
         """The fields as pymavlink orders them."""
@@ -250,6 +239,4 @@ def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
             used = (message_id, interval_us)
         case messages.RequestMessage(message_id):
             used = (message_id,)
-        case Reposition():
-            raise AssertionError("not a COMMAND_LONG")
     return used + (0.0,) * (7 - len(used))

@@ -6,12 +6,12 @@ Everything else passes, a person's words above all: sticks, every mode but OFFBO
 import math
 import struct
 from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.mavlink.packet import opened
-from companion.messages import SetMessageInterval
+from companion.messages import Asked, SetMessageInterval, Vector3
 from companion.px4_mode import OFFBOARD
 
 Source: TypeAlias = tuple[int, int]
@@ -24,6 +24,8 @@ _NO_PLACE_INT = 0x7FFF_FFFF
 _COMMAND_SIZE = 33
 # SET_MODE: the custom mode, whose third byte is PX4's main mode.
 _MODE = struct.Struct("<2xB")
+# POSITION_TARGET_TYPEMASK: any of the three that is to be ignored.
+_NO_PLACE, _NO_VELOCITY = 0x007, 0x038
 _MAIN_OFFBOARD = OFFBOARD >> 16 & 0xFF
 # Companion computers, planners and cameras that fly (MAV_COMP_ID_ONBOARD_COMPUTER to VISUAL_INERTIAL_ODOMETRY). A hand
 # has its sticks on a ground station, which has any other number.
@@ -82,6 +84,32 @@ KEPT_OUT: Mapping[int, tuple[Test, str]] = {
 SETPOINT_IDS = frozenset(number for number, (_, reason) in KEPT_OUT.items() if reason is _SETPOINT)
 # The same by name, for MAVSDK.
 SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
+
+
+def asked_by(packet: bytes) -> Asked | None:
+    """Where a setpoint leads; None of what is no setpoint."""
+    message_id, _, payload = opened(packet)
+    if message_id not in SETPOINT_IDS:
+        return None
+    message = dialect.mavlink_map[message_id]
+    values = message.unpacker.unpack(payload.ljust(message.unpacker.size, b"\0")[: message.unpacker.size])
+    return asked_of(message.msgname, dict(zip(message.ordered_fieldnames, values, strict=False)))
+
+
+def asked_of(name: str, fields: Mapping[str, Any]) -> Asked:
+    """The same of names and fields."""
+    if name != "SET_POSITION_TARGET_LOCAL_NED" or fields.get("coordinate_frame") != dialect.MAV_FRAME_LOCAL_NED:
+        return Asked()
+    mask = fields.get("type_mask", _NO_PLACE | _NO_VELOCITY)
+    place, velocity = (_vector([fields.get(name) for name in names]) for names in (("x", "y", "z"), ("vx", "vy", "vz")))
+    return Asked(None if mask & _NO_PLACE else place, None if mask & _NO_VELOCITY else velocity)
+
+
+def _vector(values: list[float | None]) -> Vector3 | None:
+    north, east, down = values
+    if north is None or east is None or down is None or not all(map(math.isfinite, (north, east, down))):
+        return None
+    return (north, east, down)
 
 
 def would_move(packet: bytes) -> bool:

@@ -17,7 +17,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
-from companion.messages import ComputerStatus, SetMessageInterval
+from companion.messages import Asked, ComputerStatus, SetMessageInterval, Vector3
 from companion.mission.model import Mission
 from companion.reflex.detector import Situation
 from companion.reflex.monitor import CollisionMonitor
@@ -206,6 +206,13 @@ def reproduce(recording: Recording, listener: Listener | None = None) -> Reprodu
     )
 
 
+def _vector(values: Sequence[float] | None) -> Vector3 | None:
+    if values is None:
+        return None
+    north, east, down = values
+    return (north, east, down)
+
+
 def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
     match record, stepped:
         case {"kind": "confirm"}, Companion():
@@ -217,7 +224,7 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
         case {"kind": "note", "event": event, "text": text}, _:
             stepped.note(str(event), str(text))
         case {"kind": "setpoint"}, Guard():
-            stepped.hear_setpoint()
+            stepped.hear_setpoint(Asked(_vector(record["place_ned_m"]), _vector(record["velocity_ned_m_s"])))
         case {"kind": "interval", "message_id": int(message_id), "interval_us": int(interval_us)}, Guard():
             stepped.hear_interval(SetMessageInterval(message_id, interval_us))
         case {"kind": "computer"}, _:

@@ -94,17 +94,19 @@ def plan(
     is_new = not stored.exists()
     settings = asked if is_new else settings
     planned = _in_etc(system, _SETTINGS_NAME, asked.text() if is_new or asked != settings else None)
+    has_clients = False
     for kind in sorted({asked.run, settings.run}):
         text = None
         if kind == asked.run and source is not None:
             text = read_text(source)
             _check_run(kind, text, str(source))
         planned += _in_etc(system, f"{kind}.yaml", text)
-        _check_run(kind, planned[-1].text, f"/{planned[-1].path}")
+        is_between = _check_run(kind, planned[-1].text, f"/{planned[-1].path}")
+        has_clients = is_between if kind == settings.run else has_clients
     planned.append(PlannedFile(SYSUSERS, files.sysusers_text()))
     if settings.device is not None:
         planned.append(PlannedFile(UDEV, files.udev_text(settings.device)))
-    unit = files.unit_text(settings, sys.executable, system.release(), serial_group())
+    unit = files.unit_text(settings, sys.executable, system.release(), serial_group(), has_clients)
     return settings, [*planned, PlannedFile(UNIT, unit)]
 
 
@@ -120,18 +122,21 @@ def _in_etc(system: System, name: str, asked: str | None) -> list[PlannedFile]:
     return [PlannedFile(path, asked or _GUARD_TEXT)]
 
 
-def _check_run(kind: str, text: str, name: str) -> None:
-    """The guard's settings or the mission, as the service will read them. Raises DocumentError."""
+def _check_run(kind: str, text: str, name: str) -> bool:
+    """The guard's settings or the mission, as the service will read them; whether others reach the vehicle through it.
+
+    Raises DocumentError.
+    """
     document = parse_document(text, name)
     if kind == "guard":
-        validated(GuardConfig, document, document.data)
-        return
+        return bool(validated(GuardConfig, document, document.data).between)
     obstacles = document.data.get("obstacles")
     file = obstacles.get("file") if isinstance(obstacles, dict) else None
     if isinstance(file, str) and not Path(file).is_absolute():
         place = document.place_of(("obstacles", "file"))
         raise DocumentError(f"{place}: obstacles.file: the mission is copied to /{FOLDER}; give the file's whole path.")
     mission_from(document)
+    return False
 
 
 def _uninstall(system: System, is_dry_run: bool) -> int:

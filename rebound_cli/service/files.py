@@ -32,6 +32,7 @@ _BACK_OFF_SINCE = 254
 # Linux's numbers of USB serial ports (devices.txt). A port that is plugged in again may have another name.
 _USB_MAJORS = {"ttyACM": 166, "ttyUSB": 188}
 _BY_ID = "/dev/serial/by-id/"
+_NO_NETWORK = "PrivateNetwork=yes\nIPAddressDeny=any\nRestrictAddressFamilies=AF_UNIX"
 _UNIT = Path(__file__).with_name(UNIT_NAME).read_text(encoding="utf-8")
 _WRITTEN_BY = _UNIT.partition("\n")[0]
 
@@ -101,8 +102,12 @@ def udev_text(device: str) -> str:
 """
 
 
-def unit_text(settings: ServiceSettings, python: str, systemd: int | None, serial_group: str) -> str:
-    """`systemd`: its release, None where nobody knows. `serial_group` may open serial ports."""
+def unit_text(
+    settings: ServiceSettings, python: str, systemd: int | None, serial_group: str, has_clients: bool = False
+) -> str:
+    """`systemd`: its release, None where nobody knows. `serial_group` may open serial ports. `has_clients`: they come
+    over a network.
+    """
     is_guard = settings.run == "guard"
     unit = _UNIT.format(
         what="guard of a vehicle" if is_guard else "a mission",
@@ -110,7 +115,7 @@ def unit_text(settings: ServiceSettings, python: str, systemd: int | None, seria
         restarting=_restarting(is_guard, systemd),
         user=USER,
         state=STATE_FOLDER,
-        link=_link(settings.device, serial_group),
+        link=_link(settings.device, serial_group, has_clients),
         install="\n[Install]\nWantedBy=multi-user.target" if is_guard else "",
     )
     return unit.rstrip() + "\n"
@@ -128,10 +133,11 @@ RestartSec=1
 RestartPreventExitStatus={" ".join(map(str, exit_codes.PERMANENT))}"""
 
 
-def _link(device: str | None, serial_group: str) -> str:
-    """The one way out to the vehicle: a device without a network, or a network without a device."""
+def _link(device: str | None, serial_group: str, has_clients: bool) -> str:
+    """The way out to the vehicle, a device or a network; the other one is open to nobody but the guard's clients."""
+    network = "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6"
     if device is None:
-        return "PrivateDevices=yes\nRestrictAddressFamilies=AF_UNIX AF_INET AF_INET6"
+        return f"PrivateDevices=yes\n{network}"
     name = Path(device).name
     if device.startswith(_BY_ID):
         # udev ends the names of converters, which are ttyUSB, with the number of their port (60-serial.rules).
@@ -143,9 +149,7 @@ def _link(device: str | None, serial_group: str) -> str:
 {present}DevicePolicy=closed
 DeviceAllow={device if major is None else f"char-{major}"} rw
 SupplementaryGroups={serial_group}
-PrivateNetwork=yes
-IPAddressDeny=any
-RestrictAddressFamilies=AF_UNIX"""
+{network if has_clients else _NO_NETWORK}"""
 
 
 def _word(text: str) -> str:

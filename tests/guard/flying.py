@@ -94,6 +94,10 @@ class Commanded(VirtualTime):
         self._repeated.append(act)
         return lambda: self._repeated.remove(act)
 
+    def stop_all(self) -> None:
+        """Whatever is repeated."""
+        self._repeated.clear()
+
     def step(self) -> None:
         for action in tuple(self._repeated):
             action()

@@ -75,15 +75,26 @@ def test_the_programs_own_heartbeats_and_time_questions_have_none_of_the_guards_
     assert "COMMAND_LONG" in sent and not sent & {"HEARTBEAT", "TIMESYNC"}
 
 
-def test_given_back_to_the_program_its_setpoints_count_again_until_the_hits_allowed_are_used_up():
-    air = holding(GuardConfig(then="previous", max_hits=2))
-    air.run_to(State.WATCHING, 10.0)
-    assert air.mode == OFFBOARD
-    given_back_s = air.time_s
-    air.run_until(lambda: air.guard.core.machine.holds, 10.0)
-    assert len(air.setpoints("program", given_back_s, air.time_s)) > 5
-    air.run_to(State.WATCHING, 10.0)
-    assert air.mode == AUTO_LOITER
+def test_a_program_is_given_back_to_when_its_setpoints_no_longer_lead_into_what_was_hit():
+    # Given a program that flies on into the wall
+    air = AttachedFlight(GuardConfig(then="previous"))
+    air.take_off()
+    ends = air.fly_by(1.5)
+    air.run_until(lambda: air.guard.core.machine.holds, 20.0)
+    air.run_to(State.GIVING_BACK, 10.0)
+    held_s = air.time_s
+    air.run_for(2.0)
+    assert air.state is State.GIVING_BACK and air.setpoints("program", held_s) == []
+    assert len(air.told("not_back")) == 1 and "lead into what was hit" in air.told("not_back")[0]
+    # When it turns back
+    ends()
+    air.every(REPEATED_EVERY_S, lambda: air.velocity(-0.5))
+    assert air.run_to(State.WATCHING, 1.0) < 0.1
+    back_s = air.time_s
+    air.run_for(1.0)
+    # Then its setpoints count again
+    assert air.mode == OFFBOARD and len(air.setpoints("program", back_s)) > 15
+    assert air.kinds().count("detection") == 1
 
 
 def test_a_program_that_commands_a_mode_while_the_guard_holds_has_its_way():

@@ -95,6 +95,59 @@ def test_whoever_flies_into_the_wall_is_recovered_and_nothing_of_his_moves_the_v
     assert any(text.startswith("Taking over") for text in told) and told[-1].startswith("Given back to AUTO.LOITER")
 
 
+@pytest.mark.parametrize("flies", [by_places, by_attitudes])
+def test_a_program_is_never_given_the_vehicle_back_to_fly_into_the_same_wall_again(flies):
+    air = hit(flies, then="previous")
+    air.run_to(State.GIVING_BACK, 10.0)
+    air.run_for(5.0)
+    # It holds, in front of the wall, and has said why
+    assert air.state is State.GIVING_BACK and len(air.vehicle.truth.hits) == 1
+    assert air.guard.status().position_ned_m[0] < FACE_NORTH_M - 0.3
+    assert len(air.told("not_back")) == 1
+    # A person chooses; so does whoever stops the guard
+    air.guard.stop("stopped")
+    air.run_until(lambda: air.mode == "AUTO.LOITER", 2.0)
+
+
+def test_a_program_that_turns_back_and_then_into_the_same_wall_again_is_stopped_before_it():
+    # Given a program that has turned back after a hit, and has the vehicle again
+    air = hit(by_places, then="previous")
+    air.stop_all()
+    north = [2.0]
+    away = [0.0] * 8
+
+    def place() -> None:
+        boot_ms = round(1e3 * air.time_s)
+        frame = dialect.MAV_FRAME_LOCAL_NED
+        air.send(
+            dialect.MAVLink_set_position_target_local_ned_message(
+                boot_ms, 1, 1, frame, PLACE_ONLY, north[0], 0, -2.5, *away
+            )
+        )
+
+    air.every(0.052, place)
+    air.run_to(State.WATCHING, 10.0)
+    air.run_for(3.0)
+    assert air.mode == "OFFBOARD" and air.guard.status().position_ned_m[0] < 2.3
+    # When it goes into the same wall, whose end nobody knows
+    north[0] = 5.0
+    air.run_to(State.GIVING_BACK, 0.3)
+    air.run_for(5.0)
+    # Then the vehicle stands before it, and has it back when it turns again
+    assert len(air.vehicle.truth.hits) == 1 and air.guard.status().position_ned_m[0] < FACE_NORTH_M - 0.3
+    north[0] = 1.0
+    air.run_to(State.WATCHING, 0.5)
+    air.run_for(3.0)
+    assert air.guard.status().position_ned_m[0] < 1.3 and air.mode == "OFFBOARD"
+
+
+def test_a_program_whose_setpoints_end_meanwhile_is_not_waited_for():
+    air = hit(by_places, then="previous")
+    air.run_to(State.GIVING_BACK, 10.0)
+    air.stop_all()
+    assert air.run_until(lambda: air.mode == "AUTO.LOITER", 3.0) > 0.5
+
+
 def test_in_a_recovery_a_stick_is_obeyed_at_once():
     air = hit(by_places)
     pilot = sticks(air, 0.0)

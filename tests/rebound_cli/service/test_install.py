@@ -233,6 +233,15 @@ def test_one_device_is_open_to_it_under_whatever_name_it_comes_back(device, rule
     assert 'DRIVERS=="ftdi_sio", ATTR{device/latency_timer}="1"' in rules[1]
 
 
+def test_a_guard_in_between_has_its_device_and_the_network_that_its_clients_come_by(system, tmp_path):
+    config = tmp_path / "between.yaml"
+    config.write_text("between: ['udpin://0.0.0.0:14540']\n")
+    assert service(system, "install", guard=config, connect=f"serial://{UART}:921600") == 0
+    text = (system.root / UNIT).read_text()
+    assert values(text, "DeviceAllow") == [f"{UART} rw"] and values(text, "PrivateNetwork") == []
+    assert values(text, "RestrictAddressFamilies") == ["AF_UNIX AF_INET AF_INET6"]
+
+
 def test_a_link_over_a_network_has_no_device():
     text = unit(connect=UDP)
     assert values(text, "PrivateDevices") == ["yes"] and values(text, "DeviceAllow") == []

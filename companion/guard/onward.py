@@ -1,0 +1,65 @@
+"""Whether what flew before the hit would fly on into what was touched."""
+
+import math
+
+from companion.flight.context import Target
+from companion.flight.obstacle_map import all_known
+from companion.guard.context import GuardContext
+from companion.guard.watching import OTHERS_STOPPED_US
+from companion.memory.patch import LEAST_SPEED_M_S
+from companion.memory.surroundings import ObstacleMap
+from companion.messages import Asked
+from companion.px4_mode import AUTO_LOITER, OFFBOARD, is_auto, mode_name
+
+# PX4 brakes a mode's flight by this (MPC_ACC_HOR, its least; see docs/how-to/guard.md).
+BRAKES_M_S2 = 2.0
+# A velocity that is asked for leads somewhere: as far as in the time in which PX4 takes its setpoint for lost.
+GOES_ON_S = OTHERS_STOPPED_US * 1e-6
+
+
+def leads_into(guard: GuardContext, mode: int) -> str | None:
+    """Why the mode would hit again; None where it would not, or a pilot flies it, at rest as the vehicle is."""
+    if mode == OFFBOARD:
+        return _setpoints_lead_into(guard)
+    if not is_auto(mode) or mode == AUTO_LOITER or not guard.collisions:
+        return None
+    contact = guard.collisions[-1].contact
+    into_m_s = -sum(v * n for v, n in zip(contact.velocity_ned_m_s, contact.normal_ned, strict=True))
+    if into_m_s < LEAST_SPEED_M_S:
+        return None
+    return f"{mode_name(mode)} goes on into what was hit: change it and choose it again, or choose another mode"
+
+
+def _setpoints_lead_into(guard: GuardContext) -> str | None:
+    does_lead = lead_into(guard, guard.asked or Asked())
+    if does_lead is None:
+        return "nobody knows where the program's setpoints lead: choose a mode"
+    return "the program's setpoints lead into what was hit: send others, or choose a mode" if does_lead else None
+
+
+def lead_into(guard: GuardContext, asked: Asked) -> bool | None:
+    """Whether setpoints do; None where they do not say where they lead."""
+    latest = guard.vehicle.history.latest()
+    if latest is None or (asked.place_ned_m is None and asked.velocity_ned_m_s is None):
+        return None
+    velocity = asked.velocity_ned_m_s or (0.0, 0.0, 0.0)
+    ahead_s = math.hypot(*velocity) / (2.0 * BRAKES_M_S2) + GOES_ON_S
+    here = guard.mission_ned_m(latest.position_ned_m)
+    place = here if asked.place_ned_m is None else guard.mission_ned_m(asked.place_ned_m)
+    north, east, down = (p + v * ahead_s for p, v in zip(place, velocity, strict=True))
+    mission = guard.mission
+    known = ObstacleMap(all_known(guard), mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+    goal = (north, east, down)
+    # A surface may be longer than it is known to be: who is in front of it stays there.
+    leads_behind = any(patch.off_m(here) > 0.0 and patch.off_m(goal) < known.clearance_m for patch in known.patches)
+    return leads_behind or known.block([here, goal])
+
+
+def stop(guard: GuardContext) -> Target | None:
+    """Where the vehicle comes to rest when it brakes now."""
+    latest = guard.vehicle.history.latest()
+    if latest is None:
+        return None
+    brakes_s = math.hypot(*latest.velocity_ned_m_s) / (2.0 * BRAKES_M_S2)
+    north, east, down = (p + v * brakes_s for p, v in zip(latest.position_ned_m, latest.velocity_ned_m_s, strict=True))
+    return Target((north, east, down), guard.yaw_rad)
