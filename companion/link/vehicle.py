@@ -94,7 +94,7 @@ class Vehicle:
     @property
     def is_position_old(self) -> bool:
         """Whether no position came lately, while other messages do; a vehicle whose estimator fails sends none."""
-        return self.last_position_us is None or self.last_received_us - self.last_position_us >= OLD_NEWS_US
+        return self.last_position_us is not None and self.last_received_us - self.last_position_us >= OLD_NEWS_US
 
     @property
     def is_mode_known(self) -> bool:

@@ -133,6 +133,10 @@ class _Binary(DFReader_binary):  # type: ignore[misc]  # pymavlink has no types
     def init_clock(self) -> None:
         """Stamps are taken as they stand: no search through the whole log for the time of day."""
 
+    def init_arrays_fast(self, progress_callback: None = None) -> None:
+        """The compiled index is no faster, and prints what it complains of where nothing can catch it."""
+        self.init_arrays(progress_callback)
+
 
 class _Text(DFReader_text):  # type: ignore[misc]
     def init_clock(self) -> None:

@@ -123,3 +123,13 @@ def test_a_message_of_no_length_is_no_endless_loop(tmp_path, length):
     (tmp_path / "log.bin").write_bytes(spoilt)
     with pytest.raises(LogError, match="has no length"):
         read_log(tmp_path / "log.bin")
+
+
+def test_a_hole_in_a_log_prints_nothing(tmp_path, capfd):
+    # Given a log that lacks some bytes in the middle of its messages
+    content = dataflash_file.dataflash(*DATAFLASH)
+    middle = len(content) // 2
+    (tmp_path / "log.bin").write_bytes(content[:middle] + content[middle + 33 :])
+    # When it is read, then nothing comes out on the way, not even from compiled code
+    read_log(tmp_path / "log.bin")
+    assert capfd.readouterr() == ("", "")

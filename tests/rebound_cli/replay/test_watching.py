@@ -126,6 +126,23 @@ def test_a_touchdown_begins_the_next_take_off():
     assert circumstances.situation.off_reason is None
 
 
+def test_without_a_position_of_late_nothing_is_watched():
+    # Given a vehicle in the air whose estimator fails, so that it sends no positions, but all else
+    circumstances = Circumstances(CompanionConfig())
+    flies = beat(True, 7 << 16)
+    for sample in (beat(False), position(0, 0.0), flies, ExtendedState(LandedState.IN_AIR), position(1, 3.0)):
+        circumstances.hear((sample,), 0)
+    circumstances.hear((flies,), 999_999)
+    assert circumstances.situation.off_reason is None
+    # When its last position is a second old
+    circumstances.hear((flies,), 1_000_000)
+    # Then neither its height counts any more nor a hit, from which no way would lead
+    assert circumstances.situation.off_reason == "no position"
+    assert circumstances.situation.height_m is None and not circumstances.situation.has_climbed
+    circumstances.hear((position(2, 3.0),), 1_100_000)
+    assert circumstances.situation.off_reason is None
+
+
 @pytest.mark.parametrize(
     ("modes", "failsafe", "reason"),
     [
