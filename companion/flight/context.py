@@ -26,8 +26,7 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
-from companion.reflex import config as reflex
-from companion.reflex.attitude_law import Lean, attitude_and_thrust
+from companion.reflex.attitude_law import Lean, attitude_and_thrust, turn_kept
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.sustained_force import SustainedForceMonitor
 from companion.reflex.thrust import ThrustGain
@@ -54,10 +53,8 @@ class Target:
     def setpoint(self, time_us: int) -> PositionSetpoint | AttitudeSetpoint:
         """As it is sent."""
         if self.lean is not None and self.acceleration_ned_m_s2 is not None:
-            yaw_rate_rad_s = reflex.TURN_KEPT * self.lean.belief.yaw_rate_rad_s
-            return AttitudeSetpoint(
-                time_us, *attitude_and_thrust(self.acceleration_ned_m_s2, self.lean), yaw_rate_rad_s
-            )
+            attitude_wxyz, thrust = attitude_and_thrust(self.acceleration_ned_m_s2, self.lean)
+            return AttitudeSetpoint(time_us, attitude_wxyz, thrust, turn_kept(self.lean.belief.yaw_rate_rad_s))
         velocity, acceleration = self.velocity_ned_m_s, self.acceleration_ned_m_s2
         return PositionSetpoint(time_us, self.position_ned_m, self.yaw_rad, velocity, acceleration)
 

@@ -71,10 +71,8 @@ class Recover:
         if attitude is None:
             return wanted_rad
         heading_rad = yaw_rad(attitude.attitude_wxyz)
-        if self._leans:
-            return heading_rad
         if wanted_rad is None:
-            return None
+            return heading_rad if self._leans else None
         short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
         is_near = abs(short_rad) <= reflex.YAW_LEAD_RAD
         return wanted_rad if is_near else heading_rad + math.copysign(reflex.YAW_LEAD_RAD, short_rad)

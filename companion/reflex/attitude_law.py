@@ -109,6 +109,11 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     return tilted(asked, lean.yaw_rad), thrust
 
 
+def turn_kept(yaw_rate_rad_s: float) -> float:
+    """The turn that is asked for, so that no more than BRAKED_RAD_S of the present one is left to brake."""
+    return yaw_rate_rad_s - min(max(yaw_rate_rad_s, -reflex.BRAKED_RAD_S), reflex.BRAKED_RAD_S)
+
+
 def tilted(force_ned: Vector3, yaw_rad: float) -> Quaternion:
     """The shortest tilt from level that has the thrust along a force, with that heading."""
     size = math.hypot(*force_ned)

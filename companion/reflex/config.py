@@ -154,9 +154,9 @@ MOST_TILT_RAD = 0.61
 HOVER_MARGIN = 1.1
 # A vehicle that turns faster about its yaw axis than this, rad/s, leans less: the lean lags behind the turn.
 SPIN_RAD_S = 3.0
-# To brake a turn PX4's mixer takes up to 0.15 of all thrust from what lifts (mixYaw). So the heading that is asked for
-# is the present one, and this share of the turn is asked for, too.
-TURN_KEPT = 0.9
+# To brake a turn PX4's mixer takes up to 0.15 of all thrust from what lifts (mixYaw). So PX4's loop of the yaw rate has
+# no more than this to brake; the rest of the turn is asked for.
+BRAKED_RAD_S = 1.0
 # The rotors keep turning: PX4's MPC_THR_MIN.
 LEAST_THRUST = 0.12
 # The thrust gain is good enough to fly by after so long: 15 reports of the thrust at 30 Hz.
