@@ -14,7 +14,6 @@ from pathlib import Path
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
-from bench.fly.packets import SETPOINT, decoded
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
@@ -30,15 +29,12 @@ from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 
+SET_ATTITUDE_TARGET = 82
 BUSY_LOOPS = 2
 # Intervals in real time before the hit.
 LEAD = 30
-# Intervals after the hit in which a setpoint is waited for: half of PX4's COM_OF_LOSS_T.
+# Intervals after the hit in which a setpoint is waited for: half a second.
 AFTER = 125
-# The cruise's setpoint moves by 6 cm from one to the next at 3 m/s; a recovery's jumps, or is a lean.
-JUMP_M = 0.2
-# POSITION_TARGET_TYPEMASK: x and y are not asked for.
-LEVEL_IGNORED = 0x003
 _FLIGHTS = 5
 
 
@@ -118,8 +114,8 @@ def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
 
 
 def exchanged(flight: Recorded, start: int, ours: socket.socket, theirs: tuple[str, int]) -> float | None:
-    """Plays what the vehicle said from an interval on. Seconds from the hit's datagram until a setpoint that jumps."""
-    began_s, hit_s, last = time.monotonic(), math.inf, None
+    """Plays what the vehicle said from an interval on. Seconds from the hit's datagram to the first attitude."""
+    began_s, hit_s = time.monotonic(), math.inf
     for interval in range(start, len(flight.said)):
         due_s = began_s + 0.004 * (interval - start)
         while (left_s := due_s - time.monotonic()) > 0.0:
@@ -129,13 +125,8 @@ def exchanged(flight: Recorded, start: int, ours: socket.socket, theirs: tuple[s
             except TimeoutError:
                 break
             at_s = time.monotonic()
-            if len(frame) > 12 and message_id_of(frame) == SETPOINT:
-                message = decoded(frame)
-                assert message is not None, "the companion's own"
-                place = (message.type_mask, message.x, message.y)
-                if last is not None and _jumps(last, place):
-                    return at_s - hit_s
-                last = place
+            if len(frame) > 12 and message_id_of(frame) == SET_ATTITUDE_TARGET:
+                return at_s - hit_s
         if interval == flight.hit:
             hit_s = time.monotonic()
         ours.sendto(flight.said[interval], theirs)
@@ -149,11 +140,6 @@ def _address_of_child(ours: socket.socket) -> tuple[str, int]:
     while data != b"\0":
         data, sender = ours.recvfrom(65_536)
     return sender
-
-
-def _jumps(last: tuple[int, float, float], place: tuple[int, float, float]) -> bool:
-    """To another place, or to a lean, which asks for none; a setpoint that only comes to rest does neither."""
-    return bool((last[0] ^ place[0]) & LEVEL_IGNORED) or math.dist(last[1:], place[1:]) > JUMP_M
 
 
 @contextlib.contextmanager

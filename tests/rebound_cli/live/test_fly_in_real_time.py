@@ -32,7 +32,7 @@ NEAR_WALL = (
     *("--set", "items.0.takeoff.height_m=0.9", "--set", "items.1.go_to.position_ned_m=[5, 0, -0.9]"),
     *("--set", "sim.walls.0.point_ned_m=[1.5, 0, -1.5]"),
 )
-SET_POSITION_TARGET = 84
+SET_ATTITUDE_TARGET = 82
 
 
 def summary_of(folder):
@@ -96,7 +96,7 @@ def test_a_flight_killed_while_it_recovers_leaves_a_log_complete_to_the_last_sec
     assert killed_at_us - packets[-1][0] < 1_000_000
     happened = {event["kind"]: event["time_us"] for event in events_of(folder)}
     detected_at_us = happened["detection"]
-    assert any(packet[7] == SET_POSITION_TARGET and at_us >= detected_at_us for at_us, packet in packets)
+    assert any(packet[7] == SET_ATTITUDE_TARGET and at_us >= detected_at_us for at_us, packet in packets)
     # And the vehicle's process ends by itself, and all of it can be decided again
     wait_until_gone(folder)
     assert assert_comes_again(folder).is_cut
