@@ -21,6 +21,8 @@ from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle
 
+# The slowest hit into a surface that a detector's bars promise to find.
+NOTICED_M_S = 0.5
 # Closer than this to how it stands, a vehicle is on the ground.
 STANDS_M = 0.03
 

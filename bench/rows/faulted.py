@@ -12,7 +12,7 @@ from bench.faults.injectors import Rewritten
 from bench.fly.air import FAILED, HANDED_OVER, KILLED, Fault, Injector
 from bench.fly.campaign import Json
 from bench.fly.faulted import FaultedFlight
-from bench.fly.lockstep import JudgedFlight, judged_flight
+from bench.fly.lockstep import NOTICED_M_S, STANDS_M, JudgedFlight, judged_flight
 from bench.rows.crashes import AIRBORNE_M, crashes, heights_m, tilts_deg
 from companion.shell.tlog import read_tlog
 from rebound_cli.replay.recording import read_recording, reproduce
@@ -21,13 +21,10 @@ from rebound_cli.results.truth_match import FlightTruth
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.truth import Hit
 
-# The slowest hit that a detector's bars promise to find.
-NOTICED_M_S = 0.5
 # From the touch to the event: a contact of 0.12 s, the slowest stream's 50 ms, and a link that holds packets back.
 FOUND_WITHIN_S = 0.5
 # A bounce of the same touch.
 SAME_TOUCH_S = 0.25
-STANDS_M = 0.03
 # A flight decided again costs as much as flown: only the first of each row is.
 DECIDED_AGAIN = 1
 CLIPPED_PART = 0.001

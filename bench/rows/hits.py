@@ -9,14 +9,12 @@ from bench.fly.campaign import Json
 from bench.fly.guarded import FREE_S, MOST_RECOVERY_S, Approach, FlownHit, Verdict, again, fly
 from bench.fly.watching import FOUND_WITHIN_US
 from bench.rows.crashes import tilts_deg
+from bench.rows.recovered import CAME_BACK_M
 from companion.report import CollisionReport
 from rebound_cli.results.truth_match import LATE_SAMPLE_US, FlightTruth
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
-
-# A vehicle that leaves a wall does not come nearer again; its estimate has nothing to do with this.
-CAME_BACK_M = 0.02
 
 
 def work_out_flown(case: FlownHit) -> Json:

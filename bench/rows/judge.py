@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.fly.campaign import Json
-from bench.fly.lockstep import JudgedFlight, fly
+from bench.fly.lockstep import NOTICED_M_S, JudgedFlight, fly
 from bench.rows.contacts import JudgedContact, Role, contacts_of, without_contact
 from bench.rows.crashes import crashes
 from bench.rows.memory import given_up, repeated
@@ -20,8 +20,6 @@ from companion.report import Event
 
 Floats = npt.NDArray[np.float64]
 
-# The slowest hit that a mission may be sure of: the detectors' bars begin here.
-NOTICED_M_S = 0.5
 # The companion counts a goal as reached within 0.5 m of its estimate, which has drifted by up to half as much.
 REACHED_M = 0.75
 # Home is reached within 0.5 m of the estimate; wind, landing and drift add as much.

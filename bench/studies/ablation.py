@@ -20,7 +20,7 @@ from bench.fly.lockstep import JudgedFlight, fly_in
 from bench.fly.watching import FLOWN_WITH
 from bench.fly.wire import JITTERY
 from bench.rows.contacts import JudgedContact, Role, contacts_of
-from bench.rows.heard import work_out_flight, work_out_hand, work_out_hit
+from bench.rows.heard import angle_deg, work_out_flight, work_out_hand, work_out_hit
 from bench.rows.judge import failures
 from bench.rows.recovered import recoveries
 from bench.rows.tables import Page, table
@@ -109,8 +109,7 @@ def _of_one(flight: JudgedFlight, figures: Json, contact: JudgedContact) -> Json
     found["rest_s"] = _rests_after_s(flight, contact.hit)
     if contact.collision is not None:
         told, hit = flight.report.collisions[contact.collision], contact.hit
-        cosine = float(np.dot(told.normal_ned, hit.normal_ned))
-        found["normal_deg"] = round(math.degrees(math.acos(min(1.0, max(-1.0, cosine)))), 1)
+        found["normal_deg"] = round(angle_deg(told.normal_ned, hit.normal_ned), 1)
         found["v_c_m_s"] = round(math.dist(told.impact_velocity_ned_m_s, hit.impact_velocity_ned_m_s), 3)
     return found
 

@@ -10,8 +10,8 @@ import pandas as pd
 from bench.cases.missions import MissionCase, airframe_data, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Results, Workers, run_campaign
-from bench.fly.lockstep import fly
-from bench.rows.judge import NOTICED_M_S, failures, work_out_mission
+from bench.fly.lockstep import NOTICED_M_S, fly
+from bench.rows.judge import failures, work_out_mission
 from bench.rows.tables import Bar, Page, bars_text, per_cent, share, summary_text, table
 from companion.errors import ConfigurationError
 from rebound_cli.main import build_parser

@@ -17,6 +17,7 @@ from bench.fly.guarded import (
     approach_of,
     draw_flown,
 )
+from bench.fly.lockstep import NOTICED_M_S
 from bench.rows.hits import work_out_approach, work_out_flown
 from bench.rows.tables import (
     CONFIDENCE,
@@ -30,9 +31,8 @@ from bench.rows.tables import (
     text_of,
 )
 
-# Into the surface. The detectors' bars begin at 0.5 m/s.
-BANDS_M_S = [0.0, 0.5, 1.0, 2.0, 3.0, 5.0]
-NOTICED_M_S = BANDS_M_S[1]
+# Into the surface.
+BANDS_M_S = [0.0, NOTICED_M_S, 1.0, 2.0, 3.0, 5.0]
 # Of hits missed, and of false alarms.
 BOUND = 0.01
 NAMED_SEEDS = 12

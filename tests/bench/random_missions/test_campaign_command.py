@@ -167,3 +167,10 @@ def test_cases_are_seeds_in_turn_with_both_airframes():
     assert missions_campaign(2, first_seed=9).cases == [
         *[MissionCase(seed, name) for seed in (9, 10) for name in both],
     ]
+
+
+@pytest.mark.parametrize("words", [["corpus", "judge", "FOLDER"], ["campaign", "page"], ["soak", "--minutes", "2"]])
+def test_a_study_that_is_gone_says_so_in_a_sentence(capsys, words):
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"bench: `{words[0]}") and line.endswith(".")
