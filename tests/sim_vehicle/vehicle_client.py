@@ -6,7 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.airframe import load_built_in
+from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -20,8 +20,17 @@ IGNORED = (0.0,) * 3
 class Client:
     """Sends packets, lets virtual time pass, and keeps what came back."""
 
-    def __init__(self, seed: int = 1, system: int = 1, component: int = 191) -> None:
-        self.vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), seed)
+    def __init__(
+        self,
+        seed: int = 1,
+        system: int = 1,
+        component: int = 191,
+        airframe: Airframe | None = None,
+        scene: Scene | None = None,
+        **more: Any,
+    ) -> None:
+        """``more``: the vehicle's own arguments."""
+        self.vehicle = SimulatedVehicle(airframe or load_built_in("foldable"), scene or Scene(), seed, **more)
         self.sent: list[bytes] = []
         self.received: list[tuple[float, Any]] = []
         self._last: dict[str, Any] = {}
@@ -86,6 +95,12 @@ class Client:
     def last(self, kind: str) -> Any:
         assert kind in self._last, f"no {kind} received"
         return self._last[kind]
+
+    def rate_hz(self, kind: str, seconds: float) -> float:
+        """Received from now on."""
+        self.forget()
+        self.run(seconds)
+        return len(self.all(kind)) / seconds
 
     def forget(self) -> None:
         self.received.clear()

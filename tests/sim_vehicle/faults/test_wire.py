@@ -13,6 +13,7 @@ from sim_vehicle.faults.wire import Wire, message_number, split
 from sim_vehicle.mavlink.restamp import Restamper
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
+from tests.sim_vehicle.vehicle_client import Client
 
 STEP_US = 4000
 
@@ -111,19 +112,15 @@ def test_bytes_are_split_where_frames_begin() -> None:
 # --- on a vehicle ------------------------------------------------------------------------------------------
 
 
-def flown(*faults: dict[str, Any], seconds: float = 3.0) -> list[Any]:
-    """What a listener decodes of a standing vehicle."""
-    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene.model_validate({"faults": faults}), seed=1)
-    parser, heard = dialect.MAVLink(None), []
-    parser.robust_parsing = True
-    for _ in range(round(seconds / 0.004)):
-        for packet in vehicle.step(b""):
-            heard += [(vehicle.time_boot_us, message) for message in parser.parse_buffer(packet) or []]
-    return heard
+def flown(*faults: dict[str, Any], seconds: float = 3.0) -> Client:
+    """Who listens to a standing vehicle."""
+    client = Client(scene=Scene.model_validate({"faults": faults}))
+    client.run(seconds)
+    return client
 
 
-def stamps(heard: list[Any], name: str, field: str) -> np.ndarray:
-    return np.array([getattr(message, field) for _, message in heard if message.get_type() == name])
+def stamps(client: Client, name: str, field: str) -> np.ndarray:
+    return np.array([getattr(message, field) for message in client.all(name)])
 
 
 def test_an_imu_that_drops_out_leaves_a_gap_in_its_message_alone() -> None:
