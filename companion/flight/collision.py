@@ -9,7 +9,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import ZERO, VelocityFix
-from companion.reflex.config import CORRECTED_US, DECIDED_US
+from companion.reflex.config import DECIDED_US, FADED_US
 from companion.reflex.confirmation import Hypothesis
 from companion.reflex.detector import DetectorState, Phase
 from companion.reflex.halfspace import away_from, plus, split
@@ -69,7 +69,7 @@ class CollisionRecord:
             self.contact_normal = level(estimate.normal)
             self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us)
         self.estimator.imu(strapdown)
-        if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= CORRECTED_US:
+        if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US:
             for sample in positions:
                 self.estimator.update(sample)
 

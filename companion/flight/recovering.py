@@ -239,20 +239,21 @@ def _report_detection(flight: FlightContext, hit: CollisionReport) -> None:
 
 def as_the_vehicle_has_it(flight: FlightContext, target: Target, time_boot_us: int) -> Target:
     """A position with the errors that a hit has left in the vehicle's estimate and tilt, and with what its integrators
-    have forgotten while it was flown by attitude. PX4 has put all of it right by CORRECTED_US.
+    have forgotten while it was flown by attitude. It fades out, as PX4 puts all of it right by itself.
     """
     record = flight.collisions[-1] if flight.collisions else None
     if record is None or target.lean is not None or not (_law(flight).leans and record.estimator.has_converged):
         return target
-    if time_boot_us - record.sample_time_boot_us > reflex.CORRECTED_US:
+    left_us = record.sample_time_boot_us + reflex.FADED_US - time_boot_us
+    if left_us <= 0:
         return target
-    estimator = record.estimator
+    estimator, share = record.estimator, min(1.0, left_us / (reflex.FADED_US - reflex.FADES_FROM_US))
     pushed = plus(estimator.belief.external_m_s2, 1.0, estimator.level_m_s2)
     return replace(
         target,
-        position_ned_m=plus(target.position_ned_m, 1.0, estimator.position_error_m),
-        velocity_ned_m_s=plus(target.velocity_ned_m_s or ZERO, 1.0, estimator.velocity_error_m_s),
-        acceleration_ned_m_s2=plus(target.acceleration_ned_m_s2 or ZERO, -1.0, pushed),
+        position_ned_m=plus(target.position_ned_m, share, estimator.position_error_m),
+        velocity_ned_m_s=plus(target.velocity_ned_m_s or ZERO, share, estimator.velocity_error_m_s),
+        acceleration_ned_m_s2=plus(target.acceleration_ned_m_s2 or ZERO, -share, pushed),
     )
 
 

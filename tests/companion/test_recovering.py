@@ -13,7 +13,7 @@ from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, AttitudeSetpoint, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.strapdown import LEVEL
-from companion.reflex.config import CORRECTED_US, EstimateConfig
+from companion.reflex.config import FADED_US, FADES_FROM_US, EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.normal import Normal
@@ -82,8 +82,11 @@ def test_every_position_has_those_errors_until_px4_has_put_them_right_whoever_as
     # Then the vehicle is asked for what its own estimate will show there, and for a tilt against both
     sent = as_the_vehicle_has_it(flight, asked, hit_us + 1_000_000)
     assert sent == Target((1.2, 2.0, -3.0), 0.5, (0.1, 0.3, 0.0), (-1.0, -0.5, 0.0))
+    # less and less of it,
+    half = as_the_vehicle_has_it(flight, asked, hit_us + (FADES_FROM_US + FADED_US) // 2)
+    assert half.position_ned_m == pytest.approx((1.1, 2.0, -3.0))
     # and for the position alone once they are right again, or as long as nobody knows them
-    assert as_the_vehicle_has_it(flight, asked, hit_us + CORRECTED_US + 1) == asked
+    assert as_the_vehicle_has_it(flight, asked, hit_us + FADED_US) == asked
     record.estimator.has_converged = False
     assert as_the_vehicle_has_it(flight, asked, hit_us + 1_000_000) == asked
 
