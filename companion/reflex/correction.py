@@ -9,12 +9,10 @@ from companion.reflex import config as reflex
 
 Floats = npt.NDArray[np.float64]
 
-# Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping, decay of the tilt per s. The last:
-# nothing is missing.
-_SWINGS = reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING
-_SOME = np.array([*product(*_SWINGS, reflex.CORRECTION_TILT_PER_S)])
-_LATE_S, _RAD_S, _DAMPING, _SLOW = np.append(_SOME, _SOME[-1:], axis=0).T
-_SWING, _ONE, _ZERO = 2.0 * _DAMPING * _RAD_S, np.ones_like(_RAD_S), np.zeros_like(_RAD_S)
+# Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping. The last: nothing is missing.
+_SOME = np.array([*product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING)])
+_LATE_S, _RAD_S, _DAMPING = np.append(_SOME, _SOME[-1:], axis=0).T
+_SWING, _SLOW, _ONE, _ZERO = 2.0 * _DAMPING * _RAD_S, reflex.TILT_PER_S, np.ones_like(_RAD_S), np.zeros_like(_RAD_S)
 # The errors p of the position, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
 # p = delay, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
 # s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
