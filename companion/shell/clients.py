@@ -14,7 +14,6 @@ from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
 from companion.shell.addresses import host_and_port, scheme_and_rest, serial_device
 from companion.shell.connection import LinkCounts, Selectable, bound_socket, resolve, send_datagram
-from companion.shell.streams import set_up
 
 # A sender of heartbeats has missed nine.
 FORGOTTEN_US = 10_000_000
@@ -114,7 +113,8 @@ class TcpPort:
     def _accept(self) -> None:
         with suppress(OSError):
             client, sender = self._listener.accept()
-            set_up(client)
+            # Packets are small and each is due now. A client that does not read for a while keeps its connection.
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             client.setblocking(False)
             self._unread[client], self._names[client] = bytearray(), _name(sender)
 

@@ -213,7 +213,7 @@ def _connected(host: str, port: int, timeout_s: float) -> Stream:
     if connected.getpeername() == connected.getsockname():
         connected.close()
         raise ConnectionRefusedError("connection refused")
-    set_up(connected)
+    _set_up(connected)
     return Stream(connected, f"{host}:{port}")
 
 
@@ -232,7 +232,7 @@ class TcpInConnection(StreamConnection):
 
     def _client(self) -> Stream:
         client, address = self._listener.accept()
-        set_up(client)
+        _set_up(client)
         return Stream(client, f"{address[0]}:{address[1]}")
 
     def close(self) -> None:
@@ -240,7 +240,7 @@ class TcpInConnection(StreamConnection):
         self._listener.close()
 
 
-def set_up(connected: socket.socket) -> None:
+def _set_up(connected: socket.socket) -> None:
     # Packets are small and each is due now: Nagle's algorithm would hold setpoints back.
     connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)

@@ -7,6 +7,7 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,6 +49,34 @@ def simulator(*options: str) -> Iterator[Simulator]:
     finally:
         process.stdin.close()
         process.wait(10)
+
+
+@contextmanager
+def guarded_simulator(*options: str) -> Iterator[Simulator]:
+    """The same behind a guard in between, which hands everything on as the simulator itself would."""
+    client, tcp = free_port(), free_port(socket.SOCK_STREAM)
+    with simulator(*options) as simulated, tempfile.TemporaryDirectory() as folder:
+        command = [os.environ.get("REBOUND_PYTHON", sys.executable), "-m", "rebound_cli", "guard", "--out", folder]
+        command += [
+            "--connect",
+            f"udpin://127.0.0.1:{simulated.companion_port}",
+            "--between",
+            f"tcpin://127.0.0.1:{tcp}",
+        ]
+        process = subprocess.Popen(
+            [*command, "--between", f"udpout://127.0.0.1:{client}"],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        assert process.stdout is not None
+        try:
+            assert any(b"standing by" in line for line in process.stdout), "the guard did not connect"
+            yield Simulator(client, tcp)
+        finally:
+            process.terminate()
+            process.communicate(timeout=20)
 
 
 def wait_until(condition, at_most_s: float, what: str) -> None:

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 from mavsdk import System
 from mavsdk.offboard import OffboardError, PositionNedYaw, VelocityBodyYawspeed
-from simulator import free_port, simulator
+from simulator import free_port, guarded_simulator, simulator
 
 
 async def first(stream, condition=lambda value: True, seconds: float = 20.0):
@@ -26,7 +26,8 @@ async def connected(port: int) -> System:
     return drone
 
 
-def test_takeoff_offboard_and_land():
+@pytest.mark.parametrize("vehicle", [simulator, guarded_simulator])
+def test_takeoff_offboard_and_land(vehicle):
     async def scenario(port: int) -> None:
         drone = await connected(port)
         await drone.action.arm()
@@ -44,7 +45,7 @@ def test_takeoff_offboard_and_land():
         await drone.action.land()
         await first(drone.telemetry.armed(), lambda armed: not armed, 40.0)
 
-    with simulator() as simulated:
+    with vehicle() as simulated:
         asyncio.run(scenario(simulated.companion_port))
 
 
