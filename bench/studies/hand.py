@@ -12,15 +12,8 @@ from bench.cases.mishaps import FAMILIES
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.stick_logs import LoggedSticks, logs_with_sticks
-from bench.fly.by_hand.watched import (
-    IMU_HZ,
-    STICKS_S,
-    GuardedFlight,
-    Row,
-    Watcher,
-    at_most_an_hour,
-    rows_of,
-)
+from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, Watcher, rows_of
+from bench.rows.tables import at_most_an_hour
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.airframe import Airframe
@@ -142,6 +135,8 @@ def table(rows: Sequence[Row]) -> Iterator[str]:
     yield f"{names}{'tilt, median, 90 %':>20}  as"
     for name, chosen in _groups(rows):
         hours = sum(row["watched_s"] for row in chosen) / 3600.0
+        if not hours:
+            continue
         kinds = Counter(one["kind"] for row in chosen for one in _in_the_air(row))
         false, tilts = sum(kinds.values()), np.array([row["tilt_deg"][:2] for row in chosen if row["tilt_deg"]])
         tilt = "/".join(f"{value:.0f}" for value in np.median(tilts, axis=0)) if len(tilts) else "-"

@@ -8,7 +8,7 @@ import pytest
 
 from bench.fly.by_hand.hand_pilot import wishes
 from bench.fly.by_hand.stick_logs import LoggedSticks, StickLogError, logs_with_sticks, moved
-from bench.fly.by_hand.watched import STICKS_S, at_most_an_hour
+from bench.fly.by_hand.watched import STICKS_S
 from bench.studies.hand import HandCase, agile, fly_by_hand, table
 from sim_vehicle.airframe import load_built_in
 
@@ -87,12 +87,6 @@ def test_no_vehicle_is_asked_for_more_tilt_than_carries_its_weight():
         upright = math.cos(math.radians(parameters["MPC_MAN_TILT_MAX"]))
         assert upright / airframe.hover_fraction > 1.0
         assert agile_one.control.tilt_max_rad == pytest.approx(math.radians(parameters["MPC_MAN_TILT_MAX"]))
-
-
-def test_the_bound_of_nothing_in_an_hour_is_the_rule_of_three():
-    assert at_most_an_hour(0, 1.0) == pytest.approx(-math.log(0.05))
-    assert at_most_an_hour(0, 5.0) == pytest.approx(-math.log(0.05) / 5.0)
-    assert at_most_an_hour(0, 0.0) == math.inf
 
 
 def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():

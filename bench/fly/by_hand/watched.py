@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.stats import chi2
 
 from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, made
 from companion.companion import Companion
@@ -29,7 +28,6 @@ IMU_HZ = (50, 100, 250)
 # Of PX4's modes, as DO_SET_MODE takes them: main and sub mode.
 MODES = {"ALTCTL": (2, 0), "POSCTL": (3, 0), "AUTO.RTL": (4, 5), "AUTO.LAND": (4, 6)}
 MODES |= {"STABILIZED": (7, 0)}
-CONFIDENCE = 0.95
 GRAVITY_M_S2 = 9.81
 # More than any drawn vehicle's thrust, with a hover at a third of it, and drag.
 STRONGEST_M_S2 = 45.0
@@ -200,11 +198,6 @@ class GuardedFlight:
 
 def limited(stick: float) -> float:
     return min(max(stick, -1.0), 1.0)
-
-
-def at_most_an_hour(events: int, hours: float) -> float:
-    """The exact upper bound of a Poisson rate (Garwood)."""
-    return float(chi2.ppf(CONFIDENCE, 2 * (events + 1))) / 2.0 / hours if hours > 0.0 else math.inf
 
 
 def rows_of(fly: Callable[[Case], Row], cases: Sequence[Case], jobs: int, out: Path, label: str) -> list[Row]:
