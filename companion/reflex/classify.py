@@ -60,8 +60,12 @@ class Touch:
 
     @property
     def is_slow(self) -> bool:
-        """What has not climbed since it stood on the ground cannot have fallen, whatever its climb rate says."""
-        is_fast = self.velocity_ned_m_s is not None and self.velocity_ned_m_s[2] >= FASTEST_LANDING_M_S
+        """What has not climbed since it stood on the ground cannot have fallen, whatever its climb rate says; and what
+        falls loses height.
+        """
+        rates_m_s = [] if self.velocity_ned_m_s is None else [self.velocity_ned_m_s[2]]
+        rates_m_s += [] if self.situation.sinking_m_s is None else [self.situation.sinking_m_s]
+        is_fast = min(rates_m_s, default=0.0) >= FASTEST_LANDING_M_S
         return not (is_fast and self.situation.has_climbed)
 
     @property
@@ -90,7 +94,7 @@ TABLE = (
     Row(
         ImpactKind.CRASH,
         "near the ground, or coming down and pushed from below or flown down by hand; "
-        "tilted by over 45 degrees, or sinking at over 3.1 m/s after a climb",
+        "tilted by over 45 degrees, or sinking at over 3.1 m/s, by velocity and by height, after a climb",
         lambda touch: touch.meets_ground and not (touch.is_upright and touch.is_slow),
     ),
     Row(

@@ -50,7 +50,8 @@ class Situation(NamedTuple):
     `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming;
     `has_climbed`: the vehicle has been higher than a take-off reaches since it stood on the ground or touched it. The
     setpoint is the one last sent, local NED. `descent_commanded`: the vehicle goes down because it was told to, or by
-    the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks. The
+    the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks.
+    `sinking_m_s` is by the reported heights, beside the reported velocity. The
     monitor fills in `validity` of the vehicle's velocity, which lacks a part of a hit that was clipped, and
     `strapdown`. Both have heard the sample already.
     """
@@ -65,6 +66,7 @@ class Situation(NamedTuple):
     strapdown: Strapdown | None = None
     flown_by_hand: bool = False
     has_climbed: bool = True
+    sinking_m_s: float | None = None
 
     @property
     def why_off(self) -> str | None:

@@ -17,9 +17,20 @@ def tilted(degrees):
     return (math.cos(half), math.sin(half), 0.0, 0.0)
 
 
-def kind(force, velocity=FORWARD, tilt_deg=0.0, height_m=5.0, descends=False, by_hand=False, has_climbed=True):
+def kind(
+    force,
+    velocity=FORWARD,
+    tilt_deg=0.0,
+    height_m=5.0,
+    descends=False,
+    by_hand=False,
+    has_climbed=True,
+    sinking_m_s=None,
+):
     situation = Situation(armed=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
-    return kind_of(force, velocity, tilted(tilt_deg), situation._replace(has_climbed=has_climbed))
+    return kind_of(
+        force, velocity, tilted(tilt_deg), situation._replace(has_climbed=has_climbed, sinking_m_s=sinking_m_s)
+    )
 
 
 def sinking(speed_m_s):
@@ -81,6 +92,9 @@ def test_what_has_not_climbed_since_it_stood_on_the_ground_cannot_have_fallen():
     assert kind(UP, **gone_astray) is ImpactKind.CRASH
     assert kind(UP, **gone_astray, has_climbed=False) is ImpactKind.LANDING
     assert kind(UP, **gone_astray, has_climbed=False, tilt_deg=60.0) is ImpactKind.CRASH
+    # What falls loses height by the reported heights, too
+    assert kind(UP, **gone_astray, sinking_m_s=0.5) is ImpactKind.LANDING
+    assert kind(UP, **gone_astray, sinking_m_s=4.0) is ImpactKind.CRASH
 
 
 def test_who_is_flown_down_by_hand_and_is_too_fast_has_crashed_whatever_a_barometer_says_of_the_height():
