@@ -108,9 +108,9 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment], no_position: bool) -
     )
     first_us = log.imu_time_boot_us[0] if len(log.imu_time_boot_us) else 0.0
     columns = series(log, flight.started_at_us)
-    columns["imu"] |= {"boot": ((log.imu_time_boot_us - first_us) * 1e-6, TIME_S)}
+    columns["imu"] = _on_both_clocks(columns["imu"], log.imu_time_boot_us - first_us)
     columns["imu"] |= {name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()}
-    columns["path"] |= {"boot": ((log.position_time_boot_us - first_us) * 1e-6, TIME_S)}
+    columns["path"] = _on_both_clocks(columns["path"], log.position_time_boot_us - first_us)
     if truth is not None:
         true, boot_us = truth.series, truth.series["time_boot_us"]
         columns["truth"] = (
@@ -125,6 +125,11 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment], no_position: bool) -
         name: _packed(table, loud if name == "imu" else None, near_s, most, no_position)
         for name, table in columns.items()
     }
+
+
+def _on_both_clocks(columns: Columns, boot_us: Floats) -> Columns:
+    """With the vehicle's clock beside the computer's."""
+    return {"t": columns["t"], "boot": (boot_us * 1e-6, TIME_S)} | columns
 
 
 def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
