@@ -181,16 +181,18 @@ class Core(ABC, Generic[FlightT, MachineT]):
             # Without control the setpoint is the vehicle's own position, and is not limited.
             if holds:
                 target = limiter.passed(flight, target, self._has_floor, moved, now_us)
+            sent = limiter.in_vehicles_view(flight, target, self._has_floor, sample_us) if holds else target
+            setpoint = sent.setpoint(now_us - self.started_at_us)
         except Exception as error:
             self.fault(error, now_us)
             if not holds or limiter.last is None:
                 return
-            target = limiter.last.at_rest()
+            target = sent = limiter.last.at_rest()
+            setpoint = sent.setpoint(now_us - self.started_at_us)
         if holds:
             flight.target = target
-            target = as_the_vehicle_has_it(flight, target, sample_us)
-            self._note_sent(target, now_us)
-        flight.outbox.append(self.resets.sent(target.setpoint(now_us - self.started_at_us)))
+            self._note_sent(sent, now_us)
+        flight.outbox.append(self.resets.sent(setpoint))
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         """Note a setpoint that was sent while the companion has the vehicle."""
@@ -324,3 +326,14 @@ class Limiter:
         # Without a position setpoint there is no step to the next one.
         self.last_ned_m, self.last_us = None if target.lean is not None else target.position_ned_m, now_us
         return target
+
+    def in_vehicles_view(self, flight: FlightContext, target: Target, has_floor: bool, time_boot_us: int) -> Target:
+        """With the errors of the vehicle's estimate, so that it flies what was passed; within fence and limits, too.
+
+        Raises SetpointError for one that is not finite.
+        """
+        sent = as_the_vehicle_has_it(flight, target, time_boot_us)
+        if sent is target:
+            return target
+        around = Surroundings(None, flight.origin_ned_m, has_floor)
+        return bounded(sent, around, flight.mission.fence, flight.mission.limits)[0]

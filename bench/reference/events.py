@@ -48,7 +48,7 @@ MEANINGS = {
     "loss": "A stream that the detector uses does not arrive.",
     "lost": "The disk refused a part of the log.",
     "mode": "The vehicle's mode changed, or the companion asked for one.",
-    "hand_over": "The vehicle rests, its own estimate agrees, and the setpoint is a position again.",
+    "hand_over": "The vehicle rests, the errors of its own estimate are known, and the setpoint is a position again.",
     "obstacle": "A hit was stored in the obstacle map.",
     "by_position": "Recovery by position, as law `paper` has it, with the reason.",
     "plan": "The plan is ready for confirmation.",

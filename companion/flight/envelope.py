@@ -117,7 +117,14 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Setpoint
 
 def is_finite(target: Target) -> bool:
     """Whether every number of the setpoint is."""
-    parts = (target.position_ned_m, target.velocity_ned_m_s or (), target.acceleration_ned_m_s2 or ())
+    parts: list[tuple[float, ...]] = [
+        target.position_ned_m,
+        target.velocity_ned_m_s or (),
+        target.acceleration_ned_m_s2 or (),
+    ]
+    if target.lean is not None:
+        belief = target.lean.belief
+        parts += [belief.attitude_wxyz, belief.level_m_s2, (belief.yaw_rate_rad_s, target.lean.yaw_rad)]
     values = [value for part in parts for value in part]
     return all(map(math.isfinite, values)) and (target.yaw_rad is None or math.isfinite(target.yaw_rad))
 

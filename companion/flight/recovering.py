@@ -30,7 +30,7 @@ class Recover:
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._flight, self._record = flight, flight.collisions[-1]
-        self._law, self._config = _law(flight), flight.mission.recovery
+        self._law = _law(flight)
         self._contact = self._record.contact  # as known now, at the vehicle's place while the obstacle goes along
         *_, first = in_one_recovery(flight.collisions)
         self._first_hit_us = first.detected_at_us
@@ -143,7 +143,7 @@ class Recover:
         if self._leans and self._rests(sample):
             self._leans, record.overshoot_m = False, 0.0
             since_s = 1e-6 * (sample.time_boot_us - record.sample_time_boot_us)
-            text = f"the vehicle's own estimate agrees {since_s:.2f} s after the hit; from here on by position"
+            text = f"at rest {since_s:.2f} s after the hit; from here on by position"
             flight.report(now_us, "hand_over", text, after_s=since_s, recovery_setpoint_ned_m=place)
         elif not self._is_known:
             return

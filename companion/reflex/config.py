@@ -149,7 +149,7 @@ WAY_S = 2.0 / BRAKING_PER_S
 TILT_AHEAD_S = 0.05
 # Back off a surface, m/s for each metre of the clearance that is missing: a third as fast as the speed is braked.
 RETURN_PER_S = 2.5
-# Height and climb: critically damped at 2 rad/s, below what thrust and tilt share.
+# Height and climb: critically damped at 4 rad/s, below what thrust and tilt share.
 HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 16.0, 8.0, 4.0
 # Largest tilt, 35 degrees: 6.9 m/s^2, with 22 % more thrust than hover's.
 MOST_TILT_RAD = 0.61
@@ -165,7 +165,7 @@ LEAST_THRUST = 0.12
 # The thrust gain is good enough to fly by after so long: 15 reports of the thrust at 30 Hz.
 THRUST_LEARNT_S = 0.5
 # Rest, by the belief: as slow as a hovering vehicle wanders by a poor estimate, for so long, and this share of the
-# clearance off all surfaces. The vehicle's own velocity differs by no more.
+# clearance off all surfaces.
 RESTS_M_S, RESTS_S, CLEAR_SHARE = 0.2, 0.1, 0.7
 # Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
 # A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.

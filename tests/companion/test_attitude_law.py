@@ -5,6 +5,8 @@ import random
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from companion.flight.context import Target
 from companion.motion.config import GRAVITY_M_S2
@@ -143,3 +145,20 @@ def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_
     belief = Belief(HERE, ZERO, level_m_s2=(1.0, 0.0, 0.0))
     attitude, _ = attitude_and_thrust((1.0, 0.0, 0.0), lean(belief))
     assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0)), "level by its own attitude"
+
+
+@given(
+    acceleration=st.tuples(*[st.floats(-50.0, 50.0)] * 3),
+    turned=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 0.1),
+    full_m_s2=st.floats(11.0, 60.0),
+)
+def test_whatever_is_asked_for_the_attitude_is_upright_and_the_thrust_one_that_there_is(
+    acceleration, turned, full_m_s2
+):
+    # Given an acceleration as of a vehicle that shoots up to the top of its fence, faster than gravity stops it
+    size = math.hypot(*turned)
+    belief = Belief(HERE, ZERO, attitude_wxyz=tuple(part / size for part in turned))
+    attitude, thrust = attitude_and_thrust(acceleration, lean(belief, [WALL], 1.0, full_m_s2))
+    assert math.hypot(*attitude) == pytest.approx(1.0)
+    assert -up_of(attitude)[2] >= math.cos(MOST_TILT_RAD) - 1e-9
+    assert LEAST_THRUST <= thrust <= 1.0

@@ -1,22 +1,25 @@
-"""A recovery: by attitude until the vehicle rests and its own estimate agrees, then by a position."""
+"""A recovery: by attitude until the vehicle rests and the errors of its own estimate are known, then by a position."""
 
 import math
 from dataclasses import replace
 
 import pytest
 
+from companion.core import Limiter
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.envelope import SetpointError
 from companion.flight.recovering import Recover, as_the_vehicle_has_it, why_no_lean
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, AttitudeSetpoint, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
-from companion.motion.strapdown import LEVEL
-from companion.reflex.config import FADED_US, FADES_FROM_US, EstimateConfig
+from companion.motion.strapdown import LEVEL, ZERO
+from companion.reflex.config import FADED_US, FADES_FROM_US, MOST_HELD_S, THRUST_LEARNT_S, EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.normal import Normal
+from tests.companion.hostile import flight_in
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -130,3 +133,40 @@ def test_a_surface_goes_along_while_it_pushes():
         hears(flight, recover, since_us, 3.0 - 0.8e-6 * since_us, -0.8)
     # Then its goal stays ahead of it
     assert flight.collisions[0].setpoint_ned_m[0] < 3.0 - 0.8 * 0.58 - 0.3
+
+
+@pytest.mark.parametrize("wrong_m_s", [40.0, math.nan])
+def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_is_a_fault(wrong_m_s):
+    # Given an estimate whose known errors no vehicle has
+    flight = flight_with()
+    estimator = flight.collisions[0].estimator
+    estimator.has_converged, estimator._hidden_error_m_s = True, (0.0, wrong_m_s, 0.0)
+    estimator.position_error_m = estimator.level_m_s2 = (wrong_m_s, wrong_m_s, 0.0)
+    asked, hit_us = Target((1.0, 2.0, -3.0), 0.5), flight.collisions[0].sample_time_boot_us
+
+    def sent() -> Target:
+        return Limiter().in_vehicles_view(flight, asked, has_floor=True, time_boot_us=hit_us + 1_000_000)
+
+    # Then what would leave is no further than the fence, and no faster than the limits, or nothing
+    if math.isnan(wrong_m_s):
+        with pytest.raises(SetpointError):
+            sent()
+    else:
+        limits, place = flight.mission.limits, sent().position_ned_m
+        assert flight.mission.fence.nearest_inside(*place[:2]) == pytest.approx(place[:2], abs=1e-4)
+        assert math.hypot(*(sent().velocity_ned_m_s or ZERO)) <= limits.max_speed_m_s + 1e-9
+        assert math.hypot(*(sent().acceleration_ned_m_s2 or ZERO)) <= 9.81 * math.tan(math.radians(limits.max_tilt_deg))
+
+
+def test_the_setpoints_that_leave_after_a_recovery_have_the_errors(monkeypatch):
+    # Given a flight that holds after a clipped hit
+    f = flight_in("holding")
+    core = f.companion.core
+    core.flight.loss_s, core.flight.thrust.known_s = MOST_HELD_S, THRUST_LEARNT_S
+    (record,) = core.flight.collisions
+    monkeypatch.setattr(MotionEstimator, "update", lambda self, sample: None)
+    record.estimator.has_converged, record.estimator.position_error_m = True, (0.25, 0.0, 0.0)
+    # When it streams its next setpoint
+    f.run_for(0.1)
+    # Then that is beside the place which the flight wants by the error
+    assert f.vehicle.setpoints[-1][1].x - core.flight.target.position_ned_m[0] == pytest.approx(0.25, abs=0.001)
