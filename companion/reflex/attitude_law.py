@@ -54,13 +54,13 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
     v_d = velocity[2]
     sides = [(one.normal_ned, reflex.RETURN_PER_S * (one.distance_m - one.off_m(place))) for one in surfaces]
     for normal, off_m_s in sides:
-        leaves_m_s = along(velocity, normal)
-        if off_m_s > 0.0 and leaves_m_s > 0.0:
-            # Near a surface only what is certain of the speed away from it is braked.
-            velocity = plus(velocity, -min(leaves_m_s, belief.spread_m_s), normal)
-        if off_m_s > 0.0:
-            # What it pushes with is no wind to lean against.
-            external = plus(external, -max(0.0, along(external, normal)), normal)
+        if off_m_s <= 0.0:
+            continue
+        # Of the speed away from a near surface only what is certain is braked.
+        faster_m_s = max(0.0, along(velocity, normal) - off_m_s)
+        velocity = plus(velocity, -min(faster_m_s, belief.spread_m_s), normal)
+        # What it pushes with is no wind to lean against.
+        external = plus(external, -max(0.0, along(external, normal)), normal)
     off = projected(ZERO, [side for side in sides if side[1] > 0.0])
     short, moves = plus(off, -1.0, velocity), plus(belief.tilt_m_s2, 1.0, external)
     n, e, _ = plus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), -1.0, moves)
@@ -88,14 +88,13 @@ def brakable_m_s(room_m: float, later_s: float) -> float:
 
 def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Quaternion, float]:
     """Attitude in the vehicle's own frame, and the collective thrust as a share of the most."""
-    belief, full_m_s2, turns_rad_s = lean.belief, lean.full_m_s2, abs(lean.belief.yaw_rate_rad_s)
+    belief, full_m_s2 = lean.belief, lean.full_m_s2
     # To stay below the top of a fence may take more than gravity, which no upright vehicle has.
     n, e, d = acceleration_ned_m_s2
     d = min(max(d, -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2)
     lifts_m_s2 = GRAVITY_M_S2 - d
     least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), reflex.HOVER_MARGIN * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
-    most_m_s2 *= reflex.SPIN_RAD_S / max(turns_rad_s, reflex.SPIN_RAD_S)
     n, e, _ = limited((n, e, 0.0), most_m_s2)
     force = (n, e, d - GRAVITY_M_S2)
     up = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0))
