@@ -66,6 +66,13 @@ def share(part: Iterable[bool]) -> float:
     return sum(values) / len(values) if values else math.nan
 
 
+def share_bar(what: str, holds: "pd.Series[bool]", least: float) -> Bar:
+    """Of how many it must hold, and of how many it does; of none there is no verdict."""
+    part, count = share(holds), len(holds)
+    of = f"{count - sum(holds)} of {count} not"
+    return Bar(what, f"≥ {100 * least:g} %", f"{per_cent(part, 2)} %", part >= least if count else None, of)
+
+
 def rms(values: Iterable[float]) -> float:
     numbers = np.array(list(values), float)
     return float(np.sqrt(np.mean(numbers**2))) if len(numbers) else math.nan
