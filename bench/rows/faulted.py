@@ -152,9 +152,7 @@ def _is_reproducible(flight: FaultedFlight) -> bool:
 
 def _is_up(flown: JudgedFlight, at_s: float) -> bool:
     """Whether the vehicle is off the ground then."""
-    time_us = flown.truth.series["time_boot_us"]
-    index = min(int(np.searchsorted(time_us, at_s * 1e6)), len(time_us) - 1)
-    return bool(heights_m(flown)[index] > STANDS_M)
+    return bool(heights_m(flown)[flown.row_at(at_s * 1e6)] > STANDS_M)
 
 
 def _ground_m_s(flown: JudgedFlight) -> float | None:

@@ -66,11 +66,12 @@ def share(part: Iterable[bool]) -> float:
     return sum(values) / len(values) if values else math.nan
 
 
-def share_bar(what: str, holds: "pd.Series[bool]", least: float) -> Bar:
-    """Of how many it must hold, and of how many it does; of none there is no verdict."""
+def share_bar(what: str, holds: "pd.Series[bool]", least: float | None = None) -> Bar:
+    """Of how many it must hold, and of how many it does. Without a least or with none there is no verdict."""
     part, count = share(holds), len(holds)
-    of = f"{count - sum(holds)} of {count} not"
-    return Bar(what, f"≥ {100 * least:g} %", f"{per_cent(part, 2)} %", part >= least if count else None, of)
+    wanted = "" if least is None else f"≥ {100 * least:g} %"
+    is_met = part >= least if least is not None and count else None
+    return Bar(what, wanted, f"{per_cent(part, 2)} %", is_met, f"{count - sum(holds)} of {count} not")
 
 
 def rms(values: Iterable[float]) -> float:
