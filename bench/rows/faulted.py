@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.faults.catalogue import FLOWN
-from bench.faults.injectors import Rewritten
+from bench.faults.injectors import OnTheWay
 from bench.fly.air import FAILED, HANDED_OVER, KILLED, Fault, Injector
 from bench.fly.campaign import Json
 from bench.fly.faulted import FaultedFlight
@@ -99,7 +99,7 @@ def _blind_until_us(flight: FaultedFlight, hit: Hit | None) -> float | None:
     """When the fault's end lets a hit be seen that it hid; None for one that it did not hide."""
     if hit is None or not flight.fault.expected.blinds:
         return None
-    assert isinstance(flight.injector, Rewritten), "what hides a hit rewrites the sensor's messages"
+    assert isinstance(flight.injector, OnTheWay), "what hides a hit rewrites the sensor's messages"
     when = flight.injector.when
     return 1e6 * when.ended_s(flight.air) if when.is_on_at(flight.air, 1e-6 * hit.contact_at_boot_us) else None
 
