@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import dask
-from distributed import Client, LocalCluster, as_completed
+from distributed import Client, as_completed
 
 from companion.errors import ReboundError
 from rebound_cli import __version__
@@ -231,8 +231,9 @@ def _client(workers: Workers) -> Client:
         resource_tracker.ensure_running()  # it unblocks the signal when it starts, with the first worker otherwise
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            address = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50}
-            return _LocalClient(LocalCluster(n_workers=workers.jobs, threads_per_worker=1, processes=True, **address))
+            # Its cluster ends with it.
+            quiet = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50}
+            return Client(n_workers=workers.jobs, threads_per_worker=1, processes=True, **quiet)
         finally:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     try:
@@ -242,14 +243,6 @@ def _client(workers: Workers) -> Client:
             f"no Dask scheduler answers at {workers.scheduler} ({error}); start one with `dask scheduler`, "
             "or leave --scheduler away"
         ) from error
-
-
-class _LocalClient(Client):  # type: ignore[misc]
-    """A client that takes its cluster down with itself."""
-
-    def __exit__(self, *exception: object) -> None:
-        super().__exit__(*exception)
-        self.cluster.close()
 
 
 def _check_versions(client: Client, module: str) -> None:

@@ -6,7 +6,7 @@ import pandas as pd
 
 from bench.cases.hits import SPEEDS_M_S
 from bench.fly.watching import ASKED_HZ, FLOWN_WITH
-from bench.rows.tables import Bar, per_cent, percentile, rms, share, share_bar, table, text_of
+from bench.rows.tables import Bar, per_cent, percentile, rms, share_bar, table, text_of
 
 (DEFAULT,), SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
 # By airframe and rate received.
@@ -56,9 +56,9 @@ def _figures(hits: pd.DataFrame) -> dict[str, object]:
     seen, normal = hits[late.notna() & hits["possible_ms"].notna()], hits["normal_error_deg"]
     return {
         "hits": len(hits),
-        "found [%]": per_cent(share(late.notna()), 2),
+        "found [%]": per_cent(late.notna().mean(), 2),
         "between the samples": f"{between['latency_ms'].notna().sum()} / {len(between)}",
-        "after the first possible sample [%]": per_cent(share(seen["samples_late"] > 0), 2),
+        "after the first possible sample [%]": per_cent((seen["samples_late"] > 0).mean(), 2),
         "latency, median / 99 % [ms]": f"{text_of(percentile(late, 50))} / {text_of(percentile(late, 99))}",
         "false before": int(hits["false"].sum()),
         "v_c error, RMS [m/s]": text_of(rms(hits["speed_error_m_s"].dropna()), 3),
