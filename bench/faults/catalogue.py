@@ -10,8 +10,8 @@ from typing import Any
 import yaml
 
 from bench.faults import injectors, people
-from bench.faults.injectors import CHANGES, Change, Once, Rewritten, adding, setting, simulated
-from bench.faults.people import Forged
+from bench.faults.injectors import CHANGES, Change, Once, adding, rewritten, setting, simulated
+from bench.faults.people import forged
 from bench.fly.air import Air, Expected, Fault, Injector, When
 from bench.fly.packets import NUMBERS
 from sim_vehicle.bench.faults import FaultRequest, ekf_reset, other
@@ -62,18 +62,18 @@ def _disarm(message: Any, air: Air) -> None:
 def _forged_velocity(chance: random.Random) -> Injector:
     """One packet, of ODOMETRY or of LOCAL_POSITION_NED, with a velocity 2 m/s aside."""
     axis, name = chance.choice(("vx", "vy", "vz")), chance.choice(("ODOMETRY", "LOCAL_POSITION_NED"))
-    return Forged(When.flying(chance), NUMBERS[name], adding(**{axis: chance.choice((-2.0, 2.0))}))
+    return forged(When.flying(chance), NUMBERS[name], adding(**{axis: chance.choice((-2.0, 2.0))}))
 
 
 def _forged_imu(names: Sequence[str], chance: random.Random, size: float, times: int = 1) -> Injector:
     when, axis = When.flying(chance), chance.choice(names)
-    return Forged(when, NUMBERS["HIGHRES_IMU"], adding(**{axis: chance.choice((-size, size))}), times, 0.004)
+    return forged(when, NUMBERS["HIGHRES_IMU"], adding(**{axis: chance.choice((-size, size))}), times, 0.004)
 
 
 # By the words after `do` in the file: what is drawn, in this order, belongs to the seed.
 DOES: dict[str, Callable[..., Injector]] = {
-    "stuck": lambda c, names, for_s=math.inf: injectors.Stuck(When.flying(c, for_s), _numbers(names)),
-    "thinned": lambda c, names, every: injectors.Thinned(When.flying(c), _numbers(names), every),
+    "stuck": lambda c, names, for_s=math.inf: injectors.stuck(When.flying(c, for_s), _numbers(names)),
+    "thinned": lambda c, names, every: injectors.thinned(When.flying(c), _numbers(names), every),
     "jumped": lambda c, jump_s: injectors.Jumped(When.flying(c), jump_s),
     "anew": lambda c: injectors.anew(When.flying(c)),
     "stalled": lambda c, seconds, moment="flying": _once(injectors.stall(seconds), c, moment),
@@ -86,16 +86,16 @@ DOES: dict[str, Callable[..., Injector]] = {
     "height_reset": lambda c: simulated(ekf_reset((0.0, 0.0, c.choice((-0.5, 0.5)))), When.flying(c)),
     "gust": _gust,
     "push": _push,
-    "forged_disarm": lambda c, *times: Forged(When.flying(c), NUMBERS["HEARTBEAT"], _disarm, *times),
+    "forged_disarm": lambda c, *times: forged(When.flying(c), NUMBERS["HEARTBEAT"], _disarm, *times),
     "forged_velocity": _forged_velocity,
     "forged_rate": partial(_forged_imu, ("xgyro", "ygyro")),
     "forged_force": partial(_forged_imu, ("xacc", "yacc")),
-    "denied": lambda c: people.Denied(When.flying(c)),
-    "strangers": lambda c: people.Strangers(When("connect", 2.0)),
-    "flood": lambda c: people.Strangers(When.flying(c, 3.0), 10),
-    "foreign_byte": lambda c: people.Noise(When("connect", 2.0), 1),
-    "foreign_bytes": lambda c: people.Noise(When.flying(c), 300),
-    "hostile": lambda c, spared=(): people.Hostile(When.flying(c), _numbers(spared)),
+    "denied": lambda c: people.denied(When.flying(c)),
+    "strangers": lambda c: people.strangers(When("connect", 2.0)),
+    "flood": lambda c: people.strangers(When.flying(c, 3.0), 10),
+    "foreign_byte": lambda c: people.noise(When("connect", 2.0), 1),
+    "foreign_bytes": lambda c: people.noise(When.flying(c), 300),
+    "hostile": lambda c, spared=(): people.hostile(When.flying(c), _numbers(spared)),
     "taken": lambda c, state, from_s, within_s, stall_s=0.0, cut_s=0.0: people.Taken(
         When(state, c.uniform(from_s, from_s + within_s)), stall_s, cut_s
     ),
@@ -111,12 +111,11 @@ def _injected(row: Row, chance: random.Random) -> Injector:
         kind, *_ = row["vehicle"].values()
         return simulated(FaultRequest(kind, {k: v for k, v in row["vehicle"].items() if k != "kind"}), when)
     if "forge" in row:
-        forged = row["forge"]
-        times, every_s = forged.get("times", 1), forged.get("every_s", 0.0)
-        return Forged(when, NUMBERS[forged["message"]], _change(forged), times, every_s)
-    rewritten = row["rewrite"]
-    change = CHANGES[rewritten["by"]] if "by" in rewritten else _change(rewritten)
-    return Rewritten(when, _numbers(rewritten["messages"]), change)
+        forge = row["forge"]
+        return forged(when, NUMBERS[forge["message"]], _change(forge), forge.get("times", 1), forge.get("every_s", 0.0))
+    rewrite = row["rewrite"]
+    change = CHANGES[rewrite["by"]] if "by" in rewrite else _change(rewrite)
+    return rewritten(when, _numbers(rewrite["messages"]), change)
 
 
 def _read(file: Path) -> dict[str, tuple[Fault, ...]]:

@@ -1,8 +1,9 @@
 """The ways in which faults act on sensors, estimates, clocks and the companion's process."""
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from bench.fly.air import Air, Injector, When
@@ -51,63 +52,52 @@ class Jumped(Injector):
 
 
 @dataclass
-class Rewritten(Injector):
-    """Packets of some messages are changed on their way to the companion."""
+class OnTheWay(Injector):
+    """Packets on their way to the companion: while it is time it gets what `act` makes of them; `note` sees all."""
 
     when: When
-    numbers: Sequence[int]
-    change: Change
+    act: Callable[[Air, list[bytes]], Sequence[bytes]]
+    note: Callable[[list[bytes]], None] = lambda frames: None
 
     def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        if not self.when.is_on(air):
-            return frames
-        return [
-            changed(frame, lambda message: self.change(message, air)) if message_id_of(frame) in self.numbers else frame
-            for frame in frames
-        ]
+        self.note(frames)
+        return self.act(air, frames) if self.when.is_on(air) else frames
 
 
-@dataclass
-class Stuck(Injector):
+def rewritten(when: When, numbers: Sequence[int], change: Change) -> OnTheWay:
+    """Packets of some messages are changed."""
+
+    def one(air: Air, frame: bytes) -> bytes:
+        return changed(frame, lambda message: change(message, air)) if message_id_of(frame) in numbers else frame
+
+    return OnTheWay(when, lambda air, frames: [one(air, frame) for frame in frames])
+
+
+def stuck(when: When, numbers: Sequence[int]) -> OnTheWay:
     """Messages come at their rate, with the stamps of their time, and say for ever what they said at first."""
+    first: dict[int, bytes] = {}
 
-    when: When
-    numbers: Sequence[int]
-    first: dict[int, bytes] = field(default_factory=dict)
+    def restamp(message: Any, air: Air) -> None:
+        for name, unit_us in (("time_usec", 1), ("time_boot_ms", 1000)):
+            if hasattr(message, name):
+                setattr(message, name, air.vehicle.time_boot_us // unit_us)
 
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        if not self.when.is_on(air):
-            return frames
-        return [self._stuck(air, frame) if message_id_of(frame) in self.numbers else frame for frame in frames]
+    def one(air: Air, frame: bytes) -> bytes:
+        if message_id_of(frame) not in numbers:
+            return frame
+        return changed(first.setdefault(message_id_of(frame), frame), lambda message: restamp(message, air))
 
-    def _stuck(self, air: Air, frame: bytes) -> bytes:
-        first = self.first.setdefault(message_id_of(frame), frame)
-
-        def restamp(message: Any) -> None:
-            for name, unit_us in (("time_usec", 1), ("time_boot_ms", 1000)):
-                if hasattr(message, name):
-                    setattr(message, name, air.vehicle.time_boot_us // unit_us)
-
-        return changed(first, restamp)
+    return OnTheWay(when, lambda air, frames: [one(air, frame) for frame in frames])
 
 
-@dataclass
-class Thinned(Injector):
+def thinned(when: When, numbers: Sequence[int], keep_every: int) -> OnTheWay:
     """Of some messages only every n-th comes."""
+    count = itertools.count(1)
 
-    when: When
-    numbers: Sequence[int]
-    keep_every: int
-    count: int = 0
+    def is_kept(frame: bytes) -> bool:
+        return message_id_of(frame) not in numbers or next(count) % keep_every == 0
 
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        if not self.when.is_on(air):
-            return frames
-        return [frame for frame in frames if message_id_of(frame) not in self.numbers or self._is_kept()]
-
-    def _is_kept(self) -> bool:
-        self.count += 1
-        return self.count % self.keep_every == 0
+    return OnTheWay(when, lambda air, frames: [frame for frame in frames if is_kept(frame)])
 
 
 def setting(**fields: Any) -> Change:

@@ -2,121 +2,105 @@
 
 import math
 import random
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from bench.faults.injectors import Change
+from bench.faults.injectors import Change, OnTheWay
 from bench.fly.air import Air, Injector, When
 from bench.fly.packets import SET_MODE, changed, decoded, made, packed_by
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import message_id_of
 
-_MANUAL = 1 << 16
+_MANUAL, _STRANGER = 1 << 16, (7, 1)
+# Ten a second.
+_DENIED_EVERY = 25
 # Among them NaN, infinities, what no float holds twice, and what a vehicle could say.
 _FLOATS: tuple[float, ...] = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, 1e-45, 0.0)
 _FLOATS += (-1e6, -100.0, -10.0, -1.0, 1.0, 10.0, 100.0)
 _BITS = {"uint8_t": 8, "uint16_t": 16, "uint32_t": 32, "uint64_t": 64, "int8_t": 7, "int16_t": 15, "int32_t": 31}
 
 
-@dataclass
-class Forged(Injector):
+def forged(when: When, number: int, change: Change, times: int = 1, every_s: float = 0.0) -> OnTheWay:
     """Packets in the vehicle's name beside its own: the newest true one of its kind with some fields changed."""
+    latest: dict[int, bytes] = {}
+    left, due_s = times, 0.0
 
-    when: When
-    number: int
-    change: Change
-    times: int = 1
-    every_s: float = 0.0
-    latest: bytes | None = None
-    _due_s: float = field(default=0.0)
-
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        for frame in frames:
-            if message_id_of(frame) == self.number:
-                self.latest = frame
-        if self.latest is None or self.times == 0 or air.now_s < self._due_s or not self.when.is_on(air):
+    def act(air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        nonlocal left, due_s
+        if number not in latest or left == 0 or air.now_s < due_s:
             return frames
-        self.times -= 1
-        self._due_s = air.now_s + self.every_s
-        return [*frames, changed(self.latest, lambda message: self.change(message, air))]
+        left, due_s = left - 1, air.now_s + every_s
+        return [*frames, changed(latest[number], lambda message: change(message, air))]
+
+    return OnTheWay(when, act, _keeping(latest))
 
 
-@dataclass
-class Noise(Injector):
+def _keeping(latest: dict[int, bytes]) -> Callable[[list[bytes]], None]:
+    """Notes the newest packet of every kind."""
+    return lambda frames: latest.update((message_id_of(frame), frame) for frame in frames)
+
+
+def noise(when: When, most: int) -> OnTheWay:
     """Bytes that are no packets, in every interval."""
-
-    when: When
-    most: int
-
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        if not self.when.is_on(air):
-            return frames
-        return [*frames, air.chance.randbytes(air.chance.randint(1, self.most))]
+    return OnTheWay(when, lambda air, frames: [*frames, air.chance.randbytes(air.chance.randint(1, most))])
 
 
-@dataclass
-class Strangers(Injector):
+def strangers(when: When, copies: int = 1) -> OnTheWay:
     """Another system's packets: its own heartbeats, modes and forces, as many as the vehicle's."""
 
-    when: When
-    copies: int = 1
-    sender: tuple[int, int] = (7, 1)
-
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        if not self.when.is_on(air):
-            return frames
+    def act(air: Air, frames: list[bytes]) -> Sequence[bytes]:
         beat = {"type": 2, "autopilot": 12, "base_mode": 1, "custom_mode": _MANUAL}
         force = {"time_usec": air.vehicle.time_boot_us, "xacc": -40.0, "fields_updated": 63}
-        forged = [made("HEARTBEAT", beat, self.sender), made("HIGHRES_IMU", force, self.sender)]
-        return [*frames, *forged * self.copies]
+        return [*frames, *(made("HEARTBEAT", beat, _STRANGER), made("HIGHRES_IMU", force, _STRANGER)) * copies]
+
+    return OnTheWay(when, act)
 
 
-@dataclass
-class Denied(Injector):
+def denied(when: When) -> OnTheWay:
     """Answers to commands in the vehicle's name: what was asked for is denied."""
+    fields = {"command": SET_MODE, "result": 2, "target_system": 1, "target_component": COMPONENT_ID}
+    intervals = 0
 
-    when: When
-    count: int = 0
+    def note(frames: list[bytes]) -> None:
+        nonlocal intervals
+        intervals += 1
 
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        self.count += 1
-        if self.count % 25 or not self.when.is_on(air):
-            return frames
-        fields = {"command": SET_MODE, "result": 2, "target_system": 1, "target_component": COMPONENT_ID}
-        return [*frames, made("COMMAND_ACK", fields)]
+    def act(air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        return frames if intervals % _DENIED_EVERY else [*frames, made("COMMAND_ACK", fields)]
+
+    return OnTheWay(when, act, note)
 
 
-@dataclass
-class Hostile(Injector):
+def hostile(when: When, spared: Sequence[int] = ()) -> OnTheWay:
     """True packets of every kind that comes, with one to three fields spoiled, beside the vehicle's own."""
+    latest: dict[int, bytes] = {}
 
-    when: When
-    spares: Sequence[int] = ()
-    latest: dict[int, bytes] = field(default_factory=dict)
+    def act(air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        chance, kinds = air.chance, [number for number in latest if number not in spared]
+        return [
+            *(_spoiled(chance, latest[chance.choice(kinds)]) for _ in range(chance.choice((0, 0, 1, 1, 2)))),
+            *frames,
+        ]
 
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        self.latest |= {message_id_of(frame): frame for frame in frames}
-        if not self.when.is_on(air):
-            return frames
-        kinds = [number for number in self.latest if number not in self.spares]
-        forged = [self._spoiled(air, air.chance.choice(kinds)) for _ in range(air.chance.choice((0, 0, 1, 1, 2)))]
-        return [*forged, *frames]
+    return OnTheWay(when, act, _keeping(latest))
 
-    def _spoiled(self, air: Air, number: int) -> bytes:
-        message = decoded(self.latest[number])
-        assert message is not None, "it was the vehicle's own"
-        names = [name for name, kind in zip(message.fieldnames, message.fieldtypes, strict=True) if kind != "char"]
-        for name in air.chance.sample(names, min(len(names), air.chance.randint(1, 3))):
-            kind, now = message.fieldtypes[message.fieldnames.index(name)], getattr(message, name)
-            value = self._value(air.chance, kind)
-            setattr(message, name, [*now[:-1], value] if isinstance(now, list) else value)
-        return packed_by(message)
 
-    def _value(self, chance: random.Random, kind: str) -> float:
-        if kind in ("float", "double"):
-            return chance.choice((chance.choice(_FLOATS), chance.uniform(-20.0, 20.0)))
-        bits = _BITS.get(kind, 31)
-        return chance.choice((0, 1, (1 << bits) - 1, chance.randint(0, (1 << bits) - 1)))
+def _spoiled(chance: random.Random, frame: bytes) -> bytes:
+    message = decoded(frame)
+    assert message is not None, "it was the vehicle's own"
+    names = [name for name, kind in zip(message.fieldnames, message.fieldtypes, strict=True) if kind != "char"]
+    for name in chance.sample(names, min(len(names), chance.randint(1, 3))):
+        kind, now = message.fieldtypes[message.fieldnames.index(name)], getattr(message, name)
+        value = _value(chance, kind)
+        setattr(message, name, [*now[:-1], value] if isinstance(now, list) else value)
+    return packed_by(message)
+
+
+def _value(chance: random.Random, kind: str) -> float:
+    if kind in ("float", "double"):
+        return chance.choice((chance.choice(_FLOATS), chance.uniform(-20.0, 20.0)))
+    bits = _BITS.get(kind, 31)
+    return chance.choice((0, 1, (1 << bits) - 1, chance.randint(0, (1 << bits) - 1)))
 
 
 @dataclass

@@ -39,11 +39,12 @@ _STICKS_EVERY, _BEAT_EVERY = 20, 250
 # PX4's modes as DO_SET_MODE takes them: main and sub mode.
 POSCTL = 3 << 16
 COMPLETED, HANDED_OVER, FAILED, KILLED = "completed", "aborted", "failed", "killed"
-_WORDS = {
-    COMPLETED: "lands as the mission says",
-    HANDED_OVER: "ends, vehicle handed over",
-    FAILED: "fault told, vehicle handed over",
-    KILLED: "PX4's own failsafe lands it",
+ENDS = {
+    COMPLETED: "landed",
+    HANDED_OVER: "handed over",
+    FAILED: "fault told",
+    KILLED: "landed by PX4",
+    "hung": "not over in 60 s",
 }
 
 
@@ -307,7 +308,7 @@ class Expected:
     not this program; the hit may be told when the sensor is back, as late as any other after its touch."""
 
     def text(self) -> str:
-        parts = [" or ".join(_WORDS[outcome] for outcome in self.outcomes)]
+        parts = [" or ".join(ENDS[outcome] for outcome in self.outcomes)]
         parts += ["the hit found"] if self.finds else [] if self.has_wall else ["(no wall in the way)"]
         parts += [] if self.false_hits else ["nothing else taken for one"]
         parts += ["who meets the wall meanwhile is PX4's and the airframe's"] if self.blinds else []

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import dask
-from distributed import Client, LocalCluster, as_completed
+from distributed import Client, as_completed
 
 from companion.errors import ReboundError
 from rebound_cli import __version__
@@ -122,6 +122,16 @@ def run_campaign(campaign: Campaign, workers: Workers, folder: Path = RECORDS_FO
     return Results(*({n: one[word] for n, one in ordered.items() if word in one} for word in ("result", "failure")))
 
 
+def rows_of(campaign: Campaign, workers: Workers, out: Path) -> list[Json]:
+    """Of a campaign whose results are rows already: all of them, each a line of a file. Raises CampaignError."""
+    results = run_campaign(campaign, workers)
+    if results.failures:
+        raise CampaignError(results.text(campaign))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text("".join(f"{json.dumps(row)}\n" for row in results.results.values()), encoding="utf-8")
+    return [*results.results.values()]
+
+
 def worked_out(function: Callable[[Any], Any], cases: Sequence[Any], workers: Workers) -> list[Any]:
     """The results of cases whose results are no JSON, in the order of cases. Raises CampaignError where one failed."""
     found = outcomes(function, list(enumerate(cases)), workers)
@@ -221,8 +231,9 @@ def _client(workers: Workers) -> Client:
         resource_tracker.ensure_running()  # it unblocks the signal when it starts, with the first worker otherwise
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            address = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50}
-            return _LocalClient(LocalCluster(n_workers=workers.jobs, threads_per_worker=1, processes=True, **address))
+            # Its cluster ends with it.
+            quiet = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50}
+            return Client(n_workers=workers.jobs, threads_per_worker=1, processes=True, **quiet)
         finally:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     try:
@@ -232,14 +243,6 @@ def _client(workers: Workers) -> Client:
             f"no Dask scheduler answers at {workers.scheduler} ({error}); start one with `dask scheduler`, "
             "or leave --scheduler away"
         ) from error
-
-
-class _LocalClient(Client):  # type: ignore[misc]
-    """A client that takes its cluster down with itself."""
-
-    def __exit__(self, *exception: object) -> None:
-        super().__exit__(*exception)
-        self.cluster.close()
 
 
 def _check_versions(client: Client, module: str) -> None:

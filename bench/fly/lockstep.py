@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from companion.companion import Companion
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
@@ -46,6 +48,15 @@ class JudgedFlight:
 
     def boot_us(self, event: Event) -> float:
         return event.time_us - self.truth.epoch_at_boot_us
+
+    def at(self, boot_us: float) -> str:
+        """In words, by the companion's own time."""
+        return f"at {1e-6 * (boot_us + self.truth.epoch_at_boot_us - self.report.started_at_us):.2f} s"
+
+    def row_at(self, boot_us: float) -> int:
+        """Of the truth's series."""
+        times_us = self.truth.series["time_boot_us"]
+        return min(int(np.searchsorted(times_us, boot_us)), len(times_us) - 1)
 
 
 def flown_in(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.detectors.config import BaselineConfig
-from bench.fly.wire import BUILDERS, HeardStep
+from bench.fly.wire import HeardStep
 from companion.link.streams import wanted_streams
 from companion.messages import MessageId
 from companion.mission.config import CompanionConfig
@@ -42,11 +42,11 @@ def detector_names() -> tuple[str, ...]:
 
 
 def streams_asked_hz(rate: int) -> dict[MessageId, float]:
-    """What is asked of the vehicle for all detectors together, HIGHRES_IMU at the rate."""
-    config = CompanionConfig().streams
-    asked = {stream.message_id: stream.asked_hz for stream in wanted_streams(config, tuple(MessageId))}
-    wanted = {message: hz for message, hz in asked.items() if message in BUILDERS}
-    return {**wanted, MessageId.HIGHRES_IMU: ASKED_HZ[rate]}
+    """What is asked of the plant for all detectors together, HIGHRES_IMU at the rate. It has no modes."""
+    wanted = wanted_streams(CompanionConfig().streams, tuple(MessageId))
+    asked_hz: dict[MessageId, float] = {stream.message_id: stream.asked_hz for stream in wanted}
+    del asked_hz[MessageId.CURRENT_MODE]
+    return asked_hz | {MessageId.HIGHRES_IMU: ASKED_HZ[rate]}
 
 
 def watch_all(

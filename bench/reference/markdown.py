@@ -1,7 +1,12 @@
-"""Markdown that several generated pages have in common."""
+"""Markdown that several generated pages have in common, and what people have written of keys and events."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import yaml
+
+MEANINGS: dict[str, dict[str, str]] = yaml.safe_load(Path(__file__).with_name("meanings.yaml").read_text("utf-8"))
 
 
 def cell(text: object) -> str:

@@ -26,7 +26,7 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
     time_us, height_m = series["time_boot_us"], heights_m(flight)
     tilt_deg = tilts_deg(series["attitude_wxyz"])
     if tilt_deg.max() > 90.0:
-        yield "tumbled", f"leant by {tilt_deg.max():.0f} deg {_at(flight, time_us[int(tilt_deg.argmax())])}"
+        yield "tumbled", f"leant by {tilt_deg.max():.0f} deg {flight.at(time_us[int(tilt_deg.argmax())])}"
     airborne = np.flatnonzero(height_m > AIRBORNE_M)
     if len(airborne) == 0:
         return
@@ -35,10 +35,10 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
         index = int(airborne[0] + touching[0])
         sink_m_s = float(series["velocity_ned_m_s"][index - 1, 2])
         if sink_m_s > LANDING_SPEED_MOST_M_S:
-            yield "fell", f"reached the ground with {sink_m_s:.1f} m/s {_at(flight, time_us[index])}"
+            yield "fell", f"reached the ground with {sink_m_s:.1f} m/s {flight.at(time_us[index])}"
         phase = phases_of(flight.events, flight.truth.epoch_at_boot_us).at(float(time_us[index]))
         if phase not in (MissionPhase.LANDING, MissionPhase.OVER):
-            yield "touched the ground", f"while {phase.value} {_at(flight, time_us[index])}"
+            yield "touched the ground", f"while {phase.value} {flight.at(time_us[index])}"
     fence, start = flight.mission.fence, np.array(flight.start_ned_m)
     places = series["position_ned_m"][:: max(1, len(time_us) // 2000)] - start
     outside_m = max(fence.outside_by_m((float(n), float(e), float(d))) for n, e, d in places)
@@ -62,8 +62,3 @@ def tilts_deg(attitude_wxyz: Floats) -> Floats:
     cosine = 1.0 - 2.0 * (attitude_wxyz[:, 1] ** 2 + attitude_wxyz[:, 2] ** 2)
     tilts: Floats = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     return tilts
-
-
-def _at(flight: JudgedFlight, boot_us: float) -> str:
-    begun_us = flight.report.started_at_us - flight.truth.epoch_at_boot_us
-    return f"at {1e-6 * (boot_us - begun_us):.2f} s"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.faults.catalogue import FLOWN
-from bench.faults.injectors import Rewritten
+from bench.faults.injectors import OnTheWay
 from bench.fly.air import FAILED, HANDED_OVER, KILLED, Fault, Injector
 from bench.fly.campaign import Json
 from bench.fly.faulted import FaultedFlight
@@ -99,7 +99,7 @@ def _blind_until_us(flight: FaultedFlight, hit: Hit | None) -> float | None:
     """When the fault's end lets a hit be seen that it hid; None for one that it did not hide."""
     if hit is None or not flight.fault.expected.blinds:
         return None
-    assert isinstance(flight.injector, Rewritten), "what hides a hit rewrites the sensor's messages"
+    assert isinstance(flight.injector, OnTheWay), "what hides a hit rewrites the sensor's messages"
     when = flight.injector.when
     return 1e6 * when.ended_s(flight.air) if when.is_on_at(flight.air, 1e-6 * hit.contact_at_boot_us) else None
 
@@ -152,9 +152,7 @@ def _is_reproducible(flight: FaultedFlight) -> bool:
 
 def _is_up(flown: JudgedFlight, at_s: float) -> bool:
     """Whether the vehicle is off the ground then."""
-    time_us = flown.truth.series["time_boot_us"]
-    index = min(int(np.searchsorted(time_us, at_s * 1e6)), len(time_us) - 1)
-    return bool(heights_m(flown)[index] > STANDS_M)
+    return bool(heights_m(flown)[flown.row_at(at_s * 1e6)] > STANDS_M)
 
 
 def _ground_m_s(flown: JudgedFlight) -> float | None:

@@ -10,7 +10,7 @@ from bench.cases.vehicles import BenchVehicle, vehicle_of
 from bench.fly.campaign import Json
 from bench.fly.cruise import fly_healthy, hit_of, hover_in_hand
 from bench.fly.watching import ASKED_HZ, FOUND_WITHIN_US, Found, configuration, streams_asked_hz, watch_all
-from bench.fly.wire import LINKS, HeardStep, VehicleRecording, Wire, over_link
+from bench.fly.wire import LINKS, HeardStep, VehicleRecording, heard
 from companion.messages import ImuSample, Vector3
 from companion.reflex.impact import ImpactEstimate
 from sim_vehicle.truth import Hit
@@ -114,10 +114,9 @@ def work_out_flight(case: FlightCase) -> Json:
 
 def _heard(recording: VehicleRecording, seed: int, link: str | None = None) -> Iterator[tuple[str, list[HeardStep]]]:
     """By rate, as a record names it: what comes over the link."""
-    wire = Wire(recording)
+    fault = None if link is None else LINKS[link]
     for rate in ASKED_HZ:
-        sent = wire.heard(streams_asked_hz(rate), seed + rate)
-        yield str(rate), sent if link is None else over_link(sent, recording, LINKS[link], seed + rate)
+        yield str(rate), heard(recording, streams_asked_hz(rate), seed + rate, fault)
 
 
 def _watched(

@@ -54,9 +54,9 @@ def _noticing(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterat
     for contact in contacts:
         if contact.role is Role.HIT and contact.collision is None and contact.closing_m_s >= NOTICED_M_S:
             text = f"{contact.hit.obstacle} at {contact.speed_m_s:.2f} m/s ({contact.closing_m_s:.2f} square to it)"
-            yield Failure("hit not noticed", f"{text} {_at(flight, contact.hit.contact_at_boot_us)}")
+            yield Failure("hit not noticed", f"{text} {flight.at(contact.hit.contact_at_boot_us)}")
     for collision in without_contact(flight):
-        yield Failure("answered a hit that was none", _at(flight, collision.sample_time_boot_us))
+        yield Failure("answered a hit that was none", flight.at(collision.sample_time_boot_us))
 
 
 def _places(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[str]:
@@ -69,7 +69,7 @@ def _places(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator
         if event.kind == "hold":
             off_m = _wandered_m(flight, event, following, contacts)
             if off_m > HELD_M:
-                yield f"moved by {off_m:.2f} m while holding {_at(flight, flight.boot_us(event))}"
+                yield f"moved by {off_m:.2f} m while holding {flight.at(flight.boot_us(event))}"
         if following.kind == "item" and event.kind in ("armed", "item"):
             step = steps[0 if event.kind == "armed" else int(str(event.data["step"]))]
             goal = _goal(step.action)
@@ -106,9 +106,8 @@ def _goal(action: object) -> Floats | None:
 
 def _place(flight: JudgedFlight, event: Event) -> Floats:
     """Where the vehicle truly was, mission coordinates."""
-    series = flight.truth.series
-    index = min(int(np.searchsorted(series["time_boot_us"], flight.boot_us(event))), len(series["time_boot_us"]) - 1)
-    place: Floats = series["position_ned_m"][index] - np.array(flight.start_ned_m) + [0.0, 0.0, flight.standing_m]
+    world_ned_m = flight.truth.series["position_ned_m"][flight.row_at(flight.boot_us(event))]
+    place: Floats = world_ned_m - np.array(flight.start_ned_m) + [0.0, 0.0, flight.standing_m]
     return place
 
 
@@ -120,10 +119,6 @@ def _wandered_m(flight: JudgedFlight, begin: Event, end: Event, contacts: Sequen
     time_us = flight.truth.series["time_boot_us"]
     path = flight.truth.series["position_ned_m"][(time_us >= first_us) & (time_us <= last_us)]
     return float(np.linalg.norm(path - path[0], axis=1).max()) if len(path) else 0.0
-
-
-def _at(flight: JudgedFlight, boot_us: float) -> str:
-    return f"at {1e-6 * (boot_us + flight.truth.epoch_at_boot_us - flight.report.started_at_us):.2f} s"
 
 
 def work_out_mission(case: MissionCase) -> Json:

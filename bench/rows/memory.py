@@ -31,8 +31,8 @@ def repeated(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterato
         if contact.role is not Role.HIT or contact.hit.contact_point_ned_m is None:
             continue
         if _keeps_off(flight, contact) and any(_is_known(contact, earlier) for earlier in answered):
-            at_s = 1e-6 * (contact.hit.contact_at_boot_us - _begun_us(flight))
-            yield f"{contact.hit.obstacle} again at {contact.speed_m_s:.2f} m/s at {at_s:.2f} s"
+            at = flight.at(contact.hit.contact_at_boot_us)
+            yield f"{contact.hit.obstacle} again at {contact.speed_m_s:.2f} m/s {at}"
         is_still = contact.hit.obstacle in flight.obstacles and flight.obstacles[contact.hit.obstacle].motion is None
         if contact.collision is not None and contact.closing_m_s >= REMEMBERED_M_S and is_still:
             answered.append(contact)
@@ -75,18 +75,12 @@ def given_up(flight: JudgedFlight) -> Iterator[str]:
         action = steps[index].action
         goal = action.position_ned_m if isinstance(action, GoToItem) and "then" in event.data else None
         if goal is not None and _is_open(flight, event, goal):
-            yield f"item {steps[index].label} at {1e-6 * (flight.boot_us(event) - _begun_us(flight)):.2f} s"
+            yield f"item {steps[index].label} {flight.at(flight.boot_us(event))}"
 
 
 def _is_open(flight: JudgedFlight, event: Event, goal_ned_m: Sequence[float]) -> bool:
-    series = flight.truth.series
-    index = min(int(np.searchsorted(series["time_boot_us"], flight.boot_us(event))), len(series["time_boot_us"]) - 1)
-    start = series["position_ned_m"][index]
+    start = flight.truth.series["position_ned_m"][flight.row_at(flight.boot_us(event))]
     goal = np.array(goal_ned_m) + np.array(flight.start_ned_m) - [0.0, 0.0, flight.standing_m]
     places = [start + share * (goal - start) for share in np.linspace(0.0, 1.0, _LOOKS)]
     still = [obstacle for obstacle in flight.obstacles.values() if obstacle.motion is None]
     return all(obstacle.distance_m((float(n), float(e), float(d))) > OPEN_M for obstacle in still for n, e, d in places)
-
-
-def _begun_us(flight: JudgedFlight) -> float:
-    return flight.report.started_at_us - flight.truth.epoch_at_boot_us

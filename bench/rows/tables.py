@@ -60,10 +60,12 @@ def table(rows: pd.DataFrame | Sequence[Mapping[str, object]]) -> str:
     return text + "\n"
 
 
-def share(part: Iterable[bool]) -> float:
-    """NaN of nothing."""
-    values = list(part)
-    return sum(values) / len(values) if values else math.nan
+def share_bar(what: str, holds: "pd.Series[bool]", least: float | None = None) -> Bar:
+    """Of how many it must hold, and of how many it does. Without a least or with none there is no verdict."""
+    part, count = float(holds.astype(bool).mean()), len(holds)
+    wanted = "" if least is None else f"≥ {100 * least:g} %"
+    is_met = part >= least if least is not None and count else None
+    return Bar(what, wanted, f"{per_cent(part, 2)} %", is_met, f"{count - sum(holds)} of {count} not")
 
 
 def rms(values: Iterable[float]) -> float:

@@ -12,7 +12,7 @@ from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Results, Workers, run_campaign
 from bench.fly.lockstep import NOTICED_M_S, fly
 from bench.rows.judge import failures, work_out_mission
-from bench.rows.tables import Bar, Page, bars_text, per_cent, share, summary_text, table
+from bench.rows.tables import Bar, Page, bars_text, share_bar, summary_text, table
 from companion.errors import ConfigurationError
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
@@ -172,40 +172,28 @@ def mission_bars(flights: pd.DataFrame, hits: pd.DataFrame, wanted: Mapping[str,
 
 
 def _endings(airframe: str, flown: pd.DataFrame, wanted: float) -> Iterator[Bar]:
-    good, of = share(flown["is_good"]), f"{len(flown)} missions, {(~flown['is_good']).sum()} not"
-    what = f"{airframe}: missions that end as they say, without a crash"
-    yield Bar(what, f"≥ {100 * wanted:g} %", f"{per_cent(good, 2)} %", good >= wanted, of)
+    yield share_bar(f"{airframe}: missions that end as they say, without a crash", flown["is_good"], wanted)
     yield Bar(f"{airframe}: ways flown round what was known", "", str(flown["detours"].sum()), None)
     yield Bar(f"{airframe}: goals reported as out of reach", "", str(flown["unreachable"].sum()), None)
 
 
 def _hits(airframe: str, hits: pd.DataFrame) -> Iterator[Bar]:
     fast = hits[hits["speed_m_s"].between(*HIT_SPEEDS_M_S, inclusive="left")]
-    answered, clear_m = fast[fast["past_m"].notna()], fast["clear_m"].dropna()
-    is_near, judged = answered["past_m"] <= OVERSHOOT_MOST_M, airframe == "foldable"
-    where, clean = f"{airframe}, 1 to 5 m/s", share(is_near & (answered["again"] == 0))
-    yield Bar(
-        f"{where}: hits without 5 cm of overshoot and without touching the surface again",
-        f"≥ {100 * CLEAN_WANTED:g} %" if judged else "",
-        f"{per_cent(clean)} %",
-        clean >= CLEAN_WANTED if judged else None,
-        f"{len(answered)} hits, {(~is_near).sum()} past by more, {(answered['again'] > 0).sum()} touched again",
-    )
-    back = share(is_near & (answered["returned"] == 0))
-    of = f"{(answered['returned'] > 0).sum()} had come back"
-    apart = f"{where}: the same, but for other guards that swing in while the vehicle leaves"
-    yield Bar(apart, "", f"{per_cent(back)} %", None, of)
-    of = f"{len(clear_m)} hits, the nearest {100 * clear_m.min():.0f} cm"
-    clear = f"{where}: guards at rest {CLEAR_LEAST_M} m clear of what was hit"
-    yield Bar(clear, "", f"{per_cent(share(clear_m >= CLEAR_LEAST_M))} %", None, of)
+    answered, is_judged = fast[fast["past_m"].notna()], airframe == "foldable"
+    where, is_near = f"{airframe}, 1 to 5 m/s", answered["past_m"] <= OVERSHOOT_MOST_M
+    what = f"{where}: hits without 5 cm of overshoot and without touching the surface again"
+    yield share_bar(what, is_near & (answered["again"] == 0), CLEAN_WANTED if is_judged else None)
+    what = f"{where}: the same, but for other guards that swing in while the vehicle leaves"
+    yield share_bar(what, is_near & (answered["returned"] == 0))
+    what = f"{where}: guards at rest {CLEAR_LEAST_M} m clear of what was hit"
+    yield share_bar(what, fast["clear_m"].dropna() >= CLEAR_LEAST_M)
     slow = level(hits[hits["speed_m_s"] < LOST_UP_TO_M_S])
     yield _worst(f"{airframe}, level, up to 2.5 m/s: height lost", slow["lost_m"], LOST_MOST_M)
     upright = slow[slow["leant_deg"] < PINNED_DEG]
     yield _worst(f"{airframe}: the same, but for hits that tip it by {PINNED_DEG:g} deg", upright["lost_m"])
     yield _worst(f"{airframe}, level: height gained", level(hits)["risen_m"], RISEN_MOST_M)
     into = hits[noticeable(hits)]
-    noticed, of = f"{per_cent(share(into['seen']))} %", f"{len(into)} hits"
-    yield Bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", "", noticed, None, of)
+    yield share_bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", into["seen"])
 
 
 def _worst(what: str, values: "pd.Series[float]", most_m: float | None = None) -> Bar:

@@ -100,18 +100,18 @@ def hits_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
     first += hits
     for seed in range(first, first + hits // VARIED_SHARE):
         noise = VELOCITY_NOISES_M_S[seed // 2 % len(VELOCITY_NOISES_M_S)]
-        cases.append(draw_case("velocity", seed, _thorough(), velocity_noise_m_s=noise))
+        cases.append(draw_case("velocity", seed, THOROUGH, velocity_noise_m_s=noise))
     first += hits
     side = _side(hits, SIDE_HITS_AT_MOST)
-    cases += [draw_case("link", first + count, _thorough(), link=JITTERY) for count in range(side)]
-    cases += [draw_case("struck", first + hits + count, _thorough(), is_struck=True) for count in range(side)]
+    cases += [draw_case("link", first + count, THOROUGH, link=JITTERY) for count in range(side)]
+    cases += [draw_case("struck", first + hits + count, THOROUGH, is_struck=True) for count in range(side)]
     return drawing.campaign("hits", {"hits": hits}, cases, work_out_hit)
 
 
 def hands_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
     """A hand's grips on a hovering vehicle, as many as belong to so many hits."""
     first, count = drawing.first_seed, 2 * _side(hits, HANDS_AT_MOST // 2)
-    cases = [draw_hand(seed, _thorough()) for seed in range(first, first + count)]
+    cases = [draw_hand(seed, THOROUGH) for seed in range(first, first + count)]
     return drawing.campaign("hands", {"hits": hits}, cases, work_out_hand)
 
 
@@ -147,8 +147,4 @@ def _is_turn(seed: int, every: int) -> bool:
 
 
 def _compared(seed: int, every: int) -> tuple[str, ...]:
-    return detector_names() if _is_turn(seed, every) else _thorough()
-
-
-def _thorough() -> tuple[str, ...]:
-    return tuple(name for name in detector_names() if name in THOROUGH) or detector_names()
+    return detector_names() if _is_turn(seed, every) else THOROUGH

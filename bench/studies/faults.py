@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from bench.faults.catalogue import FLOWN, GROUPS
+from bench.fly.air import ENDS
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
 from bench.rows.faulted import work_out_seed
 from bench.rows.tables import Page, table
@@ -12,13 +13,6 @@ from companion.errors import ConfigurationError
 
 GROUP_OF = {fault.name: group for group, faults in GROUPS.items() for fault in faults}
 _SHOWN = 3
-_ENDS = {
-    "completed": "landed",
-    "aborted": "handed over",
-    "failed": "fault told",
-    "killed": "landed by PX4",
-    "hung": "not over in 60 s",
-}
 
 
 def run_faults(options: Namespace) -> int:
@@ -73,7 +67,7 @@ def faults_table(found: Mapping[str, Sequence[Json]]) -> str:
 
 def _flights(results: Sequence[Json]) -> tuple[str, str]:
     whole = [result for result in results if "tilt_deg" in result]
-    happened = _counted(_ENDS.get(result.get("outcome", "broken"), "broken") for result in results)
+    happened = _counted(ENDS.get(result.get("outcome", "broken"), "broken") for result in results)
     hits = [result for result in whole if result["hit"]]
     happened += f"; hits found {sum(result['found'] for result in hits)} of {len(hits)}"
     told = (("unseen", "of them met unseen"), ("false", "counted for nothing"), ("unconfirmed", "taken back"))

@@ -12,7 +12,8 @@ from bench.cases.mishaps import FAMILIES
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.stick_logs import LoggedSticks, logs_with_sticks
-from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, Watcher, rows_of
+from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, Watcher
+from bench.fly.campaign import Campaign, Workers, rows_of
 from bench.rows.tables import at_most_an_hour
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
@@ -47,7 +48,8 @@ def run_hand(options: Namespace) -> int:
     for seed in range(options.first_seed, options.first_seed + options.flights):
         logged = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
         cases.append(HandCase(seed, HAND_MODES[seed % len(HAND_MODES)], logged))
-    rows = rows_of(fly_by_hand, cases, options.jobs, options.out, "flights by hand")
+    parameters = {"flights": options.flights, "first_seed": options.first_seed, "logs": [log.log for log in logs]}
+    rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs), options.out)
     watched = by_rate(rows)
     print("\n".join(table(watched)))
     return 1 if any(_in_the_air(row) for row in watched) else 0

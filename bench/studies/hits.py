@@ -2,7 +2,7 @@
 
 import math
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 import pandas as pd
@@ -110,9 +110,9 @@ def flown_parts(hits: pd.DataFrame) -> dict[str, str]:
     missed, false = ~hits["found"], hits["false"] > 0
     lead = (
         f"{len(hits)} hits, {missed.sum()} missed, {hits['false'].sum()} false alarms. Each vehicle begins in flight "
+        f"and is guarded over the wire until it rests, for {MOST_RECOVERY_S:g} s at most. The truth judges.\n"
+        f"{TWO_CORES_S / hits['processor_s'].median():,.0f} an hour on two cores, by the median.\n"
     )
-    lead += f"and is guarded over the wire until it rests, for {MOST_RECOVERY_S:g} s at most. The truth judges.\n"
-    cost = f"{TWO_CORES_S / hits['processor_s'].median():,.0f} an hour on two cores, by the median.\n"
     named = {
         "missed at 0.5 m/s and more": missed & (hits["closing_m_s"] >= NOTICED_M_S),
         "over": hits["tilt_deg"] > OVERTURNED_DEG,
@@ -121,7 +121,7 @@ def flown_parts(hits: pd.DataFrame) -> dict[str, str]:
     cells, open_cells = _cells(hits, flown_cell)
     seeds = [{"hits": what, "number": int(which.sum()), "seeds": _seeds(hits[which])} for what, which in named.items()]
     return {
-        "": lead + cost,
+        "": lead,
         "By airframe, rate and speed": f"{cells}\n{_open(open_cells)}",
         "By what was met": table([{"met": met} | flown_cell(some) for met, some in hits.groupby("approach")]),
         "To look at again": table(seeds),
@@ -130,22 +130,20 @@ def flown_parts(hits: pd.DataFrame) -> dict[str, str]:
 
 def verdict_parts(hits: pd.DataFrame, results: Sequence[Json]) -> dict[str, str]:
     again = [one for one in results if "agrees" in one]
+    false, hours = sum(one["false"] for one in results), sum(one["watched_s"] for one in results) / 3600.0
+    spent_s = sum(one["cost"]["processor_s"] for one in results)
     lead = (
         f"{len(results):,} approaches with {len(hits):,} hits, {(~hits['found']).sum():,} missed. {len(again):,} were "
-    )
-    lead += (
         f"flown again from the beginning, {sum(one['agrees'] for one in again):,} have the same verdict to the last "
+        f"digit; the guard later took back {sum(not one['kept'] for one in again)} of them.\n"
+        f"False alarms: {false}, in {hours:.2f} h of free flight from {FREE_S} s on; "
+        f"at most {at_most_an_hour(false, hours):.2f} an hour.\n"
+        f"{TWO_CORES_S * len(hits) / spent_s:,.0f} an hour on two cores.\n"
     )
-    lead += f"digit; the guard later took back {sum(not one['kept'] for one in again)} of them.\n"
-    false, hours = sum(one["false"] for one in results), sum(one["watched_s"] for one in results) / 3600.0
-    most = at_most_an_hour(false, hours)
-    alarms = f"False alarms: {false}, in {hours:.2f} h of free flight from {FREE_S} s on; at most {most:.2f} an hour.\n"
-    spent_s = sum(one["cost"]["processor_s"] for one in results)
-    cost = f"{TWO_CORES_S * len(hits) / spent_s:,.0f} an hour on two cores.\n"
     noticed = hits[hits["closing_m_s"] >= NOTICED_M_S]
     cells, open_cells = _cells(hits, verdict_cell)
     return {
-        "": lead + alarms + cost,
+        "": lead,
         "By airframe, rate and speed": f"{cells}\n{_open(open_cells)}",
         "By what was met, from 0.5 m/s on": table(
             [{"met": a} | verdict_cell(s) for a, s in noticed.groupby("approach")]
@@ -154,17 +152,16 @@ def verdict_parts(hits: pd.DataFrame, results: Sequence[Json]) -> dict[str, str]
     }
 
 
-def _cells(hits: pd.DataFrame, cell: object) -> tuple[str, list[str]]:
+def _cells(hits: pd.DataFrame, cell: Callable[[pd.DataFrame], dict[str, object]]) -> tuple[str, list[str]]:
     """The table, and the cells that are not shown to be below the bound."""
-    assert callable(cell)
     rows, open_cells = [], []
     for (airframe, imu_hz, band), some in hits.groupby(["airframe", "imu_hz", "band"]):
         found = cell(some)
         rows.append({"airframe, IMU": f"{airframe}, {imu_hz} Hz", "speed [m/s]": band, **found})
         # Nothing of the kind was flown in the cell: nothing is shown of it.
-        bounds = [text for name, text in found.items() if name.startswith("at most")]
-        bounds = [math.inf if text == "-" else float(text) for text in bounds]
-        open_cells += [] if max(bounds) < 100 * BOUND else [f"{airframe}, {imu_hz} Hz, {band} m/s"]
+        bounds = [str(text) for name, text in found.items() if name.startswith("at most")]
+        largest = max(math.inf if text == "-" else float(text) for text in bounds)
+        open_cells += [] if largest < 100 * BOUND else [f"{airframe}, {imu_hz} Hz, {band} m/s"]
     noticed = hits[hits["closing_m_s"] >= NOTICED_M_S]
     rows.append({"airframe, IMU": "all", "speed [m/s]": f"from {NOTICED_M_S:g} on", **cell(noticed)})
     return table(rows), open_cells

@@ -4,8 +4,9 @@ from argparse import Namespace
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from bench.fly.by_hand.watched import IMU_HZ, Row, rows_of
+from bench.fly.by_hand.watched import IMU_HZ, Row
 from bench.fly.by_hand.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
+from bench.fly.campaign import Campaign, Workers, rows_of
 
 CRASH, NO_COLLISION = "crash", ("landing", "contact")
 # A crash is reported within this time of its greatest deceleration.
@@ -17,7 +18,8 @@ def run_landings(options: Namespace) -> int:
     first = options.first_seed
     cases = [draw_case(seed, LANDINGS) for seed in range(first, first + options.landings)]
     cases += [draw_case(seed, FALLS) for seed in range(first, first + options.falls)]
-    rows = rows_of(fly_to_the_ground, cases, options.jobs, options.out, "ways to the ground")
+    parameters = {"landings": options.landings, "falls": options.falls, "first_seed": first}
+    rows = rows_of(Campaign("landings", parameters, cases, fly_to_the_ground), Workers(options.jobs), options.out)
     print("\n".join(table(rows)))
     return 1 if any(row["wrong"] for row in rows) else 0
 

@@ -7,7 +7,7 @@ import pytest
 from bench.cases.hits import draw_case, draw_hand, vehicle_of_hit
 from bench.fly.cruise import fly_hit, hover_in_hand
 from bench.fly.watching import streams_asked_hz
-from bench.fly.wire import JITTERY, LINKS, Wire, over_link
+from bench.fly.wire import JITTERY, LINKS, heard
 from bench.rows.heard import first_possible, work_out_hand, work_out_hit
 from bench.studies.detectors import HANDS_AT_MOST, SIDE_HITS_AT_MOST, hands_campaign, hits_campaign
 from companion.messages import ImuSample
@@ -19,8 +19,8 @@ from sim_vehicle.airframe import load_built_in
 def sent_and_arrived(fault, seed=4):
     case = draw_case("link", 0, ())
     recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
-    sent = Wire(recording).heard(streams_asked_hz(246), seed)
-    return recording, hit, sent, over_link(sent, recording, fault, seed)
+    sent, arrived = (heard(recording, streams_asked_hz(246), seed, one) for one in (None, fault))
+    return recording, hit, sent, arrived
 
 
 def imu_stamps(heard):

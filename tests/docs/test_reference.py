@@ -4,8 +4,9 @@ import ast
 
 import pytest
 
-from bench.reference import events, summary
+from bench.reference import events
 from bench.reference.command import FOLDER, PAGES, page_text
+from bench.reference.markdown import MEANINGS
 from bench.reference.states import mermaid_diagram, transitions
 from companion.flight import states as flight_states
 from companion.guard import states as guard_states
@@ -21,7 +22,7 @@ def test_a_page_is_as_the_code_has_it(name):
 
 
 def test_every_kind_of_event_has_its_meaning():
-    assert set(events.data_keys()) | events.ELSEWHERE == set(events.MEANINGS)
+    assert set(events.data_keys()) | events.ELSEWHERE == set(MEANINGS["events"])
 
 
 def test_an_event_that_is_told_under_a_name_is_found():
@@ -47,9 +48,9 @@ def test_every_key_of_the_summary_has_its_meaning():
     found = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
     # Then the page explains just the keys that there are
     (entry,) = found["collisions"]
-    assert set(found) == set(summary.FLIGHT)
-    assert set(entry) == set(summary.COLLISION)
-    assert set(entry["truth"]) == set(summary.TRUTH)
+    assert set(found) == set(MEANINGS["flight"])
+    assert set(entry) == set(MEANINGS["collision"])
+    assert set(entry["truth"]) == set(MEANINGS["truth"])
 
 
 def test_the_exit_codes_are_those_of_the_program():

@@ -1,12 +1,9 @@
 """A vehicle, whoever watches it and a ground station on virtual time; impacts that are reported, beside the truth."""
 
-import json
 import math
-import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +12,12 @@ from companion.companion import Companion
 from companion.guard.guard import Guard
 from companion.reflex.detector import Impact, Phase
 from companion.report import Status
-from rebound_cli.live.console import with_progress
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.vehicle import SimulatedVehicle
 
 Row = dict[str, Any]
-Case = TypeVar("Case")
 
 IMU_HZ = (50, 100, 250)
 # Of PX4's modes, as DO_SET_MODE takes them: main and sub mode.
@@ -198,24 +193,3 @@ class GuardedFlight:
 
 def limited(stick: float) -> float:
     return min(max(stick, -1.0), 1.0)
-
-
-def rows_of(fly: Callable[[Case], Row], cases: Sequence[Case], jobs: int, out: Path, label: str) -> list[Row]:
-    """One row a flight in the order of the cases, each written as soon as it is there."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    rows = []
-    with out.open("w", encoding="utf-8") as file:
-        for row in with_progress(_worked_out(fly, cases, jobs), len(cases), label):
-            rows.append(row)
-            print(json.dumps(row), file=file, flush=True)
-    return rows
-
-
-def _worked_out(fly: Callable[[Case], Row], cases: Sequence[Case], jobs: int) -> Iterator[Row]:
-    # Compiled kernels are in the cache after one flight; two processes would compile them twice.
-    yield fly(cases[0])
-    if jobs == 1:
-        yield from map(fly, cases[1:])
-        return
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        yield from pool.imap(fly, cases[1:])

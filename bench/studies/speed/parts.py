@@ -1,8 +1,8 @@
 """What each part of an interval costs: time, and calls of Python's and C's functions.
 
-The same flight is flown again and again: its intervals are the same each time, so that of every part of every interval
-the least time of all flights is taken. What the machine does besides falls out. The number of calls is the same on any
-machine, busy or not: `calls.json` has what it is held to, and `python -m bench speed --calls` makes that anew.
+The same flight is flown again and again, and of every part the least time is taken: what the machine does besides falls
+out. The number of calls is the same on any machine, busy or not: `calls.json` has what it is held to, and
+`python -m bench speed --calls` makes that anew.
 """
 
 import importlib
@@ -15,9 +15,6 @@ from pathlib import Path
 from time import perf_counter_ns
 from types import FrameType
 from typing import Any
-
-import numpy as np
-import numpy.typing as npt
 
 Function = Callable[..., Any]
 
@@ -70,89 +67,67 @@ def wrapped(wrap: Callable[[Part, Function], Function]) -> Iterator[None]:
                 setattr(owner, name, before)
 
 
-Ints = npt.NDArray[np.int64]
-
-
 @dataclass(frozen=True, slots=True)
-class Budget:
-    """Microseconds of an interval."""
+class Cost:
+    """Of one flight, by part: the time with the parts that it calls, and the calls that it makes itself."""
 
-    mean_us: dict[str, float]
-    """By part, without the parts that it calls; the timers, some 0.1 us each, count to whoever calls."""
+    spent_ns: dict[str, int]
+    calls: dict[str, int]
     intervals: int
 
-    @property
-    def total_us(self) -> float:
-        return sum(self.mean_us.values())
 
-
-def measured_budget(fly: Callable[[], object], flights: int) -> Budget:
-    """Of what is flown, so many times."""
-    least = 1e-3 * np.min([_timed_flight(fly) for _ in range(flights)], axis=0)
-    names = [part.name for part in PARTS]
-    spent = dict(zip(names, map(float, least.mean(axis=0)), strict=True))
-    mean = {name: us - sum(spent[part.name] for part in PARTS if part.caller == name) for name, us in spent.items()}
-    return Budget(mean, len(least))
-
-
-def _timed_flight(fly: Callable[[], object]) -> Ints:
-    """Nanoseconds of each part in each interval, with the parts that it calls (intervals, parts)."""
-    rows: list[tuple[int, ...]] = []
-    spent = {part.name: 0 for part in PARTS}
-
-    def timed(part: Part, function: Function) -> Function:
-        name, is_last = part.name, part.name == LOG
-
-        def call(*arguments: Any, **named: Any) -> Any:
-            begun = perf_counter_ns()
-            result = function(*arguments, **named)
-            spent[name] += perf_counter_ns() - begun
-            if is_last:
-                rows.append(tuple(spent.values()))
-                spent.update(dict.fromkeys(spent, 0))
-            return result
-
-        return call
-
-    with wrapped(timed):
-        fly()
-    return np.array(rows)
-
-
-HELD_TO = Path(__file__).parent / "calls.json"
-
-
-def calls_an_interval(fly: Callable[[], object]) -> dict[str, float]:
-    """Mean over all intervals of a flight, by part: what it calls itself, without the other parts."""
-    counted, intervals, within = {part.name: 0 for part in PARTS}, 0, [""]
-    observers = set()
+def cost_of(fly: Callable[[], object], counts_calls: bool = False) -> Cost:
+    """Where calls are counted the time says nothing."""
+    spent_ns, calls = ({part.name: 0 for part in PARTS} for _ in range(2))
+    intervals, within, wrappers = 0, [""], set()
 
     def count(frame: FrameType, event: str, argument: Any) -> None:
-        if event in ("call", "c_call") and within[0] and frame.f_code not in observers:
-            counted[within[0]] += 1
+        if event in ("call", "c_call") and within[0] and frame.f_code not in wrappers:
+            calls[within[0]] += 1
 
-    def observed(part: Part, function: Function) -> Function:
+    def watched(part: Part, function: Function) -> Function:
         name = part.name
 
         def run(*arguments: Any, **named: Any) -> Any:
             nonlocal intervals
             outside, within[0] = within[0], name
+            begun = perf_counter_ns()
             try:
                 return function(*arguments, **named)
             finally:
+                spent_ns[name] += perf_counter_ns() - begun
                 within[0] = outside
                 intervals += name == LOG
 
-        observers.add(run.__code__)
+        wrappers.add(run.__code__)
         return run
 
-    with wrapped(observed):
-        sys.setprofile(count)
+    with wrapped(watched):
+        sys.setprofile(count if counts_calls else None)
         try:
             fly()
         finally:
             sys.setprofile(None)
-    return {name: round(calls / intervals, 2) for name, calls in counted.items()}
+    return Cost(spent_ns, calls, intervals)
+
+
+def mean_us(fly: Callable[[], object], flights: int) -> dict[str, float]:
+    """Of an interval, by part, without the parts that it calls: the least of so many flights.
+
+    The timers, some 0.1 us each, count to whoever calls.
+    """
+    flown = [cost_of(fly) for _ in range(flights)]
+    least = {part.name: min(1e-3 * cost.spent_ns[part.name] / cost.intervals for cost in flown) for part in PARTS}
+    return {name: us - sum(least[part.name] for part in PARTS if part.caller == name) for name, us in least.items()}
+
+
+def calls_an_interval(fly: Callable[[], object]) -> dict[str, float]:
+    """Mean over all intervals of a flight, by part: what it calls itself, without the other parts."""
+    cost = cost_of(fly, counts_calls=True)
+    return {name: round(calls / cost.intervals, 2) for name, calls in cost.calls.items()}
+
+
+HELD_TO = Path(__file__).parent / "calls.json"
 
 
 def held_to() -> dict[str, float]:

@@ -14,7 +14,7 @@ from bench.fly.lockstep import flown_in
 from bench.rows.tables import Page, table
 from bench.stamps import FLOWN, ROOT
 from bench.studies.speed.latency import measured
-from bench.studies.speed.parts import PARTS, calls_an_interval, hold_to, measured_budget
+from bench.studies.speed.parts import calls_an_interval, hold_to, mean_us
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 
 CODE = (*FLOWN, "rebound_cli")
@@ -93,13 +93,12 @@ def flights_table(flights: int) -> str:
 
 
 def budget_table(flights: int) -> str:
-    budget, calls = measured_budget(fly, flights), calls_an_interval(fly)
-    spent = {part.name: (budget.mean_us[part.name], calls[part.name]) for part in PARTS}
-    spent["together"] = (budget.total_us, sum(calls.values()))
+    spent_us, calls = mean_us(fly, flights), calls_an_interval(fly)
+    spent_us["together"], calls["together"] = total_us, _ = sum(spent_us.values()), sum(calls.values())
     return table(
         [
-            {"part": name, "µs": f"{us:.1f}", "share": f"{us / budget.total_us:.0%}", "calls": f"{count:.0f}"}
-            for name, (us, count) in spent.items()
+            {"part": name, "µs": f"{us:.1f}", "share": f"{us / total_us:.0%}", "calls": f"{calls[name]:.0f}"}
+            for name, us in spent_us.items()
         ]
     )
 

@@ -100,7 +100,7 @@ def test_guards_that_swing_in_and_hits_that_pin_the_vehicle_are_reported_apart()
     bars = bars_of(made_up(count=50, again=1, lost_m=0.5, leant_deg=70.0))
     apart = [bar.measured for bar in bars if "swing in" in bar.what]
     strict = [bar.measured for bar in bars if "without touching the surface again" in bar.what]
-    assert (apart[0], strict[0]) == ("100.0 %", "98.0 %")
+    assert (apart[0], strict[0]) == ("100.00 %", "98.00 %")
     assert verdicts(bars, "height lost")[0] == MISSED
     assert "50.0 cm" not in next(bar.measured for bar in bars if "tip it" in bar.what)
 
