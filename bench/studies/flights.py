@@ -4,6 +4,7 @@ A corpus of real flights gives the rate of false alarms. Its logs are not commit
 looking at the pages that this study writes.
 """
 
+import math
 from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -12,6 +13,7 @@ from pathlib import Path
 import yaml
 
 from bench.rows.tables import at_most_an_hour
+from bench.studies.landings import CRASH_WITHIN_S
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
@@ -27,6 +29,8 @@ LABELS = Path(__file__).with_name("flights.yaml")
 ONE_EVENT_US = 2_000_000
 # A label is read off a page.
 LABEL_S = 1.0
+# The label of what was told where nothing was, with the reason above it.
+NOTHING = "nothing"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +51,14 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What was told of one contact with all that followed it: by its worst, a crash before a collision."""
+    """What was told of one contact with all that followed it: by its worst, a crash before a collision. `late_s`: how
+    long after its greatest deceleration the first crash of it was told, negative before.
+    """
 
     at_s: float
     told: str
     findings: Sequence[Finding]
+    late_s: float | None = None
 
 
 def events(replay: Replay) -> Iterator[Event]:
@@ -64,17 +71,28 @@ def events(replay: Replay) -> Iterator[Event]:
     for group in groups:
         is_crash, is_hit = any(f.is_crash for f in group), any(f.is_collision for f in group)
         told = "crash" if is_crash else "collision" if is_hit else "touchdown"
-        yield Event(replay.log.seconds(group[0].at_us), told, group)
+        late_s = _late_s(replay, group) if is_crash else None
+        yield Event(replay.log.seconds(group[0].at_us), told, group, late_s)
+
+
+def _late_s(replay: Replay, group: Sequence[Finding]) -> float:
+    first_us, last_us = group[0].at_us - 1e6 * LABEL_S, group[-1].at_us + 1e6 * LABEL_S
+    samples = [(at_us, sample) for at_us, sample in replay.log.imu() if first_us <= at_us <= last_us]
+    hardest_us, _ = max(samples, key=lambda item: math.hypot(*item[1].specific_force_frd_m_s2))
+    return 1e-6 * (next(finding.at_us for finding in group if finding.is_crash) - hardest_us)
 
 
 def mistakes(found: Sequence[Event], labels: Mapping[float, str]) -> Iterator[str]:
     """Each event that a label contradicts, each hit that none explains, each label that nothing was told of."""
-    near = {at_s: [e for e in found if _is_near(e, at_s)] for at_s in labels}
+    near = {at_s: [e for e in found if _is_near(e, at_s)] for at_s, what in labels.items() if what != NOTHING}
     labelled = [event for told in near.values() for event in told]
-    for at_s, what in labels.items():
-        if not any(event.told == what for event in near[at_s]):
-            told = ", ".join(event.told for event in near[at_s]) or "nothing"
-            yield f"{what} at {at_s:.1f} s told as {told}"
+    for at_s, events_near in near.items():
+        told = [event for event in events_near if event.told == labels[at_s]]
+        if not told:
+            others = ", ".join(event.told for event in events_near) or "nothing"
+            yield f"{labels[at_s]} at {at_s:.1f} s told as {others}"
+        elif (late_s := told[0].late_s) is not None and late_s > CRASH_WITHIN_S:
+            yield f"crash at {at_s:.1f} s told {late_s:.2f} s late"
     for event in found:
         if event.told != "touchdown" and event not in labelled:
             yield f"{event.told} at {event.at_s:.1f} s, where nothing was"
@@ -106,13 +124,13 @@ def table(rows: Sequence[Row]) -> str:
     """As Markdown, with the sums; a log of which nothing was watched is no evidence, and only named."""
     seen = [row for row in rows if row.watched_h > 0.0]
     lines = [
-        "| log | vehicle | flown h | watched h | IMU Hz | collisions | touchdowns | crashes | wrong |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---|",
+        "| log | vehicle | flown h | watched h | IMU Hz | collisions | touchdowns | crashes | promised | wrong |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---|",
     ]
     for row in seen:
         cells = (row.flown_h, row.watched_h), (row.collisions, row.touchdowns, row.crashes)
         hours = " | ".join(f"{hours:.3f}" for hours in cells[0])
-        counts = " | ".join(map(str, cells[1]))
+        counts = " | ".join(map(str, cells[1])) + f" | {row.promised:.2g}"
         lines.append(f"| {row.log} | {row.vehicle} | {hours} | {row.imu_hz:.0f} | {counts} | {'; '.join(row.wrong)} |")
     watched_h = sum(row.watched_h for row in seen)
     false = sum(wrong.endswith("where nothing was") for row in seen for wrong in row.wrong)
@@ -143,7 +161,7 @@ def run_flights(options: Namespace) -> int:
             refused.append(str(error))
             continue
         rows.append(row_of(name, replay, labels.get(name, {})))
-        if rows[-1].collisions:
+        if replay.findings.collisions:
             write_page(replayed_flight(replay, config, listener), out / f"{path.parent.name}-{path.stem}.html")
         print(f"{name}: {rows[-1].watched_h * 60:.1f} min watched, {rows[-1].collisions} collisions")
     text = table(rows) + "".join(f"\n\nNot replayed: {sentence}" for sentence in refused) + "\n"

@@ -89,17 +89,19 @@ class FusedDetector:
         x, y, z = s.floor.mean_frd_m_s2
         force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
+        is_learnt = math.dist(f, (x, y, z)) < s.threshold_m_s2
         if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
             self._learn(s, f, before_us)  # a shaking that stays
         free_until_us = min(now_us - self._averaging_us, free_until_us)
         impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio))
         if s.phase is Phase.OFF:
-            return self._unwatched(s, situation, impact)
+            s.observed = None
+            # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
+            return None if is_learnt else self._unwatched(s, situation, impact)
         return self._loud(s, situation, impact, s.jumps(f))
 
     def _unwatched(self, s: FusedState, situation: Situation, impact: Impact) -> Impact | None:
         """A crash is reported where no hit is looked for, too: in a take-off, in a landing, under strong vibration."""
-        s.observed = None
         since_us = impact.sample_time_boot_us - s.contact_began_boot_us
         is_known = s.kind is ImpactKind.CRASH and since_us <= 1e6 * self._config.longest_contact_s
         if is_known or not situation.may_crash:

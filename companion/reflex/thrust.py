@@ -27,8 +27,11 @@ class ThrustGain:
         return self.known_s >= GAIN_MEMORY_S
 
     def learn(self, time_us: int, thrust_m_s2: float, elapsed_s: float) -> None:
-        """Take the specific force by thrust of one sample of a vehicle in free air."""
-        if self.is_commanded(time_us) and elapsed_s > 0.0:
+        """Take the specific force by thrust of one sample of a vehicle in free air.
+
+        Propellers push nothing down: a vehicle whose specific force points down lies on its back.
+        """
+        if self.is_commanded(time_us) and thrust_m_s2 > 0.0 and elapsed_s > 0.0:
             self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
             self.full_m_s2 += (thrust_m_s2 / self.fraction - self.full_m_s2) * elapsed_s / self.known_s
 

@@ -1,5 +1,6 @@
 """A corpus of recorded flights: what was reported, against labels."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,12 +10,13 @@ from bench.main import main
 from bench.rows.tables import at_most_an_hour
 from bench.studies.flights import Event, events, mistakes, table
 from companion.mission.config import CompanionConfig
+from companion.reflex.detector import ImpactKind
 from rebound_cli.replay.report import replay_log
 from tests.rebound_cli.replay.flying import HIT_US, flight
 
 
-def event(at_s, told):
-    return Event(at_s, told, [SimpleNamespace(at_us=at_s * 1e6)])
+def event(at_s, told, late_s=None):
+    return Event(at_s, told, [SimpleNamespace(at_us=at_s * 1e6)], late_s)
 
 
 def test_a_label_is_met_by_an_event_of_its_class_near_it():
@@ -27,9 +29,27 @@ def test_a_label_is_met_by_an_event_of_its_class_near_it():
 @pytest.mark.parametrize("told", ["collision", "crash"])
 def test_a_collision_or_a_crash_without_a_label_is_one_where_nothing_was(told):
     assert list(mistakes([event(10.0, told)], {})) == [f"{told} at 10.0 s, where nothing was"]
+    assert list(mistakes([event(10.0, told)], {10.2: "nothing"})) == [f"{told} at 10.0 s, where nothing was"]
     assert list(mistakes([event(10.0, told)], {10.2: told})) == []
     # Landings are many, and nobody labels them all
     assert list(mistakes([event(10.0, "touchdown")], {})) == []
+
+
+def test_a_crash_that_is_told_long_after_its_hardest_moment_is_told_late():
+    labels = {10.0: "crash"}
+    assert list(mistakes([event(10.0, "crash", late_s=0.1)], labels)) == []
+    assert list(mistakes([event(10.0, "crash", late_s=-0.6)], labels)) == []
+    assert list(mistakes([event(10.0, "crash", late_s=0.6)], labels)) == ["crash at 10.0 s told 0.60 s late"]
+
+
+def test_how_late_a_crash_is_told_counts_from_its_hardest_sample():
+    replay = replay_log(flight(), CompanionConfig(), None)
+    (hit,) = replay.findings.impacts
+    assert not hit.is_crash and next(events(replay)).late_s is None
+    crash = replace(hit.first, impact=replace(hit.first.impact, kind=ImpactKind.CRASH))
+    hardest_us, _ = max(replay.log.imu(), key=lambda item: math.hypot(*item[1].specific_force_frd_m_s2))
+    replay.findings.impacts[:] = [replace(hit, at_us=hardest_us + 300_000, first=crash)]
+    assert next(events(replay)).late_s == pytest.approx(0.3)
 
 
 def test_what_follows_within_two_seconds_is_one_event():

@@ -225,3 +225,20 @@ def test_a_touch_that_tips_the_vehicle_over_is_a_crash_as_soon_as_it_lies_there(
     # Then it is one crash
     again = ImuSample(2_240_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
     assert monitor.detector.step(monitor.state, again, tilted)[1] is None
+
+
+def test_a_vehicle_that_lies_on_its_back_does_not_crash_again():
+    # Given a vehicle in the air that turns over near the ground, where no hit is looked for
+    monitor = start_monitor(CompanionConfig(), 0)
+    fly(monitor, 2_000_000)
+    monitor.estimator.strapdown.valid_wxyz = (0.0, 1.0, 0.0, 0.0)
+    low = Situation(armed=True, height_m=0.2, off_reason="below 0.5 m", strapdown=monitor.estimator.strapdown)
+    # When its accelerometer then shows gravity from the other side for seconds
+    crashes = [
+        impact
+        for t in range(2_004_000, 5_000_000, 4_000)
+        if (impact := monitor.detector.step(monitor.state, ImuSample(t, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0)), low)[1])
+    ]
+    # Then it is one crash
+    assert [impact.kind.value for impact in crashes] == ["crash"]
+    assert crashes[0].sample_time_boot_us == 2_004_000

@@ -11,6 +11,7 @@ from companion.motion.strapdown import Strapdown
 from companion.reflex.config import FusedConfig
 from companion.reflex.detector import Evidence, ImpactKind, Phase, Situation
 from companion.reflex.fused import FusedDetector
+from companion.reflex.thrust import ThrustGain
 from companion.reflex.velocity_jump import VelocityJump
 
 TICK_US = 1_000
@@ -116,6 +117,15 @@ def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push,
     velocity = (0.0, 0.0, -1.0) if kind is ImpactKind.CEILING else (0.0, 0.0, 0.0)
     impacts = Flight(pulse(push), velocity=velocity).fly()
     assert [(i.sample_time_boot_us, i.kind) for i in impacts] == [(3_004_000, kind)]
+
+
+def test_a_vehicle_on_its_back_teaches_nothing_of_its_thrust():
+    gain = ThrustGain()
+    gain.set_fraction(0, 0.5)
+    for force_m_s2 in (GRAVITY, -GRAVITY):
+        for _ in range(1_000):
+            gain.learn(0, force_m_s2, 0.004)
+    assert gain.is_known and gain.full_m_s2 == pytest.approx(GRAVITY / 0.5)
 
 
 # --- velocity jump ------------------------------------------------------------------------------------------
