@@ -30,7 +30,7 @@ class TakeOver:
 
     def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
         self.recover = recover
-        self._began_us = now_us
+        self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
         if guard.vehicle.custom_mode != OFFBOARD:
             guard.command_client.begin(SetMode(OFFBOARD))
 
@@ -49,7 +49,8 @@ class TakeOver:
         recovered(guard, self.recover, inputs, now_us)
         if outcome is not None:
             return GuardTransition(Trigger.NOT_CONFIRMED, outcome.text)
-        if took_ms > guard.config.confirm_within_s * 1e3:
+        # A late step is no refusal: the answer may not have been read yet.
+        if guard.trajectory_us - self._trajectory_began_us > guard.config.confirm_within_s * 1e6:
             return GuardTransition(
                 Trigger.NOT_CONFIRMED, f"OFFBOARD not seen within {guard.config.confirm_within_s:g} s"
             )
@@ -61,7 +62,8 @@ class Recovering:
 
     def __init__(self, recover: Recover, now_us: int) -> None:
         self._recover = recover
-        self._began_us = now_us
+        self._since_us = now_us  # in OFFBOARD, with no step late and no silence
+        self._late_us = 0
         self._foreign = 0
         self._asked_us: int | None = None  # whether the mode is still ours
 
@@ -71,18 +73,28 @@ class Recovering:
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode: only
         # a later report that says OFFBOARD makes them a program's.
+        self._forget_what_was_late(guard, now_us)
         vehicle, asked_us = guard.vehicle, self._asked_us
         if asked_us is not None and vehicle.mode_received_us > asked_us and vehicle.is_mode_known:
             guard.program_elsewhere = True
             return GuardTransition(
                 Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own"
             )
-        if vehicle.is_mode_known and now_us - self._began_us > ECHO_STALE_US:
+        if vehicle.is_mode_known and now_us - self._since_us > ECHO_STALE_US:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES and asked_us is None:
             self._asked_us = now_us
             guard.outbox.append(SendCommand(RequestMessage(MessageId.HEARTBEAT), 0))
         return GuardTransition(Trigger.SETTLED) if recovered(guard, self._recover, inputs, now_us) else None
+
+    def _forget_what_was_late(self, guard: GuardContext, now_us: int) -> None:
+        """The echoes that waited for a late step are older than what is known to have been sent. Without the guard's
+        setpoints PX4 leaves OFFBOARD, and flies to its own places until they come again.
+        """
+        late_us = now_us - guard.trajectory_us
+        if late_us != self._late_us or guard.vehicle.custom_mode != OFFBOARD:
+            self._late_us, self._since_us = late_us, now_us
+            self._foreign, self._asked_us = 0, None
 
 
 def recovered(guard: GuardContext, recover: Recover, inputs: Inputs, now_us: int) -> bool:

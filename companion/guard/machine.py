@@ -37,6 +37,9 @@ _KINDS = {
 STICKS = "the pilot moved the sticks"
 # PX4's COM_RC_STICK_OV, 30 %.
 MOVED = 0.3
+# Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD (COM_OF_LOSS_T) and takes it again by itself 0.09 s
+# after the next one. Its mode is reported every 0.1 s. A failsafe that lasts for twice all that is for another reason.
+RETURNS_US = 400_000
 # After these the vehicle is given back to hold whatever is configured.
 _TO_HOLD = (
     Trigger.STOPPED,
@@ -163,7 +166,14 @@ class GuardMachine(StateMachine):
             requested = self.handler.wish
         holder = who_decided(report, expected, requested)
         if holder is Holder.COMPANION:
+            guard.foreign_mode_since_us = None
             return None
+        is_late = OFFBOARD in (expected, requested) and report.intended_custom_mode in (None, OFFBOARD)
+        if holder is Holder.FAILSAFE and is_late:
+            if guard.foreign_mode_since_us is None:
+                guard.foreign_mode_since_us = guard.trajectory_us
+            if guard.trajectory_us - guard.foreign_mode_since_us < RETURNS_US:
+                return None
         who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot or a program"
         return f"{who} took over in {mode_name(report.custom_mode)}"
 

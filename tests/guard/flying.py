@@ -33,6 +33,8 @@ VELOCITY_ONLY = 0xDC7
 MANUAL_POSITION, OFFBOARD, HOLD, MISSION, LAND = (3, 0), (6, 0), (4, 3), (4, 4), (4, 6)
 # MAVSDK's Offboard repeats its last setpoint every 50 ms, for ever; in whole intervals of 4 ms.
 REPEATED_EVERY_S = 0.052
+# Datagrams, with Linux's default buffer (see companion.shell.connection.MOST_DATAGRAMS); later ones are lost.
+SOCKET_HOLDS = 277
 
 
 class Commanded(VirtualTime):
@@ -47,6 +49,8 @@ class Commanded(VirtualTime):
         self.events: list[Event] = []
         self.on_wire: list[tuple[float, str, Any]] = []
         self.does_beat = True
+        self.is_late = False  # the guard: what comes waits in its socket
+        self._unread: list[bytes] = []
         self._repeated: list[Callable[[], None]] = []
         self.every(1.0, self._beat)
 
@@ -105,6 +109,12 @@ class Commanded(VirtualTime):
 
     @abstractmethod
     def _exchange(self) -> None: ...
+
+    def be_late(self, seconds: float) -> None:
+        """The guard gets no turn on its computer for so long."""
+        self.is_late = True
+        self.run_for(seconds)
+        self.is_late = False
 
     def take_off(self) -> None:
         """By the other's commands: up to PX4's take-off height and hold."""
@@ -194,7 +204,10 @@ class GuardedFlight(Commanded):
             message = self._reader.decode(bytearray(packet))
             self.others_last[message.get_type()] = message
         self._guards_bytes = b""
-        self.guard_hears(b"".join(self._guard_link.take()))
+        self._unread = [*self._unread, *self._guard_link.take()][:SOCKET_HOLDS]
+        if not self.is_late:
+            received, self._unread = b"".join(self._unread), []
+            self.guard_hears(received)
 
     def guard_hears(self, received: bytes) -> list[Event]:
         """Alone, what somebody sends in the vehicle's name."""
@@ -276,8 +289,10 @@ def message_of(name: str, fields: dict[str, Any]) -> Any:
 class BetweenFlight(Commanded):
     """The guard is the link; whoever commands comes as clients of it, each by a name."""
 
-    def __init__(self, config: GuardConfig | None = None, airframe: str = "foldable", **scene: Any) -> None:
-        super().__init__(airframe, None, **scene)
+    def __init__(
+        self, config: GuardConfig | None = None, parameters: dict[str, float] | None = None, **scene: Any
+    ) -> None:
+        super().__init__("foldable", parameters, **scene)
         between = {"between": ("udpin://127.0.0.1:14540",)}
         self.guard = Guard((config or GuardConfig()).model_copy(update=between))
         self.between = Between(2_000_000, signs=False)
@@ -301,6 +316,15 @@ class BetweenFlight(Commanded):
         return str(self.guard.status().vehicle_mode)
 
     def _exchange(self) -> None:
+        if not self.is_late:
+            self._pass_on()
+        self.vehicle.advance()
+        self._unread = [*self._unread, *self.link.take()][:SOCKET_HOLDS]
+        if not self.is_late:
+            received, self._unread = b"".join(self._unread), []
+            self._hear(received)
+
+    def _pass_on(self) -> None:
         for client, packet in self._clients:
             self.between.hear(client, packet, self.now_us)
         self._clients = []
@@ -308,8 +332,8 @@ class BetweenFlight(Commanded):
             for packet in packets:
                 self.on_wire.append((self.time_s, sender, self._parser.decode(bytearray(packet))))
                 self.link.push(packet)
-        self.vehicle.advance()
-        received = b"".join(self.link.take())
+
+    def _hear(self, received: bytes) -> None:
         heard = self.between.to_clients(received)
         result = self.guard.step(received, self.now_us)
         heard += [packet for packet in result.sent_frames if self.between.sends(packet)]

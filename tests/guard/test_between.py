@@ -20,6 +20,7 @@ PLACE_ONLY = 0xDF8
 ATTITUDE_ONLY = 0x07
 TOO_LATE_S = 0.15
 LINK_BYTES_S = 2_000_000
+MODES = (dialect.MAVLINK_MSG_ID_HEARTBEAT, dialect.MAVLINK_MSG_ID_CURRENT_MODE)
 
 
 def by_places(air: BetweenFlight) -> None:
@@ -66,9 +67,9 @@ def sticks(air: BetweenFlight, forward: float) -> Callable[[], None]:
     return air.every(0.05, lambda: air.send(message, "pilot", (254, 190)))
 
 
-def hit(flies: Callable[[BetweenFlight], None], **changes) -> BetweenFlight:
+def hit(flies: Callable[[BetweenFlight], None], parameters: dict[str, float] | None = None, **changes) -> BetweenFlight:
     """Taken over at the wall."""
-    air = BetweenFlight(GuardConfig(**changes))
+    air = BetweenFlight(GuardConfig(**changes), parameters)
     air.take_off()
     flies(air)
     air.run_until(lambda: air.guard.holds, 20.0)
@@ -93,6 +94,35 @@ def test_whoever_flies_into_the_wall_is_recovered_and_nothing_of_his_moves_the_v
     # Its program sees it in OFFBOARD, and is told when it begins and when it ends
     told = [text for at_s, text in air.texts_heard if at_s >= taken_s - 0.01]
     assert any(text.startswith("Taking over") for text in told) and told[-1].startswith("Given back to AUTO.LOITER")
+
+
+@pytest.mark.parametrize(
+    ("flies", "loss_s", "late_s"),
+    [(by_places, 1.0, 0.5), (by_places, 1.0, 1.3), (by_places, 0.3, 0.5), (fly_a_mission, 0.3, 0.5)],
+)
+def test_a_late_thread_lets_go_of_no_recovery(flies, loss_s, late_s):
+    """PX4 leaves OFFBOARD meanwhile where it lasts for longer than COM_OF_LOSS_T, and flies to its own places."""
+    # Given a recovery, and a computer that is busy with something else
+    air = hit(flies, {"COM_OF_LOSS_T": loss_s})
+    air.run_for(0.1)
+    air.be_late(late_s)
+    # When it has its turn again
+    air.run_to(State.WATCHING, 10.0)
+    # Then the recovery has gone on, and nobody is taken for another program
+    assert [kind for kind in air.kinds() if kind in ("crossed", "let_go", "refused", "left_alone")] == []
+    assert air.told("recovered")[0].startswith("recovered: settled") and air.mode == "AUTO.LOITER"
+    assert not air.guard.core.flight.program_elsewhere
+
+
+def test_a_failsafe_that_lasts_has_the_vehicle_also_in_a_recovery():
+    # Given a recovery, and a battery that calls the vehicle home
+    air, vehicle = hit(by_places), dialect.MAVLink(None, 1, 1)
+    air.run_for(0.3)
+    # When its reports say so, with OFFBOARD still intended
+    told, heard = dialect.MAVLink_current_mode_message(0, 4 << 16 | 5 << 24, OFFBOARD[0] << 16), air.link.take
+    air.link.take = lambda: [told.pack(vehicle), *(packet for packet in heard() if message_id_of(packet) not in MODES)]
+    # Then the guard waits as long as PX4 needs to go on by setpoints that were late, and lets go
+    assert air.run_to(State.STOOD_DOWN, 1.0) == pytest.approx(0.4, abs=0.05)
 
 
 @pytest.mark.parametrize("flies", [by_places, by_attitudes])
