@@ -248,7 +248,7 @@ def as_the_vehicle_has_it(flight: FlightContext, target: Target, time_boot_us: i
     if left_us <= 0:
         return target
     estimator, share = record.estimator, min(1.0, left_us / (reflex.FADED_US - reflex.FADES_FROM_US))
-    pushed = plus(estimator.belief.external_m_s2, 1.0, estimator.level_m_s2)
+    pushed = plus(estimator.external_m_s2, 1.0, estimator.level_m_s2)
     return replace(
         target,
         position_ned_m=plus(target.position_ned_m, share, estimator.position_error_m),

@@ -16,8 +16,8 @@ from companion.mavlink.readers import sample_from
 from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk
 from companion.report import Event
 
-# Own setpoints that are remembered until they pass the gate: one for each IMU sample of a second, in which PX4 holds the
-# last (COM_OF_LOSS_T).
+# Own setpoints that are remembered until they pass the gate: one for each IMU sample of a second, in which PX4 holds
+# the last (COM_OF_LOSS_T).
 _MOST_ON_THE_WAY = 250
 
 Mark: TypeAlias = tuple[object, ...]

@@ -207,9 +207,6 @@ TILT_PER_S = 0.5
 MODEL_ERROR = 0.03
 # Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
-# How fast the integral's drift from the reported velocities is learnt, 1/s: half a second is longer than their errors
-# last. Gyroscopes miss a part of a hit's turn between their samples, and the tilt is then wrong.
-DRIFT_PER_S = 2.0
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
 COMPARED_S = 0.5

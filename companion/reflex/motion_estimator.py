@@ -113,7 +113,6 @@ class MotionEstimator:
     external_m_s2: Vector3 = ZERO  # external force per mass across the thrust, horizontal: wind and drag
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
-    drift_m_s2: Vector3 = ZERO  # of the integral from the reported velocities: the gyroscopes' tilt is wrong
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
@@ -151,7 +150,7 @@ class MotionEstimator:
         if not 0.0 < elapsed_s < 1e-6 * LONGEST_GAP_US:
             return
         pushed = strapdown.acceleration_ned_m_s2
-        pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else plus(pushed, 1.0, self.drift_m_s2)
+        pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else pushed
         was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
         mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
@@ -175,7 +174,7 @@ class MotionEstimator:
             motion.velocity_ned_m_s,
             self.spread_m_s,
             self.tilt_m_s2,
-            plus(self.external_m_s2, 1.0, self.drift_m_s2),
+            self.external_m_s2,
             self.attitude_wxyz,
             self.yaw_rate_rad_s,
             self.level_m_s2,
@@ -238,11 +237,7 @@ class MotionEstimator:
             if 0.0 < elapsed_s < reflex.COMPARED_S:
                 self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
         place = plus(was.position_ned_m, share, plus(measured.position_ned_m, -1.0, was.position_ned_m))
-        missed_m_s = plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s)
-        velocity = plus(was.velocity_ned_m_s, share, missed_m_s)
-        if before is not None:
-            n, e, _ = plus(self.drift_m_s2, share * reflex.DRIFT_PER_S, missed_m_s)
-            self.drift_m_s2 = (n, e, 0.0)
+        velocity = plus(was.velocity_ned_m_s, share, plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = 0.0
 

@@ -66,9 +66,9 @@ def test_the_companion_sees_the_hit_and_the_setpoint_goes_back_from_it(wall_flig
     assert start_us < log.setpoint_at_us[0]
     target = hit["recovery_setpoint_ned_m"]
     at_target = abs(log.setpoint_ned_m - target).max(axis=1) < 0.002
-    # Then the recovery setpoint was sent for some seconds, half a second times 2 m/s in front of the hit
+    # Then the recovery setpoint was sent for some seconds, clear of the hit and no further than the rebound carries
     assert at_target.sum() > 50
-    assert log.position_ned_m[:, 0].max() - target[0] == pytest.approx(0.31 * 2.0, abs=0.1)
+    assert 0.35 < log.position_ned_m[:, 0].max() - target[0] < 0.7
 
 
 def test_the_usual_tools_read_the_log(wall_flight):
