@@ -41,7 +41,7 @@ def test_a_vehicle_that_the_hit_spins_comes_to_rest_though_lower_and_further_on(
     """
     outcome, flight = flown("rigid", 5.0, 30)
     assert outcome == "completed"
-    assert flight["lost_m"] < 0.2
+    assert flight["lost_m"] < 0.3
     assert flight["past_m"] < 0.8
 
 
