@@ -129,8 +129,9 @@ def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():
     # Given a vehicle that leans by 40 degrees into the wall that it touches
     into = tilted((math.sin(math.radians(40.0)), 0.0, -math.cos(math.radians(40.0))), 0.0)
     belief = Belief(HERE, ZERO, attitude_wxyz=into)
-    asked = wanted(belief, [WALL], HERE[2])
-    _, pressing = attitude_and_thrust(asked, lean(belief, [WALL]))
+    near = Surface(HERE, SOUTH, 0.25)
+    asked = wanted(belief, [near], HERE[2])
+    _, pressing = attitude_and_thrust(asked, lean(belief, [near]))
     _, lifting = attitude_and_thrust(asked, lean(belief, [FAR]))
     # Then its thrust is the projection of the wanted force, not what would carry it
     force = plus(asked, -GRAVITY_M_S2, (0.0, 0.0, 1.0))
