@@ -159,8 +159,7 @@ def _add_flights(commands: Commands) -> None:
     flights.add_argument("--labels", metavar="FILE", type=Path, help=text)
     text = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
     flights.add_argument("--rate", metavar="HZ", type=float, help=text)
-    text = "folder of table and pages (default: %(default)s)"
-    flights.add_argument("--out", metavar="DIR", type=Path, default=Path("build/flights"), help=text)
+    _add_out(flights, "flights")
 
     text = "Full deflections, reversals, 30 to 45 degrees of tilt, gusts; one minute a flight."
     does = "fly drawn vehicles hard by hand, and count what is reported"

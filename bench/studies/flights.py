@@ -6,13 +6,17 @@ looking at the pages that this study writes.
 
 import math
 from argparse import Namespace
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
+import pandas as pd
 import yaml
 
-from bench.rows.tables import at_most_an_hour
+from bench.fly.by_hand.stick_logs import logs_below
+from bench.fly.campaign import Json
+from bench.rows.tables import Page, at_most_an_hour, table
 from bench.studies.landings import CRASH_WITHIN_S
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
@@ -23,7 +27,6 @@ from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import replayed_flight
 from rebound_cli.report.writer import write_page
 
-SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
 LABELS = Path(__file__).with_name("flights.yaml")
 # A contact bounces and tumbles: ArduPilot's crash check waits for so long, too (crash_check.cpp, 2 s).
 ONE_EVENT_US = 2_000_000
@@ -31,22 +34,7 @@ ONE_EVENT_US = 2_000_000
 LABEL_S = 1.0
 # The label of what was told where nothing was, with the reason above it.
 NOTHING = "nothing"
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One log. Hours; rates in Hz; `promised` and the counts are of the hours watched."""
-
-    log: str
-    vehicle: str
-    flown_h: float
-    watched_h: float
-    imu_hz: float
-    promised: float
-    collisions: int
-    touchdowns: int
-    crashes: int
-    wrong: tuple[str, ...]
+SUMS = ("flown_h", "watched_h", "collisions", "touchdowns", "crashes", "promised")
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,56 +91,42 @@ def _is_near(event: Event, at_s: float) -> bool:
     return event.at_s - LABEL_S <= at_s <= last_s + LABEL_S
 
 
-def row_of(name: str, replay: Replay, labels: Mapping[float, str]) -> Row:
+def row_of(name: str, replay: Replay, labels: Mapping[float, str]) -> Json:
+    """Of one log. `promised` and the counts are of the hours watched."""
     found, findings = list(events(replay)), replay.findings
-    counts = {told: sum(event.told == told for event in found) for told in ("collision", "touchdown", "crash")}
-    return Row(
-        log=name,
-        vehicle=replay.log.vehicle,
-        flown_h=findings.flown_us / 3.6e9,
-        watched_h=findings.watched_us / 3.6e9,
-        imu_hz=replay.shaking.rate_hz,
-        promised=findings.promised,
-        collisions=counts["collision"],
-        touchdowns=counts["touchdown"],
-        crashes=counts["crash"],
-        wrong=tuple(mistakes(found, labels)),
+    told = Counter(event.told for event in found)
+    return {
+        "log": name,
+        "vehicle": replay.log.vehicle,
+        "flown_h": findings.flown_us / 3.6e9,
+        "watched_h": findings.watched_us / 3.6e9,
+        "imu_hz": replay.shaking.rate_hz,
+        "collisions": told["collision"],
+        "touchdowns": told["touchdown"],
+        "crashes": told["crash"],
+        "promised": findings.promised,
+        "wrong": list(mistakes(found, labels)),
+    }
+
+
+def sums_text(rows: Sequence[Json]) -> str:
+    """Of the logs of which anything was watched."""
+    sums = {name: sum(row[name] for row in rows) for name in SUMS}
+    hours, false = sums["watched_h"], sum(wrong.endswith("where nothing was") for row in rows for wrong in row["wrong"])
+    if not hours:
+        return "Nothing was watched.\n"
+    return (
+        f"{len(rows)} logs, {sums['flown_h']:.2f} h flown, {hours:.2f} h watched: {sums['collisions']} collisions, "
+        f"{sums['touchdowns']} touchdowns, {sums['crashes']} crashes. {false} collisions or crashes where nothing was: "
+        f"{false / hours:.1f} an hour, at most {at_most_an_hour(false, hours):.1f} with 95 % confidence; "
+        f"{sums['promised']:.2g} in these hours promised by Gaussian noise.\n"
     )
-
-
-def table(rows: Sequence[Row]) -> str:
-    """As Markdown, with the sums; a log of which nothing was watched is no evidence, and only named."""
-    seen = [row for row in rows if row.watched_h > 0.0]
-    lines = [
-        "| log | vehicle | flown h | watched h | IMU Hz | collisions | touchdowns | crashes | promised | wrong |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|---|",
-    ]
-    for row in seen:
-        cells = (row.flown_h, row.watched_h), (row.collisions, row.touchdowns, row.crashes)
-        hours = " | ".join(f"{hours:.3f}" for hours in cells[0])
-        counts = " | ".join(map(str, cells[1])) + f" | {row.promised:.2g}"
-        lines.append(f"| {row.log} | {row.vehicle} | {hours} | {row.imu_hz:.0f} | {counts} | {'; '.join(row.wrong)} |")
-    watched_h = sum(row.watched_h for row in seen)
-    false = sum(wrong.endswith("where nothing was") for row in seen for wrong in row.wrong)
-    lines.append("")
-    if watched_h:
-        lines.append(
-            f"{len(seen)} logs, {sum(row.flown_h for row in seen):.2f} h flown, {watched_h:.2f} h watched: "
-            f"{sum(row.collisions for row in seen)} collisions, {sum(row.touchdowns for row in seen)} touchdowns, "
-            f"{sum(row.crashes for row in seen)} crashes. {false} collisions and crashes where nothing was: "
-            f"{false / watched_h:.1f} an hour, at most {at_most_an_hour(false, watched_h):.1f} with 95 % confidence; "
-            f"{sum(row.promised for row in seen):.2g} in these hours promised by Gaussian noise."
-        )
-    lines += [f"No evidence, because nothing of it was watched: {row.log}." for row in rows if not row.watched_h]
-    return "\n".join(lines)
 
 
 def run_flights(options: Namespace) -> int:
     labels = yaml.safe_load((options.labels or LABELS).read_text()) or {}
-    out: Path = options.out
-    out.mkdir(parents=True, exist_ok=True)
-    rows, refused = [], []
-    for path in sorted(p for folder in options.folders for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES):
+    page, rows, refused = Page(options.out, "flights"), [], []
+    for path in logs_below(*options.folders):
         name = f"{path.parent.name}/{path.name}"
         config, listener = CompanionConfig(), Listener()
         try:
@@ -162,10 +136,14 @@ def run_flights(options: Namespace) -> int:
             continue
         rows.append(row_of(name, replay, labels.get(name, {})))
         if replay.findings.collisions:
-            write_page(replayed_flight(replay, config, listener), out / f"{path.parent.name}-{path.stem}.html")
-        print(f"{name}: {rows[-1].watched_h * 60:.1f} min watched, {rows[-1].collisions} collisions")
-    text = table(rows) + "".join(f"\n\nNot replayed: {sentence}" for sentence in refused) + "\n"
-    (out / "flights.md").write_text(text)
-    (out / "flights.yaml").write_text(yaml.safe_dump([asdict(row) | {"wrong": list(row.wrong)} for row in rows]))
-    print(f"\n{text.splitlines()[len([r for r in rows if r.watched_h]) + 3] if rows else 'no log found'}\n{out}")
+            shown = page.folder / f"{path.parent.name}-{path.stem}.html"
+            write_page(replayed_flight(replay, config, listener), shown)
+        print(f"{name}: {rows[-1]['watched_h'] * 60:.1f} min watched, {rows[-1]['collisions']} collisions")
+    seen = [row for row in rows if row["watched_h"] > 0.0]
+    idle = "\n".join(row["log"] for row in rows if row not in seen) or "None."
+    written = [{**row, "promised": f"{row['promised']:.2g}", "wrong": "; ".join(row["wrong"])} for row in seen]
+    parts = {"": f"{sums_text(seen)}\n{table(pd.DataFrame(written).round(3))}"}
+    parts |= {"No evidence, because nothing of it was watched": f"{idle}\n", "Not replayed": "\n".join(refused) + "\n"}
+    page.write("Recorded flights", options.typed, parts, rows=pd.DataFrame(rows))
+    print(sums_text(seen) if rows else "no log found")
     return 0 if rows else 1

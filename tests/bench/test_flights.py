@@ -8,7 +8,7 @@ import pytest
 
 from bench.main import main
 from bench.rows.tables import at_most_an_hour
-from bench.studies.flights import Event, events, mistakes, table
+from bench.studies.flights import Event, events, mistakes, sums_text
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind
 from rebound_cli.replay.report import replay_log
@@ -72,5 +72,5 @@ def test_a_log_that_cannot_be_read_is_named_and_a_folder_without_logs_is_an_erro
     assert "the file is empty" in (tmp_path / "out" / "flights.md").read_text()
 
 
-def test_the_table_of_no_rows_promises_nothing():
-    assert "an hour" not in table([])
+def test_no_hours_promise_nothing():
+    assert "an hour" not in sums_text([])

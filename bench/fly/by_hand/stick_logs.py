@@ -36,6 +36,11 @@ class LoggedSticks:
     rows: Floats
 
 
+def logs_below(*folders: Path) -> list[Path]:
+    """In the order of their names."""
+    return sorted(path for folder in folders for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
+
+
 def logs_with_sticks(folder: Path, most: int) -> list[LoggedSticks]:
     """In the order of their names. Raises StickLogError where there is none."""
     found = [logged for _, logged in zip(range(most), _found(folder), strict=False)]
@@ -45,7 +50,7 @@ def logs_with_sticks(folder: Path, most: int) -> list[LoggedSticks]:
 
 
 def _found(folder: Path) -> Iterator[LoggedSticks]:
-    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES):
+    for path in logs_below(folder):
         try:
             heard = read_log(path).heard
         except (LogError, OSError):

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench.cases.walls import CRUISE_S, approach
-from bench.rows.tables import table
 from bench.studies.paper.claims import claim
 from bench.studies.paper.flights import StudyFlight, StudyResult
 from bench.studies.paper.study import (
     StudyFindings,
-    cells,
+    flown_table,
     is_lost,
     worst_overshoot_by_estimate_m,
     worst_overshoot_m,
@@ -89,12 +88,8 @@ def conclude(results: Sequence[StudyResult]) -> StudyFindings:
         claim("clipped", worst_overshoot_m(clipped), own=worst_overshoot_by_estimate_m(clipped)),
         claim("accelerating", leaning_again, flown=len(leaning), past=worst_overshoot_m(leaning)),
     )
-    flown = [
-        {"airframe": cause.airframe, "changed": cause.name, **cells(some)}
-        for cause in CAUSES
-        if (some := _of(results, cause.airframe, cause.name))
-    ]
-    return StudyFindings("Why rigid differs", rows, tables={"One cause at a time, at 2 m/s": table(flown)})
+    flown = flown_table(results, lambda result: dict(zip(("airframe", "changed"), result.flight.key, strict=True)))
+    return StudyFindings("Why rigid differs", rows, tables={"One cause at a time, at 2 m/s": flown})
 
 
 def _of(results: Sequence[StudyResult], airframe: str, name: str) -> list[StudyResult]:

@@ -5,10 +5,9 @@ from itertools import pairwise
 
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import approach
-from bench.rows.tables import table
 from bench.studies.paper.claims import ClaimRow, claim, number
 from bench.studies.paper.flights import StudyFlight, StudyResult
-from bench.studies.paper.study import StudyFindings, cells, worst_overshoot_by_estimate_m, worst_overshoot_m
+from bench.studies.paper.study import StudyFindings, flown_table, worst_overshoot_by_estimate_m, worst_overshoot_m
 
 SPEEDS_M_S = (1.0, 2.0, 3.0, 4.0, 5.0)
 # Between the flight and the wall's normal, to the left and to the right in turn; beyond the paper.
@@ -47,17 +46,16 @@ def _flight(airframe: str, slant_deg: float, speed_m_s: float, seed: int) -> Stu
 
 def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     """By the strictest count, and without what ends the collision before (see `flights.StudyContact`)."""
-    rows: list[ClaimRow] = []
-    flown: list[dict[str, object]] = []
-    for airframe, slant_deg in GROUPS:
-        for speed in SPEEDS_M_S:
-            some = [r for r in results if (*r.flight.key[:2], r.flight.key[3]) == (airframe, speed, slant_deg)]
-            some = [result for result in some if result.contacts]
-            if (airframe, slant_deg) == ("foldable", 0.0):
-                rows += _rows(speed, some)
-            if some:
-                flown.append({"": f"{airframe}, slant {slant_deg:g}°", "m/s": f"{speed:g}", **cells(some)})
-    return StudyFindings("Walls from any side", rows, tables={"Walls from any side, each speed": table(flown)})
+    square = [r for r in results if r.contacts and (r.flight.key[0], r.flight.key[3]) == ("foldable", 0.0)]
+    rows = [row for speed in SPEEDS_M_S for row in _rows(speed, [r for r in square if r.flight.key[1] == speed])]
+    return StudyFindings(
+        "Walls from any side", rows, tables={"Walls from any side, each speed": flown_table(results, _names)}
+    )
+
+
+def _names(result: StudyResult) -> dict[str, str]:
+    airframe, speed_m_s, _, slant_deg = result.flight.key
+    return {"": f"{airframe}, slant {slant_deg:g}°", "m/s": f"{speed_m_s:g}"}
 
 
 def _rows(speed_m_s: float, flown: Sequence[StudyResult]) -> Iterator[ClaimRow]:

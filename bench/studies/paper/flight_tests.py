@@ -7,11 +7,10 @@ from matplotlib.figure import Figure
 
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import GAMMA_S, approach
-from bench.rows.tables import table
 from bench.studies.paper.claims import claim
 from bench.studies.paper.figures import add_legend, draw_position, draw_velocity, mark_paper, new_figure
 from bench.studies.paper.flights import StudyFlight, StudyResult
-from bench.studies.paper.study import StudyFindings, cells, is_lost, worst_overshoot_m
+from bench.studies.paper.study import StudyFindings, flown_table, is_lost, worst_overshoot_m
 
 PAPER_SPEEDS_M_S = (1.0, 1.5, 2.0, 2.5)
 BEYOND_M_S = (3.0, 4.0, 5.0)
@@ -45,14 +44,9 @@ def conclude(results: Sequence[StudyResult]) -> StudyFindings:
         claim("rigid again", sum(r.second_hits > 0 for r in fast), flown=len(fast), lost=sum(map(is_lost, fast))),
         claim("rigid overshoot", worst_overshoot_m(seen), flown=len(seen)),
     )
-    flown = [
-        {"airframe": airframe, "m/s": f"{speed:g}", **cells(some)}
-        for airframe in AIRFRAMES
-        for speed in (*PAPER_SPEEDS_M_S, *BEYOND_M_S)
-        if (some := of(results, airframe, (speed,)))
-    ]
+    flown = flown_table(results, lambda r: {"airframe": r.flight.key[0], "m/s": f"{r.flight.key[1]:g}"})
     pictures = {f"flight_tests_{airframe}.png": _figure(results, airframe) for airframe in AIRFRAMES}
-    return StudyFindings("Flight tests", rows, pictures, {"Head-on, each speed": table(flown)})
+    return StudyFindings("Flight tests", rows, pictures, {"Head-on, each speed": flown})
 
 
 def of(results: Sequence[StudyResult], airframe: str, speeds: Sequence[float]) -> list[StudyResult]:

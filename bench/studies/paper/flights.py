@@ -1,7 +1,7 @@
 """One flight of a study: what is flown, and what is kept of it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from bench.detectors.config import BaselineMission
 from bench.fly.lockstep import flown_with_log
 from bench.studies.paper.track import Floats, StudyTrack, Vector3, track_of
+from companion.report import CollisionReport
 from rebound_cli.inputs import with_guards
 from rebound_cli.results.flight_log import FlightLog
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
@@ -40,21 +41,17 @@ class StudyFlight:
 
 @dataclass(frozen=True, slots=True)
 class StudyContact:
-    """A hit, and what the companion made of it: None where it did not see it. SI units."""
+    """A hit, and what the companion told of it: None where it did not see it. SI units."""
 
     hit: Hit
     share_received: float
     """Share of the contact that lies in the averaging windows of the samples that were received."""
     fold_before_m: float
     """Greatest fold of any arm just before the first touch, beyond the hysteresis: not yet back from a hit before."""
+    told: CollisionReport | None = None
     latency_s: float | None = None
-    impact_speed_estimate_m_s: float | None = None
-    setpoint_ned_m: Vector3 | None = None
-    """In the vehicle's own frame, like the next."""
-    position_estimate_ned_m: Vector3 | None = None
     overshoot_m: float | None = None
     """By the truth, which places the setpoint where the vehicle's own frame was at the first touch."""
-    overshoot_by_estimate_m: float | None = None
 
     @property
     def impact_speed_m_s(self) -> float:
@@ -63,14 +60,14 @@ class StudyContact:
     @property
     def setpoint_in_world_ned_m(self) -> Vector3 | None:
         """Where the setpoint lay at the first touch, for what is measured from the truth."""
-        if self.setpoint_ned_m is None:
+        if self.told is None:
             return None
-        x, y, z = np.subtract(self.setpoint_ned_m, self.hit.frame_offset_ned_m).tolist()
+        x, y, z = np.subtract(self.told.recovery_setpoint_ned_m, self.hit.frame_offset_ned_m).tolist()
         return x, y, z
 
     @property
     def is_detected(self) -> bool:
-        return self.latency_s is not None
+        return self.told is not None
 
     @property
     def is_approach(self) -> bool:
@@ -91,11 +88,9 @@ class StudyResult:
     """What the studies need of a flight."""
 
     flight: StudyFlight
-    is_completed: bool
     contacts: tuple[StudyContact, ...]
     recontacts: int
     """Touches after the first, before the vehicle had recovered, 20 ms or more after the last ended."""
-    false_detections: int
     imu_received_hz: float
     integration_interval_us: int
     greatest_lean_rad: float
@@ -112,13 +107,13 @@ class StudyResult:
         return self.recontacts - sum(contact.is_end_of_the_one_before for contact in self.contacts[1:])
 
     @property
-    def overshoots_m(self) -> list[float]:
-        return [contact.overshoot_m for contact in self.contacts if contact.overshoot_m is not None]
+    def overshoot_m(self) -> float:
+        """The largest."""
+        return max((contact.overshoot_m or 0.0 for contact in self.contacts), default=0.0)
 
     @property
-    def overshoots_by_estimate_m(self) -> list[float]:
-        past_m = (contact.overshoot_by_estimate_m for contact in self.contacts)
-        return [each_m for each_m in past_m if each_m is not None]
+    def overshoot_by_estimate_m(self) -> float:
+        return max((contact.told.overshoot_m for contact in self.contacts if contact.told is not None), default=0.0)
 
 
 def fly(flight: StudyFlight) -> StudyResult:
@@ -127,15 +122,12 @@ def fly(flight: StudyFlight) -> StudyResult:
     mission = BaselineMission.model_validate(with_guards(flight.mission, airframe))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
     flown, truth, log = flown_with_log(mission, scene, airframe)
-    settled_duration_s = mission.companion.settled.duration_s
-    matches = match_contacts(flown.report.collisions, truth.hits, settled_duration_s)
+    matches = match_contacts(flown.report.collisions, truth.hits, mission.companion.settled.duration_s)
     interval_us = airframe.imu.integration_interval_us
     return StudyResult(
         flight=flight,
-        is_completed=flown.report.outcome == "completed",
-        contacts=tuple(_contacts(flown, truth, log, airframe, settled_duration_s)),
+        contacts=tuple(_contacts(flown, truth, log, airframe, mission.companion.settled.duration_s)),
         recontacts=matches.recontacts,
-        false_detections=matches.false_detections,
         imu_received_hz=flown.report.stream_rates_hz["HIGHRES_IMU"],
         integration_interval_us=interval_us,
         greatest_lean_rad=_greatest_lean_rad(truth),
@@ -145,34 +137,20 @@ def fly(flight: StudyFlight) -> StudyResult:
 
 def _contacts(
     flown: Flown, truth: FlightTruth, log: FlightLog, airframe: Airframe, settled_s: float
-) -> list[StudyContact]:
+) -> Iterator[StudyContact]:
     collisions, interval_us = flown.report.collisions, airframe.imu.integration_interval_us
     matches = match_contacts(collisions, truth.hits, settled_s)
     entries = build_summary(flown, FlightFacts("", None, None, settled_s))["collisions"]
     told = zip(matches.hit_of_collision, collisions, entries, strict=True)
     seen = {id(hit): (collision, entry["truth"]) for hit, collision, entry in told if hit is not None}
-    contacts = []
     for hit in truth.hits:
-        share = share_received(log.imu_time_boot_us, interval_us, hit)
         fold_m = _fold_before_m(truth, hit, airframe.arms.hysteresis_m)
-        if id(hit) not in seen:
-            contacts.append(StudyContact(hit, share, fold_m))
-            continue
-        collision, entry = seen[id(hit)]
-        contacts.append(
-            StudyContact(
-                hit,
-                share,
-                fold_m,
-                latency_s=1e-3 * entry["detection_latency_ms"],
-                impact_speed_estimate_m_s=collision.impact_speed_m_s,
-                setpoint_ned_m=collision.recovery_setpoint_ned_m,
-                position_estimate_ned_m=collision.position_ned_m,
-                overshoot_m=entry["overshoot_m"],
-                overshoot_by_estimate_m=collision.overshoot_m,
-            )
-        )
-    return contacts
+        contact = StudyContact(hit, share_received(log.imu_time_boot_us, interval_us, hit), fold_m)
+        if id(hit) in seen:
+            collision, entry = seen[id(hit)]
+            late_s, overshoot_m = 1e-3 * entry["detection_latency_ms"], entry["overshoot_m"]
+            contact = replace(contact, told=collision, latency_s=late_s, overshoot_m=overshoot_m)
+        yield contact
 
 
 def _fold_before_m(truth: FlightTruth, hit: Hit, hysteresis_m: float) -> float:

@@ -70,13 +70,14 @@ class Experiment:
         ]
 
     def conclude(self, results: Sequence[StudyResult]) -> StudyFindings:
-        detected = [result.first for result in results if result.contacts and result.first.is_detected]
-        errors_m_s = [(contact.impact_speed_estimate_m_s or 0.0) - contact.impact_speed_m_s for contact in detected]
-        known_m = _back_m([(c.position_estimate_ned_m, c.setpoint_ned_m) for c in detected])
-        true_m = _back_m([(c.hit.contact_position_ned_m, c.setpoint_in_world_ned_m) for c in detected])
+        first = [result.first for result in results if result.contacts]
+        told = [(contact, contact.told) for contact in first if contact.told is not None]
+        errors_m_s = [report.impact_speed_m_s - contact.impact_speed_m_s for contact, report in told]
+        known_m = _back_m([(report.position_ned_m, report.recovery_setpoint_ned_m) for _, report in told])
+        true_m = _back_m([(c.hit.contact_position_ned_m, c.setpoint_in_world_ned_m) for c, _ in told])
         track = results[0].track
         assert track is not None, "the wall is hit"
-        rows = _experiment_rows(float(np.mean([c.impact_speed_m_s for c in detected])), known_m, true_m, errors_m_s)
+        rows = _experiment_rows(float(np.mean([c.impact_speed_m_s for c, _ in told])), known_m, true_m, errors_m_s)
         return StudyFindings(
             "Simulation against experiment",
             tuple(rows),

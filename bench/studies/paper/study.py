@@ -1,12 +1,13 @@
 """What every study of the paper is: flights to fly, rows of the paper's numbers beside ours, tables and pictures."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from bench.rows.tables import table
 from bench.studies.paper.claims import ClaimRow, number
 from bench.studies.paper.flights import StudyFlight, StudyResult
 from rebound_cli.results.summary import BREAKING_FORCE_N
@@ -43,11 +44,11 @@ def is_lost(result: StudyResult) -> bool:
 
 
 def worst_overshoot_m(results: Iterable[StudyResult]) -> float:
-    return max((overshoot for result in results for overshoot in result.overshoots_m), default=0.0)
+    return max((result.overshoot_m for result in results), default=0.0)
 
 
 def worst_overshoot_by_estimate_m(results: Iterable[StudyResult]) -> float:
-    return max((overshoot for result in results for overshoot in result.overshoots_by_estimate_m), default=0.0)
+    return max((result.overshoot_by_estimate_m for result in results), default=0.0)
 
 
 def safety_text(peak_force_n: float) -> str:
@@ -56,8 +57,17 @@ def safety_text(peak_force_n: float) -> str:
     return f"{factor:.2f}" if factor >= 1.0 else f"**{factor:.2f}**"
 
 
-def cells(results: Sequence[StudyResult]) -> dict[str, object]:
-    """Of flights that hit the wall. Overshoot by the truth, and as the vehicle itself saw it."""
+def flown_table(results: Iterable[StudyResult], names_of: Callable[[StudyResult], Mapping[str, str]]) -> str:
+    """Of flights that hit the wall: a row for those whose first columns are the same, in the order flown."""
+    groups: dict[tuple[tuple[str, str], ...], list[StudyResult]] = {}
+    for result in results:
+        if result.contacts:
+            groups.setdefault(tuple(names_of(result).items()), []).append(result)
+    return table([dict(names) | _cells(some) for names, some in groups.items()])
+
+
+def _cells(results: Sequence[StudyResult]) -> dict[str, object]:
+    """Overshoot by the truth, and as the vehicle itself saw it."""
     first = [result.first for result in results]
     ratios = [contact.hit.rebound_speed_m_s / contact.impact_speed_m_s for contact in first]
     peak_n = max(contact.hit.peak_force_n for result in results for contact in result.contacts)
