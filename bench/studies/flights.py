@@ -12,6 +12,7 @@ from pathlib import Path
 
 import yaml
 
+from bench.fly.by_hand.stick_logs import logs_in
 from bench.rows.tables import at_most_an_hour
 from bench.studies.landings import CRASH_WITHIN_S
 from companion.mission.config import CompanionConfig
@@ -23,7 +24,6 @@ from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import replayed_flight
 from rebound_cli.report.writer import write_page
 
-SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
 LABELS = Path(__file__).with_name("flights.yaml")
 # A contact bounces and tumbles: ArduPilot's crash check waits for so long, too (crash_check.cpp, 2 s).
 ONE_EVENT_US = 2_000_000
@@ -128,10 +128,9 @@ def table(rows: Sequence[Row]) -> str:
         "|---|---|---:|---:|---:|---:|---:|---:|---:|---|",
     ]
     for row in seen:
-        cells = (row.flown_h, row.watched_h), (row.collisions, row.touchdowns, row.crashes)
-        hours = " | ".join(f"{hours:.3f}" for hours in cells[0])
-        counts = " | ".join(map(str, cells[1])) + f" | {row.promised:.2g}"
-        lines.append(f"| {row.log} | {row.vehicle} | {hours} | {row.imu_hz:.0f} | {counts} | {'; '.join(row.wrong)} |")
+        hours = f"{row.flown_h:.3f} | {row.watched_h:.3f} | {row.imu_hz:.0f}"
+        counts = f"{row.collisions} | {row.touchdowns} | {row.crashes} | {row.promised:.2g}"
+        lines.append(f"| {row.log} | {row.vehicle} | {hours} | {counts} | {'; '.join(row.wrong)} |")
     watched_h = sum(row.watched_h for row in seen)
     false = sum(wrong.endswith("where nothing was") for row in seen for wrong in row.wrong)
     lines.append("")
@@ -152,7 +151,7 @@ def run_flights(options: Namespace) -> int:
     out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
     rows, refused = [], []
-    for path in sorted(p for folder in options.folders for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES):
+    for path in (path for folder in options.folders for path in logs_in(folder)):
         name = f"{path.parent.name}/{path.name}"
         config, listener = CompanionConfig(), Listener()
         try:

@@ -36,6 +36,11 @@ class LoggedSticks:
     rows: Floats
 
 
+def logs_in(folder: Path) -> list[Path]:
+    """What looks like a log, by its name, in the order of the names."""
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
+
+
 def logs_with_sticks(folder: Path, most: int) -> list[LoggedSticks]:
     """In the order of their names. Raises StickLogError where there is none."""
     found = [logged for _, logged in zip(range(most), _found(folder), strict=False)]
@@ -45,7 +50,7 @@ def logs_with_sticks(folder: Path, most: int) -> list[LoggedSticks]:
 
 
 def _found(folder: Path) -> Iterator[LoggedSticks]:
-    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES):
+    for path in logs_in(folder):
         try:
             heard = read_log(path).heard
         except (LogError, OSError):
