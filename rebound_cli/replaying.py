@@ -19,7 +19,10 @@ from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
 
 
 def run_replay(options: Namespace) -> int:
-    """Print the findings, write their page. 1 when they are not what was expected, or a flight did not come again."""
+    """Print the findings, write their page.
+
+    1 when they are not what was expected, when a flight did not come again, or when no flight was heard.
+    """
     console = console_for(options.json)
     replay, shown = _replay(options, console)
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
@@ -70,4 +73,4 @@ def _exit_code(replay: Replay, expected: int | None, least_watched: float, conso
         seen = "nothing" if share is None else f"{100.0 * share:.0f} %"
         console.print(f"expected no collisions, and {seen} of the flight was watched: that shows none")
         return 1
-    return int(again is not None and again.first_difference is not None)
+    return int(share is None if again is None else again.first_difference is not None)

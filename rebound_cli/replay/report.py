@@ -130,7 +130,7 @@ def _verdict(replay: Replay) -> str:
     text += f", {others} contact{' that is' if others == 1 else 's that are'} none" if others else ""
     share = replay.findings.watched_share
     if share is None:
-        return f"{text}; no flight was heard"
+        return f"{text}; no flight was heard: that is no evidence"
     watched = f"{100.0 * share:.0f} % of the flight was watched"
     return f"{text}; {watched}" if share else f"{text}; nothing of the flight was watched: that is no evidence"
 

@@ -8,6 +8,7 @@ import numpy as np
 from bench.fly.by_hand.stick_logs import Floats, LoggedSticks
 from bench.fly.by_hand.watched import STICKS_S, GuardedFlight, Sticks
 from companion.guard.guard import Guard
+from companion.motion.config import GRAVITY_M_S2
 from sim_vehicle.airframe import Airframe
 
 FLOWN_S = 60.0
@@ -101,7 +102,7 @@ class Pilot:
         climbs_m_s = -self._flight.velocity_ned_m_s[2]
         asked_m_s2 = CLIMB_P_PER_S * (wish.throttle * self._climb_m_s - climbs_m_s)
         upright = max(math.cos(math.radians(self._flight.tilt_deg)), 0.5)
-        thrust = self._hover / upright * max(1.0 + asked_m_s2 / 9.81, 0.1)
+        thrust = self._hover / upright * max(1.0 + asked_m_s2 / GRAVITY_M_S2, 0.1)
         # MPC_THR_CURVE has hovering in the middle.
         above = thrust - self._hover
         throttle = above / (1.0 - self._hover) if above > 0.0 else above / self._hover

@@ -10,6 +10,7 @@ import numpy as np
 from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, made
 from companion.companion import Companion
 from companion.guard.guard import Guard
+from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.detector import Impact, Phase
 from companion.report import Status
 from rebound_cli.simulation.lockstep import EPOCH_US
@@ -23,7 +24,6 @@ IMU_HZ = (50, 100, 250)
 # Of PX4's modes, as DO_SET_MODE takes them: main and sub mode.
 MODES = {"ALTCTL": (2, 0), "POSCTL": (3, 0), "AUTO.RTL": (4, 5), "AUTO.LAND": (4, 6)}
 MODES |= {"STABILIZED": (7, 0)}
-GRAVITY_M_S2 = 9.81
 # More than any drawn vehicle's thrust, with a hover at a third of it, and drag.
 STRONGEST_M_S2 = 45.0
 # A ground station's sticks come at 25 to 50 Hz, its heartbeat once a second.

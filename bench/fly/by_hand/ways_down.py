@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
-from bench.fly.by_hand.watched import GRAVITY_M_S2, GuardedFlight, Sticks, Watcher
+from bench.fly.by_hand.watched import GuardedFlight, Sticks, Watcher
 from companion.companion import Companion
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
 from companion.mission.model import Mission
+from companion.motion.config import GRAVITY_M_S2
 from sim_vehicle.airframe import Airframe, Bounce
 from sim_vehicle.autopilot.flight_tasks.manual import EXPO
 from sim_vehicle.scene import Scene
