@@ -357,12 +357,12 @@ def add_replay(commands: Commands) -> None:
 
 
 def add_tune(commands: Commands) -> None:
-    text = "Noise floor, margins, the smallest hit that would be seen, settings; see docs/how-to/recorded-flights.md."
+    text = "Noise floor, margins, the smallest hit that shows, settings; see docs/how-to/recorded-flights.md."
     tune = _command(commands, "tune", "tune.command:run_tune", "settings for a vehicle from its healthy flights", text)
     text = "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders"
     _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
-    _option(tune, "--airframe", "whose arms hit the wall (default: both foldable and rigid)", "NAME|FILE")
+    _gone(tune, "--airframe", "the smallest hit that shows is the detector's own promise, whatever the arms")
     _option(tune, "--companion", "settings to begin with (default: the defaults)", "FILE")
     _option(tune, "--out", "write the settings, for rebound fly --companion FILE", "FILE")
     _add_json(tune, "figures")
@@ -372,16 +372,10 @@ def add_identify(commands: Commands) -> None:
     text = "Fits stiffness, damping and restitution to hits on a wall; see docs/how-to/airframes.md."
     summary = "find an airframe's springs in recorded hits"
     identify = _command(commands, "identify", "identification.command:run_identify", summary, text)
-    _option(
-        identify,
-        "data",
-        "a CSV file, or a log or run's folder as replay reads it: one hit each",
-        "DATA",
-        type=Path,
-        nargs="+",
-    )
+    text = "logs or runs' folders as replay reads them: one hit each"
+    _option(identify, "data", text, "DATA", type=Path, nargs="+")
     _option(identify, "--mass", "of the vehicle; known for simulated runs", "KG", type=mass_kg)
-    _option(identify, "--axis", "CSV: it is square to the wall (default: by the turn)", choices=("x", "y"))
+    _gone(identify, "--axis", "it belonged to CSV files of motion capture; a log tells where the wall is")
     _option(identify, "--out", "write an airframe file", "FILE")
     _option(identify, "--name", "name of the airframe (default: the file's)")
     _option(identify, "--based-on", "airframe for all else (default: foldable, rigid where no spring is seen)", "NAME")

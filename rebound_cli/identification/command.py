@@ -6,7 +6,6 @@ from argparse import Namespace
 from pathlib import Path
 
 from rebound_cli.documents import load_document, parse_document, validated, write_text
-from rebound_cli.identification.capture import find_hit, read_table
 from rebound_cli.identification.fit import Identified, Number, Spring, identify
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
@@ -21,7 +20,7 @@ def run_identify(options: Namespace) -> int:
     out: Path | None = options.out
     if out is not None and out.exists():
         raise IdentificationError(f"{out} exists already: give --out another name.")
-    found = identify([_hit(path, {"x": 0, "y": 1}.get(options.axis)) for path in options.data])
+    found = identify([_hit(path) for path in options.data])
     mass_kg = _mass_kg(options)
     print(report_text(found), end="")
     if out is None:
@@ -38,8 +37,11 @@ def run_identify(options: Namespace) -> int:
     return 0
 
 
-def _hit(path: Path, axis: int | None) -> Hit:
-    return find_hit(read_table(path), axis) if path.suffix.lower() == ".csv" else flight_hit(read_log(log_file(path)))
+def _hit(path: Path) -> Hit:
+    if path.suffix.lower() == ".csv":
+        text = "positions of motion capture are not read any more: give the same flight's log, with its IMU"
+        raise IdentificationError(f"{path}: {text}.")
+    return flight_hit(read_log(log_file(path)))
 
 
 def _mass_kg(options: Namespace) -> float | None:

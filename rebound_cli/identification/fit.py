@@ -1,6 +1,6 @@
 """Stiffness, damping and restitution from hits, each with its standard deviation.
 
-The spring is the paper's eq. 2 on a wall that cannot pull: its path and its rebound in closed form.
+The spring is the paper's eq. 2 on a wall that cannot pull.
 """
 
 import math
@@ -9,25 +9,8 @@ from dataclasses import dataclass
 from statistics import median_high
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from rebound_cli.identification.hit import Floats, Hit, Push, Track
-
-# Positions see a spring only if the contact lasts this many of their intervals; eq. 2 bends the path three
-# times (touch, turn, release), and with fewer samples any stiff spring fits.
-_LEAST_CONTACT_INTERVALS = 2.5
-
-_STARTS_RAD_S = (25.0, 60.0, 120.0, 250.0)
-_START_RATIO = 0.3
-# Logarithm of the frequency, ratio, then speed, place and moment of the touch, which are free. Stiffer than
-# 3000 rad/s is a contact below 1 ms: beyond any motion capture and most inertial sensors.
-_MOST_RATIO = 0.99
-_BOUNDS = (
-    [math.log(5.0), 0.001, -np.inf, -np.inf, -np.inf],
-    [math.log(3000.0), _MOST_RATIO, np.inf, np.inf, np.inf],
-)
-# Their usual sizes: a third of the frequency, 0.1, 0.1 m/s, 5 mm and 10 ms.
-_SCALE = (0.3, 0.1, 0.1, 0.005, 0.01)
+from rebound_cli.identification.hit import Floats, Hit, Push
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,21 +59,6 @@ class Spring:
 def _phase(ratio: float) -> float:
     """Of the damped oscillation where its force is back at zero."""
     return math.atan2(2 * ratio * math.sqrt(1 - ratio**2), 2 * ratio**2 - 1)
-
-
-def _restitution(ratio: float) -> float:
-    """Speed after over speed before."""
-    return math.exp(-ratio * _phase(ratio) / math.sqrt(1 - ratio**2))
-
-
-def _path(since_touch_s: Floats, speed_m_s: float, natural_rad_s: float, ratio: float) -> Floats:
-    """Depth beyond the first touch, negative before it; free flight until the touch and after the release."""
-    damped = natural_rad_s * math.sqrt(1 - ratio**2)
-    release_s = _phase(ratio) / damped
-    pressed_s = np.clip(since_touch_s, 0.0, release_s)
-    depth: Floats = speed_m_s / damped * np.exp(-ratio * natural_rad_s * pressed_s) * np.sin(damped * pressed_s)
-    before, after = np.minimum(since_touch_s, 0.0), np.maximum(since_touch_s - release_s, 0.0)
-    return depth + speed_m_s * (before - _restitution(ratio) * after)
 
 
 def fit_restitution(hits: Sequence[Hit]) -> Number:
@@ -143,13 +111,7 @@ def fit_spring(hits: Sequence[Hit]) -> Spring | None:
 
 def _spring_of(hit: Hit) -> Spring | None:
     """The spring of one hit, or None where the contact is too short, or the data too poor, to show it."""
-    spring = None
-    if hit.push is not None:
-        spring = _from_push(hit, hit.push)
-    elif hit.track is not None:
-        spring = _from_track(hit, hit.track)
-        if spring.contact_time_s(hit.guards) < _LEAST_CONTACT_INTERVALS * hit.track.interval_s:
-            return None
+    spring = None if hit.push is None else _from_push(hit, hit.push)
     # A stiffness known no better than to a factor is not one to write into a file.
     if spring is None or spring.stiffness_per_s2.sigma >= spring.stiffness_per_s2.value or spring.ratio.value < 0:
         return None
@@ -184,32 +146,6 @@ def _from_push(hit: Hit, push: Push) -> Spring | None:
     covariance_rad_s = -ratio * natural * relative**2
     found = Number(natural, natural * relative), Number(ratio, ratio_sigma)
     return Spring(*found, covariance_rad_s=covariance_rad_s)
-
-
-def _from_track(hit: Hit, data: Track) -> Spring:
-    """Two numbers of the spring, and speed, place and moment of the first touch."""
-    share = math.sqrt(hit.guards / 2)
-
-    def residuals(numbers: Floats) -> Floats:
-        natural, ratio, speed, place, moment = numbers
-        depth = _path(data.time_s - moment, speed, math.exp(natural) * share, min(ratio * share, _MOST_RATIO))
-        rest: Floats = depth + place - data.towards_wall_m
-        return rest
-
-    top = int(np.argmax(data.towards_wall_m))
-    fits = []
-    for start_rad_s in _STARTS_RAD_S:
-        lead_s = 1.0 / start_rad_s
-        place = data.towards_wall_m[top] - 0.6 * lead_s * hit.speed_in_m_s
-        start = [math.log(start_rad_s), _START_RATIO, hit.speed_in_m_s, place, data.time_s[top] - lead_s]
-        fits.append(least_squares(residuals, start, bounds=_BOUNDS, x_scale=_SCALE, max_nfev=200))
-    best = min(fits, key=lambda fit: float(fit.cost))
-    variance = 2 * float(best.cost) / max(1, len(data.time_s) - len(best.x))
-    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
-    # The fit has the frequency's logarithm.
-    natural, (logarithm_sigma, ratio_sigma, *_) = math.exp(best.x[0]), np.sqrt(np.diag(covariance)).tolist()
-    found = Number(natural, natural * logarithm_sigma), Number(float(best.x[1]), ratio_sigma)
-    return Spring(*found, covariance_rad_s=natural * float(covariance[0, 1]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What one hit on a wall left behind, whichever instrument saw it."""
+"""What one hit on a wall left behind."""
 
 import math
 from dataclasses import dataclass
@@ -13,15 +13,6 @@ Floats = npt.NDArray[np.float64]
 
 class IdentificationError(ReboundError):
     """Data from which no contact can be identified: the sentence says what is missing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Track:
-    """Positions through a hit along the wall's normal, growing towards the wall from any origin."""
-
-    time_s: Floats
-    towards_wall_m: Floats
-    interval_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +37,6 @@ class Hit:
     along_in_m_s: float
     along_out_m_s: float
     guards: int  # that meet the wall: 2 head-on, 1 with the nose turned by 45 degrees
-    track: Track | None = None
     push: Push | None = None
     stop_m: float | None = None  # depth at which the stop of the arms was met, if it was
 

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self, TypeAlias
 
-import numpy as np
-
 from companion import messages
 from companion.errors import ReboundError
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, Identity, identify
 from companion.messages import Heartbeat, ImuSample, MessageId, Sample, Vector3
-from rebound_cli.logs.topic import Floats
 
 # Without these a detector loses something.
 WANTED = {
@@ -109,17 +106,6 @@ class Log:
 def vector(row: Sequence[float]) -> Vector3:
     """The first three."""
     return row[0], row[1], row[2]
-
-
-def low_pass_answer_per_s(cutoff_hz: float, step_s: float) -> Floats:
-    """What a Butterworth filter of second order gives each step after a pulse of 1, until a thousandth is left.
-
-    Its poles lie at a (-1 +- i), a = 2 pi f / sqrt(2): the answer is back at zero after pi / a = 1 / (sqrt(2) f).
-    """
-    decay_per_s = math.sqrt(2.0) * math.pi * cutoff_hz
-    since = decay_per_s * step_s * np.arange(math.ceil(7.0 / (decay_per_s * step_s)))
-    answer: Floats = 2.0 * decay_per_s * np.exp(-since) * np.sin(since)
-    return answer
 
 
 def in_order(heard: Iterable[LoggedSample], middle_us: float) -> tuple[LoggedSample, ...]:

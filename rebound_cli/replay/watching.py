@@ -16,6 +16,7 @@ from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind, Situation
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
+from companion.reflex.promise import Promise
 from rebound_cli.logs.log import Demand, Log, LoggedSample, Told
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
@@ -123,6 +124,7 @@ class Findings:
     flown_us: int = 0  # armed and in the air
     watched_us: int = 0  # of that, with a detector that was on and saw
     promised: float = 0.0  # false alarms in that time, by the detector's own statistic
+    promise: Promise | None = None  # when it was last armed
     _open: dict[str, tuple[int, str]] = field(default_factory=dict)
     _noted_us: int | None = None
 
@@ -163,6 +165,7 @@ class Findings:
             self.flown_us += elapsed_us
             if off is None and monitor.no_data_reason is None:
                 self.watched_us += elapsed_us
+                self.promise = monitor.promise
                 self.promised += elapsed_us / 3.6e9 * (monitor.promise.false_alarms_per_h if monitor.promise else 0.0)
 
     def _note_span(self, name: str, reason: str | None, at_us: int) -> None:

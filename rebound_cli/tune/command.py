@@ -16,18 +16,17 @@ from companion.errors import ConfigurationError
 from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
 from rebound_cli.documents import parse_document, validated, write_text
-from rebound_cli.inputs import companion_settings, load_world
-from rebound_cli.live.console import console_for, with_progress
+from rebound_cli.inputs import companion_settings
+from rebound_cli.live.console import console_for
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
 from rebound_cli.replay.recording import log_file
 from rebound_cli.replay.watching import Findings, watch_log
 from rebound_cli.results.run_folder import SUMMARY_NAME
-from rebound_cli.tune.hits import SPEEDS_M_S, HitSensitivity, hit_moments, sensitivity
 from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
-SCHEMA = 1
+SCHEMA = 2
 
 _WIDTH = 110
 # PX4's failure detector takes a larger tilt for a lost attitude: FD_FAIL_R and FD_FAIL_P, 60 deg by default.
@@ -35,9 +34,8 @@ _TILT_DEG = 60.0
 # PX4's land detector takes less force, for so long, for a fall: LNDMC_FFALL_THR and LNDMC_FFALL_TTRI.
 _FALL_M_S2 = 2.0
 _FALL_US = 300_000
-BUILT_IN = ("foldable", "rigid")
-# Beside the recorded rate: what a radio or a slow serial port leaves of it, and PX4's default.
-RATES_HZ = (100.0, 50.0)
+# The detector learns its floor in half a second (`shaking.MEMORY_US`): six times that show how it wavers.
+_LEAST_FLYING_S = 3.0
 
 
 def run_tune(options: Namespace) -> int:
@@ -46,16 +44,10 @@ def run_tune(options: Namespace) -> int:
     if out is not None and out.exists():
         raise ConfigurationError(f"{out} exists already: give --out another name.")
     config = companion_settings(options.companion, (), options.detector)
-    names = BUILT_IN if options.airframe is None else (options.airframe,)
-    airframes = [load_world(None, (), name, None).airframe for name in names]
     flights = [read_healthy(path, config) for path in options.logs]
-    logs, recorded_hz = [flight.log for flight in flights], min(flight.shaking.rate_hz for flight in flights)
-    # A rate as good as the recorded one shows nothing new.
-    rates = [None, *(rate_hz for rate_hz in RATES_HZ if rate_hz < 0.9 * recorded_hz)]
+    logs = [flight.log for flight in flights]
     found = margins(logs, config)
-    sensitivities = (sensitivity(logs, config, airframe, rate_hz) for airframe in airframes for rate_hz in rates)
-    seen = list(with_progress(sensitivities, len(airframes) * len(rates)))
-    tuning = Tuning(config.detector, flights, found, seen, advise(logs, config, found, seen))
+    tuning = Tuning(config.detector, flights, found, advise(logs, config, found))
     text = settings_text(tuning.advice, ", ".join(path.name for path in options.logs))
     # Read as `rebound fly` will read it before anybody has it.
     document = parse_document(text, str(out or "the settings"))
@@ -91,7 +83,6 @@ class Tuning:
     detector: str
     flights: Sequence[Healthy]
     margins: Sequence[Margin]
-    sensitivities: Sequence[HitSensitivity]
     advice: Advice
 
 
@@ -103,9 +94,10 @@ def read_healthy(path: Path, config: CompanionConfig) -> Healthy:
     if wrong is not None:
         raise LogError(f"{path}: not a healthy flight, {wrong}; tune learns from flights without a hit or a crash.")
     shakes = shaking(log)
-    if not any(stage in FLYING for stage in shakes.stages):
+    flying_s = sum(stage in FLYING for stage in shakes.stages) * shakes.interval_us * 1e-6
+    if not flying_s:
         raise LogError(f"{path}: no flight in it, only the ground, a take-off and a landing.")
-    if not any(hit_moments(log)):
+    if flying_s < _LEAST_FLYING_S:
         raise LogError(f"{path}: too short a flight to learn from; a minute in the air is a good one.")
     return Healthy(log, shakes, watch_log(log, config))
 
@@ -139,7 +131,7 @@ def crash(log: Log) -> str | None:
 
 
 def tuning_text(tuning: Tuning) -> str:
-    parts = [*map(_flight_rows, tuning.flights), _margin_rows(tuning), _sight_rows(tuning)]
+    parts = [*map(_flight_rows, tuning.flights), _margin_rows(tuning)]
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 
 
@@ -159,6 +151,7 @@ def _flight_rows(flight: Healthy) -> Iterator[str]:
     rows += [
         f"  clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how})",
         f"  as set now: {alarms or 'no'} false alarm{'s' if alarms > 1 else ''}, {blind}",
+        f"  smallest hit that shows: {found.promise.text() if found.promise else 'not known'}",
         *(f"  note: {loss}" for loss in log.losses),
     ]
     for row in rows:
@@ -175,16 +168,6 @@ def _margin_rows(tuning: Tuning) -> Iterator[str]:
         yield f"  with the settings below still {left} false alarms: this vehicle is not made quiet by thresholds"
 
 
-def _sight_rows(tuning: Tuning) -> Iterator[str]:
-    hits = tuning.sensitivities[0].hits
-    yield f"hits put into these flights, seen of {hits}, by speed in m/s (eq. 2, head-on, by force alone)"
-    yield f"  {'':<24}{''.join(f'{speed:>6g}' for speed in SPEEDS_M_S)}   all seen from"
-    for one in tuning.sensitivities:
-        counts, certain = "".join(f"{count:>6}" for count in one.seen), one.certain_from_m_s
-        text = "no speed tried" if certain is None else f"{certain:g} m/s on"
-        yield f"  {one.airframe + f', {one.rate_hz:.0f} Hz':<24}{counts}   {text}"
-
-
 def tuning_data(tuning: Tuning) -> dict[str, Any]:
     """The same for a program; SI units, body FRD."""
     return {
@@ -192,17 +175,6 @@ def tuning_data(tuning: Tuning) -> dict[str, Any]:
         "detector": tuning.detector,
         "flights": [_flight_data(flight) for flight in tuning.flights],
         "margins": [asdict(margin) for margin in tuning.margins],
-        "hits": [
-            {
-                "airframe": one.airframe,
-                "rate_hz": round(one.rate_hz, 2),
-                "hits": one.hits,
-                "speeds_m_s": list(SPEEDS_M_S),
-                "seen": list(one.seen),
-                "all_seen_from_m_s": one.certain_from_m_s,
-            }
-            for one in tuning.sensitivities
-        ],
         "settings": [
             {"place": ".".join(("companion", *place)), "value": value, "reason": reason}
             for place, (value, reason) in tuning.advice.settings.items()
@@ -222,6 +194,7 @@ def _flight_data(flight: Healthy) -> dict[str, Any]:
         "clipped_samples": count,
         "clipping_known_by": how,
         "false_alarms": len(flight.findings.collisions),
+        "promise": flight.findings.promise and flight.findings.promise.summary(),
         "blind_s": round(sum(span.duration_s for span in flight.findings.blind), 3),
         "notes": list(flight.log.losses),
     }

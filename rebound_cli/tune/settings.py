@@ -15,7 +15,6 @@ from typing import Any
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.watching import watch_log
-from rebound_cli.tune.hits import HitSensitivity
 
 # What settings of a detector are compared with the flight, by the words in their names.
 _COMPARED = re.compile(r"threshold|factor|step")
@@ -24,10 +23,6 @@ _COMPARED = re.compile(r"threshold|factor|step")
 SHARES = [round(0.4 + 0.02 * step, 2) for step in range(181)]
 # Other days have other gusts: a threshold stands at least this many times above the largest of these flights.
 RESERVE = 1.25
-# The rate below which a flight must not begin is that at which every hit from this speed on was seen.
-WANTED_M_S = 1.0
-# A rate asked for is received to within a tenth.
-RECEIVED_SHARE = 0.9
 
 Path = tuple[str, ...]
 
@@ -80,9 +75,7 @@ def _false_alarms(logs: Sequence[Log], config: CompanionConfig) -> int:
     return sum(len(watch_log(log, config).collisions) for log in logs)
 
 
-def advise(
-    logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin], sensitivities: Sequence[HitSensitivity]
-) -> Advice:
+def advise(logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin]) -> Advice:
     """Thresholds with a reserve over these flights, never below where they started."""
     raised = _raised(logs, start, found)
     given = _leaves(start.model_dump(mode="json", exclude_unset=True))
@@ -92,7 +85,6 @@ def advise(
         value = raised.get(margin.setting, margin.value)
         settings[start.detector, margin.setting] = value, _why(margin, raised)
     settings["estimate", "imu_averaging_interval_s"] = _averaging(logs, start)
-    settings["streams", "min_highres_imu_hz"] = _least_rate(sensitivities, start)
     config = _with(start, raised)
     return Advice(config, settings, _false_alarms(logs, config))
 
@@ -126,16 +118,6 @@ def _averaging(logs: Sequence[Log], start: CompanionConfig) -> tuple[float, str]
     if not known:
         return start.estimate.imu_averaging_interval_s, "not told by these logs: 1 / IMU_INTEG_RATE"
     return math.ceil(max(known) / 100) / 1e4, "99 of 100 IMU samples hold this time or less"
-
-
-def _least_rate(sensitivities: Sequence[HitSensitivity], start: CompanionConfig) -> tuple[float, str]:
-    name, seen = sensitivities[0].airframe, f"all hits from {WANTED_M_S:g} m/s on"
-    rates = [s.rate_hz for s in sensitivities if s.airframe == name and (s.certain_from_m_s or math.inf) <= WANTED_M_S]
-    if not rates:
-        reason = f"as it was: at no rate tried were {seen} seen ({name} arms)"
-        return start.streams.min_highres_imu_hz, reason
-    reason = f"at {min(rates):.0f} Hz {seen} were seen ({name} arms)"
-    return float(math.floor(RECEIVED_SHARE * min(rates))), reason
 
 
 def settings_text(advice: Advice, source: str) -> str:
