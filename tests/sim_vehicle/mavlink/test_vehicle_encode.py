@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.commander.failsafe_table import Action
-from sim_vehicle.autopilot.messages import CommandAck, Identity, Result, Severity, StatusText
+from sim_vehicle.autopilot.messages import Identity, Severity, StatusText
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
@@ -39,13 +39,6 @@ def telemetry() -> Telemetry:
 
 def read_back(message):
     return dialect.MAVLink(None).decode(bytearray(Encoder(Identity()).packet(message)))
-
-
-def test_packets_are_mavlink_2_from_the_autopilot():
-    raw = Encoder(Identity()).packet(encode.heartbeat(telemetry()))
-    assert raw[0] == 0xFD
-    message = dialect.MAVLink(None).decode(bytearray(raw))
-    assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 1)
 
 
 @pytest.mark.parametrize(
@@ -156,14 +149,6 @@ def test_the_failsafe_looks_as_in_px4():
     assert (mode.custom_mode, mode.intended_custom_mode) == (0x00030000, 0x00060000)
 
 
-def test_prearm_health_follows_the_checks():
-    state = telemetry()
-    prearm = 0x10000000
-    assert condition.sys_status(state).onboard_control_sensors_health & prearm
-    state.autopilot.request_mode(Mode.MANUAL)
-    assert not condition.sys_status(state).onboard_control_sensors_health & prearm
-
-
 @pytest.mark.parametrize(
     ("applied", "mask", "fields"),
     [
@@ -193,12 +178,6 @@ def test_version_is_px4s_and_the_hash_is_not():
     assert message.capabilities == 59647
 
 
-def test_acks_name_whom_they_answer():
-    message = read_back(encode.command_ack(CommandAck(400, Result.TEMPORARILY_REJECTED, 255, 190)))
-    assert (message.command, message.result) == (400, 1)
-    assert (message.target_system, message.target_component) == (255, 190)
-
-
 def test_vibration_is_the_slow_mean_of_the_jumps():
     metric = VibrationMetrics()
     for number in range(2_000):
@@ -211,12 +190,6 @@ def test_vibration_is_the_slow_mean_of_the_jumps():
 # --- STATUSTEXT -------------------------------------------------------------------------------------------
 
 ARMED = StatusText(Severity.INFO, "Armed by external command")
-
-
-def test_without_a_ground_station_there_is_no_text():
-    link = TextLink()
-    link.add(ARMED, 0)
-    assert [message for now in range(0, 10 * SECOND, 4_000) for message in link.due(now)] == []
 
 
 def test_with_one_the_text_comes_and_ends_in_a_tab():
