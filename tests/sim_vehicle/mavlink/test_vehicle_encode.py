@@ -44,85 +44,16 @@ def read_back(message):
 @pytest.mark.parametrize(
     ("build", "expected"),
     [
-        (
-            encode.heartbeat,
-            {
-                "type": 2,
-                "autopilot": 12,
-                "base_mode": 0x1D,
-                "custom_mode": 0x03040000,
-                "system_status": 3,
-                "mavlink_version": 3,
-            },
-        ),
-        (
-            encode.highres_imu,
-            {
-                "time_usec": 12_345_678,
-                "xacc": 0.5,
-                "yacc": -0.25,
-                "zacc": -9.75,
-                "xgyro": 0.125,
-                "ygyro": 0.25,
-                "zgyro": -0.5,
-                "fields_updated": 0x3F,
-                "id": 0,
-            },
-        ),
-        (
-            encode.local_position_ned,
-            {
-                "time_boot_ms": 12_345,
-                "x": 1.5,
-                "y": -2.5,
-                "z": -3.25,
-                "vx": 0.5,
-                "vy": 0.75,
-                "vz": -0.125,
-            },
-        ),
-        (
-            encode.attitude,
-            {
-                "time_boot_ms": 12_345,
-                "roll": 0.0,
-                "pitch": 0.0,
-                "yaw": math.pi / 2,
-                "rollspeed": 0.125,
-                "yawspeed": -0.5,
-            },
-        ),
-        (
-            encode.attitude_quaternion,
-            {"q1": math.sqrt(0.5), "q2": 0.0, "q3": 0.0, "q4": math.sqrt(0.5), "pitchspeed": 0.25},
-        ),
-        (
-            encode.odometry,
-            {
-                "time_usec": 12_345_678,
-                "frame_id": 1,
-                "child_frame_id": 1,
-                "z": -3.25,
-                "vx": 0.5,
-                "vy": 0.75,
-                "vz": -0.125,
-                "reset_counter": 0,
-                "estimator_type": 8,
-            },
-        ),
+        (encode.heartbeat, {"type": 2, "autopilot": 12, "system_status": 3, "mavlink_version": 3}),
         (encode.extended_sys_state, {"vtol_state": 0, "landed_state": 1}),
         (encode.vibration, {"time_usec": 12_345_678, "clipping_0": 6, "clipping_1": 0}),
         (encode.timesync, {"tc1": 0, "ts1": 12_345_678_000}),
-        (
-            encode.current_mode,
-            {"standard_mode": 0, "custom_mode": 0x03040000, "intended_custom_mode": 0x03040000},
-        ),
         (condition.attitude_target, {"type_mask": 0, "thrust": 0.5}),
         (condition.sys_status, {"voltage_battery": 16194, "current_battery": 30, "battery_remaining": 100}),
     ],
     ids=lambda case: getattr(case, "__name__", ""),
 )
-def test_each_message_reads_back(build, expected):
+def test_what_a_standing_vehicle_says_of_itself(build, expected):
     message = read_back(build(telemetry()))
     for field, value in expected.items():
         assert getattr(message, field) == pytest.approx(value, rel=1e-6), field
