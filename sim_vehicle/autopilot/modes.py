@@ -87,7 +87,6 @@ class ModeEvent(StrEnum):
 
     REQUEST = "requested"
     TAKEOFF_REACHED = "takeoff height reached"
-    MISSION_AFTER_TAKEOFF = "takeoff height reached, COM_TAKEOFF_ACT 1"
     MISSION_FINISHED = "mission finished in the air"
     STICKS = "sticks moved"
     DISARMED = "disarmed"
@@ -139,7 +138,6 @@ TRANSITIONS: tuple[Transition, ...] = (
     _request(Mode.OFFBOARD),
     _request(Mode.TERMINATION, ModeCondition.ALWAYS),
     Transition((Mode.TAKEOFF,), ModeEvent.TAKEOFF_REACHED, ModeCondition.ARMED, Mode.LOITER),
-    Transition((Mode.TAKEOFF,), ModeEvent.MISSION_AFTER_TAKEOFF, ModeCondition.ARMED, Mode.MISSION),
     Transition((Mode.MISSION,), ModeEvent.MISSION_FINISHED, ModeCondition.ARMED, Mode.LOITER),
     Transition(_FLOWN_WITHOUT_STICKS, ModeEvent.STICKS, ModeCondition.ARMED, Mode.POSCTL),
     Transition(tuple(sorted(NOT_KEPT_AFTER_DISARMING)), ModeEvent.DISARMED, ModeCondition.ALWAYS, None),

@@ -5,8 +5,6 @@ import math
 import pytest
 
 from bench.cases.vehicles import vehicle_of
-from sim_vehicle.autopilot.autopilot import LandedState
-from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -37,15 +35,6 @@ def test_a_vehicle_that_begins_in_flight_goes_steadily_on(kind, seed, speed_m_s)
     w, _, _, z = body[6:10]
     assert 2.0 * math.atan2(z, w) == pytest.approx(math.atan2(0.8, 0.6), abs=0.1)
     assert texts == []
-
-
-def test_it_is_armed_off_the_ground_and_in_hold():
-    vehicle = SimulatedVehicle(vehicle_of("foldable").airframe, Scene(), 3)
-    vehicle.begin_in_flight(START_NED_M, (1.0, 0.0, 0.0))
-    autopilot = vehicle._autopilot
-    assert autopilot.arming.armed and autopilot.modes.flown is Mode.LOITER
-    assert autopilot.landed_state is LandedState.IN_AIR
-    assert autopilot.home_ned_m[2] == pytest.approx(0.0, abs=0.1), "home is below, on the ground"
 
 
 def test_its_motors_turn_from_the_first_interval_on():

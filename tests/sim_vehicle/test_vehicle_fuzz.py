@@ -140,12 +140,3 @@ def test_the_same_seed_gives_the_same_bytes():
     first = scripted(seed=3)
     assert first == scripted(seed=3)
     assert first != scripted(seed=4)
-
-
-def test_mavlink_1_commands_are_obeyed():
-    client = Client()
-    link = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
-    message = dialect.MAVLink_command_long_message(1, 1, ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
-    client.send_raw(message.pack(link, force_mavlink1=True))
-    client.run(0.1)
-    assert client.results(ARM_DISARM) == [0]

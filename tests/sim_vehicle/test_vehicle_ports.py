@@ -85,18 +85,6 @@ def test_several_clients_on_tcp_each_with_answers_of_its_own():
     assert len(vehicle._links) <= 2
 
 
-def test_a_client_that_hangs_up_leaves_no_link_behind():
-    vehicle = new_vehicle()
-    port = open_port(vehicle, "tcpin://127.0.0.1:0")
-    with served(vehicle, port):
-        with socket.create_connection(("127.0.0.1", port.local_port)) as connection:
-            read_socket(connection, {"ATTITUDE"})
-        until_s = time.monotonic() + TIMEOUT_S
-        while vehicle._links:
-            assert time.monotonic() < until_s
-            time.sleep(0.01)
-
-
 def test_a_udp_server_answers_each_client_at_its_address():
     vehicle = new_vehicle()
     port = open_port(vehicle, "udpin://127.0.0.1:0?set=onboard")
@@ -174,21 +162,6 @@ def test_a_wrong_address_is_one_sentence(address, words):
 def test_a_serial_port_that_is_not_there_is_one_sentence():
     with pytest.raises(PortInUse, match="Serial port /dev/none cannot be opened"):
         open_port(new_vehicle(), "serial:///dev/none:57600")
-
-
-def test_a_peer_by_name_is_sent_to_without_looking_the_name_up_again():
-    # Given a companion that is named, not numbered
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as companion:
-        companion.bind(("127.0.0.1", 0))
-        vehicle = new_vehicle()
-        port, ground = px4_ports(vehicle, 0, 0, ("localhost", companion.getsockname()[1]))
-        ground.close()
-        # When packets go out
-        with served(vehicle, port):
-            reader = read_socket(companion, {"HEARTBEAT"})
-        # Then they arrive, and what is kept is the number
-        assert reader.messages
-        assert port._remote[0] == "127.0.0.1"
 
 
 def test_two_vehicles_beside_one_another():

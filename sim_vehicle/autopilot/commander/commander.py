@@ -157,10 +157,7 @@ class Commander:
         progress = self._navigator.progress
         if self.modes.flown is Mode.MISSION:
             return ModeEvent.MISSION_FINISHED if progress.finished else None
-        if not self._navigator.takeoff_is_over:
-            return None
-        goes_on = self._parameters["COM_TAKEOFF_ACT"] == 1 and progress.valid
-        return ModeEvent.MISSION_AFTER_TAKEOFF if goes_on else ModeEvent.TAKEOFF_REACHED
+        return ModeEvent.TAKEOFF_REACHED if self._navigator.takeoff_is_over else None
 
     def _obey_sticks(self) -> None:
         if self.sticks.sticks is None:

@@ -20,8 +20,6 @@ from sim_vehicle.parameters.store import Parameters
 
 # Below this COM_FAIL_ACT_T there is no delay, and then sticks alone do not take over either.
 _NO_DELAY_S = 0.1
-# The delay grows back slower than it runs down, so that a trigger that flickers acts at last.
-_RECOVERY_SHARE = 4
 
 MODE_OF: dict[Action, Mode] = {
     Action.FALL_BACK_TO_POSITION: Mode.POSCTL,
@@ -86,8 +84,6 @@ class Failsafe:
         self._last_us: int | None = None
         self._armed = False
         self._intended: Mode | None = None
-        self._start_delay_us = 0
-        self._parameter_changes = -1
         self._delay_us = 0
         self._announce = False
         self._settled: tuple[FailsafeSituation, int, Decision] | None = None
@@ -113,28 +109,16 @@ class Failsafe:
         if changed or self.took_over:
             self._forget_kept()
         self._delay_us = max(0, self._delay_us - elapsed_us)
-        configured_us = int(1e6 * parameters["COM_FAIL_ACT_T"])
-        if parameters.changes != self._parameter_changes:
-            # Any parameter: PX4 forgets that the last failsafe has used up a part of its hold
-            self._parameter_changes, self._start_delay_us = parameters.changes, configured_us
         self._check(now, parameters)
         if self.action > Action.HOLD or Mode.LOITER in now.cannot_run or self.took_over:
             self._delay_us = 0
         decision, delayed, took_over = self._select(now, parameters, changed)
-        self._run_start_delay(elapsed_us, delayed is not Action.NONE, configured_us)
         says = self._announcement(decision.action, delayed)
         self.action, self.took_over, self._intended = decision.action, took_over, decision.intended
         decision = Decision(decision.action, decision.intended, says)
-        waits = self._active or took_over or self._delay_us > 0 or self._start_delay_us != configured_us
+        waits = self._active or took_over or self._delay_us > 0
         self._settled = None if waits or says else (now, parameters.changes, decision)
         return decision
-
-    def _run_start_delay(self, elapsed_us: int, runs: bool, configured_us: int) -> None:
-        start_us = self._start_delay_us
-        if runs:
-            self._start_delay_us = max(0, start_us - elapsed_us)
-        else:
-            self._start_delay_us = min(configured_us, start_us + elapsed_us // _RECOVERY_SHARE)
 
     def _announcement(self, action: Action, delayed: Action) -> tuple[str, ...]:
         tells = action > self.action or (action is not Action.NONE and self._announce)
@@ -173,7 +157,7 @@ class Failsafe:
             if parameters["COM_FAIL_ACT_T"] > _NO_DELAY_S:
                 takeover = Takeover.ALWAYS
                 if response.action is not Action.WARN and self._delay_us == 0:
-                    self._delay_us = self._start_delay_us
+                    self._delay_us = int(1e6 * parameters["COM_FAIL_ACT_T"])
         self._active[trigger] = _Active(response, takeover)
         self._announce = self._announce or response.action is Action.WARN
         if response.action >= Action.HOLD:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
-from sim_vehicle.autopilot.flight_commands import DO_CHANGE_ALTITUDE, DO_CHANGE_SPEED, DO_ORBIT, DO_REPOSITION
+from sim_vehicle.autopilot.flight_commands import DO_CHANGE_ALTITUDE, DO_ORBIT, DO_REPOSITION
 from sim_vehicle.autopilot.messages import FollowTarget, Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
@@ -89,14 +89,6 @@ def test_another_altitude_over_the_same_place():
     assert flight.ask(DO_CHANGE_ALTITUDE, SEA_LEVEL_HOME_M + 9.0, 0) is Result.ACCEPTED
     flight.fly(8.0)
     assert flight.height_m == pytest.approx(9.0, abs=0.05)
-
-
-def test_a_speed_holds_until_the_mode_changes():
-    flight = hovering(5.0)
-    flight.ask(DO_CHANGE_SPEED, 1, 1.5, -1, 0, 0, 0, 0)
-    flight.ask(DO_REPOSITION, -1, 1, 0, NAN, *place(40.0, 0.0), NAN)
-    flight.fly(4.0)
-    assert flight.state.velocity_ned_m_s[0] == pytest.approx(1.5, abs=0.1)
 
 
 @pytest.mark.parametrize("radius_m", [10.0, -10.0])

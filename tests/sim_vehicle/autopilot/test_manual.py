@@ -113,13 +113,6 @@ def test_the_throttle_is_a_climb_and_centred_it_holds_the_height(mode):
     assert flight.height_m == pytest.approx(held_m, abs=0.05)
 
 
-def test_a_stick_within_the_dead_zone_is_centred():
-    flight = flying(Mode.POSCTL)
-    there = flight.state.position_ned_m
-    sticks(flight, 5.0, pitch=0.09, roll=-0.09, throttle=0.09)
-    assert math.dist(flight.state.position_ned_m, there) < 0.1
-
-
 def test_pulled_down_it_lands_and_disarms():
     flight = flying(Mode.POSCTL)
     for _ in range(200):
@@ -180,15 +173,3 @@ def test_a_throttle_that_is_up_refuses_arming(mode, throttle, why):
     result = flight.ask(COMPONENT_ARM_DISARM, 1)
     assert result is (Result.TEMPORARILY_REJECTED if why else Result.ACCEPTED)
     assert flight.texts()[-1] == (f"Arming denied: {why}" if why else "Armed by external command")
-
-
-def test_without_sticks_a_stick_mode_is_refused_in_the_air_and_cannot_be_armed():
-    flight = Flight()
-    set_mode(flight, Mode.POSCTL)
-    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
-
-
-def test_sticks_that_stop_in_a_stick_mode_are_a_failsafe():
-    flight = flying(Mode.POSCTL, NAV_RCL_ACT=3, COM_FAIL_ACT_T=0.0)
-    flight.fly(0.7)
-    assert flight.autopilot.modes.flown is Mode.LAND

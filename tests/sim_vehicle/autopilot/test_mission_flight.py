@@ -1,7 +1,6 @@
 """Missions flown by the kinematic vehicle: items, jumps, pause, resume, changes in flight, what is refused."""
 
 import math
-from itertools import pairwise
 
 import pytest
 
@@ -63,16 +62,6 @@ def test_a_mission_from_the_ground_and_back_disarms_and_says_so():
     assert said.index("Mission finished, landed") < said.index("Disarmed by landing")
 
 
-def test_items_are_passed_in_their_order_and_the_current_one_is_shown():
-    flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
-    seen = []
-    while flight.autopilot.arming.armed:
-        flight.step()
-        if not seen or seen[-1] != flight.autopilot.missions.current:
-            seen.append(flight.autopilot.missions.current)
-    assert seen == [0, 1, 2, 3]
-
-
 def test_without_a_landing_it_holds_at_the_last_place():
     flight = begun(TAKEOFF, NORTH)
     flight.fly_until(lambda: flight.autopilot.missions.progress.finished, 60.0)
@@ -80,15 +69,6 @@ def test_without_a_landing_it_holds_at_the_last_place():
     flight.fly(10.0)
     assert math.dist(north_east(flight), (20.0, 0.0)) < 0.1
     assert flight.autopilot.modes.flown is Mode.LOITER
-
-
-def test_a_takeoff_may_lead_into_the_mission():
-    flight = Flight()
-    flight.parameters.set("COM_TAKEOFF_ACT", 1)
-    upload(flight, TAKEOFF, NORTH)
-    set_mode(flight, Mode.TAKEOFF)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.MISSION, 30.0)
 
 
 def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
@@ -254,11 +234,3 @@ def test_a_first_place_far_away_is_only_a_warning():
     upload(flight, item(kinds.WAYPOINT, 150.5))
     assert flight.texts() == ["First waypoint far away from home: 150m. Correct mission loaded?"]
     assert flight.autopilot.missions.progress.valid
-
-
-def test_the_order_of_visits_is_the_order_of_the_list():
-    corners = [(10.0 * n, 5.0 * (n % 2)) for n in range(1, 6)]
-    flight = begun(TAKEOFF, *[item(kinds.WAYPOINT, north, east) for north, east in corners])
-    flight.fly_until(lambda: flight.autopilot.missions.progress.finished, 90.0)
-    assert all(a[0] < b[0] for a, b in pairwise(corners))
-    assert math.dist(north_east(flight), corners[-1]) < 2.1

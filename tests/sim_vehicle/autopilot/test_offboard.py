@@ -46,14 +46,6 @@ def test_what_is_refused_and_in_which_words(setpoint, why):
     assert (refusal.text if refusal else None) == why
 
 
-def test_the_local_frame_is_passed_on_as_it_is():
-    setpoint = target((1.0, 2.0, -3.0), (0.5, 0.0, 0.0), yaw_rad=1.0)
-    flown = offboard.trajectory_setpoint(setpoint, EAST)
-    assert flown.position_ned_m == (1.0, 2.0, -3.0)
-    assert flown.velocity_ned_m_s == (0.5, 0.0, 0.0)
-    assert flown.yaw_rad == 1.0
-
-
 def test_forward_with_the_nose_east_is_east():
     setpoint = target(frame=8, velocity=(2.0, 0.0, 0.5))
     assert offboard.trajectory_setpoint(setpoint, NORTH).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.5))
@@ -114,17 +106,6 @@ def test_in_the_air_offboard_without_setpoints_is_refused():
     flight.fly(2.0)
     assert flight.ask(DO_SET_MODE, 1, 6) is Result.TEMPORARILY_REJECTED
     assert flight.autopilot.modes.flown is Mode.LOITER
-
-
-@pytest.mark.parametrize("extra_steps", range(0, 26, 5))
-def test_lost_setpoints_change_the_mode_after_a_second(extra_steps):
-    flight = hovering()
-    flight.fly(0.004 * extra_steps)
-    flight.autopilot.setpoint(UP_THERE)
-    waited_s = flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.POSCTL, 2.0)
-    assert 1.03 <= waited_s <= 1.11
-    assert flight.autopilot.system_status == 5
-    assert flight.autopilot.texts[-1].text == "Failsafe activated"
 
 
 def test_lost_setpoints_sink_land_and_disarm_and_offboard_is_shown_again():

@@ -129,18 +129,6 @@ def test_from_an_attitude_to_a_position_no_ramp_holds_it_back():
     assert flight.height_m > lowest - 0.3
 
 
-def test_attitude_setpoints_that_stop_are_lost_offboard():
-    flight = hovering(5.0)
-    level = AttitudeTarget(LEVEL, NO_RATES, HOVER)
-    stream(flight, level, 0.2)
-    set_mode(flight, Mode.OFFBOARD)
-    stream(flight, level, 0.5)
-    assert isinstance(flight.autopilot.applied, AttitudeSetpoint)
-    flight.fly(1.2)
-    assert flight.autopilot.modes.flown is Mode.POSCTL
-    assert isinstance(flight.autopilot.applied, TrajectorySetpoint)
-
-
 def test_low_thrust_by_attitude_is_a_landing_without_a_commanded_descent():
     flight = hovering(2.5)
     stream(flight, AttitudeTarget(LEVEL, NO_RATES, HOVER), 0.2)
@@ -179,10 +167,3 @@ def test_the_loops_turn_at_the_rates_asked_for():
     for _ in range(60):
         output = plant.step(RatesSetpoint((0.8, -0.4, 0.5), hover), armed=True)
     assert output.angular_velocity_frd_rad_s == pytest.approx((0.8, -0.4, 0.5), abs=0.12)
-
-
-def test_thrust_is_a_share_of_all_that_there_is():
-    plant, hover = thrown_up()
-    for _ in range(100):
-        output = plant.step(AttitudeSetpoint(LEVEL, 0.9 * hover), armed=True)
-    assert output.thrust_fraction == pytest.approx(0.9 * hover, abs=0.005)

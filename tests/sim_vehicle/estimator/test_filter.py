@@ -131,13 +131,6 @@ def test_cameras_that_are_turned_down_for_a_second_reset_the_position():
     assert np.linalg.norm(hit.flight.position_error_m) < 0.02
 
 
-def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
-    flights = [Flight(filtered(), seed) for seed in (5, 5, 6)]
-    first, again, other = (flight.fly(HOVER, 3.0) for flight in flights)
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-
-
 def test_the_truth_does_not_reach_the_filter_but_through_its_sensors():
     # Given two flights of which one has every aiding sensor lost for good
     lost = {name: {"lost_between_s": [[0.0, 1e6]]} for name in ("optical_flow", "range_finder", "compass")}

@@ -25,12 +25,6 @@ def test_flow_and_range_are_sent_at_ten_hertz_where_they_are_simulated():
     assert (flow.integration_time_us, flow.quality, flow.distance) == (100_000, 0, -1.0)
 
 
-def test_without_the_filter_neither_is_sent():
-    wire = Client()
-    wire.run(2.0)
-    assert wire.all("ATTITUDE") and not wire.all("OPTICAL_FLOW_RAD") + wire.all("DISTANCE_SENSOR")
-
-
 def test_the_truth_is_sent_on_request_alone():
     scene = Scene.model_validate({"start": {"position_ned_m": [30.0, -20.0, 0.0], "yaw_deg": 90}})
     wire = Client(airframe=filtered(), scene=scene)
@@ -43,16 +37,6 @@ def test_the_truth_is_sent_on_request_alone():
     assert (truth.lat, truth.lon) == (round(1e7 * place.latitude_deg), round(1e7 * place.longitude_deg))
     assert truth.alt == pytest.approx(1e3 * place.altitude_m, abs=20)
     assert truth.attitude_quaternion == pytest.approx([math.sqrt(0.5), 0, 0, math.sqrt(0.5)], abs=0.01)
-
-
-def test_the_truth_lies_where_the_parameters_put_the_world():
-    there = {"SIH_LOC_LAT0": -33.0, "SIH_LOC_LON0": 151.0, "SIH_LOC_H0": 20.0}
-    wire = Client(airframe=filtered(), parameters=there)
-    wire.command(SET_INTERVAL, TRUTH, 20_000)
-    wire.run(0.5)
-    truth = wire.last("HIL_STATE_QUATERNION")
-    assert (truth.lat, truth.lon) == pytest.approx((-330_000_000, 1_510_000_000), abs=1)
-    assert truth.alt == pytest.approx(20_000, abs=100)
 
 
 def test_odometry_counts_the_filters_resets_and_states_its_variances():

@@ -5,7 +5,6 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.airframe import load_built_in
 from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, Client
 
@@ -126,19 +125,6 @@ def test_the_hash_changes_with_a_value_and_comes_back_with_it():
     set_to(client, "COM_RC_IN_MODE", as_float(1), INT32)
     (after,) = request(client, "_HASH_CHECK")
     assert whole_of(before) == whole_of(after) != whole_of(changed)
-
-
-def height_after_takeoff(client: Client) -> float:
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(14.0)
-    return -client.position()[2] - load_built_in("foldable").geometry.foot_depth_m
-
-
-def test_the_takeoff_height_is_obeyed():
-    client = Client()
-    set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)
-    assert height_after_takeoff(client) == pytest.approx(4.0, abs=0.15)
 
 
 def test_a_gain_changes_how_the_vehicle_flies():

@@ -188,18 +188,6 @@ def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_
     assert client.last("SYS_STATUS").battery_remaining == 50
 
 
-def test_a_low_battery_shows():
-    client = Client()
-    for name, value in (("SIM_BAT_DRAIN", 5.0), ("SIM_BAT_MIN_PCT", 0.0)):
-        client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(4.7)
-    assert client.vehicle._board.autopilot.battery.warning > 0
-    client.run(0.3)
-    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x2000000
-
-
 def test_a_hundred_metres_east_is_as_many_degrees_as_the_parallel_says():
     place = Origin().place_at((0.0, 100.0, -12.0))
     degrees = 100.0 / (111_194.93 * math.cos(math.radians(47.397742)))
@@ -218,6 +206,42 @@ def test_the_world_lies_where_the_parameters_say():
         assert (last[name].lat, last[name].lon) == pytest.approx((-339_000_000, 1_512_000_000), abs=100)
         assert last[name].alt == pytest.approx(20_000, abs=500)
     assert last["ALTITUDE"].altitude_monotonic == pytest.approx(20.0, abs=3.0)
+
+
+@pytest.fixture(scope="module")
+def orbiting() -> Client:
+    client = Client(system=255, component=190)
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(8.0)
+    client.command(34, -6.0, 2.0, 0, 0, NAN, NAN, NAN)
+    client.run(20.0)
+    return client
+
+
+def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiting):
+    # Given a vehicle on its way round a circle, its nose to the centre, and the truth at each message
+    x, y, z, vx, vy, vz, qw, qx, qy, qz, p, q, r = orbiting.vehicle.state.body
+    for kind in ("LOCAL_POSITION_NED", "ODOMETRY"):
+        told = orbiting.last(kind)
+        assert (told.x, told.y, told.z) == pytest.approx((x, y, z), abs=0.2), kind
+        assert (told.vx, told.vy, told.vz) == pytest.approx((vx, vy, vz), abs=0.2), kind
+    assert (told.frame_id, told.child_frame_id, told.estimator_type) == (1, 1, 8)
+    turned = orbiting.last("ATTITUDE_QUATERNION")
+    alike = qw * turned.q1 + qx * turned.q2 + qy * turned.q3 + qz * turned.q4
+    assert abs(alike) == pytest.approx(1.0, abs=1e-3)
+    told = orbiting.last("ATTITUDE")
+    yaw_rad = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+    assert math.remainder(told.yaw - yaw_rad, 2 * math.pi) == pytest.approx(0.0, abs=0.05)
+    assert (told.rollspeed, told.pitchspeed, told.yawspeed) == pytest.approx((p, q, r), abs=0.06)
+    assert (turned.rollspeed, turned.pitchspeed, turned.yawspeed) == pytest.approx((p, q, r), abs=0.06)
+    felt = orbiting.last("HIGHRES_IMU")
+    assert (felt.xgyro, felt.ygyro, felt.zgyro) == pytest.approx((p, q, r), abs=0.06)
+    assert felt.zacc == pytest.approx(-9.8, abs=1.0) and felt.fields_updated & 0x3F == 0x3F
+    # It flies at 2 m/s round a circle of 6 m, anticlockwise
+    assert math.hypot(vx, vy) == pytest.approx(2.0, abs=0.2) and r == pytest.approx(-1 / 3, abs=0.1)
+    for stamp_us in (felt.time_usec, orbiting.last("ODOMETRY").time_usec, 1000 * told.time_boot_ms):
+        assert orbiting.time_s - 1e-6 * stamp_us < 0.05
 
 
 def test_an_orbit_shows_five_times_a_second_while_it_is_flown():

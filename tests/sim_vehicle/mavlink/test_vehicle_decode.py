@@ -145,16 +145,6 @@ def test_a_setpoint_for_another_is_dropped(system, component, ours):
     assert bool(decoder().push(raw)) is ours
 
 
-def test_many_packets_cut_anywhere():
-    raw = b"".join(packet(message) for message in MESSAGES)
-    wanted = [number for number in ids(MESSAGES) if number in READ]
-    chance = random.Random(1)
-    for _ in range(50):
-        cuts = sorted(chance.sample(range(len(raw)), 6))
-        parts, end = [raw[a:b] for a, b in zip([0, *cuts], [*cuts, len(raw)], strict=True)], decoder()
-        assert ids(got for part in parts for got in end.push(part)) == wanted
-
-
 HEARTBEAT, TARGET = packet(MESSAGES[0]), packet(MESSAGES[-1])
 
 
@@ -180,19 +170,3 @@ def test_what_follows_noise_is_not_held_up(noise):
     assert end.push(noise) == []
     assert ids(end.push(HEARTBEAT)) == [0]
     assert ids(end.push(HEARTBEAT)) == [0]
-
-
-def test_noise_for_hours_is_not_kept():
-    end, chance = decoder(), random.Random(2)
-    for _ in range(300):
-        end.push(chance.randbytes(1000))
-        assert len(end._rest) < 600
-    assert ids(end.push(HEARTBEAT)) == [0]
-
-
-def test_a_signed_packet_is_read_without_a_key():
-    link = dialect.MAVLink(None, srcSystem=1, srcComponent=191)
-    link.signing.secret_key = bytes(32)
-    link.signing.sign_outgoing = True
-    link.signing.timestamp = 1
-    assert ids(decoder().push(MESSAGES[0].pack(link))) == [0]

@@ -184,22 +184,6 @@ def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
     assert 0.005 < np.sqrt((position_error**2).mean()) < 0.02
 
 
-def test_wind_pushes_downwind() -> None:
-    plant = Plant(quiet(load_built_in("foldable"), drag_n_s_m=0.25), Scene(wind_ned_m_s=(0.0, 5.0, 0.0)), seed=1)
-    plant.state.body[2] = -50.0
-    flown(plant, None, 1.0)
-    assert plant.state.body[1] > 0.3
-    assert abs(plant.state.body[0]) < 1e-9
-
-
-def test_the_same_seed_gives_the_same_bits_and_another_does_not() -> None:
-    def path(seed: int) -> bytes:
-        return hovering(load_built_in("foldable"), seed).truth.series()["position_ned_m"].tobytes()
-
-    assert path(1) == path(1)
-    assert path(1) != path(2)
-
-
 def test_a_tumble_in_free_fall_keeps_its_angular_momentum() -> None:
     airframe = quiet(load_built_in("foldable"))
     plant = Plant(airframe, Scene(), seed=1)
