@@ -182,4 +182,5 @@ class Companion(Stepped[FlightCore]):
             unconfirmed=flight.unconfirmed,
             round_trip=flight.round_trip.report(),
             promise=core.monitor.promise,
+            crashed=flight.crashed,
         )

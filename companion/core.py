@@ -134,6 +134,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             if flight.collisions:
                 flight.collisions[-1].follow(monitor.state, monitor.estimator, positions)
             note_motors(flight, samples, now_us)
+            flight.crash.update(samples, flight.height_m, flight.vehicle.landed)
         except Exception as error:
             return self.machine.fail(error, now_us)
         return moved

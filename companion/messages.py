@@ -260,10 +260,11 @@ class SetMode:
 
 @dataclass(frozen=True, slots=True)
 class SetArmed:
-    """MAV_CMD_COMPONENT_ARM_DISARM, never forced."""
+    """MAV_CMD_COMPONENT_ARM_DISARM; `is_forced`: also where PX4 does not know that it has landed."""
 
     command_id: ClassVar[int] = 400
     armed: bool
+    is_forced: bool = False
 
 
 @dataclass(frozen=True, slots=True)

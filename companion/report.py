@@ -98,6 +98,7 @@ class FlightReport:
     in mission coordinates. `unreachable` are the labels of items, or "home", to which that left no way.
     `refused_messages` counts the vehicle's messages that were not accepted, by name. `unconfirmed` counts the hits that
     were none: one sample showed them, and nothing else. `promise` is the detector's, when it was last armed.
+    `crashed` says how; empty of a vehicle that has not.
     """
 
     outcome: Outcome
@@ -116,3 +117,4 @@ class FlightReport:
     unconfirmed: int = 0
     round_trip: RoundTripReport = RoundTripReport()
     promise: Promise | None = None
+    crashed: str = ""

@@ -93,6 +93,7 @@ def _recorded(
             "outcome": guard.outcome or "goes on in the next folder",
             "collisions": hits,
             "left_alone": guard.left_alone(),
+            "crashed": guard.crashed() or None,
             "kept_out": 0 if between is None else between.kept_out,
             "round_trip_ms": guard.round_trip().summary(),
             **asdict(connection.counts),

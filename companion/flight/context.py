@@ -27,6 +27,7 @@ from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
 from companion.reflex.attitude_law import Lean, attitude_and_thrust, turn_kept
+from companion.reflex.crash import CrashWatch
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.sustained_force import SustainedForceMonitor
 from companion.reflex.thrust import ThrustGain
@@ -171,6 +172,8 @@ class FlightContext:
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
+    crash: CrashWatch = field(default_factory=CrashWatch)
+    crashed: str = ""  # how, once it has
     motors: MotorWatch = field(default_factory=MotorWatch)
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground

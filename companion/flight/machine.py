@@ -10,6 +10,7 @@ from companion.flight import expectations
 from companion.flight.after_hit import decide, lands_anyway, note_before
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import FlightContext, Inputs, StateHandler, Transition
+from companion.flight.crash import Crashed, crashed
 from companion.flight.ending import ON_THE_GROUND, HandOver, Released, early_end
 from companion.flight.obstacle_map import remember
 from companion.flight.progress import FlyHome, FlyItems, HoldAfterRecovery
@@ -95,6 +96,9 @@ class Machine(StateMachine):
         before = self.handler
         if self.state not in FINAL_STATES:
             self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
+        if TABLE.moves(self.state, Trigger.CRASHED):
+            how = crashed(self.flight, self.state is State.LANDING, now_us)
+            self._take(None if how is None else Transition(Trigger.CRASHED, how), now_us)
         for estimate in inputs.impacts:
             if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
@@ -159,10 +163,12 @@ class Machine(StateMachine):
                 return FlyHome(flight, now_us)
             case State.LANDING:
                 return Land(flight, now_us)
+            case State.CRASHED:
+                return Crashed(flight)
             case State.DONE:
                 return self._done(now_us)
             case State.ABORTED:
-                return self._aborted(transition, now_us)
+                return self._aborted(previous, transition, now_us)
 
     def _done(self, now_us: int) -> StateHandler:
         flight = self.flight
@@ -175,7 +181,7 @@ class Machine(StateMachine):
         flight.report(now_us, "done", text, outcome=flight.outcome, reason=flight.reason)
         return Released()
 
-    def _aborted(self, transition: Transition, now_us: int) -> StateHandler:
+    def _aborted(self, previous: State, transition: Transition, now_us: int) -> StateHandler:
         flight = self.flight
         flight.outcome = "failed" if transition.trigger is Trigger.REFUSED or flight.fault else "aborted"
         flight.reason = transition.text
@@ -184,7 +190,8 @@ class Machine(StateMachine):
         flight.report(
             now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index
         )
-        return HandOver(flight, now_us) if transition.hand_over else Released()
+        is_held = transition.hand_over and previous is not State.CRASHED
+        return HandOver(flight, now_us) if is_held else Released()
 
 
 def _hits(count: int) -> str:

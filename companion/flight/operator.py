@@ -64,7 +64,7 @@ _WARNING = (
         "crossed",
         "not_back",
     ),
-    *("left_alone", "lost", "late", "round_trip", "damage", "crash"),
+    *("left_alone", "lost", "late", "round_trip", "damage", "crash", "crashed"),
 )
 _NOTICE = ("policy", "envelope", "unconfirmed", "given_back")
 _AS_THEY_STAND = dict.fromkeys(_WARNING, Severity.WARNING) | dict.fromkeys(_NOTICE, Severity.NOTICE)

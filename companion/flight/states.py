@@ -17,6 +17,7 @@ class State(Enum):
     RETURNING = "returning"
     LANDING = "landing"
     DONE = "done"
+    CRASHED = "crashed"
     ABORTED = "aborted"
 
 
@@ -27,6 +28,7 @@ class Trigger(Enum):
     REFUSED = "the vehicle cannot or will not fly"
     INTERRUPTED = "stop, silent link, abort condition or a step that did not end in time"
     LINK_RESTORED = "the link is back after a silence, as after a restart"
+    CRASHED = "tipped over, on the floor after a hit, or pressed to something"
     COLLISION = "hit detected"
     VEHICLE_READY = "identified, streams fast enough"
     PLAN_CONFIRMED = "person confirmed the plan"
@@ -42,13 +44,15 @@ class Trigger(Enum):
     RETURN_DUE = "next item is return, or a time-out or a goal out of reach says so"
     LAND_DUE = "next item is land, or a time-out or a goal out of reach says so"
     HOME_REACHED = "above the arming position"
-    DISARMED = "vehicle disarmed itself"
+    DISARMED = "vehicle disarmed"
+    FLIES_AGAIN = "upright and above the ground again"
 
 
 # What ends a flight wherever it is in the air, and what interrupts it.
 _IN_THE_AIR = {
     Trigger.CONTROL_LOST: State.ABORTED,
     Trigger.INTERRUPTED: State.ABORTED,
+    Trigger.CRASHED: State.CRASHED,
     Trigger.COLLISION: State.RECOVERING,
 }
 _ON_THE_GROUND = {
@@ -75,6 +79,11 @@ TABLE = StateTable[State, Trigger](
         State.HOLDING: {**_IN_THE_AIR, Trigger.HOLD_ENDED: State.MISSION},
         State.RETURNING: {**_IN_THE_AIR, Trigger.HOME_REACHED: State.LANDING, Trigger.LAND_DUE: State.LANDING},
         State.LANDING: {**_IN_THE_AIR, Trigger.DISARMED: State.DONE},
+        State.CRASHED: {
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.DISARMED: State.ABORTED,
+            Trigger.FLIES_AGAIN: State.ABORTED,
+        },
         State.DONE: {},
         State.ABORTED: {},
     }

@@ -7,7 +7,7 @@ from pydantic import Field, field_validator
 from companion.fence import Fence
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from companion.mission.policy import SetpointLimits
+from companion.mission.policy import OnCrash, SetpointLimits
 from companion.px4_mode import MODE_NAMES
 from companion.reflex.config import RecoveryConfig
 from companion.strict_model import Positive, StrictModel
@@ -29,6 +29,8 @@ class GuardConfig(StrictModel):
     """PX4's modes that the guard may take over."""
     then: Literal["previous", "hold"] = "hold"
     """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
+    on_crash: OnCrash = "tell"
+    """When the vehicle lies on the ground after a crash: whose vehicle it is decides. Never in the air."""
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
     """Of one flight; after this one the vehicle is given back to hold, whatever `then` says. Three hits in one
     flight are no accident."""
@@ -66,6 +68,7 @@ class GuardConfig(StrictModel):
             items=(),
             fence=self.fence,
             limits=self.limits,
+            on_crash=self.on_crash,
             recovery=self.recovery,
             companion=self.companion,
         )

@@ -66,6 +66,10 @@ class Guard(Stepped[GuardCore]):
     def collisions(self) -> tuple[CollisionReport, ...]:
         return () if self._core is None else self._core.collisions()
 
+    def crashed(self) -> str:
+        """How, where the vehicle has; empty otherwise."""
+        return "" if self._core is None else self._core.flight.crashed
+
     def left_alone(self) -> int:
         """Hits that were told and left to the program that flies."""
         return 0 if self._core is None else self._core.flight.left_alone

@@ -2,7 +2,8 @@
 
 import math
 
-from companion.flight.context import Inputs, Target
+from companion.flight.context import Inputs, NoSetpoint, Target
+from companion.flight.crash import Crashed
 from companion.flight.ending import silent_position
 from companion.flight.recovering import Recover
 from companion.guard.context import GuardContext, GuardTransition
@@ -221,3 +222,14 @@ class StandDown:
                 self._target = None
                 guard.command_client.cancel()
         return GuardTransition(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None
+
+
+class GuardCrashed(NoSetpoint):
+    """The same as of a flight; after it the guard stands by, and for the next flight watches again."""
+
+    def __init__(self, guard: GuardContext) -> None:
+        self._crashed = Crashed(guard)
+
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+        over = self._crashed.step(guard, inputs, now_us)
+        return None if over is None else GuardTransition(Trigger[over.trigger.name], over.text)

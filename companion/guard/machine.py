@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
+from companion.flight.crash import crashed
 from companion.flight.ending import LINK_RESTORED, Holder, Released, silent_link, silent_position, who_decided
 from companion.flight.machine import StateMachine
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
 from companion.guard.descent import THROTTLE
-from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
+from companion.guard.holding import GiveBack, GuardCrashed, Recovering, StandDown, TakeOver
 from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import GuardConnect, StandBy, Watching
@@ -71,6 +72,10 @@ class GuardMachine(StateMachine):
     def step(self, inputs: Inputs, now_us: int) -> bool:
         before = self.handler
         self._take(self._from_outside(inputs, now_us), now_us)
+        if TABLE.moves(self.state, Trigger.CRASHED):
+            meant = self.state not in HOLDING and self.flight.descent.is_meant(self.flight.vehicle, now_us)
+            if crashed(self.flight, meant, now_us) is not None:
+                self._take(GuardTransition(Trigger.CRASHED), now_us)
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over
@@ -227,6 +232,8 @@ class GuardMachine(StateMachine):
                 return GiveBack(guard, transition.trigger is Trigger.CROSSED, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)
+            case State.CRASHED:
+                return GuardCrashed(guard)
             case State.ENDED:
                 self.outcome = transition.text
                 return Released()

@@ -11,7 +11,8 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Asked
 from companion.px4_mode import AUTO_LOITER, OFFBOARD, is_auto, mode_name
 
-# PX4 brakes a mode's flight by this (MPC_ACC_HOR, its least; see docs/how-to/guard.md).
+# PX4 brakes by this where MPC_ACC_HOR is what docs/how-to/guard.md has it set to. With PX4's default it needs less room
+# (reflex.config.BRAKES_M_S2).
 BRAKES_M_S2 = 2.0
 # A velocity that is asked for leads somewhere: as far as in the time in which PX4 takes its setpoint for lost.
 GOES_ON_S = OTHERS_STOPPED_US * 1e-6

@@ -15,6 +15,7 @@ class State(Enum):
     RECOVERING = "recovering"
     GIVING_BACK = "giving back"
     STOOD_DOWN = "stood down"
+    CRASHED = "crashed"
     ENDED = "ended"
 
 
@@ -25,6 +26,7 @@ class Trigger(Enum):
     CONTROL_LOST = "pilot, failsafe or another program took over, or the link fell silent"
     REFUSED = "no vehicle that can be guarded"
     STOPPED = "asked to stop"
+    CRASHED = "tipped over, on the floor after a hit, or pressed to something"
     HIT = "hit detected"
     LEADS_BACK = "a program's setpoints lead into what was hit"
     CONNECTED = "identified, streams fast enough"
@@ -38,10 +40,15 @@ class Trigger(Enum):
     GIVEN_BACK = "mode confirmed"
     STREAMS_GONE = "the vehicle speaks, its streams have ended, or may have in a silence"
     ENABLED = "person enabled it again"
+    FLIES_AGAIN = "upright and above the ground again"
 
 
 # What ends the holding in every state.
-_RELEASED = {Trigger.DISARMED: State.STANDING_BY, Trigger.CONTROL_LOST: State.STOOD_DOWN}
+_RELEASED = {
+    Trigger.DISARMED: State.STANDING_BY,
+    Trigger.CONTROL_LOST: State.STOOD_DOWN,
+    Trigger.CRASHED: State.CRASHED,
+}
 TABLE = StateTable[State, Trigger](
     {
         State.CONNECTING: {
@@ -58,6 +65,7 @@ TABLE = StateTable[State, Trigger](
         State.WATCHING: {
             Trigger.DISARMED: State.STANDING_BY,
             Trigger.STOPPED: State.ENDED,
+            Trigger.CRASHED: State.CRASHED,
             Trigger.HIT: State.TAKING_OVER,
             Trigger.LEADS_BACK: State.GIVING_BACK,
             Trigger.NOT_TO_GUARD: State.STANDING_BY,
@@ -87,6 +95,11 @@ TABLE = StateTable[State, Trigger](
             Trigger.DISARMED: State.STANDING_BY,
             Trigger.STOPPED: State.ENDED,
             Trigger.ENABLED: State.STANDING_BY,
+        },
+        State.CRASHED: {
+            Trigger.DISARMED: State.STANDING_BY,
+            Trigger.STOPPED: State.ENDED,
+            Trigger.FLIES_AGAIN: State.STANDING_BY,
         },
         State.ENDED: {},
     }

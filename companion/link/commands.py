@@ -65,7 +65,7 @@ def is_final(command: messages.VehicleCommand, result: CommandResult) -> bool:
     """Whether repeating is useless. A refused disarm is final: the vehicle flies."""
     if result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED):
         return True
-    return result is CommandResult.TEMPORARILY_REJECTED and command == messages.SetArmed(False)
+    return result is CommandResult.TEMPORARILY_REJECTED and isinstance(command, messages.SetArmed) and not command.armed
 
 
 class CommandClient:

@@ -37,6 +37,8 @@ NAN = math.nan
 # ONBOARD_COMPUTER_STATUS: the largest number of a field says that it is not used.
 _UNUSED_INT8, _UNUSED_UINT8, _UNUSED_INT16, _UNUSED_UINT32 = 0x7F, 0xFF, 0x7FFF, 0xFFFFFFFF
 _CORES = 8
+# ARM_DISARM's parameter 2, by MAVLink's definition of the command.
+_FORCE = 21196.0
 
 # STATUSTEXT's field.
 TEXT_LENGTH = 50
@@ -233,8 +235,8 @@ def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
             # param1 says that param2 and param3 hold PX4's main and sub mode
             main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
             used: tuple[float, ...] = (dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
-        case messages.SetArmed(armed):
-            used = (1.0 if armed else 0.0,)
+        case messages.SetArmed(armed, is_forced):
+            used = (1.0 if armed else 0.0, _FORCE if is_forced else 0.0)
         case messages.SetMessageInterval(message_id, interval_us):
             used = (message_id, interval_us)
         case messages.RequestMessage(message_id):

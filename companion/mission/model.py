@@ -19,7 +19,7 @@ from companion.mission import items
 from companion.mission.config import CompanionConfig
 from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, trajectory_around
 from companion.mission.items import MissionItem
-from companion.mission.policy import AbortWhen, Handover, OnCollision, OnDamage, Resume, SetpointLimits
+from companion.mission.policy import AbortWhen, Handover, OnCollision, OnCrash, OnDamage, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
 from companion.reflex.config import RecoveryConfig
 from companion.strict_model import StrictModel
@@ -43,6 +43,8 @@ class Mission(StrictModel):
     abort_when: AbortWhen = AbortWhen()
     on_damage: OnDamage = "tell"
     """After a hit that has hurt a propeller or a motor; told in any case. From the recovery's end on."""
+    on_crash: OnCrash = "disarm"
+    """When the vehicle lies on the ground after a crash, which is told in any case. Never in the air."""
     on_interrupt: Handover = "hold"
     """What the vehicle is told to do when the flight ends early."""
     companion: CompanionConfig = CompanionConfig()

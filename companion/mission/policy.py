@@ -8,6 +8,7 @@ from companion.strict_model import NotNegative, PositionNed, Positive, StrictMod
 
 Handover: TypeAlias = Literal["hold", "land"]
 OnDamage: TypeAlias = Literal["tell", "land", "return"]
+OnCrash: TypeAlias = Literal["tell", "disarm"]
 OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
 
 

@@ -76,6 +76,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         "refused_messages": dict(report.refused_messages),
         "refused_packets": dict(flown.refused_packets),
         "unconfirmed": report.unconfirmed,
+        "crashed": report.crashed or None,
         "promise": None if report.promise is None else report.promise.summary(),
         "false_detections": matches.false_detections if matches else None,
         "missed_contacts": matches.missed_contacts if matches else None,

@@ -62,6 +62,7 @@ class FakeVehicle:
 
     time_us: int = 5_000_000
     yaw_rad: float = 0.0
+    roll_rad: float = 0.0
     mode: int = LOITER
     intended: int = LOITER
     armed: bool = False
@@ -171,8 +172,8 @@ class FakeVehicle:
         if n % 5 == 0 and not self.no_positions:
             self.send(mav.MAVLink_local_position_ned_message(boot_ms, *self.position, *self.velocity))
         if n % 5 == 1:
-            turn = math.cos(0.5 * self.yaw_rad), 0.0, 0.0, math.sin(0.5 * self.yaw_rad)
-            self.send(mav.MAVLink_attitude_quaternion_message(boot_ms, *turn, 0.0, 0.0, 0.0))
+            (c, s), (d, r) = ((math.cos(0.5 * a), math.sin(0.5 * a)) for a in (self.yaw_rad, self.roll_rad))
+            self.send(mav.MAVLink_attitude_quaternion_message(boot_ms, c * d, c * r, s * r, s * d, 0.0, 0.0, 0.0))
         if n % 25 == 2 and not self.no_current_mode:
             self.send(mav.MAVLink_current_mode_message(0, self.mode, self.intended))
         if n % 50 == 3:

@@ -5,7 +5,7 @@ import pytest
 from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 
 BEFORE_THE_FLIGHT = {State.CONNECT, State.READY}
-IN_THE_AIR = set(State) - FINAL_STATES - BEFORE_THE_FLIGHT
+IN_THE_AIR = set(State) - FINAL_STATES - BEFORE_THE_FLIGHT - {State.CRASHED}
 
 
 @pytest.mark.parametrize("state", [state for state in State if state not in FINAL_STATES])
@@ -19,6 +19,12 @@ def test_every_state_can_be_interrupted_and_a_refusal_counts_until_the_vehicle_h
 def test_in_the_air_whoever_takes_control_has_it_and_every_hit_is_recovered_from(state):
     assert TABLE.next_state(state, Trigger.CONTROL_LOST) is State.ABORTED
     assert TABLE.next_state(state, Trigger.COLLISION) is State.RECOVERING
+    assert TABLE.next_state(state, Trigger.CRASHED) is State.CRASHED
+
+
+def test_a_crash_ends_with_a_disarm_or_in_other_hands_and_no_hit_or_mode_brings_the_flight_back():
+    assert set(TABLE.rows[State.CRASHED]) == {Trigger.INTERRUPTED, Trigger.DISARMED, Trigger.FLIES_AGAIN}
+    assert set(TABLE.rows[State.CRASHED].values()) == {State.ABORTED}
 
 
 @pytest.mark.parametrize("state", [state for state in State if state not in IN_THE_AIR])

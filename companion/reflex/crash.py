@@ -1,0 +1,69 @@
+"""What shows a crash: a tilt that lasts, rest near the ground, and a weight that no thrust carries."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Sample, Vector3
+from companion.motion.config import GRAVITY_M_S2
+from companion.motion.rotation import tilt_rad
+from companion.motion.strapdown import ZERO
+from companion.reflex.config import (
+    CARRIED_SHARE,
+    LOW_M,
+    LYING_SHARE,
+    STILL_M_S,
+    STILL_M_S2,
+    STILL_RAD_S,
+    TIPPED_RAD,
+)
+from companion.reflex.halfspace import plus
+
+
+@dataclass(slots=True)
+class Lasting:
+    """For how long something has been so, by the vehicle's clock: a late step makes nothing last."""
+
+    since_us: int | None = None
+    lasts_us: int = 0
+
+    def update(self, is_so: bool, time_boot_us: int) -> None:
+        self.since_us = (time_boot_us if self.since_us is None else self.since_us) if is_so else None
+        self.lasts_us = 0 if self.since_us is None else time_boot_us - self.since_us
+
+
+@dataclass(slots=True)
+class CrashWatch:
+    """Changed only by `update`."""
+
+    tipped: Lasting = field(default_factory=Lasting)
+    low: Lasting = field(default_factory=Lasting)  # and still
+    lying: Lasting = field(default_factory=Lasting)
+    is_carried: bool = False  # not by its thrust, which points along body z
+    force_frd_m_s2: Vector3 = ZERO
+    rates_frd_rad_s: Vector3 = ZERO
+
+    def update(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
+        """`height_m`: above the arming position, None where it is not known."""
+        for sample in samples:
+            match sample:
+                case ImuSample():
+                    self.force_frd_m_s2 = _mean(self.force_frd_m_s2, sample.specific_force_frd_m_s2)
+                    self.rates_frd_rad_s = _mean(self.rates_frd_rad_s, sample.angular_velocity_frd_rad_s)
+                case Attitude():
+                    self.tipped.update(tilt_rad(sample.attitude_wxyz) > TIPPED_RAD, sample.time_boot_us)
+                case LocalPosition():
+                    self._rest(sample, height_m is not None and height_m < LOW_M, landed)
+
+    def _rest(self, sample: LocalPosition, is_low: bool, landed: LandedState) -> None:
+        is_still = is_low and math.hypot(*sample.velocity_ned_m_s) < STILL_M_S
+        self.low.update(is_still, sample.time_boot_us)
+        is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < STILL_M_S2
+        self.is_carried = is_weight and -self.force_frd_m_s2[2] < CARRIED_SHARE * GRAVITY_M_S2
+        turns = math.hypot(*self.rates_frd_rad_s) > STILL_RAD_S
+        lies = self.is_carried or landed is LandedState.ON_GROUND
+        self.lying.update(is_still and lies and not turns, sample.time_boot_us)
+
+
+def _mean(mean: Vector3, sample: Vector3) -> Vector3:
+    return plus(mean, LYING_SHARE, plus(sample, -1.0, mean))

@@ -1,0 +1,157 @@
+"""A crash: what it is, that it is told once, and that no vehicle is disarmed that may fly."""
+
+import math
+import random
+
+import pytest
+
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition
+from companion.motion.config import GRAVITY_M_S2
+from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
+from companion.reflex.crash import CrashWatch
+from tests.companion.fake_vehicle import flying_in
+from tests.flying import Flight
+
+ON_ITS_SIDE, ON_ITS_BACK, UPRIGHT = (0.0, GRAVITY_M_S2, 0.0), (0.0, 0.0, GRAVITY_M_S2), (0.0, 0.0, -GRAVITY_M_S2)
+NOTHING = (0.0, 0.0, 0.0)
+DISARM, FORCE, REFUSED, ACCEPTED = 400, 21196.0, 1, 0
+
+
+def lies(f: Flight, height_m: float = 0.1, roll_deg: float = 90.0) -> None:
+    """From now on, wherever it was; its weight is carried by what it lies on."""
+    vehicle = f.vehicle
+    vehicle.position[2], vehicle.velocity, vehicle.roll_rad = -height_m, [0.0, 0.0, 0.0], math.radians(roll_deg)
+    roll = vehicle.roll_rad
+    vehicle.specific_force = [0.0, -math.sin(roll) * GRAVITY_M_S2, -math.cos(roll) * GRAVITY_M_S2]
+    vehicle.move = lambda: None
+
+
+def disarms(f: Flight) -> list[float]:
+    """Of each request: by how much force."""
+    return [message.param2 for _, message in f.vehicle.commands if (message.command, message.param1) == (DISARM, 0.0)]
+
+
+@pytest.mark.parametrize("state", ["takeoff", "mission", "recovering", "landing"])
+def test_a_vehicle_that_is_tipped_over_for_half_a_second_has_crashed_and_its_setpoints_stop(state):
+    f = flying_in(state)
+    f.vehicle.roll_rad = math.radians(70.0)
+    assert f.run_to("crashed", 2.0) == pytest.approx(1e-6 * TIPPED_US, abs=0.05)
+    crashed_us = f.now_us
+    f.run_for(2.0)
+    assert [text.partition(",")[0] for text in f.told("crashed")] == ["crashed: tipped over"]
+    assert f.setpoints_since(crashed_us) == []
+    data = f.event("crashed").data
+    assert data["tilt_deg"] == pytest.approx(70.0, abs=0.1) and data["speed_m_s"] >= 0.0
+
+
+def test_a_hard_turn_that_ends_in_time_is_no_crash():
+    f = flying_in("mission")
+    f.vehicle.roll_rad = math.radians(70.0)
+    f.run_for(0.4)
+    f.vehicle.roll_rad = math.radians(50.0)
+    f.run_for(1.0)
+    assert f.told("crashed") == []
+
+
+def test_on_the_floor_after_a_hit_it_has_crashed_also_where_it_stands_upright():
+    f = flying_in("recovering")
+    lies(f, roll_deg=0.0)
+    assert f.run_to("crashed", 3.0) == pytest.approx(1e-6 * LOW_US, abs=0.1)
+    assert f.told("crashed")[0].startswith("crashed: on the floor after a hit")
+
+
+def test_what_is_still_pressed_to_a_wall_when_the_time_for_the_recovery_is_over_has_crashed():
+    f = flying_in("recovering")
+    f.vehicle.position[0] = f.companion.core.flight.collisions[-1].contact.position_ned_m[0]
+    lies(f, height_m=1.5, roll_deg=20.0)
+    assert f.run_to("crashed", 15.0) == pytest.approx(10.0, abs=0.5)
+    assert f.told("crashed")[0].startswith("crashed: pressed to what was hit")
+    f.run_for(5.0)
+    assert disarms(f) == [], "it may fall"
+
+
+def test_a_vehicle_that_lies_is_disarmed_at_last_by_force_and_the_flight_says_so():
+    # Given a vehicle on its side that does not know that it has landed
+    f = flying_in("mission")
+    f.vehicle.ack = lambda command, count: [REFUSED if (command, count) == (DISARM, 2) else ACCEPTED]
+    f.vehicle.obey = lambda command, count: (command, count) != (DISARM, 2)
+    lies(f)
+    # When it has lain for twice as long as makes sure of it
+    assert f.run_until(lambda: bool(disarms(f)), 4.0) >= 1e-6 * LIES_US
+    f.run_to("aborted", 6.0)
+    # Then it was asked first, and forced after its refusal
+    assert disarms(f)[:2] == [0.0, FORCE] and len(disarms(f)) <= 3, "a HEARTBEAT a second tells"
+    assert f.report.outcome == "aborted" and f.report.reason == f.report.crashed
+    assert f.report.crashed == "crashed: tipped over, tilted by 90 degrees"
+
+
+def test_a_vehicle_that_stands_upright_is_never_forced():
+    f = flying_in("recovering")
+    f.vehicle.ack = lambda command, count: [REFUSED]
+    f.vehicle.obey = lambda command, count: False
+    lies(f, roll_deg=0.0)
+    f.vehicle.landed = 1
+    f.run_for(10.0)
+    assert disarms(f) and set(disarms(f)) == {0.0}
+
+
+def test_where_the_mission_says_tell_it_is_told_and_left_to_people():
+    f = flying_in("mission", on_crash="tell")
+    lies(f)
+    f.run_for(6.0)
+    assert (f.state, disarms(f)) == ("crashed", [])
+    f.companion.stop("stopped with Ctrl-C")
+    f.run_for(0.1)
+    assert f.companion.finished and f.report.reason == "stopped with Ctrl-C" and f.report.crashed
+
+
+def test_one_that_flies_again_is_in_other_hands():
+    f = flying_in("mission")
+    f.vehicle.roll_rad = math.radians(70.0)
+    f.run_to("crashed", 2.0)
+    f.vehicle.roll_rad, f.vehicle.mode, f.vehicle.intended = 0.0, 3 << 16, 3 << 16
+    f.run_for(1.0)
+    f.vehicle.move = lambda: None
+    f.vehicle.position[0] += 1.0
+    f.run_to("aborted", 1.0)
+    assert f.report.reason.endswith("it flies again, in other hands") and disarms(f) == []
+
+
+# --- what lies, and what may fly
+
+
+def watched(force_frd, height_m=0.1, speed_m_s=0.0, rate_rad_s=0.0, landed=LandedState.IN_AIR) -> CrashWatch:
+    """For three seconds."""
+    watch = CrashWatch()
+    for time_us in range(0, 3_000_000, 4_000):
+        samples = [ImuSample(time_us, force_frd, (rate_rad_s, 0.0, 0.0))]
+        if time_us % 20_000 == 0:
+            samples.append(LocalPosition(time_us, NOTHING, (0.0, 0.0, speed_m_s)))
+        watch.update(samples, height_m, landed)
+    return watch
+
+
+@pytest.mark.parametrize("force_frd", [ON_ITS_SIDE, ON_ITS_BACK])
+def test_what_is_carried_across_its_thrust_lies_and_what_moves_or_turns_or_is_high_does_not(force_frd):
+    assert watched(force_frd).lying.lasts_us >= LIES_US
+    for change in ({"height_m": 0.4}, {"height_m": None}, {"speed_m_s": 0.3}, {"rate_rad_s": 1.0}):
+        assert watched(force_frd, **change).lying.lasts_us == 0
+    assert watched(UPRIGHT).lying.lasts_us == 0, "so it hovers"
+    assert watched(UPRIGHT, landed=LandedState.ON_GROUND).lying.lasts_us >= LIES_US
+
+
+def test_whatever_its_thrust_does_a_vehicle_in_the_air_does_not_lie():
+    """Drag of 0.3 /s at most moves it sideways; a vehicle that falls on its back at its last speed is fast."""
+    chance = random.Random(1)
+    for _ in range(300):
+        speed_m_s = chance.choice((0.0, chance.uniform(0.0, 30.0)))
+        drag = [0.3 * speed_m_s * chance.uniform(-1.0, 1.0) for _ in range(3)]
+        force = (drag[0], drag[1], drag[2] - chance.uniform(0.0, 3.0 * GRAVITY_M_S2))
+        assert watched(force, height_m=chance.uniform(-1.0, 3.0), speed_m_s=speed_m_s).lying.lasts_us < LIES_US
+
+
+def test_a_late_step_makes_no_tilt_last():
+    watch, tipped = CrashWatch(), (math.cos(0.6), math.sin(0.6), 0.0, 0.0)
+    watch.update([Attitude(0, tipped)], 1.0, LandedState.IN_AIR)
+    watch.update([Attitude(20_000, tipped), Attitude(40_000, tipped)], 1.0, LandedState.IN_AIR)
+    assert watch.tipped.lasts_us == 40_000
