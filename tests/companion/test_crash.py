@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Sample
 from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
 from companion.reflex.crash import CrashWatch
@@ -124,7 +124,7 @@ def watched(force_frd, height_m=0.1, speed_m_s=0.0, rate_rad_s=0.0, landed=Lande
     """For three seconds."""
     watch = CrashWatch()
     for time_us in range(0, 3_000_000, 4_000):
-        samples = [ImuSample(time_us, force_frd, (rate_rad_s, 0.0, 0.0))]
+        samples: list[Sample] = [ImuSample(time_us, force_frd, (rate_rad_s, 0.0, 0.0))]
         if time_us % 20_000 == 0:
             samples.append(LocalPosition(time_us, NOTHING, (0.0, 0.0, speed_m_s)))
         watch.update(samples, height_m, landed)
