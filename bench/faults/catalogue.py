@@ -13,7 +13,7 @@ from bench.faults import injectors, people
 from bench.faults.injectors import CHANGES, Change, Once, adding, rewritten, setting, simulated
 from bench.faults.people import forged
 from bench.fly.air import Air, Expected, Fault, Injector, When
-from bench.fly.packets import NUMBERS
+from bench.fly.packets import number_of
 from sim_vehicle.bench.faults import FaultRequest, ekf_reset, other
 
 Row = Mapping[str, Any]
@@ -21,7 +21,7 @@ _ARMED = 0x80
 
 
 def _numbers(names: Sequence[str]) -> tuple[int, ...]:
-    return tuple(NUMBERS[name] for name in names)
+    return tuple(map(number_of, names))
 
 
 def _change(row: Row) -> Change:
@@ -62,12 +62,12 @@ def _disarm(message: Any, air: Air) -> None:
 def _forged_velocity(chance: random.Random) -> Injector:
     """One packet, of ODOMETRY or of LOCAL_POSITION_NED, with a velocity 2 m/s aside."""
     axis, name = chance.choice(("vx", "vy", "vz")), chance.choice(("ODOMETRY", "LOCAL_POSITION_NED"))
-    return forged(When.flying(chance), NUMBERS[name], adding(**{axis: chance.choice((-2.0, 2.0))}))
+    return forged(When.flying(chance), number_of(name), adding(**{axis: chance.choice((-2.0, 2.0))}))
 
 
 def _forged_imu(names: Sequence[str], chance: random.Random, size: float, times: int = 1) -> Injector:
     when, axis = When.flying(chance), chance.choice(names)
-    return forged(when, NUMBERS["HIGHRES_IMU"], adding(**{axis: chance.choice((-size, size))}), times, 0.004)
+    return forged(when, number_of("HIGHRES_IMU"), adding(**{axis: chance.choice((-size, size))}), times, 0.004)
 
 
 # By the words after `do` in the file: what is drawn, in this order, belongs to the seed.
@@ -86,7 +86,7 @@ DOES: dict[str, Callable[..., Injector]] = {
     "height_reset": lambda c: simulated(ekf_reset((0.0, 0.0, c.choice((-0.5, 0.5)))), When.flying(c)),
     "gust": _gust,
     "push": _push,
-    "forged_disarm": lambda c, *times: forged(When.flying(c), NUMBERS["HEARTBEAT"], _disarm, *times),
+    "forged_disarm": lambda c, *times: forged(When.flying(c), number_of("HEARTBEAT"), _disarm, *times),
     "forged_velocity": _forged_velocity,
     "forged_rate": partial(_forged_imu, ("xgyro", "ygyro")),
     "forged_force": partial(_forged_imu, ("xacc", "yacc")),
@@ -112,7 +112,9 @@ def _injected(row: Row, chance: random.Random) -> Injector:
         return simulated(FaultRequest(kind, {k: v for k, v in row["vehicle"].items() if k != "kind"}), when)
     if "forge" in row:
         forge = row["forge"]
-        return forged(when, NUMBERS[forge["message"]], _change(forge), forge.get("times", 1), forge.get("every_s", 0.0))
+        return forged(
+            when, number_of(forge["message"]), _change(forge), forge.get("times", 1), forge.get("every_s", 0.0)
+        )
     rewrite = row["rewrite"]
     change = CHANGES[rewrite["by"]] if "by" in rewrite else _change(rewrite)
     return rewritten(when, _numbers(rewrite["messages"]), change)

@@ -9,12 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 from companion.core import FlightCore
 from companion.mavlink.packet import message_id_of, payload_of
 
-HEARTBEAT, ATTITUDE, POSITION, COMMAND_ACK = 0, 31, 32, 77
-IMU, EXTENDED_STATE, ODOMETRY, MODE = 105, 245, 331, 436
-COMMAND, SETPOINT = 76, 84
-NUMBERS = {"HEARTBEAT": HEARTBEAT, "ATTITUDE_QUATERNION": ATTITUDE, "LOCAL_POSITION_NED": POSITION}
-NUMBERS |= {"COMMAND_ACK": COMMAND_ACK, "HIGHRES_IMU": IMU, "EXTENDED_SYS_STATE": EXTENDED_STATE}
-NUMBERS |= {"ODOMETRY": ODOMETRY, "CURRENT_MODE": MODE}
+HEARTBEAT, MODE, COMMAND, SETPOINT = 0, 436, 76, 84
 ARM, SET_MODE = 400, 176
 # Which of two messages of the same kind is whose.
 VEHICLE, GROUND_STATION = (1, 1), (255, 190)
@@ -26,6 +21,12 @@ _GRAVITY_M_S2 = 9.81
 # POSITION_TARGET_TYPEMASK.
 _XY, _Z, _VELOCITY, _ACCELERATION, _YAW = 0x003, 0x004, 0x038, 0x1C0, 0x400
 _VALUES = ("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz")
+
+
+def number_of(name: str) -> int:
+    """Of the message of that name."""
+    number: int = getattr(dialect, f"MAVLINK_MSG_ID_{name}")
+    return number
 
 
 def decoded(frame: bytes) -> Any | None:

@@ -16,7 +16,7 @@ from bench.faults.injectors import rewritten, setting, simulated
 from bench.faults.people import Taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.faulted import FaultedFlight
-from bench.fly.packets import ARM, IMU, SET_MODE, made, outside
+from bench.fly.packets import ARM, SET_MODE, made, number_of, outside
 from bench.main import main
 from bench.rows.faulted import judged, work_out_fault, work_out_seed
 from bench.studies import faults as study
@@ -67,7 +67,12 @@ def branched(number: int, faults: Sequence[Fault]) -> dict[str, Any]:
 @pytest.mark.slow
 def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
     # Given a sensor that says nothing true any more, and nothing at all
-    blind = Fault("blind", "", lambda _: rewritten(When("mission"), (IMU,), setting(xgyro=math.nan)), Expected())
+    blind = Fault(
+        "blind",
+        "",
+        lambda _: rewritten(When("mission"), (number_of("HIGHRES_IMU"),), setting(xgyro=math.nan)),
+        Expected(),
+    )
     calm = Fault("calm", "", lambda _: Injector(), Expected((COMPLETED,)))
     # When both fly on from one take-off
     # (a wall that the blind one falls beside at once, and does not scratch along for half a minute)

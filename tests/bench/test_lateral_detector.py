@@ -93,17 +93,6 @@ def test_thrust_and_free_fall_are_not_lateral():
     assert run(samples)[0] == []
 
 
-def test_threshold_is_the_configurations():
-    assert run(hits(400_000, level=10.0), threshold_m_s2=12.0)[0] == []
-    assert len(run(hits(400_000, level=13.0), threshold_m_s2=12.0)[0]) == 1
-
-
-def test_off_is_silent_and_says_why():
-    impacts, states = run(hits(400_000), off=lambda sample: "landing")
-    assert impacts == []
-    assert states[-1].describe() == "off (landing)"
-
-
 def test_switched_on_in_the_middle_of_a_shake_it_waits_for_quiet():
     def off(sample):
         return "takeoff" if sample.time_boot_us < 405_000 else None

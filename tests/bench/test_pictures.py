@@ -9,7 +9,7 @@ from PIL import Image
 from bench.main import main
 from bench.pictures import command
 from bench.pictures.animation import SLOW_S, SLOWNESS, Frame, frame_times_s
-from bench.stamps import ROOT, stamp_text, stamped_anew, stamps_in
+from bench.stamps import ROOT, stamp_text, stamps_in
 from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL, run_here
 
@@ -73,8 +73,3 @@ def test_a_command_makes_all_pictures_and_stamps_their_pages(tmp_path, monkeypat
     assert (images / "hit.webp").read_text() == "wall" and (images / "wall.png").stat().st_size > 10_000
     found = stamps_in((tmp_path / "README.md").read_text())
     assert [(stamp.command, stamp.is_old) for stamp in found] == [(command.COMMAND, False), ("make bumps", False)]
-
-
-def test_a_stamp_of_another_command_stays_as_it_is():
-    text = "Measured by `make bumps` on version 0.1.0+0 of `docs`."
-    assert stamped_anew(text, command.COMMAND) == text
