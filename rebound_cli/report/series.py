@@ -16,6 +16,7 @@ Floats = npt.NDArray[np.float64]
 Columns: TypeAlias = dict[str, tuple[Floats, float]]
 
 TIME_S, PLACE_M, SPEED_M_S, UNIT, FORCE_M_S2, RATE_RAD_S, FOLD_M = 1e-5, 1e-3, 1e-3, 1e-4, 1e-2, 1e-3, 1e-4
+TILT_DEG = 1e-2
 NED, VELOCITY, TURN = ("n", "e", "d"), ("vn", "ve", "vd"), ("qw", "qx", "qy", "qz")
 
 
@@ -27,6 +28,16 @@ def vector(names: Sequence[str], rows: Floats, resolution: float) -> Columns:
     return {name: (rows[:, number], resolution) for number, name in enumerate(names)}
 
 
+def _tilt(attitude_wxyz: Floats) -> Columns:
+    """How far the thrust leans from upright."""
+    _, x, y, _ = attitude_wxyz.T
+    return {"tilt": (np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))), TILT_DEG)}
+
+
+def _attitude_control(at_us: Floats, asked: Floats, started_us: float) -> Columns:
+    return times(at_us, started_us) | _tilt(asked[:, :4]) | {"thrust": (asked[:, 4], UNIT)}
+
+
 def series(log: FlightLog, started_us: float) -> dict[str, Columns]:
     """Of each stream that every flight has; `t` is seconds since the flight began."""
     return {
@@ -36,6 +47,10 @@ def series(log: FlightLog, started_us: float) -> dict[str, Columns]:
         "path": times(log.position_at_us, started_us)
         | vector(NED, log.position_ned_m, PLACE_M)
         | vector(VELOCITY, log.velocity_ned_m_s, SPEED_M_S),
-        "attitude": times(log.attitude_at_us, started_us) | vector(TURN, log.attitude_wxyz, UNIT),
+        "attitude": times(log.attitude_at_us, started_us)
+        | vector(TURN, log.attitude_wxyz, UNIT)
+        | _tilt(log.attitude_wxyz),
+        "target": _attitude_control(log.target_at_us, log.target, started_us),
+        "wanted": _attitude_control(log.wanted_at_us, log.wanted, started_us),
         "setpoint": times(log.setpoint_at_us, started_us) | vector(NED, log.setpoint_ned_m, PLACE_M),
     }

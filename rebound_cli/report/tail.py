@@ -20,7 +20,9 @@ from rebound_cli.results.flight_log import FlightLog, flight_log_of_packets
 # Columns of each table of the page, in the order of a row.
 COLUMNS = {
     "path": ("t", *NED, *VELOCITY),
-    "attitude": ("t", *TURN),
+    "attitude": ("t", *TURN, "tilt"),
+    "target": ("t", "tilt", "thrust"),
+    "wanted": ("t", "tilt", "thrust"),
     "setpoint": ("t", *NED),
     "force": ("t", "peak"),
 }

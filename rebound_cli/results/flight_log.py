@@ -11,18 +11,24 @@ import numpy.typing as npt
 
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
-from companion.messages import Attitude, ImuSample, LocalPosition, MessageId, Sample
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, MessageId, Sample
 from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import Demand, Log, Told
 
 Floats = npt.NDArray[np.float64]
 
+_SET_ATTITUDE_TARGET = 82
 _SET_POSITION_TARGET_LOCAL_NED = 84
 _STATUSTEXT = 253
-_MEASURED = (MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_QUATERNION)
+_MEASURED = (
+    *(MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED),
+    *(MessageId.ATTITUDE_QUATERNION, MessageId.ATTITUDE_TARGET),
+)
 
 # SET_POSITION_TARGET_LOCAL_NED begins with time_boot_ms, then north, east, down.
 _PLACE = struct.Struct("<4x3f")
+# SET_ATTITUDE_TARGET: the same, then the attitude, three rates, the thrust.
+_ATTITUDE = struct.Struct("<4x4f12xf")
 # STATUSTEXT: severity, 50 bytes of text; a longer text goes on in packets of the same id that is not 0.
 _TEXT = struct.Struct("<B50sHB")
 
@@ -44,6 +50,10 @@ class FlightLog:
     attitude_wxyz: Floats
     setpoint_at_us: Floats
     setpoint_ned_m: Floats  # NaN where a setpoint asked for no place
+    target_at_us: Floats
+    target: Floats  # of the vehicle's own attitude control: w, x, y, z, NaN where it told none; thrust as a share
+    wanted_at_us: Floats
+    wanted: Floats  # of the setpoints by attitude that were sent, alike
     texts: tuple[tuple[int, str], ...]  # STATUSTEXT, when and what
 
 
@@ -55,7 +65,8 @@ def read_flight_log(path: Path) -> FlightLog:
 def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
     """The same of packets with their stamps: what the companion hears of them, what it asked for, and all texts."""
     decoder = Decoder(is_packet=lambda *_: True)
-    heard, asked, texts = list[tuple[int, Sample]](), list[Any](), list[tuple[int, bytes]]()
+    heard, texts = list[tuple[int, Sample]](), list[tuple[int, bytes]]()
+    asked, wanted = list[Any](), list[Any]()
     for at_us, packet in packets:
         message_id = message_id_of(packet)
         if message_id in _MEASURED:
@@ -63,13 +74,17 @@ def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
             heard += ((at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
         elif message_id == _SET_POSITION_TARGET_LOCAL_NED:
             asked.append((at_us, *_PLACE.unpack_from(payload_of(packet).ljust(_PLACE.size, b"\0"))))
+        elif message_id == _SET_ATTITUDE_TARGET:
+            wanted.append((at_us, *_ATTITUDE.unpack_from(payload_of(packet).ljust(_ATTITUDE.size, b"\0"))))
         elif message_id == _STATUSTEXT:
             texts.append((at_us, packet))
-    setpoints = np.array(asked, np.float64).reshape(-1, 4)
+    setpoints, attitudes = np.array(asked, np.float64).reshape(-1, 4), np.array(wanted, np.float64).reshape(-1, 6)
     return replace(
         flight_log_of(heard),
         setpoint_at_us=setpoints[:, 0],
         setpoint_ned_m=setpoints[:, 1:],
+        wanted_at_us=attitudes[:, 0],
+        wanted=attitudes[:, 1:],
         texts=tuple(_texts(texts)),
     )
 
@@ -94,7 +109,7 @@ def flight_log_of_log(log: Log) -> FlightLog:
 
 def flight_log_of(samples: Iterable[tuple[int, Told]]) -> FlightLog:
     """The same of samples that were decoded already; setpoints as the vehicle tells them."""
-    imu, moved, turned, asked = list[Any](), list[Any](), list[Any](), list[Any]()
+    imu, moved, turned, asked, target = (list[Any]() for _ in range(5))
     for at_us, sample in samples:
         match sample:
             case ImuSample(boot_us, force, rates):
@@ -103,11 +118,14 @@ def flight_log_of(samples: Iterable[tuple[int, Told]]) -> FlightLog:
                 moved.append((at_us, boot_us, *position, *velocity))
             case Attitude(boot_us, turn):
                 turned.append((at_us, boot_us, *turn))
+            case AttitudeTarget(_, thrust, turn):
+                target.append((at_us, *(turn or (np.nan,) * 4), thrust))
             case Demand():
                 asked.append((at_us, *(sample.position_ned_m or (np.nan, np.nan, np.nan))))
-    widths = ((imu, 8), (moved, 8), (turned, 6), (asked, 4))
-    i, m, t, a = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
+    widths = ((imu, 8), (moved, 8), (turned, 6), (asked, 4), (target, 6))
+    i, m, t, a, c = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
     return FlightLog(
         *(i[:, 0], i[:, 1], i[:, 2:5], i[:, 5:8], m[:, 0], m[:, 1], m[:, 2:5], m[:, 5:8]),
-        *(t[:, 0], t[:, 1], t[:, 2:6], a[:, 0], a[:, 1:4], ()),
+        *(t[:, 0], t[:, 1], t[:, 2:6], a[:, 0], a[:, 1:4]),
+        *(c[:, 0], c[:, 1:6], np.empty(0), np.empty((0, 5)), ()),
     )

@@ -138,7 +138,7 @@ function fitCharts() {
 // The whole flight: what there is to be seen of it, each as a chart with a function that gives its columns.
 function overviews() {
   const found = [];
-  const { path, setpoint, attitude, imu, force } = tables;
+  const { path, setpoint, attitude, target, wanted, imu, force } = tables;
   if (path.length || flight.live) {
     const series = [{ label: "speed, m/s", colour: "--blue" }];
     if (path.has("d")) series.push({ label: "height, m", colour: "--orange" });
@@ -167,6 +167,8 @@ function overviews() {
       return [t, roll, pitch].map(plotted);
     } });
   }
+  if (attitude.length || flight.live) found.push(wantedAndFlown("Tilt", "°", "tilt", attitude));
+  if (target.length || wanted.length || flight.live) found.push(wantedAndFlown("Thrust", "share of the most", "thrust", null));
   if (imu.length) {
     const series = [{ label: "push over threshold", colour: "--blue" }, { label: "a hit from here on", colour: "--red", number: 1 }];
     // What a contact makes leaves the picture: what came near to one is looked for.
@@ -185,16 +187,41 @@ function overviews() {
   return found;
 }
 
+// What the companion asked for by attitude, what the vehicle's own control asks for, and what was flown.
+function wantedAndFlown(title, unit, column, flown) {
+  const told = flown ? "wanted by the vehicle's own control" : "flown by the vehicle's own control";
+  const series = [{ label: "wanted by the companion", colour: "--red", number: 0 }, { label: told, colour: "--orange", number: 1 }];
+  if (flown) series.unshift({ label: "flown", colour: "--blue", number: 0 });
+  return { title: `${title}, wanted and flown; green: hand-over`, unit, series, columns: () => {
+    const { target, wanted } = tables;
+    const t = (flown || (target.length ? target : wanted)).columns.t;
+    const asked = [wanted, target].map((table) => Array.from(t, (time) => lastAt(table, [column], time, 0.3)[0]));
+    return [t, ...(flown ? [flown.columns[column]] : []), ...asked].map(plotted);
+  } };
+}
+
 // North and east of the setpoint that was flown at a time; none where none came for a second.
 function askedAt(time) {
-  const { t, n, e } = tables.setpoint.columns;
+  return lastAt(tables.setpoint, ["n", "e"], time, 1);
+}
+
+// What the last row before a time says; none where it is older than that.
+function lastAt(table, names, time, longest) {
+  const { t } = table.columns;
   const row = rowAt(t, time);
-  return row >= 0 && time - t[row] < 1 ? [n[row], e[row]] : [NaN, NaN];
+  return names.map((name) => (row >= 0 && time - t[row] < longest ? table.columns[name][row] : NaN));
+}
+
+// Moments, and when a recovery by attitude went over to a position.
+function overviewMarks() {
+  const marks = flight.moments.map((moment) => ({ at: moment.t, colour: "--red", dashed: moment.kind !== "hit" }));
+  const handed = flight.events.filter((event) => event.kind === "hand_over");
+  return [...marks, ...handed.map((event) => ({ at: event.t, colour: "--green" }))];
 }
 
 // A click goes to its time. `showNow` marks a time, `refill` takes what a live flight has brought.
 function addOverview(parent, goTo) {
-  const marks = flight.moments.map((moment) => ({ at: moment.t, colour: "--red", dashed: moment.kind !== "hit" }));
+  const marks = overviewMarks();
   const range = flight.live ? undefined : [0, Math.max(flight.duration_s, 0.001)];
   const made = overviews().map((one) => {
     const [x, ...values] = one.columns();
@@ -207,7 +234,10 @@ function addOverview(parent, goTo) {
   });
   return {
     showNow: (time) => made.forEach(({ plot, now }) => { now.style.left = `${plot.valToPos(time, "x")}px`; }),
-    refill: () => made.forEach(({ plot, columns }) => plot.setData(columns())),
+    refill: () => {
+      marks.splice(0, marks.length, ...overviewMarks());
+      made.forEach(({ plot, columns }) => plot.setData(columns()));
+    },
   };
 }
 

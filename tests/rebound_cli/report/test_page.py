@@ -120,6 +120,23 @@ def test_what_came_nearest_to_a_hit_is_told_with_why_it_was_none(opened):
     assert 0.3 < imu["side"][row] / imu["side_threshold"][row] < 1.0
 
 
+def test_a_recovery_shows_what_was_wanted_and_flown_until_it_was_handed_over(wall_folder, opened):
+    wanted, flown = opened.table("wanted"), opened.table("attitude")
+    times_s = {event["kind"]: event["t"] for event in opened.data["events"]}
+    # Given a recovery by attitude: its setpoints begin with the hit and end with the hand-over
+    assert wanted["t"][0] == pytest.approx(times_s["detection"], abs=0.01)
+    assert wanted["t"][-1] == pytest.approx(times_s["hand_over"], abs=0.01)
+    # Then the vehicle leans as it was asked to: it follows within a fifth of a second
+    lag_s = 0.15
+    at_flown = np.interp(wanted["t"] + lag_s, flown["t"], flown["tilt"])
+    assert np.corrcoef(at_flown, wanted["tilt"])[0, 1] > 0.5
+    # and its own control has the companion's thrust
+    target = opened.table("target")
+    asked = np.interp(target["t"], wanted["t"], wanted["thrust"])
+    during = (target["t"] > wanted["t"][0] + 0.1) & (target["t"] < wanted["t"][-1])
+    assert np.abs(asked - target["thrust"])[during].max() < 0.05
+
+
 def test_the_scene_holds_wall_path_truth_and_what_is_remembered(opened):
     (wall,) = opened.data["obstacles"]
     assert wall["name"] == "north wall" and wall["centre"] == [4.05, 0.0, -1.5] and wall["sizes"] == [0.1, 6.0, 3.0]
