@@ -27,11 +27,6 @@ def heartbeats(connection, seconds: float) -> None:
         connection.recv_match(type="HEARTBEAT", blocking=True, timeout=1.0)
 
 
-def flies_in(connection, mode: str) -> bool:
-    connection.recv_match(type="HEARTBEAT", blocking=True, timeout=1)
-    return connection.flightmode == mode
-
-
 def test_heartbeat_modes_arming_takeoff_and_land(vehicle):
     assert vehicle.wait_heartbeat(timeout=5).autopilot == mavutil.mavlink.MAV_AUTOPILOT_PX4
     assert vehicle.target_system == 1

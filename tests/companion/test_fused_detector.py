@@ -239,10 +239,6 @@ def gone(t):
     return max(0.0, 1.0 - (t - HIT_US) / 60_000) if t > HIT_US else 1.0
 
 
-def spinning_up(t):
-    return (80e-6 * max(0, t - HIT_US), 0.0, 0.0)
-
-
 @pytest.mark.parametrize("late_us", [20_000, 50_000])
 def test_what_lags_behind_a_manoeuvre_is_no_hit_once_the_vehicle_has_manoeuvred(late_us):
     """Gentle climbs and dives for some seconds show how late its velocity is; then come wild ones."""

@@ -42,9 +42,17 @@ def client() -> Client:
         (410, (), [ACCEPTED]),
         (528, (1,), [ACCEPTED]),
         (SET_INTERVAL, (26, 100_000), [ACCEPTED]),
+        (SET_INTERVAL, (105, 4_000, NAN, NAN, NAN, NAN, NAN), [ACCEPTED]),
         (SET_INTERVAL, (27, 100_000), [FAILED]),
+        # Another link's interval, or an answer to somebody else, cannot be asked for
+        (SET_INTERVAL, (105, 4_000, 1), [FAILED]),
+        (SET_INTERVAL, (105, 4_000, 0, 1), [FAILED]),
+        (SET_INTERVAL, (105, 4_000, 0, 0, 0, 0, 1), [FAILED]),
+        (SET_INTERVAL, (NAN, 4_000), [FAILED]),
+        (SET_INTERVAL, (105, NAN), [FAILED]),
         (510, (26,), [ACCEPTED]),
         (REQUEST_MESSAGE, (27,), [DENIED]),
+        (REQUEST_MESSAGE, (244, 105), [ACCEPTED]),
         (REQUEST_MESSAGE, (300,), [ACCEPTED]),
         (519, (1,), [ACCEPTED]),
         (REQUEST_MESSAGE, (395,), [DENIED]),
@@ -80,6 +88,22 @@ def client() -> Client:
 )
 def test_answers_on_the_ground(client, number, params, answers):
     assert results(client, number, *params) == answers
+
+
+@pytest.mark.parametrize(
+    ("target", "ours"),
+    [((0, 0), True), ((0, 1), True), ((1, 0), True), ((2, 1), False), ((1, 191), False)],
+)
+def test_only_what_is_addressed_to_us_is_answered(client, target, ours):
+    assert bool(results(client, SET_MODE, 1, 4, 3, target=target)) is ours
+
+
+@pytest.mark.parametrize("custom", [(1, 1), (1, 4, 4), (1, 4, 6), (1, 4, 5), (1, 3)])
+def test_modes_in_which_nobody_can_arm(client, custom):
+    assert results(client, SET_MODE, *custom) == [ACCEPTED, ACCEPTED]
+    assert results(client, ARM_DISARM, 1) == [TEMPORARILY_REJECTED]
+    # Force changes nothing
+    assert results(client, ARM_DISARM, 1, 21196) == [TEMPORARILY_REJECTED]
 
 
 def test_a_place_that_is_none_in_the_other_commands_way_is_denied(client):

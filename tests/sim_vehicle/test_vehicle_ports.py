@@ -1,4 +1,4 @@
-"""The vehicle's ports: TCP, a UDP server, serial lines over a pseudo-terminal, addresses, several vehicles."""
+"""The vehicle in real time: UDP, TCP, serial lines, addresses, several vehicles; its pace and how it ends."""
 
 import os
 import pty
@@ -7,17 +7,21 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import LinkAddressError, PortInUse
+from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.addresses import open_port, px4_ports
 from sim_vehicle.shell.port import Port
-from sim_vehicle.shell.realtime import serve
+from sim_vehicle.shell.realtime import RealtimePace, serve
+from sim_vehicle.shell.truth_file import load_truth
+from sim_vehicle.shell.udp_ports import UdpPeerPort
 from sim_vehicle.vehicle import SimulatedVehicle
 
 TIMEOUT_S = 5.0
@@ -28,9 +32,9 @@ def new_vehicle(system: int = 1) -> SimulatedVehicle:
 
 
 @contextmanager
-def served(vehicle: SimulatedVehicle, *ports: Port) -> Iterator[None]:
+def served(vehicle: SimulatedVehicle, *ports: Port, truth_path: Path | None = None) -> Iterator[None]:
     stop = threading.Event()
-    thread = threading.Thread(target=serve, args=(vehicle, ports), kwargs={"stop": stop.is_set})
+    thread = threading.Thread(target=serve, args=(vehicle, ports, truth_path, stop.is_set))
     thread.start()
     try:
         yield
@@ -53,6 +57,15 @@ class Reader:
 
     def kinds(self) -> set[str]:
         return {message.get_type() for message in self.messages}
+
+
+@contextmanager
+def bound() -> Iterator[socket.socket]:
+    """Somebody on UDP."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        peer.settimeout(TIMEOUT_S)
+        yield peer
 
 
 def client(system: int = 255) -> dialect.MAVLink:
@@ -165,12 +178,7 @@ def test_a_serial_port_that_is_not_there_is_one_sentence():
 
 
 def test_two_vehicles_beside_one_another():
-    with (
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second,
-    ):
-        for connection in (first, second):
-            connection.bind(("127.0.0.1", 0))
+    with bound() as first, bound() as second:
         one, two = new_vehicle(1), new_vehicle(2)
         with (
             served(one, *px4_ports(one, 0, 0, first.getsockname())),
@@ -179,3 +187,101 @@ def test_two_vehicles_beside_one_another():
             for number, connection in ((1, first), (2, second)):
                 reader = read_socket(connection, {"HEARTBEAT", "ATTITUDE"})
                 assert {message.get_srcSystem() for message in reader.messages} == {number}
+
+
+def test_a_port_in_use_is_one_sentence():
+    with bound() as other:
+        port = other.getsockname()[1]
+        with pytest.raises(PortInUse) as raised:
+            px4_ports(new_vehicle(), 0, port)
+    assert str(raised.value).startswith(f"UDP port {port} is in use")
+
+
+def test_it_sends_unasked_one_packet_a_datagram():
+    vehicle = new_vehicle()
+    with bound() as companion, served(vehicle, *px4_ports(vehicle, 0, 0, companion.getsockname())):
+        for wanted in ("HEARTBEAT", "HIGHRES_IMU", "LOCAL_POSITION_NED"):
+            read_socket(companion, {wanted})
+        assert dialect.MAVLink(None).decode(bytearray(companion.recv(2048)))
+
+
+def test_only_this_machine_is_listened_to_unless_another_was_named():
+    for remote, here in (
+        (("127.0.0.1", 9), "127.0.0.1"),
+        (("localhost", 9), "127.0.0.1"),
+        (("192.0.2.1", 9), "0.0.0.0"),
+    ):
+        port = UdpPeerPort(new_vehicle(), LinkOptions(LinkKind.ONBOARD), 0, remote)
+        assert port._socket.getsockname()[0] == here
+        port.close()
+
+
+def test_the_first_sender_becomes_the_companion_for_good():
+    with bound() as companion, bound() as first, bound() as second:
+        vehicle = new_vehicle()
+        ports = px4_ports(vehicle, 0, 0, companion.getsockname())
+        with served(vehicle, *ports):
+            companion.recv(2048)
+            for sender in (first, second):
+                sender.sendto(
+                    client().heartbeat_encode(18, 8, 0, 0, 0).pack(client()), ("127.0.0.1", ports[0].local_port)
+                )
+                read_socket(first, {"HEARTBEAT", "ATTITUDE"})
+        second.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            second.recv(2048)
+
+
+def test_it_flies_on_when_nobody_listens(tmp_path: Path):
+    with bound() as gone:
+        address = gone.getsockname()
+    path = tmp_path / "truth.npz"
+    vehicle = new_vehicle()
+    with served(vehicle, *px4_ports(vehicle, 0, 0, address), truth_path=path):
+        until_s = time.monotonic() + TIMEOUT_S
+        while vehicle.time_boot_us < 200_000:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+    # And the truth is written at the end, with the wall clock of boot
+    hits, series, epoch_us = load_truth(path)
+    assert hits == []
+    assert series["time_boot_us"][-1] == vehicle.time_boot_us
+    assert epoch_us + vehicle.time_boot_us == pytest.approx(time.time_ns() // 1000, abs=2e6)
+
+
+class Machine:
+    """A clock that passes only when someone sleeps or hangs."""
+
+    def __init__(self) -> None:
+        self.now_ns = 5_000_000_000
+
+    def monotonic_ns(self) -> int:
+        return self.now_ns
+
+    def sleep_s(self, seconds: float) -> None:
+        self.now_ns += round(1e9 * seconds)
+
+
+@pytest.mark.parametrize(("hangs_ms", "lost_ms"), [(0, 0), (200, 0), (500, 0), (800, 796)])
+def test_lateness_is_caught_up_unless_the_machine_was_away(hangs_ms: int, lost_ms: int):
+    """800 ms away: the interval that was due then is flown, the other 796 ms are left out."""
+    machine = Machine()
+    pace = RealtimePace(0, 1.0, machine.monotonic_ns, machine.sleep_s)
+    start_ns, boot_us = machine.now_ns, 0
+    while machine.now_ns - start_ns < 2_000_000_000:
+        pace.wait_until(boot_us + 4_000)
+        boot_us += 4_000
+        if boot_us == 100_000:
+            machine.now_ns += hangs_ms * 1_000_000
+    assert boot_us == 2_000_000 - 1000 * lost_ms
+    # And that the clock stood then is known, for whoever puts truth and telemetry beside each other
+    assert pace.stalls == ([(104_000, 1000 * lost_ms)] if lost_ms else [])
+
+
+@pytest.mark.parametrize(("speed", "lasts_ns"), [(0.5, 8_000_000), (1.0, 4_000_000), (4.0, 1_000_000), (0.0, 0)])
+def test_an_interval_is_never_flown_before_it_has_passed_at_the_asked_speed(speed: float, lasts_ns: int):
+    machine = Machine()
+    pace = RealtimePace(4_000, speed, machine.monotonic_ns, machine.sleep_s)
+    begun_ns = machine.now_ns
+    pace.wait_until(8_000)
+    assert machine.now_ns - begun_ns == lasts_ns
