@@ -147,9 +147,8 @@ BRAKING_PER_S = 7.0
 WAY_S = 2.0 / BRAKING_PER_S
 # The present tilt is that of so much later: a setpoint's way to the vehicle, and its motors.
 TILT_AHEAD_S = 0.05
-# Back off a surface, m/s for each metre of the clearance that is missing. Half as fast as the speed is braked is a
-# damping of 0.7.
-RETURN_PER_S = 0.5 * BRAKING_PER_S
+# Back off a surface, m/s for each metre of the clearance that is missing: a third as fast as the speed is braked.
+RETURN_PER_S = 2.5
 # Height and climb: critically damped at 4 rad/s, below what thrust and tilt share.
 HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 16.0, 8.0, 4.0
 # Largest tilt, 35 degrees: 6.9 m/s^2, with 22 % more thrust than hover's.
