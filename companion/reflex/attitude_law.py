@@ -88,13 +88,14 @@ def brakable_m_s(room_m: float, later_s: float) -> float:
 
 def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Quaternion, float]:
     """Attitude in the vehicle's own frame, and the collective thrust as a share of the most."""
-    belief, full_m_s2 = lean.belief, lean.full_m_s2
+    belief, full_m_s2, turns_rad_s = lean.belief, lean.full_m_s2, abs(lean.belief.yaw_rate_rad_s)
     # To stay below the top of a fence may take more than gravity, which no upright vehicle has.
     n, e, d = acceleration_ned_m_s2
     d = min(max(d, -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2)
     lifts_m_s2 = GRAVITY_M_S2 - d
     least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), reflex.HOVER_MARGIN * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
+    most_m_s2 *= reflex.SPIN_RAD_S / max(turns_rad_s, reflex.SPIN_RAD_S)
     n, e, _ = limited((n, e, 0.0), most_m_s2)
     force = (n, e, d - GRAVITY_M_S2)
     up = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0))

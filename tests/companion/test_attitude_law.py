@@ -119,8 +119,12 @@ def test_a_vehicle_with_little_thrust_to_spare_leans_less():
     assert -up_of(weak)[2] == pytest.approx(1.1 / 1.25), "hover's share of the thrust, and a tenth to spare"
 
 
-def test_a_turn_is_braked_little_by_little():
-    spinning = lean(Belief(HERE, (-4.0, 0.0, 0.0), yaw_rate_rad_s=-12.0))
+def test_a_vehicle_that_spins_leans_less_and_brakes_the_turn_little_by_little():
+    still = Belief(HERE, (-4.0, 0.0, 0.0))
+    spinning = lean(replace(still, yaw_rate_rad_s=-12.0))
+    slow, _ = attitude_and_thrust((9.0, 0.0, -4.0), lean(still))
+    spun, _ = attitude_and_thrust((9.0, 0.0, -4.0), spinning)
+    assert up_of(spun)[0] < 0.5 * up_of(slow)[0]
     sent = Target(HERE, 0.0, None, (9.0, 0.0, -4.0), spinning).setpoint(0)
     assert -12.0 < sent.yaw_rate_rad_s < -10.0
 
