@@ -4,7 +4,6 @@ import json
 
 import pytest
 
-from bench.cases.missions import MissionCase
 from bench.fly.campaign import Results
 from bench.main import main
 from bench.rows.tables import MET, MISSED
@@ -160,13 +159,6 @@ def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsy
 def test_an_airframe_is_chosen_for_a_single_mission_only(capsys):
     assert main(["campaign", "--airframe", "rigid"]) == 1
     assert "--airframe belongs to --only" in capsys.readouterr().err
-
-
-def test_cases_are_seeds_in_turn_with_both_airframes():
-    both = ("foldable", "rigid")
-    assert missions_campaign(2, first_seed=9).cases == [
-        *[MissionCase(seed, name) for seed in (9, 10) for name in both],
-    ]
 
 
 @pytest.mark.parametrize("words", [["corpus", "judge", "FOLDER"], ["campaign", "page"], ["soak", "--minutes", "2"]])
