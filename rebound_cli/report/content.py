@@ -7,11 +7,13 @@ import base64
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from companion.reflex.detector import Phase
 from rebound_cli.flights.archive import without_places
 from rebound_cli.replay.listening import PHASES
 from rebound_cli.report.moments import Moment, moments_of
@@ -20,7 +22,10 @@ from rebound_cli.report.series import (
     FOLD_M,
     FORCE_M_S2,
     NED,
+    OVERVIEWS,
     PLACE_M,
+    PLACES,
+    RATIO,
     SPEED_M_S,
     TIME_S,
     TURN,
@@ -56,7 +61,7 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "averaging_ms": flight.config.estimate.imu_averaging_interval_s * 1e3,
         "tables": _tables(flight, moments, no_position),
         "moments": [_moment(flight, moment, no_position) for moment in moments],
-        "phases": [phase.value for phase in PHASES],
+        "overviews": [asdict(overview) for overview in OVERVIEWS],
         "modes": modes(flight),
         "recovering": recovering(flight),
         "obstacles": [] if no_position else obstacles(flight),
@@ -110,6 +115,8 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment], no_position: bool) -
     columns = series(log, flight.started_at_us)
     columns["imu"] = _on_both_clocks(columns["imu"], log.imu_time_boot_us - first_us)
     columns["imu"] |= {name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()}
+    watches = tested["phase"] >= PHASES.index(Phase.ARMED)
+    columns["imu"]["ratio"] = (np.where(watches, loud, np.nan), RATIO)
     columns["path"] = _on_both_clocks(columns["path"], log.position_time_boot_us - first_us)
     if truth is not None:
         true, boot_us = truth.series, truth.series["time_boot_us"]
@@ -168,7 +175,7 @@ def _packed(
         "columns": {
             name: packed(values[rows], resolution)
             for name, (values, resolution) in columns.items()
-            if not (no_position and name in NED)
+            if not (no_position and name in PLACES)
         },
     }
 

@@ -19,8 +19,8 @@ from rebound_cli.results.flight_log import FlightLog, flight_log_of_packets
 
 # Columns of each table of the page, in the order of a row.
 COLUMNS = {
-    "path": ("t", *NED, *VELOCITY),
-    "attitude": ("t", *TURN, "tilt"),
+    "path": ("t", *NED, *VELOCITY, "speed", "height"),
+    "attitude": ("t", *TURN, "roll", "pitch", "tilt"),
     "target": ("t", "tilt", "thrust"),
     "wanted": ("t", "tilt", "thrust"),
     "setpoint": ("t", *NED),

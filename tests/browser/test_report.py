@@ -14,8 +14,8 @@ from tests.browser.opened_page import drawn_share, line_share, pixels
 from tests.rebound_cli.report.test_page import HOSTILE
 
 _OVERVIEWS = "overviews().map((one) => ({ title: one.title, columns: one.columns() }))"
-# Speed and height, place, lean, how near to a hit; six of the hit; lateness.
-CHART_COUNT = 11
+# Speed and height, place, lean, tilt, thrust, how near to a hit; six of the hit; lateness.
+CHART_COUNT = 13
 # A line one pixel high across a chart of 113.
 LINE = 0.5 / 113
 

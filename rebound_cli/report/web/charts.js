@@ -137,79 +137,26 @@ function fitCharts() {
 
 // The whole flight: what there is to be seen of it, each as a chart with a function that gives its columns.
 function overviews() {
-  const found = [];
-  const { path, setpoint, attitude, target, wanted, imu, force } = tables;
-  if (path.length || flight.live) {
-    const series = [{ label: "speed, m/s", colour: "--blue" }];
-    if (path.has("d")) series.push({ label: "height, m", colour: "--orange" });
-    found.push({ title: "Speed and height", unit: "m/s, m", series, columns: () => {
-      const { t, vn, ve, vd, d } = path.columns;
-      const speed = Array.from(vn, (north, row) => Math.hypot(north, ve[row], vd[row]));
-      return [t, speed, ...(d ? [d.map((down) => -down)] : [])].map(plotted);
-    } });
-  }
-  if (path.has("n") && (setpoint.length || flight.live)) {
-    const lines = [["north", "--blue"], ["east", "--orange"]].flatMap(([label, colour]) =>
-      [{ label, colour, number: 0 }, { label: "its setpoint", colour, number: 1 }]);
-    found.push({ title: "Place and setpoint", unit: "m", series: lines, columns: () => {
-      const { t, n, e } = path.columns;
-      const asked = Array.from(t, askedAt);
-      return [t, n, asked.map((place) => place[0]), e, asked.map((place) => place[1])].map(plotted);
-    } });
-  }
-  if (attitude.length || flight.live) {
-    const series = [{ label: "roll, right side down", colour: "--blue" }, { label: "pitch, nose up", colour: "--orange" }];
-    found.push({ title: "Lean", unit: "°", series, columns: () => {
-      const { t, qw, qx, qy, qz } = attitude.columns;
-      const turns = (angle) => Array.from(qw, (w, row) => (angle(w, qx[row], qy[row], qz[row]) * 180) / Math.PI);
-      const roll = turns((w, x, y, z) => Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)));
-      const pitch = turns((w, x, y, z) => Math.asin(Math.max(-1, Math.min(1, 2 * (w * y - x * z)))));
-      return [t, roll, pitch].map(plotted);
-    } });
-  }
-  if (attitude.length || flight.live) found.push(wantedAndFlown("Tilt", "°", "tilt", attitude));
-  if (target.length || wanted.length || flight.live) found.push(wantedAndFlown("Thrust", "share of the most", "thrust", null));
-  if (imu.length) {
-    const series = [{ label: "push over threshold", colour: "--blue" }, { label: "a hit from here on", colour: "--red", number: 1 }];
-    // What a contact makes leaves the picture: what came near to one is looked for.
-    found.push({ title: "How near to a hit, while the detector was on", unit: "thresholds", series, up: { range: [0, 1.5] }, columns: () => {
-      const { t, side, side_threshold, beyond, beyond_threshold, phase } = imu.columns;
-      const watches = flight.phases.indexOf("armed");
-      const ratio = Array.from(side, (push, row) =>
-        phase[row] >= watches ? Math.max(push / side_threshold[row], beyond[row] / beyond_threshold[row]) : NaN);
-      return [t, ratio, ratio.map(() => 1)].map(plotted);
-    } });
-  }
-  if (force) {
-    const series = [{ label: "largest in a tenth of a second", colour: "--blue" }];
-    found.push({ title: "Specific force sideways", unit: "m/s²", series, columns: () => [force.columns.t, force.columns.peak].map(plotted) });
-  }
-  return found;
-}
-
-// What the companion asked for by attitude, what the vehicle's own control asks for, and what was flown.
-function wantedAndFlown(title, unit, column, flown) {
-  const told = flown ? "wanted by the vehicle's own control" : "flown by the vehicle's own control";
-  const series = [{ label: "wanted by the companion", colour: "--red", number: 0 }, { label: told, colour: "--orange", number: 1 }];
-  if (flown) series.unshift({ label: "flown", colour: "--blue", number: 0 });
-  return { title: `${title}, wanted and flown; green: hand-over`, unit, series, columns: () => {
-    const { target, wanted } = tables;
-    const t = (flown || (target.length ? target : wanted)).columns.t;
-    const asked = [wanted, target].map((table) => Array.from(t, (time) => lastAt(table, [column], time, 0.3)[0]));
-    return [t, ...(flown ? [flown.columns[column]] : []), ...asked].map(plotted);
-  } };
-}
-
-// North and east of the setpoint that was flown at a time; none where none came for a second.
-function askedAt(time) {
-  return lastAt(tables.setpoint, ["n", "e"], time, 1);
+  const isThere = ({ table, column }) => tables[table] && tables[table].has(column) && (tables[table].length || flight.live);
+  return flight.overviews.map((one) => ({ ...one, lines: one.lines.filter(isThere) })).filter((one) => one.lines.length).map((one) => {
+    const series = one.lines.map((line) => ({ label: line.label, colour: `--${line.colour}`, number: line.dashed ? 1 : 0 }));
+    if (one.level) series.push({ label: one.level[1], colour: "--red", number: 1 });
+    const columns = () => {
+      const first = tables[one.lines[0].table];
+      const { t } = first.columns;
+      const found = one.lines.map(({ table, column, held_s: held }) =>
+        tables[table] === first ? first.columns[column] : Array.from(t, (time) => lastAt(tables[table], column, time, held)));
+      return [t, ...found, ...(one.level ? [Array.from(t, () => one.level[0])] : [])].map(plotted);
+    };
+    return { title: one.title, unit: one.unit, series, columns, up: one.top === null ? {} : { range: [0, one.top] } };
+  });
 }
 
 // What the last row before a time says; none where it is older than that.
-function lastAt(table, names, time, longest) {
+function lastAt(table, column, time, held) {
   const { t } = table.columns;
   const row = rowAt(t, time);
-  return names.map((name) => (row >= 0 && time - t[row] < longest ? table.columns[name][row] : NaN));
+  return row >= 0 && time - t[row] < held ? table.columns[column][row] : NaN;
 }
 
 // Moments, and when a recovery by attitude went over to a position.

@@ -10,7 +10,8 @@ const ARRAYS = { i2: Int16Array, i4: Int32Array };
 const UNITS = {
   t: "s", boot: "s", fx: "m/s2", fy: "m/s2", fz: "m/s2", p: "rad/s", q: "rad/s", r: "rad/s", phase: "",
   side: "m/s2", side_threshold: "m/s2", beyond: "m/s2", beyond_threshold: "m/s2",
-  n: "m", e: "m", d: "m", vn: "m/s", ve: "m/s", vd: "m/s", qw: "", qx: "", qy: "", qz: "", tilt: "deg", thrust: "",
+  n: "m", e: "m", d: "m", vn: "m/s", ve: "m/s", vd: "m/s", qw: "", qx: "", qy: "", qz: "", roll: "deg", pitch: "deg", tilt: "deg", thrust: "", ratio: "",
+  speed: "m/s", height: "m",
   fold1: "m", fold2: "m", fold3: "m", fold4: "m",
 };
 

@@ -38,11 +38,8 @@ def test_a_mission_before_it_is_flown(drawn, tmp_path):
     assert_legible(figure)
 
 
-@pytest.mark.parametrize(
-    ("changes", "parts"), [((), 6), (("--set", "items=[{takeoff: {height_m: 1}}, {land: {}}]"), 4)]
-)
-def test_a_flight_with_a_hit_and_one_without(drawn, tmp_path, changes, parts):
+@pytest.mark.parametrize("changes", [(), ("--set", "items=[{takeoff: {height_m: 1}}, {land: {}}]")])
+def test_a_flight_with_a_hit_and_one_without(drawn, tmp_path, changes):
     assert run_here("fly", WALL, *changes, "--lockstep", "--json", "--out", tmp_path / "flight").returncode == 0
     (figure,) = drawn
-    assert len(figure.axes) == parts
     assert_legible(figure)
