@@ -36,8 +36,6 @@ _RESETS = (2, 3, 4)
 
 def _set_home(command: Command, flight: CommandedVehicle) -> Result:
     """To where the vehicle is, or to a place; a heading that is not a number is north."""
-    if not flight.parameters["COM_HOME_EN"]:
-        return Result.DENIED
     if command.param1 > 0.5:
         flight.navigator.set_home_here()
         return Result.ACCEPTED

@@ -172,3 +172,33 @@ def test_parameters_outlive_a_reboot_and_some_count_only_then(client):
 
 def _whole_set(name: str, whole: int) -> bytes:
     return whole.to_bytes(4, "little", signed=True) + bytes([1, 1]) + name.encode().ljust(16, b"\0") + bytes([6])
+
+
+def test_set_mode_the_message_is_answered_once(client):
+    client.send(dialect.MAVLink_set_mode_message(1, 1, 0x06040000))
+    client.run(0.02)
+    assert client.results(SET_MODE) == [ACCEPTED]
+    client.run(1.0)
+    assert client.last("HEARTBEAT").custom_mode == 0x06040000
+
+
+def test_defaults_come_back_by_command(client):
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 9.0, 9))
+    client.run(0.05)
+    assert results(client, STORAGE, 2) == [ACCEPTED]
+    assert client.vehicle.parameters["MIS_TAKEOFF_ALT"] == 2.5
+
+
+def test_a_lost_gps_shows_and_comes_back(client):
+    results(client, INJECT_FAILURE, 4, 1, 0)
+    client.run(1.0)
+    assert client.last("GPS_RAW_INT").fix_type == 0
+    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x20
+    results(client, INJECT_FAILURE, 4, 0, 0)
+    client.run(1.0)
+    assert client.last("GPS_RAW_INT").fix_type == 3
+
+
+def test_failures_are_refused_where_they_are_switched_off(client):
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"SYS_FAILURE_EN", 0.0, 6))
+    assert results(client, INJECT_FAILURE, 4, 1, 0) == [DENIED]

@@ -229,6 +229,12 @@ def test_lost_sticks(value, mode):
     assert flown(flight) is mode
 
 
+def test_whoever_arms_without_sticks_does_not_lose_them():
+    flight = hovering(5.0, NAV_RCL_ACT=2)
+    flight.fly(3.0)
+    assert flown(flight) is Mode.LOITER
+
+
 @pytest.mark.parametrize(
     ("act", "remaining", "mode"),
     [
@@ -257,6 +263,15 @@ def test_a_flight_that_lasts_too_long_returns():
     flight = hovering(5.0, COM_FLT_TIME_MAX=20, COM_FAIL_ACT_T=0.0)
     until_it_acts(flight, 25.0)
     assert flown(flight) is Mode.RETURN
+
+
+def test_a_mode_chosen_in_the_delay_takes_over_at_once():
+    flight = with_ground_station(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0)
+    flight.fly(8.5)
+    assert flown(flight) is Mode.LOITER and flight.autopilot.system_status == 5
+    assert set_mode(flight, Mode.LAND) is Result.ACCEPTED
+    flight.fly(6.0)
+    assert (flown(flight), flight.autopilot.system_status) == (Mode.LAND, 4)
 
 
 def test_sticks_take_over_from_a_failsafe():
@@ -289,6 +304,10 @@ def test_terminated_is_for_good():
     assert set_mode(flight, Mode.LOITER) is Result.TEMPORARILY_REJECTED
     flight.ask(COMPONENT_ARM_DISARM, 0, 21196)
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
+
+
+def test_on_the_ground_and_disarmed_there_is_nothing_to_terminate():
+    assert Flight().ask(DO_FLIGHTTERMINATION, 1) is Result.DENIED
 
 
 def test_killed_in_the_air_it_falls():

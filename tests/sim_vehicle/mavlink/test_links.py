@@ -101,6 +101,12 @@ def test_a_line_carries_what_its_parameter_plans(kind, name):
     assert sent / 5 == pytest.approx(2_000, rel=0.15)
 
 
+def test_a_serial_line_begins_with_the_version():
+    vehicle = Vehicle(LinkOptions(LinkKind.ONBOARD, Line(921_600)))
+    vehicle.run(0.02)
+    assert vehicle.ends[0].messages[0].get_type() == "AUTOPILOT_VERSION"
+
+
 def test_each_link_has_its_own_streams_and_numbers():
     vehicle = Vehicle(ONBOARD, ONBOARD)
     first, second = vehicle.ends
@@ -128,6 +134,13 @@ def test_answers_go_where_they_were_asked_for_and_texts_where_a_ground_station_i
     assert companion.all("STATUSTEXT") == []
 
 
+def test_a_changed_parameter_is_told_on_every_link():
+    vehicle = Vehicle(ONBOARD, GROUND)
+    vehicle.ends[0].send(dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 4.0, 9))
+    vehicle.run(0.1)
+    assert [len(end.all("PARAM_VALUE")) for end in vehicle.ends] == [2, 1]
+
+
 def test_what_is_meant_for_others_is_passed_on_between_links():
     vehicle = Vehicle(ONBOARD, GROUND, LinkOptions(LinkKind.ONBOARD, forwards=False))
     companion, station, deaf = vehicle.ends
@@ -142,6 +155,15 @@ def test_what_is_meant_for_others_is_passed_on_between_links():
     assert asked in companion.packets
     assert [packet for packet in companion.packets if packet[7] == 76] == [asked]
     assert asked not in deaf.packets
+
+
+def test_somebody_who_was_never_heard_gets_nothing_passed_on():
+    vehicle = Vehicle(ONBOARD, GROUND)
+    vehicle.ends[0].heartbeat()
+    vehicle.run(0.05)
+    asked = vehicle.ends[0].send(dialect.MAVLink_command_long_message(9, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    vehicle.run(0.05)
+    assert asked not in vehicle.ends[1].packets
 
 
 def test_a_ping_comes_back_to_its_sender():
@@ -204,6 +226,30 @@ def test_unsigned_wrongly_signed_and_replayed_packets_are_refused_and_counted(gu
         guarded.run(0.05)
         assert each.all("COMMAND_ACK") == []
     assert refused(guarded).replayed == 2
+
+
+def test_a_forged_packet_from_the_future_does_not_lock_the_genuine_out(guarded):
+    end = guarded.ends[1]
+    signed(end)
+    end.command(400, 0)
+    signed(end, time_stamp=2**47, key=bytes(32))
+    end.command(400, 0)
+    signed(end, time_stamp=10**15 + 5)
+    end.command(400, 0)
+    guarded.run(0.05)
+    assert len(end.all("COMMAND_ACK")) == 2
+
+
+def test_a_new_sender_may_not_be_a_minute_late(guarded):
+    end = guarded.ends[1]
+    signed(end)
+    end.command(400, 0)
+    guarded.run(0.02)
+    end.mav.srcComponent = 77
+    signed(end, time_stamp=10**15 - 61 * 100_000)
+    end.command(400, 0)
+    guarded.run(0.02)
+    assert refused(guarded).replayed == 1
 
 
 @pytest.mark.parametrize(("sign_cfg", "heard"), [(0, True), (1, False), (2, False)])

@@ -1,5 +1,7 @@
 """The mission protocol: every message in every state, and lists that survive a bad link."""
 
+import math
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -34,6 +36,15 @@ def sending() -> Exchange:
 
 def said(exchange: Exchange) -> str:
     return exchange.transfer.texts[-1].text
+
+
+def test_an_uploaded_list_comes_back_as_it_went():
+    exchange = Exchange()
+    assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
+    back = exchange.download()
+    assert [(item.seq, item.command) for item in back] == [(0, 22), (1, 16), (2, 16), (3, 21)]
+    assert [item.x for item in back] == [wire_item(n).x for n in range(4)]
+    assert [item.current for item in back] == [1, 0, 0, 0]
 
 
 @settings(max_examples=25, deadline=None)
@@ -138,6 +149,12 @@ def test_what_px4_keeps_of_an_items_parameters(sent, stored):
     assert exchange.store.mission.items[0].params[:4] == pytest.approx(stored)
 
 
+def test_a_heading_that_is_not_given_stays_so():
+    exchange = Exchange()
+    exchange.upload([wire_item(0, params=(0.0, 0.0, 0.0, math.nan))])
+    assert exchange.store.mission.items[0].yaw_rad is None
+
+
 @pytest.mark.parametrize("kind", list(MOST_ITEMS))
 def test_more_items_than_there_is_room_for(kind):
     exchange = Exchange()
@@ -211,6 +228,15 @@ def test_a_peer_that_wants_the_old_kind_of_item_gets_it():
     old = wire_item(0, frame=commands.FRAME_GLOBAL_RELATIVE, x=47.397742, y=8.545594, is_int=False)
     exchange.ask(sent(old))
     assert exchange.store.mission.items[0].latitude_deg == pytest.approx(47.397742)
+
+
+def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
+    exchange = Exchange()
+    exchange.upload(SQUARE)
+    exchange.ask(client.count(2, MISSION))
+    exchange.ask(client.ack(MissionResult.CANCELLED, MISSION))
+    assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
+    assert len(exchange.store.mission.items) == 4
 
 
 @pytest.mark.parametrize(

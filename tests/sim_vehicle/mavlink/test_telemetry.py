@@ -188,6 +188,16 @@ def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_
     assert client.last("SYS_STATUS").battery_remaining == 50
 
 
+def test_a_low_battery_shows():
+    client = Client()
+    for name, value in (("SIM_BAT_DRAIN", 5.0), ("SIM_BAT_MIN_PCT", 0.0)):
+        client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(5.0)
+    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x2000000
+
+
 def test_a_hundred_metres_east_is_as_many_degrees_as_the_parallel_says():
     place = Origin().place_at((0.0, 100.0, -12.0))
     degrees = 100.0 / (111_194.93 * math.cos(math.radians(47.397742)))

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.commander.failsafe_table import Action
-from sim_vehicle.autopilot.messages import Identity, Severity, StatusText
+from sim_vehicle.autopilot.messages import CommandAck, Identity, Result, Severity, StatusText
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
@@ -107,6 +107,20 @@ def test_version_is_px4s_and_the_hash_is_not():
     assert message.flight_sw_version.to_bytes(4, "big") == bytes([1, 17, 0, 64])
     assert bytes(message.flight_custom_version) == b"rebound\0"
     assert message.capabilities == 59647
+
+
+def test_prearm_health_follows_the_checks():
+    state = telemetry()
+    prearm = 0x10000000
+    assert condition.sys_status(state).onboard_control_sensors_health & prearm
+    state.autopilot.request_mode(Mode.MANUAL)
+    assert not condition.sys_status(state).onboard_control_sensors_health & prearm
+
+
+def test_acks_name_whom_they_answer():
+    message = read_back(encode.command_ack(CommandAck(400, Result.TEMPORARILY_REJECTED, 255, 190)))
+    assert (message.command, message.result) == (400, 1)
+    assert (message.target_system, message.target_component) == (255, 190)
 
 
 def test_vibration_is_the_slow_mean_of_the_jumps():
