@@ -17,8 +17,8 @@ class State(Enum):
     RETURNING = "returning"
     LANDING = "landing"
     DONE = "done"
-    CRASHED = "crashed"
     ABORTED = "aborted"
+    CRASHED = "crashed"
 
 
 class Trigger(Enum):
@@ -79,13 +79,13 @@ TABLE = StateTable[State, Trigger](
         State.HOLDING: {**_IN_THE_AIR, Trigger.HOLD_ENDED: State.MISSION},
         State.RETURNING: {**_IN_THE_AIR, Trigger.HOME_REACHED: State.LANDING, Trigger.LAND_DUE: State.LANDING},
         State.LANDING: {**_IN_THE_AIR, Trigger.DISARMED: State.DONE},
+        State.DONE: {},
+        State.ABORTED: {},
         State.CRASHED: {
             Trigger.INTERRUPTED: State.ABORTED,
             Trigger.DISARMED: State.ABORTED,
             Trigger.FLIES_AGAIN: State.ABORTED,
         },
-        State.DONE: {},
-        State.ABORTED: {},
     }
 )
 

@@ -15,8 +15,8 @@ class State(Enum):
     RECOVERING = "recovering"
     GIVING_BACK = "giving back"
     STOOD_DOWN = "stood down"
-    CRASHED = "crashed"
     ENDED = "ended"
+    CRASHED = "crashed"
 
 
 class Trigger(Enum):
@@ -96,12 +96,12 @@ TABLE = StateTable[State, Trigger](
             Trigger.STOPPED: State.ENDED,
             Trigger.ENABLED: State.STANDING_BY,
         },
+        State.ENDED: {},
         State.CRASHED: {
             Trigger.DISARMED: State.STANDING_BY,
             Trigger.STOPPED: State.ENDED,
             Trigger.FLIES_AGAIN: State.STANDING_BY,
         },
-        State.ENDED: {},
     }
 )
 

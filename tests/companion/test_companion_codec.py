@@ -377,6 +377,7 @@ def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
         (SetMode(4 << 16 | 6 << 24), 176, (1, 4, 6)),
         (SetArmed(True), 400, (1, 0, 0)),
         (SetArmed(False), 400, (0, 0, 0)),
+        (SetArmed(False, True), 400, (0, 21196, 0)),
         (SetMessageInterval(105, 4000), 511, (105, 4000, 0)),
         (RequestMessage(148), 512, (148, 0, 0)),
     ],
