@@ -155,8 +155,8 @@ HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 16.0, 8.0, 4.0
 MOST_TILT_RAD = 0.61
 # Thrust that the tilt leaves for the height, over what hovers at it.
 HOVER_MARGIN = 1.1
-# A vehicle that turns faster about its yaw axis than this, rad/s, leans less: the lean lags behind the turn, and one that
-# is held without a companion is not where it was asked for.
+# A vehicle that turns faster about its yaw axis than this, rad/s, leans less: the lean lags behind the turn, and one
+# that is held without a companion is not where it was asked for.
 SPIN_RAD_S = 3.0
 # To brake a turn PX4's mixer takes up to 0.15 of all thrust from what lifts (mixYaw). So PX4's loop of the yaw rate has
 # no more than this to brake; the rest of the turn is asked for.
