@@ -17,7 +17,6 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
     watch, latest, attitude = flight.crash, flight.vehicle.history.latest(), flight.vehicle.attitude
     if latest is None or attitude is None or not flight.vehicle.armed:
         return None
-    tilt_deg = math.degrees(tilt_rad(attitude.attitude_wxyz))
     hits = flight.collisions[flight.motors.earlier_hits :]
     has_unsettled = bool(hits) and hits[-1].settled_after_s is None
     if watch.tipped.lasts_us >= TIPPED_US:
@@ -28,6 +27,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
         how = "pressed to what was hit"
     else:
         return None
+    tilt_deg = math.degrees(tilt_rad(attitude.attitude_wxyz))
     speed_m_s = hits[-1].report().impact_speed_m_s if hits else math.hypot(*latest.velocity_ned_m_s)
     damage, height_m = flight.motors.damage, -flight.mission_ned_m(latest.position_ned_m)[2]
     flight.crashed = f"crashed: {how}, tilted by {tilt_deg:.0f} degrees"

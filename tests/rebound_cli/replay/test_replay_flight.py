@@ -153,6 +153,6 @@ def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(flown, tmp
 
 def test_a_log_that_is_cut_before_the_flight_is_no_evidence(flown, tmp_path, capsys):
     content = (flown / "flight.tlog").read_bytes()
-    (tmp_path / "cut.tlog").write_bytes(content[: len(content) // 50])
+    (tmp_path / "cut.tlog").write_bytes(content[: len(content) // 10])
     code, text, _ = replay(capsys, tmp_path / "cut.tlog", "--out", tmp_path / "out")
     assert code == 1 and "no flight was heard: that is no evidence" in text
