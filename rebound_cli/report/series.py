@@ -87,7 +87,7 @@ OVERVIEWS = (
         "Thrust, wanted and flown; green: hand-over",
         "share of the most",
         (
-            Line("target", "thrust", "flown by the vehicle's own control", "orange", dashed=True),
+            Line("target", "thrust", "flown by the vehicle's own control", "blue"),
             Line("wanted", "thrust", "wanted by the companion", "red", held_s=_ATTITUDE_HELD_S),
         ),
     ),
