@@ -8,8 +8,6 @@ from companion.flight.envelope import LOSS_PARAMETER, longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
 from companion.messages import MessageId, Sample
-from companion.motion.config import SHOWN_US
-from companion.motion.history import MotionHistory
 from companion.px4_mode import is_by_hand, mode_name
 from companion.reflex.config import HELD_S
 from companion.reflex.detector import NO_POSITION, Situation
@@ -132,17 +130,4 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool) 
         descent_commanded=goes_down,
         flown_by_hand=is_by_hand(flight.vehicle.custom_mode or 0),
         has_climbed=flight.has_climbed,
-        sinking_m_s=_sinking_m_s(flight.vehicle.history),
     )
-
-
-def _sinking_m_s(history: MotionHistory) -> float | None:
-    """By the reported heights of the last SHOWN_US; None without two of them."""
-    latest = history.latest()
-    if latest is None:
-        return None
-    earlier = history.before(latest.time_boot_us - SHOWN_US)
-    if earlier is None:
-        return None
-    seconds = 1e-6 * (latest.time_boot_us - earlier.time_boot_us)
-    return (latest.position_ned_m[2] - earlier.position_ned_m[2]) / seconds

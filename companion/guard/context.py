@@ -39,7 +39,9 @@ class GuardContext(FlightContext):
     left_alone: int = 0  # hits told, and left to the program that flies
     others_setpoint_us: int | None = None  # when one was last seen on its way
     asked: Asked | None = None  # where it leads
-    sticks: Sticks | None = None
+    sticks: Sticks | None = None  # before the hit
+    sticks_now: Sticks | None = None
+    sticks_us: int | None = None  # when these were heard
     descent: Descent = field(default_factory=Descent)
     # When, and to where; PX4 echoes no attitude.
     sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))

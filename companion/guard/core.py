@@ -53,6 +53,8 @@ class GuardCore(Core[GuardContext, GuardMachine]):
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         guard = self.flight
         sticks = [sample for sample in samples if isinstance(sample, Sticks)]
+        if sticks:
+            guard.sticks_now, guard.sticks_us = sticks[-1], now_us
         if sticks and self.machine.state not in HOLDING:
             guard.sticks = sticks[-1]
         elif sticks and guard.sticks is None:

@@ -11,7 +11,7 @@ from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
 from companion.guard.watching import OTHERS_STOPPED_US
 from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand, SetMode
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, mode_name
+from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, is_auto, mode_name
 
 # The vehicle reports its setpoint. Further than this from all that was sent, it is somebody else's: at 12 m/s a moving
 # setpoint advances 0.24 m from one to the next.
@@ -123,7 +123,8 @@ class GiveBack:
     overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
 
     What flew before has it back where it does not lead into what was hit (see onward.leads_into). For a program's next
-    setpoint the guard waits, holding; in any other case the vehicle is given back to hold.
+    setpoint, and for sticks that are let go, the guard waits, holding; in any other case the vehicle is given back to
+    hold.
 
     A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on another link
     nothing is streamed. When no mode is taken the setpoints stop, and PX4's action for lost setpoints follows.
@@ -144,7 +145,7 @@ class GiveBack:
         return self._target
 
     def _waits(self, guard: GuardContext, inputs: Inputs, now_us: int) -> bool:
-        """Whether a program's next setpoints are waited for. A mode that would hit again is given up."""
+        """Whether a program's next setpoints are waited for, or a pilot. A mode that would hit again is given up."""
         reason = leads_into(guard, self.wish) if self._is_doubted else None
         if reason is None:
             self._is_doubted = False
@@ -152,9 +153,9 @@ class GiveBack:
         if not self._is_told:
             self._is_told = True
             guard.report(now_us, "not_back", f"not given back: {reason}")
-        heard_us = guard.others_setpoint_us
+        heard_us = guard.others_setpoint_us if self.wish == OFFBOARD else guard.sticks_us
         streams = heard_us is not None and now_us - heard_us < OTHERS_STOPPED_US
-        if self.wish == OFFBOARD and streams and inputs.stop_reason is None and silent_position(guard) is None:
+        if not is_auto(self.wish) and streams and inputs.stop_reason is None and silent_position(guard) is None:
             return True
         self._wishes.pop(0)
         self._began_us, self._is_doubted = now_us, False

@@ -5,11 +5,15 @@ import math
 from companion.flight.context import Target
 from companion.flight.obstacle_map import all_known
 from companion.guard.context import GuardContext
+from companion.guard.descent import STICK_DEADZONE
 from companion.guard.watching import OTHERS_STOPPED_US
 from companion.memory.patch import LEAST_SPEED_M_S
 from companion.memory.surroundings import ObstacleMap
-from companion.messages import Asked
+from companion.messages import Asked, Vector3
+from companion.motion.rotation import yaw_rad
+from companion.motion.strapdown import ZERO
 from companion.px4_mode import AUTO_LOITER, OFFBOARD, is_auto, mode_name
+from companion.reflex.halfspace import along
 
 # PX4 brakes by this where MPC_ACC_HOR is what docs/how-to/guard.md has it set to. With PX4's default it needs less room
 # (reflex.config.BRAKES_M_S2).
@@ -19,16 +23,29 @@ GOES_ON_S = OTHERS_STOPPED_US * 1e-6
 
 
 def leads_into(guard: GuardContext, mode: int) -> str | None:
-    """Why the mode would hit again; None where it would not, or a pilot flies it, at rest as the vehicle is."""
+    """Why the mode would hit again; None where it would not."""
     if mode == OFFBOARD:
         return _setpoints_lead_into(guard)
-    if not is_auto(mode) or mode == AUTO_LOITER or not guard.collisions:
+    if mode == AUTO_LOITER or not guard.collisions:
         return None
     contact = guard.collisions[-1].contact
-    into_m_s = -sum(v * n for v, n in zip(contact.velocity_ned_m_s, contact.normal_ned, strict=True))
-    if into_m_s < LEAST_SPEED_M_S:
+    if not is_auto(mode):
+        pushed = -along(_sticks_ned(guard), contact.normal_ned) > STICK_DEADZONE
+        return "the sticks push on into what was hit: let go of them" if pushed else None
+    if -along(contact.velocity_ned_m_s, contact.normal_ned) < LEAST_SPEED_M_S:
         return None
     return f"{mode_name(mode)} goes on into what was hit: change it and choose it again, or choose another mode"
+
+
+def _sticks_ned(guard: GuardContext) -> Vector3:
+    """Where the pilot's sticks push the vehicle by its present heading: 1 is full deflection, NED."""
+    attitude = guard.vehicle.attitude
+    if guard.sticks_now is None or attitude is None:
+        return ZERO
+    forward, right, *_ = guard.sticks_now.deflections
+    heading_rad = yaw_rad(attitude.attitude_wxyz)
+    cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+    return (forward * cosine - right * sine, forward * sine + right * cosine, 0.0)
 
 
 def _setpoints_lead_into(guard: GuardContext) -> str | None:

@@ -44,7 +44,7 @@ class Mission(StrictModel):
     on_damage: OnDamage = "tell"
     """After a hit that has hurt a propeller or a motor; told in any case. From the recovery's end on."""
     on_crash: OnCrash = "disarm"
-    """When the vehicle lies on the ground after a crash, which is told in any case. Never in the air."""
+    """When the vehicle lies on the ground after a crash, which is reported in any case. Never in the air."""
     on_interrupt: Handover = "hold"
     """What the vehicle is told to do when the flight ends early."""
     companion: CompanionConfig = CompanionConfig()

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from companion.messages import Quaternion, Vector3
-from companion.motion.config import GRAVITY_M_S2, SAME_M_S
+from companion.motion.config import GRAVITY_M_S2, SAME_M_S, SHOWN_US
+from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, tilt_rad
 from companion.motion.strapdown import LEVEL, ZERO
 from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
@@ -23,12 +24,16 @@ def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What is known of a contact when it is noticed. Local NED, SI; `upward` is the sine of the force's elevation."""
+    """What is known of a contact when it is noticed. Local NED, SI.
+
+    `upward` is the sine of the force's elevation; `sinking_m_s` is by the reported heights.
+    """
 
     upward: float
     velocity_ned_m_s: Vector3 | None
     attitude_wxyz: Quaternion
     situation: Situation
+    sinking_m_s: float | None = None
 
     @property
     def near_ground(self) -> bool:
@@ -64,7 +69,7 @@ class Touch:
         falls loses height.
         """
         rates_m_s = [] if self.velocity_ned_m_s is None else [self.velocity_ned_m_s[2]]
-        rates_m_s += [] if self.situation.sinking_m_s is None else [self.situation.sinking_m_s]
+        rates_m_s += [] if self.sinking_m_s is None else [self.sinking_m_s]
         is_fast = min(rates_m_s, default=0.0) >= FASTEST_LANDING_M_S
         return not (is_fast and self.situation.has_climbed)
 
@@ -126,11 +131,16 @@ TABLE = (
 
 
 def kind_of(
-    force_ned: Vector3, velocity_ned_m_s: Vector3 | None, attitude_wxyz: Quaternion, situation: Situation
+    force_ned: Vector3,
+    velocity_ned_m_s: Vector3 | None,
+    attitude_wxyz: Quaternion,
+    situation: Situation,
+    sinking_m_s: float | None = None,
 ) -> ImpactKind:
     """The kind by direction, motion and situation; the size of the force has no influence."""
     size = math.hypot(*force_ned)
-    touch = Touch(-force_ned[2] / size if size > 0.0 else 0.0, velocity_ned_m_s, attitude_wxyz, situation)
+    upward = -force_ned[2] / size if size > 0.0 else 0.0
+    touch = Touch(upward, velocity_ned_m_s, attitude_wxyz, situation, sinking_m_s)
     return next(row.kind for row in TABLE if row.applies(touch))
 
 
@@ -141,6 +151,24 @@ def classified(impact: Impact, velocity_ned_m_s: Vector3 | None, situation: Situ
     strapdown, free_us = situation.strapdown, impact.contact_free_until_boot_us
     attitude, fixes = (LEVEL, ()) if strapdown is None else (strapdown.valid_wxyz, strapdown.fixes)
     # The newest velocity may contain a part of the contact already.
-    before = (fix.velocity_ned_m_s for fix in reversed(fixes) if fix.time_boot_us <= free_us)
+    before = next((fix for fix in reversed(fixes) if fix.time_boot_us <= free_us), None)
+    velocity, until_us = velocity_ned_m_s, impact.sample_time_boot_us
+    if before is not None:
+        velocity, until_us = before.velocity_ned_m_s, before.time_boot_us
     force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
-    return replace(impact, kind=kind_of(force_ned, next(before, velocity_ned_m_s), attitude, situation))
+    kind = kind_of(force_ned, velocity, attitude, situation, _sinking_m_s(situation.history, until_us))
+    return replace(impact, kind=kind)
+
+
+def _sinking_m_s(history: MotionHistory | None, time_boot_us: int) -> float | None:
+    """By the reported heights of SHOWN_US until a time; None without two of them.
+
+    They give the mean of that time. A vehicle that falls is faster at its end, by half of what its reported velocity
+    has gained.
+    """
+    last = None if history is None else history.before(time_boot_us + 1)
+    first = None if history is None or last is None else history.before(last.time_boot_us - SHOWN_US)
+    if last is None or first is None:
+        return None
+    mean_m_s = (last.position_ned_m[2] - first.position_ned_m[2]) * 1e6 / (last.time_boot_us - first.time_boot_us)
+    return mean_m_s + 0.5 * (last.velocity_ned_m_s[2] - first.velocity_ned_m_s[2])

@@ -7,6 +7,7 @@ from enum import Enum
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from companion.messages import LandedState, MessageId, Sample, Vector3
+from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
 from companion.reflex.validity import VelocityValidity
 
@@ -50,10 +51,9 @@ class Situation(NamedTuple):
     `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming;
     `has_climbed`: the vehicle has been higher than a take-off reaches since it stood on the ground or touched it. The
     setpoint is the one last sent, local NED. `descent_commanded`: the vehicle goes down because it was told to, or by
-    the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks.
-    `sinking_m_s` is by the reported heights, beside the reported velocity. The
-    monitor fills in `validity` of the vehicle's velocity, which lacks a part of a hit that was clipped, and
-    `strapdown`. Both have heard the sample already.
+    the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks. The
+    monitor fills in `validity` of the vehicle's velocity, which lacks a part of a hit that was clipped, `strapdown` and
+    `history`. All have heard the sample already.
     """
 
     off_reason: str | None = None
@@ -66,7 +66,7 @@ class Situation(NamedTuple):
     strapdown: Strapdown | None = None
     flown_by_hand: bool = False
     has_climbed: bool = True
-    sinking_m_s: float | None = None
+    history: MotionHistory | None = None
 
     @property
     def why_off(self) -> str | None:

@@ -127,6 +127,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         off_reason=situation.off_reason or _vibration(monitor),
         strapdown=monitor.estimator.strapdown,
         validity=monitor.estimator.validity,
+        history=monitor.estimator.history,
     )
     for sample in samples:
         if type(sample) is ImuSample:

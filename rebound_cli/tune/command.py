@@ -34,7 +34,7 @@ _TILT_DEG = 60.0
 # PX4's land detector takes less force, for so long, for a fall: LNDMC_FFALL_THR and LNDMC_FFALL_TTRI.
 _FALL_M_S2 = 2.0
 _FALL_US = 300_000
-# The detector learns its floor in half a second (`shaking.MEMORY_US`): six times that show how it wavers.
+# The detector learns its floor in half a second (`shaking.MEMORY_US`): six times that show how it varies.
 _LEAST_FLYING_S = 3.0
 
 

@@ -1,12 +1,16 @@
 """The kind of an impact: what the vehicle did, then what was asked of it."""
 
 import math
+from collections import deque
 
 import pytest
 
-from companion.reflex.classify import FASTEST_LANDING_M_S, TABLE, kind_of
+from companion.messages import LocalPosition
+from companion.motion.history import MotionHistory
+from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.reflex.classify import FASTEST_LANDING_M_S, TABLE, classified, kind_of
 from companion.reflex.config import GROUND_M, SCRAPING_M
-from companion.reflex.detector import ImpactKind, Situation
+from companion.reflex.detector import Impact, ImpactKind, Situation
 
 UP, DOWN, BACK = (0.0, 0.0, -30.0), (0.0, 0.0, 30.0), (-30.0, 0.0, 0.0)
 FORWARD, HOVER = (2.0, 0.0, 0.0), (0.0, 0.05, 0.0)
@@ -28,9 +32,7 @@ def kind(
     sinking_m_s=None,
 ):
     situation = Situation(armed=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
-    return kind_of(
-        force, velocity, tilted(tilt_deg), situation._replace(has_climbed=has_climbed, sinking_m_s=sinking_m_s)
-    )
+    return kind_of(force, velocity, tilted(tilt_deg), situation._replace(has_climbed=has_climbed), sinking_m_s)
 
 
 def sinking(speed_m_s):
@@ -113,3 +115,18 @@ def test_the_table_ends_with_a_row_for_everything_and_names_each_kind_once():
     kinds = [row.kind for row in TABLE]
     assert len(set(kinds)) == len(kinds)
     assert {*kinds, ImpactKind.UNKNOWN, ImpactKind.CONTACT} == set(ImpactKind)
+
+
+def test_a_fall_is_as_fast_as_at_its_end_and_not_as_its_heights_were_in_the_mean():
+    # Given heights of a fall from rest whose last report shows the bounce already
+    history, touch_us = MotionHistory(), 400_000
+    for time_us in range(0, touch_us, 20_000):
+        since_s = 1e-6 * time_us
+        history.add(LocalPosition(time_us, (0.0, 0.0, 0.5 * 9.81 * since_s**2 - 0.8), (0.0, 0.0, 9.81 * since_s)))
+    history.add(LocalPosition(touch_us, (0.0, 0.0, 0.0), (0.0, 0.0, -1.5)))
+    before = VelocityFix(touch_us - 20_000, (0.0, 0.0, 3.7), (0.0, 0.0, 0.0))
+    situation = Situation(armed=True, height_m=0.1, history=history, strapdown=Strapdown(fixes=deque([before])))
+    # When it meets the ground at 3.7 m/s, whose mean over the last tenths of a second was 2.9 m/s
+    impact = Impact(touch_us, touch_us - 10_000, (0.0, 0.0, -100.0))
+    # Then it has crashed
+    assert classified(impact, (0.0, 0.0, -1.5), situation).kind is ImpactKind.CRASH

@@ -1,4 +1,4 @@
-"""A crash: what it is, that it is told once, and that no vehicle is disarmed that may fly."""
+"""A crash: what it is, that it is reported once, and that no vehicle is disarmed that may fly."""
 
 import math
 import random

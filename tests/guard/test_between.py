@@ -121,7 +121,7 @@ def test_a_failsafe_that_lasts_has_the_vehicle_also_in_a_recovery():
     # When its reports say so, with OFFBOARD still intended
     told, heard = dialect.MAVLink_current_mode_message(0, 4 << 16 | 5 << 24, OFFBOARD[0] << 16), air.link.take
     air.link.take = lambda: (told.pack(vehicle), *(packet for packet in heard() if message_id_of(packet) not in MODES))
-    # Then the guard waits as long as PX4 needs to go on by setpoints that were late, and lets go
+    # Then the guard waits as long as PX4 needs to go on by setpoints that were late, and releases the vehicle
     assert air.run_to(State.STOOD_DOWN, 1.0) == pytest.approx(0.4, abs=0.05)
 
 

@@ -96,6 +96,33 @@ def test_a_mission_is_not_given_back_to_that_would_go_on_into_what_was_hit():
     assert "not given back: AUTO.MISSION goes on into what was hit" in air.told("not_back")[0]
 
 
+def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
+    # Given a pilot who does not open the hand after a hit
+    air = Air(GuardConfig(then="previous"))
+    stick = air.pushed_into_the_wall(recovers=False)
+    stick[0] = 0.3
+    # When the vehicle has recovered
+    air.run_to(State.GIVING_BACK, 10.0)
+    air.run_for(3.0)
+    # Then it is held, and told why, until the stick is let go
+    assert air.state is State.GIVING_BACK
+    assert air.told("not_back") == ["not given back: the sticks push on into what was hit: let go of them"]
+    stick[0] = 0.0
+    air.run_to(State.WATCHING, 1.0)
+    air.run_until(lambda: air.mode == "POSCTL", 1.0)
+    assert len(air.told("detection")) == 1
+
+
+def test_sticks_that_are_heard_no_more_are_not_waited_for():
+    air = Air(GuardConfig(then="previous"))
+    stick = air.pushed_into_the_wall(recovers=False)
+    stick[0] = 0.3
+    air.run_to(State.GIVING_BACK, 10.0)
+    air.stop_all()
+    air.run_until(lambda: air.state is not State.GIVING_BACK, 3.0)
+    assert air.mode == "AUTO.LOITER" and air.told("given_back")
+
+
 # --- whoever takes the vehicle has it
 
 
