@@ -21,7 +21,7 @@ from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
 def run_replay(options: Namespace) -> int:
     """Print the findings, write their page.
 
-    1 when they are not what was expected, when a flight did not come again, or when no flight was heard.
+    1 when they are not what was expected, when a flight did not come again, or when nothing was watched.
     """
     console = console_for(options.json)
     replay, shown = _replay(options, console)
@@ -73,4 +73,7 @@ def _exit_code(replay: Replay, expected: int | None, least_watched: float, conso
         seen = "nothing" if share is None else f"{100.0 * share:.0f} %"
         console.print(f"expected no collisions, and {seen} of the flight was watched: that shows none")
         return 1
-    return int(share is None if again is None else again.first_difference is not None)
+    if again is not None:
+        return int(again.first_difference is not None)
+    # Who expects something has said how much must have been watched.
+    return int(share is None or (share == 0.0 and expected is None))

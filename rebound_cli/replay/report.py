@@ -173,6 +173,8 @@ def _facts(replay: Replay) -> Iterator[str]:
         yield f"{word}: {total_s:.2f} s in all: {', '.join(shown)}{more}" if spans else f"{word}: never"
     for loss in replay.losses:
         yield f"note: {loss}"
+    if replay.reproduction is None and replay.findings.is_flying:
+        yield "note: the log ends in flight, cut short or without power: what came then is not in it"
 
 
 def _reproduction_text(again: Reproduction) -> str:

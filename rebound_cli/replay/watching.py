@@ -125,6 +125,7 @@ class Findings:
     watched_us: int = 0  # of that, with a detector that was on and saw
     promised: float = 0.0  # false alarms in that time, by the detector's own statistic
     promise: Promise | None = None  # when it was last armed
+    is_flying: bool = False  # armed and in the air at the end
     _open: dict[str, tuple[int, str]] = field(default_factory=dict)
     _noted_us: int | None = None
 
@@ -161,7 +162,8 @@ class Findings:
         self._note_span("off", off, at_us)
         elapsed_us = 0 if self._noted_us is None else at_us - self._noted_us
         self._noted_us = at_us
-        if situation.armed and situation.landed_state is not messages.LandedState.ON_GROUND:
+        self.is_flying = situation.may_crash
+        if self.is_flying:
             self.flown_us += elapsed_us
             if off is None and monitor.no_data_reason is None:
                 self.watched_us += elapsed_us

@@ -149,6 +149,16 @@ def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(flown, tmp
     assert "0 % of the flight was watched" in said and "that shows none" in said
     # Unless the person asks for no more
     assert main(["replay", *map(str, arguments), "--least-watched", "0"]) == 0
+    # And of a person who expects nothing the log is no evidence either
+    assert main(["replay", *map(str, arguments[:3]), *map(str, arguments[5:])]) == 1
+
+
+def test_a_log_that_is_cut_in_flight_is_read_to_its_end_and_says_so(flown, tmp_path, capsys):
+    content = (flown / "flight.tlog").read_bytes()
+    (tmp_path / "cut.tlog").write_bytes(content[: len(content) // 2])
+    for log, is_cut in ((flown / "flight.tlog", False), (tmp_path / "cut.tlog", True)):
+        _, text, _ = replay(capsys, log, "--any-mode", "--out", tmp_path / "out")
+        assert ("ends in flight" in text) is is_cut
 
 
 def test_a_log_that_is_cut_before_the_flight_is_no_evidence(flown, tmp_path, capsys):
