@@ -185,11 +185,10 @@ HELD_S, NOTICED_S = 1.0, 0.13
 # PX4's failure detector: FD_FAIL_R and FD_FAIL_P, 60 degrees. It waits for 0.3 s (FD_FAIL_R_TTRI); a vehicle that a hit
 # has turned over is upright again within half a second, or never. ArduPilot waits for 2 s (crash_check.cpp).
 TIPPED_RAD, TIPPED_US = 1.05, 500_000
-# So low and so slow for so long, in a recovery that asks for more: it is on the floor. A vehicle is 0.3 m wide, and a
-# hover wanders by 0.1 m/s.
-LOW_M, STILL_M_S, LOW_US = 0.3, 0.2, 1_000_000
+# So low and at rest for so long, in a recovery that asks for more: it is on the floor. A vehicle is 0.3 m wide.
+LOW_M, LOW_US = 0.3, 1_000_000
 # It lies: twice as long.
-LIES_US = 2_000_000
+LIES_US = 2 * LOW_US
 # Largest difference of the mean specific force from gravity, and largest rate, of a vehicle that lies while its motors
 # shake it; the mean is over about twenty samples.
 STILL_M_S2, STILL_RAD_S, LYING_SHARE = 1.0, 0.3, 0.05

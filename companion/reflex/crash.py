@@ -12,7 +12,7 @@ from companion.reflex.config import (
     CARRIED_SHARE,
     LOW_M,
     LYING_SHARE,
-    STILL_M_S,
+    RESTS_M_S,
     STILL_M_S2,
     STILL_RAD_S,
     TIPPED_RAD,
@@ -56,7 +56,7 @@ class CrashWatch:
                     self._rest(sample, height_m is not None and height_m < LOW_M, landed)
 
     def _rest(self, sample: LocalPosition, is_low: bool, landed: LandedState) -> None:
-        is_still = is_low and math.hypot(*sample.velocity_ned_m_s) < STILL_M_S
+        is_still = is_low and math.hypot(*sample.velocity_ned_m_s) < RESTS_M_S
         self.low.update(is_still, sample.time_boot_us)
         is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < STILL_M_S2
         self.is_carried = is_weight and -self.force_frd_m_s2[2] < CARRIED_SHARE * GRAVITY_M_S2
