@@ -174,6 +174,7 @@ class FlightContext:
     unreachable: list[str] = field(default_factory=list)
     crash: CrashWatch = field(default_factory=CrashWatch)
     crashed: str = ""  # how, once it has
+    is_wreck: bool = False  # since then, until it is disarmed or flies again
     motors: MotorWatch = field(default_factory=MotorWatch)
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground

@@ -66,15 +66,16 @@ class Crashed(NoSetpoint):
 
     def __init__(self, flight: FlightContext) -> None:
         flight.command_client.cancel()
-        flight.expected_mode = None
+        flight.expected_mode, flight.is_wreck = None, True
         latest = flight.vehicle.history.latest()
         self._place_ned_m = None if latest is None else latest.position_ned_m
         self._ask_us, self._is_forced = 0, False
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        flight.is_wreck = flight.vehicle.armed is not False and not self._flies_again(flight)
         if flight.vehicle.armed is False:
             return Transition(Trigger.DISARMED, flight.crashed)
-        if self._flies_again(flight):
+        if not flight.is_wreck:
             return Transition(Trigger.FLIES_AGAIN, f"{flight.crashed}; it flies again, in other hands")
         lies, client = flight.crash.lying.lasts_us >= LIES_US, flight.command_client
         if not lies:

@@ -28,12 +28,9 @@ def collisions(
     for notice in result.notices:
         flight.report(now_us, notice.kind, notice.text, **notice.data)
     for estimate in result.impacts:
-        if not estimate.impact.is_collision:
-            kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
-            text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
-            flight.report(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
-        elif estimate.impact.kind is ImpactKind.CRASH:
-            _report_crash(flight, estimate, collision_monitor.estimator.strapdown, now_us)
+        # A wreck bounces and is picked up: that is one crash, and reported.
+        if not flight.is_wreck:
+            _report_contact(flight, estimate, collision_monitor.estimator.strapdown, now_us)
         if estimate.impact.is_ground:
             flight.note_touchdown()
     # A crash is told where no hit is looked for, too.
@@ -45,11 +42,16 @@ def collisions(
     return found if held is None else [held]
 
 
-def _report_crash(flight: FlightContext, estimate: ImpactEstimate, strapdown: Strapdown, now_us: int) -> None:
-    force_m_s2, down_m_s = estimate.peak_specific_force_m_s2, estimate.velocity_ned_m_s[2]
-    tilt_deg = math.degrees(tilt_rad(strapdown.valid_wxyz))
-    text = f"crash: {force_m_s2:.0f} m/s^2, sinking at {down_m_s:.1f} m/s, tilted by {tilt_deg:.0f} degrees"
-    flight.report(now_us, "crash", text, specific_force_m_s2=force_m_s2, down_m_s=down_m_s, tilt_deg=tilt_deg)
+def _report_contact(flight: FlightContext, estimate: ImpactEstimate, strapdown: Strapdown, now_us: int) -> None:
+    """What is no collision, and a crash; a collision is reported with its recovery."""
+    kind, force_m_s2, down_m_s = estimate.impact.kind, estimate.peak_specific_force_m_s2, estimate.velocity_ned_m_s[2]
+    if not estimate.impact.is_collision:
+        text = f"{kind.value}: {force_m_s2:.1f} m/s^2, no collision"
+        flight.report(now_us, "contact", text, touched=kind.value, specific_force_m_s2=force_m_s2)
+    elif kind is ImpactKind.CRASH:
+        tilt_deg = math.degrees(tilt_rad(strapdown.valid_wxyz))
+        text = f"crash: {force_m_s2:.0f} m/s^2, sinking at {down_m_s:.1f} m/s, tilted by {tilt_deg:.0f} degrees"
+        flight.report(now_us, "crash", text, specific_force_m_s2=force_m_s2, down_m_s=down_m_s, tilt_deg=tilt_deg)
 
 
 def _learn_thrust(flight: FlightContext, samples: Sequence[Sample], phase: Phase) -> None:

@@ -44,6 +44,24 @@ def test_a_vehicle_that_is_tipped_over_for_half_a_second_has_crashed_and_its_set
     assert data["tilt_deg"] == pytest.approx(70.0, abs=0.1) and data["speed_m_s"] >= 0.0
 
 
+@pytest.mark.parametrize("state", ["mission", "recovering"])
+def test_a_wreck_that_bounces_is_one_crash(state):
+    # Given a vehicle that has crashed, and is reported
+    f = flying_in(state)
+    lies(f)
+    f.run_to("crashed", 3.0)
+    told = len(f.events)
+    # When its parts settle with knocks
+    for _ in range(5):
+        f.run_for(0.3)
+        f.vehicle.specific_force[0] += 80.0
+        f.run_for(0.02)
+        f.vehicle.specific_force[0] -= 80.0
+    # Then nothing more is reported of it
+    kinds = [event.kind for event in f.events[told:]]
+    assert [kind for kind in kinds if kind in ("crash", "crashed", "contact", "detection")] == []
+
+
 def test_a_hard_turn_that_ends_in_time_is_no_crash():
     f = flying_in("mission")
     f.vehicle.roll_rad = math.radians(70.0)
