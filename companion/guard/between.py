@@ -1,8 +1,8 @@
 """The guard as the link: whole packets of the vehicle's and of its clients', bytes in and bytes out.
 
-While `is_closed` what would move the vehicle is kept out (see moves.KEPT_OUT). All else passes unchanged and in the
-order of its sender. Packets of different senders take turns, so that no sender's bytes come inside another's packet: an
-unfinished packet stays here, and so do bytes that begin none.
+While `is_closed` what would move the vehicle is kept out (see moves.KEPT_OUT), and setpoints while it `awaits_choice`.
+All else passes unchanged and in the order of its sender. Packets of different senders take turns, so that no sender's
+bytes come inside another's packet: an unfinished packet stays here, and so do bytes that begin none.
 """
 
 import struct
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.mavlink.decode import Decoder, checksum_holds
-from companion.mavlink.moves import asked_by, interval_asked, would_move
+from companion.mavlink.moves import SETPOINT_IDS, asked_by, interval_asked, would_move
 from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, has_signature, message_id_of, payload_of, source_of
 from companion.messages import Asked, SetMessageInterval
 
@@ -51,7 +51,8 @@ class Between:
 
     def __init__(self, bytes_per_s: float, signs: bool) -> None:
         """`bytes_per_s`: what the link to the vehicle carries. `signs`: the guard has the vehicle's key."""
-        self.is_closed = False
+        self.is_closed = True  # until the guard has met the vehicle
+        self.awaits_choice = False  # setpoints are kept out until somebody asks for a mode
         self.kept_out = 0  # packets
         self.intervals: list[SetMessageInterval] = []  # asked for by clients, and not yet told to the guard
         self._setpoint: Asked | None = None
@@ -130,6 +131,12 @@ class Between:
         setpoint, self._setpoint, self._told_us = self._setpoint, None, now_us
         return setpoint
 
+    def await_choice(self) -> None:
+        """The guard has begun in flight: a program that flew into something would do it again by itself."""
+        if not self.awaits_choice:
+            self.awaits_choice = True
+            self.note("begun in flight: a program's setpoints are kept out until somebody asks for a mode")
+
     def note(self, text: str) -> None:
         """Something that whoever has the sockets knows of a client."""
         self._news.append(text)
@@ -140,9 +147,11 @@ class Between:
 
     def _lets_pass(self, packet: bytes) -> bool:
         self._setpoint = asked_by(packet) or self._setpoint
-        if self.is_closed and would_move(packet):
-            self.kept_out += 1
-            return False
+        if (self.is_closed or self.awaits_choice) and would_move(packet):
+            if self.is_closed or message_id_of(packet) in SETPOINT_IDS:
+                self.kept_out += 1
+                return False
+            self.awaits_choice = False
         if (asked := interval_asked(packet)) is not None:
             self.intervals.append(asked)
         return True

@@ -9,7 +9,7 @@ from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.states import State
-from companion.guard.watching import OWN_STREAMS
+from companion.guard.watching import OWN_STREAMS, GuardConnect
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, SendCommand, SetMessageInterval
 from companion.report import CollisionReport, RoundTripReport
@@ -34,7 +34,15 @@ class Guard(Stepped[GuardCore]):
 
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
-        between.is_closed = self.holds
+        handler = None if self._core is None else self._core.machine.handler
+        armed = None if self._core is None else self._core.flight.vehicle.armed
+        # Whoever was behind a guard before a restart goes on, and nobody would notice a hit.
+        begins = handler is None or (isinstance(handler, GuardConnect) and handler.begins)
+        between.is_closed = self.holds or (begins and armed is not False)
+        if begins and armed:
+            between.await_choice()
+        elif armed is False:
+            between.awaits_choice = False
         if (setpoint := between.new_setpoint(now_us)) is not None:
             self.hear_setpoint(setpoint)
             yield "setpoint", asdict(setpoint)

@@ -77,6 +77,11 @@ class GuardConnect(Meet[GuardTransition]):
         super().__init__(now_us)
         self._is_first = is_first
 
+    @property
+    def begins(self) -> bool:
+        """Whether no vehicle was met before, and it may yet be that this one can be guarded."""
+        return self._is_first and not self._is_told
+
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
         return [*super()._commands(flight), *OWN_STREAMS]
 

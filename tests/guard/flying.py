@@ -294,17 +294,26 @@ class BetweenFlight(Commanded):
     ) -> None:
         super().__init__("foldable", parameters, **scene)
         between = {"between": ("udpin://127.0.0.1:14540",)}
-        self.guard = Guard((config or GuardConfig()).model_copy(update=between))
-        self.between = Between(2_000_000, signs=False)
+        self._config = (config or GuardConfig()).model_copy(update=between)
+        self._begin()
         self.link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
         self._mavlinks: dict[str, dialect.MAVLink] = {}
         self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
-        self._guards: list[bytes] = []
-        self._clients: list[tuple[str, bytes]] = []
         self.others_last: dict[str, Any] = {}
         self.texts_heard: list[tuple[float, str]] = []
         self.told_by_clients: list[Any] = []
         self.on_heard: Callable[[Any], None] = lambda message: None
+
+    def _begin(self) -> None:
+        self.guard, self.between = Guard(self._config), Between(2_000_000, signs=False)
+        self._guards: list[bytes] = []
+        self._clients: list[tuple[str, bytes]] = []
+
+    def be_restarted(self, after_s: float) -> None:
+        """The guard dies, and the link with it; its service manager begins another one."""
+        self.be_late(after_s)
+        self._unread = []
+        self._begin()
 
     def send(self, message: Any, client: str = "program", source: tuple[int, int] = (255, 190)) -> None:
         mavlink = self._mavlinks.setdefault(client, dialect.MAVLink(None, *source))

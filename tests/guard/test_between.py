@@ -114,6 +114,34 @@ def test_a_late_thread_lets_go_of_no_recovery(flies, loss_s, late_s):
     assert not air.guard.core.flight.program_elsewhere
 
 
+@pytest.mark.parametrize("loss_s", [0.3, 1.0])
+def test_after_a_restart_of_the_guard_in_flight_a_program_flies_when_it_asks_for_it_and_is_watched(loss_s):
+    # Given a recovery, and a guard that dies in it
+    air = hit(by_places, {"COM_OF_LOSS_T": loss_s})
+    air.run_for(0.3)
+    # When its service manager has begun another one
+    air.be_restarted(1.0)
+    again_s = air.time_s
+    air.run_to(State.STANDING_BY, 10.0)
+    air.run_for(2.0)
+    # Then PX4's failsafe holds the vehicle, and the program's setpoints do not end that
+    assert air.sent_by("program", "SET_", again_s) == [] and len(air.vehicle.truth.hits) == 1
+    assert [told["text"] for kind, told in air.told_by_clients if kind == "note"] == []
+    # Until it asks for OFFBOARD
+    air.set_mode(OFFBOARD)
+    air.run_until(lambda: air.mode == "OFFBOARD", 1.0)
+    assert air.sent_by("program", "SET_", again_s) != []
+
+
+def test_a_guard_that_begins_on_the_ground_keeps_nothing_out():
+    air = BetweenFlight()
+    air.run_to(State.STANDING_BY, 10.0)
+    air.between.kept_out = 0
+    air.velocity(1.0)
+    air.run_for(0.1)
+    assert air.between.kept_out == 0
+
+
 def test_a_failsafe_that_lasts_has_the_vehicle_also_in_a_recovery():
     # Given a recovery, and a battery that calls the vehicle home
     air, vehicle = hit(by_places), dialect.MAVLink(None, 1, 1)
@@ -331,6 +359,7 @@ def test_packets_of_every_message_pass_both_ways_byte_by_byte_in_each_senders_or
     chance = random.Random(1)
     said = {name: [random_packet(chance) for _ in range(10_000)] for name in ("a", "b", "vehicle")}
     between, now_us = Between(LINK_BYTES_S, signs=False), 0
+    between.is_closed = False
     passed, heard = list[bytes](), list[bytes]()
     cut = {name: iter(pieces(b"".join(packets), chance)) for name, packets in said.items()}
     # When they come as fast as the link carries them
@@ -376,7 +405,6 @@ def test_what_of_the_vehicle_is_no_packet_passes_too_and_of_a_client_it_stays():
 def test_hostile_bytes_break_nothing_and_no_setpoint_passes_while_it_is_closed():
     chance = random.Random(3)
     between = Between(LINK_BYTES_S, signs=False)
-    between.is_closed = True
     for number in range(5_000):
         packet = bytearray(random_packet(chance))
         if chance.random() < 0.5:
@@ -396,6 +424,7 @@ def test_hostile_bytes_break_nothing_and_no_setpoint_passes_while_it_is_closed()
 def test_a_client_that_floods_takes_no_turn_from_another_and_is_named():
     # Given a UART of 921,600 baud, and a client that sends a hundred times as much
     between, flood = Between(92_160, signs=False), long(400, 1) * 30
+    between.is_closed = False
     quiet = packet_of(ANY_STICKS, (1, 191))
     passed, waited_us, said_us = list[bytes](), list[int](), 0
     for now_us in range(0, 3_000_000, 1_000):
