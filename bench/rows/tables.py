@@ -1,5 +1,6 @@
 """What a study shows of its rows: figures out of many, bars with a verdict, tables, and a page to look at."""
 
+import json
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -115,6 +116,12 @@ def per_cent(value: float, digits: int = 1) -> str:
 
 def text_of(value: float, digits: int = 1) -> str:
     return "-" if math.isnan(value) else f"{value:.{digits}f}"
+
+
+def write_rows(rows: Sequence[Mapping[str, object]], out: Path) -> None:
+    """As JSON, one a line."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text("".join(f"{json.dumps(row)}\n" for row in rows), encoding="utf-8")
 
 
 class Page:

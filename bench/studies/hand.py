@@ -14,7 +14,7 @@ from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.stick_logs import LoggedSticks, logs_with_sticks
 from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, Watcher
 from bench.fly.campaign import Campaign, Workers, rows_of
-from bench.rows.tables import at_most_an_hour
+from bench.rows.tables import at_most_an_hour, write_rows
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.airframe import Airframe
@@ -49,7 +49,8 @@ def run_hand(options: Namespace) -> int:
         logged = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
         cases.append(HandCase(seed, HAND_MODES[seed % len(HAND_MODES)], logged))
     parameters = {"flights": options.flights, "first_seed": options.first_seed, "logs": [log.log for log in logs]}
-    rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs), options.out)
+    rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs))
+    write_rows(rows, options.out)
     watched = by_rate(rows)
     print("\n".join(table(watched)))
     return 1 if any(_in_the_air(row) for row in watched) else 0

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from bench.fly.by_hand.watched import IMU_HZ, Row
 from bench.fly.by_hand.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
 from bench.fly.campaign import Campaign, Workers, rows_of
+from bench.rows.tables import write_rows
 
 CRASH, NO_COLLISION = "crash", ("landing", "contact")
 # A crash is reported within this time of its greatest deceleration.
@@ -19,7 +20,8 @@ def run_landings(options: Namespace) -> int:
     cases = [draw_case(seed, LANDINGS) for seed in range(first, first + options.landings)]
     cases += [draw_case(seed, FALLS) for seed in range(first, first + options.falls)]
     parameters = {"landings": options.landings, "falls": options.falls, "first_seed": first}
-    rows = rows_of(Campaign("landings", parameters, cases, fly_to_the_ground), Workers(options.jobs), options.out)
+    rows = rows_of(Campaign("landings", parameters, cases, fly_to_the_ground), Workers(options.jobs))
+    write_rows(rows, options.out)
     print("\n".join(table(rows)))
     return 1 if any(row["wrong"] for row in rows) else 0
 
