@@ -3,7 +3,7 @@
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,6 +59,12 @@ def table(rows: pd.DataFrame | Sequence[Mapping[str, object]]) -> str:
     frame = pd.DataFrame(rows)
     text: str = frame.to_markdown(index=False, disable_numparse=True) if len(frame) else "None."
     return text + "\n"
+
+
+def by_each(rows: pd.DataFrame, columns: Sequence[str], figures: Callable[[pd.DataFrame], Mapping[str, object]]) -> str:
+    """A line for each value of one column after the other."""
+    groups = [(value, some) for column in columns for value, some in rows.groupby(column, sort=False)]
+    return table([{"": value, **figures(some)} for value, some in groups])
 
 
 def share_bar(what: str, holds: "pd.Series[bool]", least: float | None = None) -> Bar:

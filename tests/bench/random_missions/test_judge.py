@@ -335,16 +335,3 @@ def test_a_recovery_is_measured_by_truth():
     assert figures["latency_ms"] == pytest.approx(4.0)
     assert figures["closing_m_s"] == pytest.approx(2.0)
     assert np.isclose(figures["risen_m"], 0.0)
-    # the wall that it flew into was straight ahead
-    assert figures["bearing_deg"] == 0.0
-
-
-def test_a_hits_bearing_is_seen_from_the_nose():
-    # Given a vehicle that is pushed from the north, its nose to the east and leaning
-    series = path((0, 0, 0, 0), (10, 2, 0, 2), (17, 1.5, 0, 2))
-    quarter, lean = np.sqrt(0.5), 0.1
-    series["attitude_wxyz"][:] = [quarter * np.cos(lean), 0.0, quarter * np.sin(lean), quarter * np.cos(lean)]
-    series["attitude_wxyz"] /= np.linalg.norm(series["attitude_wxyz"], axis=1)[:, None]
-    judged = bounced(series=series)
-    (figures,) = recoveries(judged, contacts_of(judged))
-    assert figures["bearing_deg"] == pytest.approx(-90.0, abs=1.0)
