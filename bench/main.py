@@ -144,8 +144,8 @@ def _add_drawn(commands: Commands) -> None:
     names = tuple(rule.name for rule in RULES)
     text = f"one of: {', '.join(names)} (default: all)"
     ablation.add_argument("--rule", action="append", choices=names, metavar="NAME", help=text)
-    text = "drawn hits for the detector alone, with hands and flights"
-    ablation.add_argument("--hits", type=count, metavar="N", help=text)
+    ablation.add_argument("--hits", type=count, help=SUPPRESS)
+    ablation.set_defaults(gone={"hits": "`bench detectors` has the detector alone"})
     _add_workers(ablation)
     _add_out(ablation, "ablation")
 

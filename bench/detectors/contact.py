@@ -5,19 +5,30 @@ from typing import Any, ClassVar
 
 from companion.messages import MessageId, Vector3
 from companion.reflex.detector import DetectorState, Impact, Phase
+from companion.strict_model import Positive, StrictModel
 
 # A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
 REARM_US = 40_000
+
+
+class Threshold(StrictModel):
+    """The setting of a baseline: from how large a force on it is loud."""
+
+    threshold_m_s2: Positive
 
 
 class Baseline:
     """Built from its settings, as the drone's own detector is."""
 
     losses: ClassVar[Mapping[MessageId, str]] = {}
+    state: ClassVar[type[DetectorState]]
 
-    def __init__(self, config: Any, averaging_interval_us: int) -> None:
-        self._config = config
+    def __init__(self, config: Threshold | None, averaging_interval_us: int) -> None:
+        self._least_m_s2 = 0.0 if config is None else config.threshold_m_s2
         self._averaging_us = averaging_interval_us
+
+    def initial(self) -> Any:
+        return self.state(threshold_m_s2=self._least_m_s2)
 
 
 def judge(

@@ -21,13 +21,6 @@ from companion.messages import Attitude, ImuSample, Quaternion, Sample
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import LEVEL
 from companion.reflex.detector import DetectorState, Impact, Situation
-from companion.strict_model import Positive, StrictModel
-
-
-class FuzzyConfig(StrictModel):
-    """Settings of the detector `fuzzy`, as in its authors' program."""
-
-    threshold_m_s2: Positive = 9.81
 
 
 @dataclass(slots=True)
@@ -40,10 +33,7 @@ class FuzzyState(DetectorState):
 class FuzzyDetector(Baseline):
     """See the module's text."""
 
-    name = "fuzzy"
-
-    def initial(self) -> FuzzyState:
-        return FuzzyState(threshold_m_s2=self._config.threshold_m_s2)
+    name, state = "fuzzy", FuzzyState
 
     def step(self, state: FuzzyState, sample: Sample, situation: Situation) -> tuple[FuzzyState, Impact | None]:
         if isinstance(sample, Attitude):

@@ -29,21 +29,13 @@ from companion.messages import AttitudeTarget, ImuSample, MessageId, Sample, Vec
 from companion.motion.strapdown import ZERO
 from companion.reflex.detector import DetectorState, Impact, Situation
 from companion.reflex.thrust import ThrustGain
-from companion.strict_model import Positive, StrictModel
 
-
-class HybridConfig(StrictModel):
-    """Settings of the detector `hybrid`."""
-
-    # Wind and the thrust's lag of 20 ms make up to 4 m/s^2 on a vehicle that manoeuvres.
-    threshold_m_s2: Positive = 6.0
-    # A contact's first sample shows 70 % of itself at 250 Hz, all of it at 50 Hz.
-    force_gain_per_s: Positive = 300.0
-    # Wind: what is slower than 2 Hz.
-    wind_gain_per_s: Positive = 12.0
-    # Motors at full moment make 200 rad/s^2; nothing that flies by itself needs more.
-    torque_threshold_rad_s2: Positive = 400.0
-    torque_gain_per_s: Positive = 100.0
+# A contact's first sample shows 70 % of itself at 250 Hz, all of it at 50 Hz.
+FORCE_GAIN_PER_S = 300.0
+# Wind: what is slower than 2 Hz.
+WIND_GAIN_PER_S = 12.0
+# Motors at full moment make 200 rad/s^2; nothing that flies by itself needs more.
+TORQUE_THRESHOLD_RAD_S2, TORQUE_GAIN_PER_S = 400.0, 100.0
 
 
 @dataclass(slots=True)
@@ -60,13 +52,10 @@ class HybridState(DetectorState):
 class HybridDetector(Baseline):
     """See the module's text."""
 
-    name = "hybrid"
+    name, state = "hybrid", HybridState
     losses: ClassVar[Mapping[MessageId, str]] = {
         MessageId.ATTITUDE_TARGET: "the z axis is not watched, so pushes from above and below are not seen"
     }
-
-    def initial(self) -> HybridState:
-        return HybridState(threshold_m_s2=self._config.threshold_m_s2)
 
     def step(self, state: HybridState, sample: Sample, situation: Situation) -> tuple[HybridState, Impact | None]:
         if isinstance(sample, AttitudeTarget):
@@ -78,7 +67,7 @@ class HybridDetector(Baseline):
         push = self._force(state, sample, dt_s)
         turning = self._torque(state, sample.angular_velocity_frd_rad_s, dt_s)
         size = math.sqrt(push[0] ** 2 + push[1] ** 2 + push[2] ** 2)
-        is_loud = size >= state.threshold_m_s2 or turning >= self._config.torque_threshold_rad_s2
+        is_loud = size >= state.threshold_m_s2 or turning >= TORQUE_THRESHOLD_RAD_S2
         free_until_us = min(now_us - self._averaging_us, before_us)
         return state, judge(state, now_us, free_until_us, push, size, is_loud, situation.off_reason)
 
@@ -88,8 +77,8 @@ class HybridDetector(Baseline):
         s.thrust.learn(sample.time_boot_us, -f_z, dt_s)
         # Without a thrust to go by the observer sees none of the axis that it acts on.
         external = (f_x, f_y, f_z - s.thrust.expected_m_s2(sample.time_boot_us, f_z))
-        s.force_m_s2 = force = _followed(s.force_m_s2, external, self._config.force_gain_per_s * dt_s)
-        s.wind_m_s2 = wind = _followed(s.wind_m_s2, external, self._config.wind_gain_per_s * dt_s)
+        s.force_m_s2 = force = _followed(s.force_m_s2, external, FORCE_GAIN_PER_S * dt_s)
+        s.wind_m_s2 = wind = _followed(s.wind_m_s2, external, WIND_GAIN_PER_S * dt_s)
         return (force[0] - wind[0], force[1] - wind[1], force[2] - wind[2])
 
     def _torque(self, s: HybridState, w: Vector3, dt_s: float) -> float:
@@ -97,7 +86,7 @@ class HybridDetector(Baseline):
         before = s.rates_rad_s or w
         s.rates_rad_s = w
         change = ((w[0] - before[0]) / dt_s, (w[1] - before[1]) / dt_s, (w[2] - before[2]) / dt_s)
-        s.turning_rad_s2 = r = _followed(s.turning_rad_s2, change, self._config.torque_gain_per_s * dt_s)
+        s.turning_rad_s2 = r = _followed(s.turning_rad_s2, change, TORQUE_GAIN_PER_S * dt_s)
         return math.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
 
 

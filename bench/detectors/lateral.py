@@ -14,21 +14,12 @@ from dataclasses import dataclass
 from bench.detectors.contact import Baseline, judge
 from companion.messages import ImuSample, Sample
 from companion.reflex.detector import DetectorState, Impact, Phase, Situation
-from companion.strict_model import Positive, StrictModel
 from rebound_cli.logs.shaking import MEMORY_US
 
-
-class LateralConfig(StrictModel):
-    """Settings of the detector `lateral`."""
-
-    # Above the noise of a quiet vehicle: the simulated HIGHRES_IMU's 0.25 m/s^2 RMS per axis stays below 1.5 at
-    # six sigma, and drag changes by less than 1.1 within the mean's memory. Below the signal: eq. 2 begins with
-    # b_s * v_c = 30 m/s^2 at 1 m/s, of which a 4 ms mean that saw the last millisecond shows 7.5.
-    threshold_m_s2: Positive = 4.0
-    # A vehicle that shakes more gets a higher threshold: this many times the spread it shows in its own flight.
-    # Of samples with a normal spread not one in 10^8 is beyond six; four public PX4 logs of healthy flights, with
-    # spreads of 1.2 to 4 m/s^2, stay below five but for one sample.
-    noise_factor: Positive = 6.0
+# A vehicle that shakes more gets a higher threshold: this many times the spread it shows in its own flight.
+# Of samples with a normal spread not one in 10^8 is beyond six; four public PX4 logs of healthy flights, with
+# spreads of 1.2 to 4 m/s^2, stay below five but for one sample.
+NOISE_FACTOR = 6.0
 
 
 @dataclass(slots=True)
@@ -61,10 +52,7 @@ class LateralState(DetectorState):
 class LateralDetector(Baseline):
     """See the module's text. Specific forces in FRD, m/s^2; times in the vehicle's boot clock."""
 
-    name = "lateral"
-
-    def initial(self) -> LateralState:
-        return LateralState(threshold_m_s2=self._config.threshold_m_s2)
+    name, state = "lateral", LateralState
 
     def step(self, state: LateralState, sample: Sample, situation: Situation) -> tuple[LateralState, Impact | None]:
         if not isinstance(sample, ImuSample):
@@ -81,5 +69,5 @@ class LateralDetector(Baseline):
         # threshold that is too low would never rise.
         if not is_loud or state.phase is not Phase.CONTACT:
             state.learn(f_x, f_y, elapsed_us)
-            state.threshold_m_s2 = max(self._config.threshold_m_s2, self._config.noise_factor * state.spread_m_s2)
+            state.threshold_m_s2 = max(self._least_m_s2, NOISE_FACTOR * state.spread_m_s2)
         return state, impact

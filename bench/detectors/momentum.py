@@ -37,22 +37,13 @@ from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import LEVEL, ZERO
 from companion.reflex.detector import DetectorState, Impact, Situation
 from companion.reflex.thrust import ThrustGain
-from companion.strict_model import Positive, StrictModel
 
 # Drag changes within a second; the model's error in seconds.
 MEAN_MEMORY_S = 1.0
 # Velocities further apart leave the observer on its own for too long.
 LONGEST_STEP_S = 0.25
-
-
-class MomentumConfig(StrictModel):
-    """Settings of the detector `momentum`."""
-
-    # A velocity that is wrong by 0.03 m/s makes K times that, 0.6 m/s^2; manoeuvres with a thrust that is told 20 ms
-    # late make up to 3.
-    threshold_m_s2: Positive = 5.0
-    # 50 ms: a contact of 20 to 120 ms is followed, and velocities at 50 Hz carry it.
-    gain_per_s: Positive = 20.0
+# 50 ms: a contact of 20 to 120 ms is followed, and velocities at 50 Hz carry it.
+GAIN_PER_S = 20.0
 
 
 @dataclass(slots=True)
@@ -70,13 +61,10 @@ class MomentumState(DetectorState):
 class MomentumDetector(Baseline):
     """See the module's text."""
 
-    name = "momentum"
+    name, state = "momentum", MomentumState
     losses: ClassVar[Mapping[MessageId, str]] = {
         MessageId.ATTITUDE_TARGET: "thrust is taken for the accelerometer's mean, so that manoeuvres look like pushes"
     }
-
-    def initial(self) -> MomentumState:
-        return MomentumState(threshold_m_s2=self._config.threshold_m_s2)
 
     def step(self, state: MomentumState, sample: Sample, situation: Situation) -> tuple[MomentumState, Impact | None]:
         match sample:
@@ -104,14 +92,13 @@ class MomentumDetector(Baseline):
             return None
         lift = s.thrust.expected_m_s2(now_us, -GRAVITY_M_S2)
         n, e, d = body_to_ned(s.attitude_wxyz, (0.0, 0.0, lift))
-        known, r, gain = (n, e, d + GRAVITY_M_S2), s.residual_m_s2, self._config.gain_per_s
-        i = s.integral_m_s
+        known, r, i = (n, e, d + GRAVITY_M_S2), s.residual_m_s2, s.integral_m_s
         s.integral_m_s = i = (
             i[0] + dt_s * (known[0] + r[0]),
             i[1] + dt_s * (known[1] + r[1]),
             i[2] + dt_s * (known[2] + r[2]),
         )
-        s.residual_m_s2 = r = (gain * (v[0] - i[0]), gain * (v[1] - i[1]), gain * (v[2] - i[2]))
+        s.residual_m_s2 = r = (GAIN_PER_S * (v[0] - i[0]), GAIN_PER_S * (v[1] - i[1]), GAIN_PER_S * (v[2] - i[2]))
         push = (r[0] - s.mean_m_s2[0], r[1] - s.mean_m_s2[1], r[2] - s.mean_m_s2[2])
         size = math.sqrt(push[0] ** 2 + push[1] ** 2 + push[2] ** 2)
         is_loud = size >= s.threshold_m_s2
@@ -120,7 +107,7 @@ class MomentumDetector(Baseline):
             m = s.mean_m_s2
             s.mean_m_s2 = (m[0] + share * push[0], m[1] + share * push[1], m[2] + share * push[2])
         force = ned_to_body(s.attitude_wxyz, push)
-        free_until_us = now_us - round(1e6 / gain) - round(2e6 * dt_s)
+        free_until_us = now_us - round(1e6 / GAIN_PER_S) - round(2e6 * dt_s)
         last_imu_us = s.last_sample_boot_us
         impact = judge(s, now_us, free_until_us, force, size, is_loud, situation.off_reason)
         s.last_sample_boot_us = last_imu_us

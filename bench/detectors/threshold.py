@@ -11,23 +11,15 @@ Not theirs: one contact is told once (`contact`), and reports while the detector
 """
 
 from dataclasses import dataclass
-from typing import Annotated
-
-from pydantic import Field
 
 from bench.detectors.contact import Baseline, judge
 from companion.messages import ImuSample, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.strapdown import ZERO
 from companion.reflex.detector import DetectorState, Impact, Situation
-from companion.strict_model import Positive, StrictModel
 
-
-class ThresholdConfig(StrictModel):
-    """Settings of the detector `threshold`, as in its authors' program."""
-
-    threshold_m_s2: Positive = 20.0
-    window: Annotated[int, Field(strict=True, ge=1, le=100)] = 10
+# Samples, as in its authors' program.
+WINDOW = 10
 
 
 @dataclass(slots=True)
@@ -44,10 +36,7 @@ class ThresholdState(DetectorState):
 class ThresholdDetector(Baseline):
     """See the module's text."""
 
-    name = "threshold"
-
-    def initial(self) -> ThresholdState:
-        return ThresholdState(threshold_m_s2=self._config.threshold_m_s2)
+    name, state = "threshold", ThresholdState
 
     def step(self, state: ThresholdState, sample: Sample, situation: Situation) -> tuple[ThresholdState, Impact | None]:
         if not isinstance(sample, ImuSample):
@@ -55,7 +44,7 @@ class ThresholdDetector(Baseline):
         now_us = sample.time_boot_us
         f_x, f_y, f_z = sample.specific_force_frd_m_s2
         self._look(state, now_us, (f_x, f_y, f_z + GRAVITY_M_S2))
-        is_told = state.is_open and state.since is not None and state.since > self._config.window
+        is_told = state.is_open and state.since is not None and state.since > WINDOW
         if is_told:
             state.is_open = False
         push, size, off = state.force_m_s2, state.largest_m_s2, situation.off_reason
@@ -68,9 +57,9 @@ class ThresholdDetector(Baseline):
             s.since += 1
         if size <= s.threshold_m_s2:
             return
-        if s.since is None or s.since > self._config.window:
+        if s.since is None or s.since > WINDOW:
             if not s.is_open:
                 s.free_until_us = min(now_us - self._averaging_us, s.last_sample_boot_us)
             s.since, s.largest_m_s2 = 0, 0.0
-        if size > s.largest_m_s2 and s.since < self._config.window:
+        if size > s.largest_m_s2 and s.since < WINDOW:
             s.is_open, s.largest_m_s2, s.force_m_s2 = True, size, force

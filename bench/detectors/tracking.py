@@ -22,19 +22,13 @@ from companion.messages import Attitude, LocalPosition, Quaternion, Sample
 from companion.motion.rotation import ned_to_body
 from companion.motion.strapdown import LEVEL
 from companion.reflex.detector import DetectorState, Impact, Situation
-from companion.strict_model import Positive, StrictModel
 
 # The lag follows the speed within a second; velocities before that belong to another part of the path.
 MEAN_MEMORY_S = 1.0
 # A setpoint that jumps further than this from one position to the next begins a new path.
 JUMP_M = 0.5
-
-
-class TrackingConfig(StrictModel):
-    """Settings of the detector `tracking`."""
-
-    # PX4 follows a setpoint that speeds up by 2 m/s^2 to 0.2 m; a good position is good to 0.01 m.
-    bound_m: Positive = 0.3
+# PX4 follows a setpoint that speeds up by 2 m/s^2 to 0.2 m; a good position is good to 0.01 m.
+BOUND_M = 0.3
 
 
 @dataclass(slots=True)
@@ -50,10 +44,7 @@ class TrackingState(DetectorState):
 class TrackingDetector(Baseline):
     """See the module's text."""
 
-    name = "tracking"
-
-    def initial(self) -> TrackingState:
-        return TrackingState()
+    name, state = "tracking", TrackingState
 
     def step(self, state: TrackingState, sample: Sample, situation: Situation) -> tuple[TrackingState, Impact | None]:
         if isinstance(sample, Attitude):
@@ -71,7 +62,7 @@ class TrackingDetector(Baseline):
         before_us, state.position_boot_us = state.position_boot_us, now_us
         if last is None or math.dist(last, asked) > JUMP_M:
             state.mean_m = error_m
-        is_loud = error_m - state.mean_m >= self._config.bound_m
+        is_loud = error_m - state.mean_m >= BOUND_M
         if not is_loud:
             state.mean_m += elapsed_s / MEAN_MEMORY_S * (error_m - state.mean_m)
         # Thrown back from the setpoint with what it takes to be left behind this far in the time of the mean.

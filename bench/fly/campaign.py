@@ -122,24 +122,12 @@ def run_campaign(campaign: Campaign, workers: Workers, folder: Path = RECORDS_FO
     return Results(*({n: one[word] for n, one in ordered.items() if word in one} for word in ("result", "failure")))
 
 
-def rows_of(campaign: Campaign, workers: Workers, out: Path) -> list[Json]:
-    """Of a campaign whose results are rows already: all of them, each a line of a file. Raises CampaignError."""
+def rows_of(campaign: Campaign, workers: Workers) -> list[Json]:
+    """Of a campaign whose results are rows already. Raises CampaignError where a case failed."""
     results = run_campaign(campaign, workers)
     if results.failures:
         raise CampaignError(results.text(campaign))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text("".join(f"{json.dumps(row)}\n" for row in results.results.values()), encoding="utf-8")
     return [*results.results.values()]
-
-
-def worked_out(function: Callable[[Any], Any], cases: Sequence[Any], workers: Workers) -> list[Any]:
-    """The results of cases whose results are no JSON, in the order of cases. Raises CampaignError where one failed."""
-    found = outcomes(function, list(enumerate(cases)), workers)
-    ordered = sorted(with_progress(found, len(cases), "flights"), key=lambda one: one["case"])
-    for outcome in ordered:
-        if "failure" in outcome:
-            raise CampaignError(f"case {outcome['case']} failed: {outcome['failure']}; {cases[outcome['case']]}")
-    return [outcome["result"] for outcome in ordered]
 
 
 def outcomes(function: Callable[[Any], Any], cases: Sequence[tuple[int, Any]], workers: Workers) -> Iterator[Json]:

@@ -17,36 +17,16 @@ from companion.report import CollisionReport, Event
 MODULES: tuple[ModuleType, ...] = (companion.mavsdk, sim_vehicle.testing)
 
 
-_MODULE = """## {name}
-
-{doc}
-
-{names}
-"""
-_PAGE = """# Python API
-
-What other programs import. Everything else may change between versions. `help(NAME)` says more.
-
-{modules}## Values
-
-What `CollisionGuard.events` and `CollisionGuard.collisions` hold. [summary.json](summary.md) has most of a collision's
-fields with their meaning.
-
-{values}"""
 HEADS = ("name", "what it is or does")
 
 
-def api_page() -> str:
-    modules = [
-        _MODULE.format(
-            name=module.__name__,
-            doc=inspect.getdoc(module),
-            names=table(HEADS, once(row for name in module.__all__ for row in _rows(name, getattr(module, name)))),
-        )
-        for module in MODULES
-    ]
+def api() -> dict[str, str]:
+    modules = ""
+    for module in MODULES:
+        rows = once(row for name in module.__all__ for row in _rows(name, getattr(module, name)))
+        modules += f"## {module.__name__}\n\n{inspect.getdoc(module)}\n\n{table(HEADS, rows)}\n"
     values = [*_rows("companion.report.Event", Event), *_rows("CollisionReport", CollisionReport)]
-    return _PAGE.format(modules="".join(modules), values=table(HEADS, values))
+    return {"modules": modules, "values": table(HEADS, values)}
 
 
 def _rows(name: str, value: object) -> Iterator[tuple[str, str]]:

@@ -4,32 +4,47 @@ from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from bench.reference import api, commands, events, messages, models, states, summary
+from bench.reference.api import api
+from bench.reference.commands import commands
+from bench.reference.events import events
+from bench.reference.markdown import MEANINGS, code, table
+from bench.reference.messages import messages
+from bench.reference.models import airframe, companion, guard, mission, world
+from bench.reference.states import states
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "reference"
+TEMPLATES = Path(__file__).parent / "pages"
 
-# Of each page the function that makes it.
-PAGES: Mapping[str, Callable[[], str]] = {
-    "commands.md": commands.commands_page,
-    "mission.md": models.mission_page,
-    "companion.md": models.companion_page,
-    "guard.md": models.guard_page,
-    "world.md": models.world_page,
-    "airframe.md": models.airframe_page,
-    "events.md": events.events_page,
-    "summary.md": summary.summary_page,
-    "states.md": states.states_page,
-    "messages.md": messages.messages_page,
-    "python-api.md": api.api_page,
+
+def summary() -> dict[str, str]:
+    """The meaning of every key."""
+    rows = {name: [(code(key), text) for key, text in keys.items()] for name, keys in MEANINGS.items()}
+    return {name: table(("key", "meaning"), rows[name]) for name in ("flight", "collision", "truth")}
+
+
+# Of each page, whose text stands in `pages/`, the function that makes what is put in.
+PAGES: Mapping[str, Callable[[], dict[str, str]]] = {
+    "commands.md": commands,
+    "mission.md": mission,
+    "companion.md": companion,
+    "guard.md": guard,
+    "world.md": world,
+    "airframe.md": airframe,
+    "events.md": events,
+    "summary.md": summary,
+    "states.md": states,
+    "messages.md": messages,
+    "python-api.md": api,
 }
 MADE_BY = "\n<!-- Written by `make docs`. -->\n"
 
 
 def page_text(name: str) -> str:
     """The page as it is to be."""
+    text = (TEMPLATES / name).read_text(encoding="utf-8").format(**PAGES[name]())
     # Below the title, which the site takes from the first line.
-    title, rest = PAGES[name]().rstrip().split("\n", 1)
+    title, rest = text.rstrip().split("\n", 1)
     return f"{title}\n{MADE_BY}{rest}\n"
 
 

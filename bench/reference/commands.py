@@ -18,30 +18,13 @@ _EXITS = (
 )
 
 
-_TEXT = """# Commands
-
-`rebound COMMAND --help` has the options of each.
-
-{commands}
-## Studies
-
-They need a checkout. `python -m bench STUDY --help` has the options of each.
-
-{studies}
-## Exit codes
-
-`fly` and `guard` tell a wrong configuration from other failures. Other commands end with {error} there.
-
-{exits}"""
-
-
-def commands_page() -> str:
-    return _TEXT.format(
-        commands=table(("command", "does", "more"), _commands(rebound_cli.main.build_parser())),
-        studies=table(("study", "does", "more"), _commands(bench.main.build_parser())),
-        error=exit_codes.ERROR,
-        exits=table(("code", "meaning", "a guard as a service"), _EXITS),
-    )
+def commands() -> dict[str, str]:
+    return {
+        "commands": table(("command", "does", "more"), _commands(rebound_cli.main.build_parser())),
+        "studies": table(("study", "does", "more"), _commands(bench.main.build_parser())),
+        "error": str(exit_codes.ERROR),
+        "exits": table(("code", "meaning", "a guard as a service"), _EXITS),
+    }
 
 
 def _commands(parser: argparse.ArgumentParser, does: str = "") -> Iterator[tuple[str, str, str]]:

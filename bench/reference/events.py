@@ -13,18 +13,13 @@ ROOT = Path(__file__).parents[2]
 ELSEWHERE = frozenset({"late", "lost", "guard", *_KINDS.values()})
 
 
-def events_page() -> str:
-    text = (
-        "# Events\n\nEach line of `events.jsonl` is one event: `time_us` (Unix time in microseconds), `kind`, `text` "
-    )
-    text += "for people and `data`\nfor programs. `CollisionGuard.watch_events()` gives the same.\n\n"
+def events() -> dict[str, str]:
     told = data_keys()
     rows = [
         (code(kind), meaning, ", ".join(map(code, told.get(kind, ())))) for kind, meaning in MEANINGS["events"].items()
     ]
-    kinds = [(row.kind.value, row.criterion) for row in TABLE]
-    text += table(("kind", "meaning", "data"), rows) + "\n\n## Kinds of impact\n\nThe first row that holds counts.\n\n"
-    return text + table(("kind", "criterion"), kinds)
+    impacts = [(row.kind.value, row.criterion) for row in TABLE]
+    return {"events": table(("kind", "meaning", "data"), rows), "impacts": table(("kind", "criterion"), impacts)}
 
 
 def data_keys() -> dict[str, list[str]]:

@@ -6,22 +6,10 @@ import re
 from bench.reference.markdown import code, table
 from companion.mavlink import encode, readers
 
-_TEXT = """# MAVLink messages of the companion
 
-## Received
-
-`companion/mavlink/readers.py` reads these fields and no others.
-
-{received}
-## Sent
-
-`companion/mavlink/encode.py` makes these: {sent}.
-"""
-
-
-def messages_page() -> str:
+def messages() -> dict[str, str]:
     read = [(code(name), ", ".join(map(code, reader._names))) for name, reader in sorted(readers._BY_NAME.items())]
-    return _TEXT.format(received=table(("message", "fields"), read), sent=", ".join(map(code, sorted(_sent()))))
+    return {"received": table(("message", "fields"), read), "sent": ", ".join(map(code, sorted(_sent())))}
 
 
 def _sent() -> set[str]:

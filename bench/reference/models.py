@@ -24,76 +24,34 @@ HEADS = ("key", "value", "default", "meaning")
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "object": "map"}
 
 
-_MISSION = """# Mission keys
-
-[Write a mission](../how-to/missions.md) shows how they are used. A key below another stands in its map.
-Positions are metres north, east and down of the arming position.
-
-{keys}
-## Missions that ship
-
-`rebound fly NAME --lockstep` flies one. Those without an obstacle fly on a real PX4 with only the address changed.
-
-{missions}"""
-_COMPANION = """# Companion keys
-
-The `companion:` part of a mission, of a guard's file and of `--companion FILE`. Every key is optional.
-`companion/mission/config.py` and `companion/reflex/config.py` have the reason of each number.
-
-{keys}"""
-_GUARD = """# Guard keys
-
-The file of `rebound guard --config`. Every key is optional. `companion/guard/config.py` has the reason of each number.
-
-{keys}"""
-_WORLD = """# World keys
-
-The `sim:` part of a mission file: what the simulated vehicle flies in. A flight with `--connect` ignores it.
-Positions are metres in the world, whose origin is the vehicle's default start.
-
-{keys}
-## Faults
-
-Each entry of `faults` has a `kind` and a time, in seconds of the vehicle's boot clock: `at_s`, from then on or the
-moment of what happens once, or `between_s`, `[from, until]`.
-
-{faults}"""
-_AIRFRAME = """# Airframe keys
-
-A file states what differs from a built-in airframe: `based_on: foldable` or `rigid`. SI units; body axes forward,
-right, down. `sim_vehicle/airframes/foldable.yaml` has the source of each number.
-
-{keys}"""
-
-
-def mission_page() -> str:
+def mission() -> dict[str, str]:
     """With the missions that ship."""
     shipped = [(code(path.stem), yaml.safe_load(path.read_text("utf-8"))) for path in sorted(MISSIONS.glob("*.yaml"))]
     missions = table(("name", "what it flies"), [(name, data["description"]) for name, data in shipped])
-    return _MISSION.format(keys=table(HEADS, Keys(Mission, COMPANION).rows()), missions=missions)
+    return {"keys": table(HEADS, Keys(Mission, COMPANION).rows()), "missions": missions}
 
 
-def companion_page() -> str:
-    return _COMPANION.format(keys=_short_table(Keys(CompanionConfig)))
+def companion() -> dict[str, str]:
+    return {"keys": _short_table(Keys(CompanionConfig))}
 
 
-def guard_page() -> str:
-    return _GUARD.format(keys=_short_table(Keys(GuardConfig, COMPANION | OF_A_MISSION)))
+def guard() -> dict[str, str]:
+    return {"keys": _short_table(Keys(GuardConfig, COMPANION | OF_A_MISSION))}
 
 
 def _short_table(keys: "Keys") -> str:
     return table(HEADS, ((*row[:-1], first_sentence(row[-1])) for row in keys.rows()))
 
 
-def world_page() -> str:
+def world() -> dict[str, str]:
     whole = Keys(Scene)
     faults = whole.choices(whole.schema["properties"]["faults"])
-    world = Keys(Scene, dict.fromkeys(faults, "[kinds below](#faults)"))
-    kinds = table(HEADS, (row for name in faults for row in world.fault_rows(name)))
-    return _WORLD.format(keys=table(HEADS, world.rows()), faults=kinds)
+    keys = Keys(Scene, dict.fromkeys(faults, "[kinds below](#faults)"))
+    kinds = table(HEADS, (row for name in faults for row in keys.fault_rows(name)))
+    return {"keys": table(HEADS, keys.rows()), "faults": kinds}
 
 
-def airframe_page() -> str:
+def airframe() -> dict[str, str]:
     """With both built-in airframes' values instead of bounds."""
     first, second = (load_built_in(name).model_dump() for name in ("foldable", "rigid"))
     rows = []
@@ -101,7 +59,7 @@ def airframe_page() -> str:
         one, other = (code(json.dumps(_value(data, key))) for data in (first, second))
         if not isinstance(_value(first, key), dict):
             rows.append((code(key), one if one == other else f"{one}, rigid {other}", meaning))
-    return _AIRFRAME.format(keys=table(("key", "foldable", "meaning"), once(rows)))
+    return {"keys": table(("key", "foldable", "meaning"), once(rows))}
 
 
 class Keys:

@@ -10,51 +10,17 @@ from companion.state_table import StateTable
 from sim_vehicle.autopilot.commander.failsafe_table import markdown_table as failsafe_table
 from sim_vehicle.autopilot.modes import mode_diagram
 
-# Diagrams are Mermaid's, which GitHub and the site draw.
-_TEXT = """# State machines
 
-A trigger that a state does not list leaves the state as it is.
-
-## The flight
-
-`companion/flight/states.py` is the source.
-
-```mermaid
-{flight_diagram}```
-
-{flight}
-## The guard
-
-`companion/guard/states.py` is the source.
-
-```mermaid
-{guard_diagram}```
-
-{guard}
-## The simulated vehicle's modes
-
-`sim_vehicle/autopilot/modes.py` is the source.
-
-```mermaid
-{modes}```
-
-## The simulated vehicle's failsafes
-
-`sim_vehicle/autopilot/commander/failsafe_table.py` is the source. Of several actions the vehicle takes the one that
-stands last in `Action`.
-
-{failsafes}"""
-
-
-def states_page() -> str:
-    return _TEXT.format(
-        flight_diagram=mermaid_diagram(FLIGHT),
-        flight=transitions(FLIGHT),
-        guard_diagram=mermaid_diagram(GUARD),
-        guard=transitions(GUARD),
-        modes=mode_diagram(),
-        failsafes=failsafe_table(),
-    )
+def states() -> dict[str, str]:
+    """Diagrams are Mermaid's, which GitHub and the site draw."""
+    return {
+        "flight_diagram": mermaid_diagram(FLIGHT),
+        "flight": transitions(FLIGHT),
+        "guard_diagram": mermaid_diagram(GUARD),
+        "guard": transitions(GUARD),
+        "modes": mode_diagram(),
+        "failsafes": failsafe_table(),
+    }
 
 
 def mermaid_diagram(states: StateTable[Any, Any]) -> str:

@@ -143,21 +143,8 @@ def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> 
         "samples_late": possible.samples_late(first.time_boot_us),
         "evidence": first.first.impact.evidence.value,
         "speed_error_m_s": math.hypot(*velocity) - math.hypot(*true_velocity),
-        "velocity_error_m_s": math.dist(velocity, true_velocity),
         "normal_error_deg": angle_deg(first.final.normal.direction_ned, hit.normal_ned),
-        "first_normal_error_deg": angle_deg(first.first.normal.direction_ned, hit.normal_ned),
-        "time_error_ms": 1e-3 * (first.final.time_boot_us - touch_us),
-        "kind": first.final.impact.kind.value,
-        "confidence": first.final.impact.confidence,
-        "bound": first.final.is_lower_bound,
-        "impulse": _ratio(first.final, hit),
     }
-
-
-def _ratio(estimate: ImpactEstimate, hit: Hit) -> float:
-    """Impulse per unit mass over the true change of velocity that the obstacle made."""
-    change = math.dist(hit.rebound_velocity_ned_m_s, hit.impact_velocity_ned_m_s)
-    return estimate.impulse_m_s / change if change > 0.0 else 0.0
 
 
 def _clipped(recording: VehicleRecording, hit: Hit) -> bool:

@@ -1,6 +1,5 @@
 """Figures of every recovery of a flight, by the simulator's truth. SI units."""
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -56,7 +55,6 @@ def _figures(flight: JudgedFlight, episode: Sequence[JudgedContact]) -> Json:
         "closing_m_s": round(first.closing_m_s, _DIGITS),
         "climbing_m_s": round(-first.hit.impact_velocity_ned_m_s[2], _DIGITS),
         "steepness": round(normal[2], _DIGITS),
-        "bearing_deg": round(_bearing_deg(flight, first.hit), 1),
         "seen": first.collision is not None,
         "again": sum(contact.role is Role.AGAIN for contact in episode),
         "others": sum(contact.role is Role.NEXT for contact in episode),
@@ -68,15 +66,6 @@ def _figures(flight: JudgedFlight, episode: Sequence[JudgedContact]) -> Json:
         found["latency_ms"] = round(1e-3 * (detected_boot_us - first.hit.contact_at_boot_us), 3)
     seen = [contact for contact in episode if contact.collision is not None]
     return found | (_recovery(flight, seen[-1], episode) if seen else {})
-
-
-def _bearing_deg(flight: JudgedFlight, hit: Hit) -> float:
-    """Of the surface from the vehicle, seen from above: 0 ahead, 90 to its right; up to 180 to both sides."""
-    series, (north, east, _) = flight.truth.series, hit.normal_ned
-    row = int(np.searchsorted(series["time_boot_us"], hit.contact_at_boot_us, side="right")) - 1
-    w, x, y, z = series["attitude_wxyz"][max(row, 0)].tolist()
-    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return math.degrees(math.remainder(math.atan2(-east, -north) - heading, math.tau))
 
 
 def _recovery(flight: JudgedFlight, contact: JudgedContact, episode: Sequence[JudgedContact]) -> Json:

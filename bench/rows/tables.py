@@ -1,8 +1,9 @@
 """What a study shows of its rows: figures out of many, bars with a verdict, tables, and a page to look at."""
 
+import json
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,6 +61,12 @@ def table(rows: pd.DataFrame | Sequence[Mapping[str, object]]) -> str:
     return text + "\n"
 
 
+def by_each(rows: pd.DataFrame, columns: Sequence[str], figures: Callable[[pd.DataFrame], Mapping[str, object]]) -> str:
+    """A line for each value of one column after the other."""
+    groups = [(value, some) for column in columns for value, some in rows.groupby(column, sort=False)]
+    return table([{"": value, **figures(some)} for value, some in groups])
+
+
 def share_bar(what: str, holds: "pd.Series[bool]", least: float | None = None) -> Bar:
     """Of how many it must hold, and of how many it does. Without a least or with none there is no verdict."""
     part, count = float(holds.astype(bool).mean()), len(holds)
@@ -115,6 +122,12 @@ def per_cent(value: float, digits: int = 1) -> str:
 
 def text_of(value: float, digits: int = 1) -> str:
     return "-" if math.isnan(value) else f"{value:.{digits}f}"
+
+
+def write_rows(rows: Sequence[Mapping[str, object]], out: Path) -> None:
+    """As JSON, one a line."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text("".join(f"{json.dumps(row)}\n" for row in rows), encoding="utf-8")
 
 
 class Page:

@@ -1,26 +1,20 @@
-"""`bench ablation`: what each special rule of the companion is worth, in drawn flights and to the detector."""
+"""`bench ablation`: what each special rule of the companion is worth, in drawn flights."""
 
 import math
 import statistics
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from bench.cases.hits import HandCase, HitCase, draw_case, draw_hand
-from bench.cases.mishaps import FAMILIES, FlightCase
 from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
 from bench.fly.lockstep import JudgedFlight, fly_in
-from bench.fly.watching import FLOWN_WITH
-from bench.fly.wire import JITTERY
 from bench.rows.contacts import JudgedContact, Role, contacts_of
-from bench.rows.heard import angle_deg, work_out_flight, work_out_hand, work_out_hit
+from bench.rows.heard import angle_deg
 from bench.rows.judge import failures
 from bench.rows.recovered import recoveries
 from bench.rows.tables import Page, table
@@ -31,16 +25,6 @@ from sim_vehicle.truth import Hit
 RESTS_M_S, RESTS_S = 0.2, 0.4
 # How long a vehicle is waited for.
 LONGEST_S = 8.0
-# Of so many hits in a row: as drawn, on a vehicle that shakes, over a bad link, on one that hovers.
-KINDS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("plain", {}),
-    ("plain", {}),
-    ("vibration", {"vibration_m_s2": 2.0}),
-    ("link", {"link": JITTERY}),
-    ("struck", {"is_struck": True}),
-)
-# One hand and one flight to so many hits.
-HANDS_EVERY, FLIGHTS_EVERY = 10, 10
 # What a recovery must show: past its setpoint, height lost, time to rest.
 PAST_M, LOST_M, REST_S = 0.05, 0.10, 3.5
 # What is compared of each hit, in which unit, to how many digits.
@@ -55,17 +39,12 @@ FIGURES: dict[str, tuple[str, float, int]] = {
 
 def run_ablation(options: Namespace) -> int:
     """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
-    page, workers = Page(options.out, "ablation"), Workers(options.jobs, options.scheduler)
+    page = Page(options.out, "ablation")
     names = tuple(options.rule or (rule.name for rule in RULES))
     campaign = ablation_campaign(options.missions, options.first_seed, names)
-    results = run_campaign(campaign, workers)
+    results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
     rules, failed = [rule for rule in RULES if rule.name in names], results.text(campaign)
     parts = {"Flights": flights_table(rules, list(results.results.values()))}
-    if options.hits is not None:
-        heard = detections_campaign(options.hits, options.first_seed, names)
-        detections = run_campaign(heard, workers)
-        parts["The detector alone, at each rate"] = detections_table(rules, list(detections.results.values()))
-        failed += detections.text(heard)
     page.write("What each special rule is worth: with it, less without", options.typed, parts)
     print(failed)
     return 1 if failed else 0
@@ -126,63 +105,6 @@ def _rests_after_s(flight: JudgedFlight, hit: Hit) -> float | None:
     return round(float(began_s[long[0]]), 3) if long.size else None
 
 
-@dataclass(frozen=True, slots=True)
-class DetectionCase:
-    """Something to hear, and the rules that are looked at."""
-
-    kind: str
-    case: HitCase | HandCase | FlightCase
-    names: tuple[str, ...]
-
-
-def detections_campaign(hits: int, first_seed: int, names: tuple[str, ...]) -> Campaign:
-    cases: list[tuple[str, Any]] = []
-    for number in range(hits):
-        seed, (family, settings) = first_seed + number, KINDS[number // 2 % len(KINDS)]
-        cases.append((family, draw_case(family, seed, FLOWN_WITH, is_drawn=True, **settings)))
-        if number % HANDS_EVERY == 0:
-            cases.append(("hand", replace(draw_hand(seed, FLOWN_WITH), is_drawn=True)))
-        if number % FLIGHTS_EVERY == 0:
-            turn = number // FLIGHTS_EVERY
-            family, airframe = list(FAMILIES)[turn // 2 % len(FAMILIES)], AIRFRAMES[turn % 2]
-            cases.append(("flight", FlightCase(family, seed, airframe, FLOWN_WITH, is_drawn=True)))
-    parameters = {"hits": hits, "first_seed": first_seed, "rules": list(names)}
-    heard = [DetectionCase(kind, case, names) for kind, case in cases]
-    return Campaign("ablation-detections", parameters, heard, work_out_heard)
-
-
-def work_out_heard(heard: DetectionCase) -> Json:
-    """What the detector said, by rate; and what it said without each rule that mattered."""
-    rules = [rule for rule in RULES if rule.name in heard.names]
-    with switched(rules) as copies:
-        said: Json | None = None
-        try:
-            said = _said(heard)
-        finally:
-            copies.leave(lambda: {"failure": "the detector failed"} if said is None else said)
-        return {"kind": heard.kind, "with": said, "without": copies.found}
-
-
-def _said(heard: DetectionCase) -> Json:
-    """By rate: hits found and when, and alarms that were none."""
-    rates = _WORK[type(heard.case)](heard.case)["rates"]
-    return {rate: _of_rate(found["detectors"][FLOWN_WITH[0]]) for rate, found in rates.items()}
-
-
-def _of_rate(entry: Json) -> Json:
-    """Of a hit, which has `false`; of a healthy flight or a hand, in which every alarm is one."""
-    if "false" not in entry:
-        return {"false": len(entry["alarms"] if "alarms" in entry else entry["collisions"])}
-    return {"found": "latency_ms" in entry, "ms": entry.get("latency_ms"), "false": entry["false"]}
-
-
-_WORK: dict[type, Callable[[Any], Json]] = {
-    HitCase: work_out_hit,
-    HandCase: work_out_hand,
-    FlightCase: work_out_flight,
-}
-
-
 def flights_table(rules: Sequence[Rule], flights: Sequence[Json]) -> str:
     """Of each rule the flights in which it changed an answer: how they end, how hits recover, medians of changes."""
     rows: list[dict[str, object]] = []
@@ -194,20 +116,6 @@ def flights_table(rules: Sequence[Rule], flights: Sequence[Json]) -> str:
         changes = {label: _change(flown, key, times, digits) for key, (label, times, digits) in FIGURES.items()}
         counts = {"mattered": len(known), "ends": f"{ends:+d}", "recovers": f"{recovers:+d}"}
         rows.append({"rule": rule.name, "what it does": rule.does, **counts, **changes})
-    return table(rows)
-
-
-def detections_table(rules: Sequence[Rule], heard: Sequence[Json]) -> str:
-    """Hits found, false alarms, and hits told sooner."""
-    rows: list[dict[str, object]] = []
-    for rule in rules:
-        pairs = [(one["with"], one["without"][rule.name]) for one in heard if rule.name in one["without"]]
-        rates = [(kept[rate], left[rate]) for kept, left in pairs if "failure" not in left for rate in kept]
-        found = sum(kept.get("found", 0) - left.get("found", 0) for kept, left in rates)
-        alarms = sum(kept["false"] - left["false"] for kept, left in rates)
-        sooner = sum((left.get("ms") or 0.0) > (kept.get("ms") or math.inf) for kept, left in rates)
-        changes = {"found": f"{found:+d}", "alarms": f"{alarms:+d}", "sooner": sooner}
-        rows += [{"rule": rule.name, "mattered": len(pairs), **changes}] if pairs else []
     return table(rows)
 
 

@@ -33,7 +33,7 @@ VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
 SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
 # Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
 FLIGHT_S = AIRBORNE_S + 40.0
-OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "velocity_error_m_s", "normal_error_deg")
+OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "normal_error_deg")
 
 
 @dataclass(frozen=True, slots=True)

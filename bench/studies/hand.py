@@ -3,10 +3,11 @@
 import math
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from bench.cases.mishaps import FAMILIES
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
@@ -14,7 +15,7 @@ from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.stick_logs import LoggedSticks, logs_with_sticks
 from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, Watcher
 from bench.fly.campaign import Campaign, Workers, rows_of
-from bench.rows.tables import at_most_an_hour
+from bench.rows.tables import at_most_an_hour, by_each, write_rows
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.airframe import Airframe
@@ -49,9 +50,10 @@ def run_hand(options: Namespace) -> int:
         logged = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
         cases.append(HandCase(seed, HAND_MODES[seed % len(HAND_MODES)], logged))
     parameters = {"flights": options.flights, "first_seed": options.first_seed, "logs": [log.log for log in logs]}
-    rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs), options.out)
+    rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs))
+    write_rows(rows, options.out)
     watched = by_rate(rows)
-    print("\n".join(table(watched)))
+    print(text_of(watched))
     return 1 if any(_in_the_air(row) for row in watched) else 0
 
 
@@ -131,35 +133,30 @@ def by_rate(rows: Sequence[Row]) -> list[Row]:
     return [{**row, **watched} for row in rows for watched in row["watched"]]
 
 
-def table(rows: Sequence[Row]) -> Iterator[str]:
-    """By IMU rate and by mode what was reported in the air, then every report. The bar: 0."""
-    names = f"{'':<16}{'flights':>8}{'watched, h':>12}{'reported':>10}{'an hour, at most':>18}"
-    yield f"{names}{'tilt, median, 90 %':>20}  as"
-    for name, chosen in _groups(rows):
-        hours = sum(row["watched_s"] for row in chosen) / 3600.0
-        if not hours:
-            continue
-        kinds = Counter(one["kind"] for row in chosen for one in _in_the_air(row))
-        false, tilts = sum(kinds.values()), np.array([row["tilt_deg"][:2] for row in chosen if row["tilt_deg"]])
-        tilt = "/".join(f"{value:.0f}" for value in np.median(tilts, axis=0)) if len(tilts) else "-"
-        as_what = ", ".join(f"{kind} {number}" for kind, number in kinds.most_common())
-        most = at_most_an_hour(false, hours)
-        yield f"{name:<16}{len(chosen):>8}{hours:>12.2f}{false:>10}{most:>18.2f}{tilt:>20}  {as_what}"
-    touched = len({row["seed"] for row in rows if row["touched"]})
-    yield f"{touched} flights touched the ground; reports from then on do not count. Bar: 0 reported."
-    for row in rows:
-        for one in _in_the_air(row):
-            yield f"seed {row['seed']}, {row['imu_hz']} Hz, {row['mode']}, {row['air']}, {row['sticks']}: {one}"
+def text_of(rows: Sequence[Row]) -> str:
+    """By IMU rate, mode and air what was reported in the air, then every report. The bar: 0."""
+    frame = pd.DataFrame(rows).assign(false=[_in_the_air(row) for row in rows])
+    frame["of logs"] = ["drawn sticks" if sticks == "drawn" else "sticks of logs" for sticks in frame["sticks"]]
+    lines = by_each(frame[frame["watched_s"] > 0.0], ("imu_hz", "mode", "air", "of logs"), _figures)
+    touched = frame[frame["touched"]]["seed"].nunique()
+    lines += f"{touched} flights touched the ground; reports from then on do not count. Bar: 0 reported.\n"
+    for row in frame.explode("false").dropna(subset="false").to_dict("records"):
+        where = f"seed {row['seed']}, {row['imu_hz']} Hz, {row['mode']}, {row['air']}, {row['sticks']}"
+        lines += f"{where}: {row['false']}\n"
+    return lines
 
 
-def _groups(rows: Sequence[Row]) -> Iterator[tuple[str, list[Row]]]:
-    for imu_hz in IMU_HZ:
-        yield f"{imu_hz} Hz", [row for row in rows if row["imu_hz"] == imu_hz]
-    for mode in HAND_MODES:
-        yield mode, [row for row in rows if row["mode"] == mode]
-    for air in AIR:
-        yield air, [row for row in rows if row["air"] == air]
-    yield "sticks of logs", [row for row in rows if row["sticks"] != "drawn"]
+def _figures(flights: pd.DataFrame) -> Row:
+    kinds = Counter(one["kind"] for false in flights["false"] for one in false)
+    hours, tilts = flights["watched_s"].sum() / 3600.0, [tilts[:2] for tilts in flights["tilt_deg"] if tilts]
+    return {
+        "flights": len(flights),
+        "watched, h": f"{hours:.2f}",
+        "reported": kinds.total(),
+        "an hour, at most": f"{at_most_an_hour(kinds.total(), hours):.2f}",
+        "tilt, median, 90 %": "/".join(f"{value:.0f}" for value in np.median(tilts, axis=0)) if tilts else "-",
+        "as": ", ".join(f"{kind} {number}" for kind, number in kinds.most_common()),
+    }
 
 
 def _in_the_air(row: Row) -> list[Row]:

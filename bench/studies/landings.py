@@ -2,11 +2,14 @@
 
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+
+import pandas as pd
 
 from bench.fly.by_hand.watched import IMU_HZ, Row
 from bench.fly.by_hand.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
 from bench.fly.campaign import Campaign, Workers, rows_of
+from bench.rows.tables import by_each, write_rows
 
 CRASH, NO_COLLISION = "crash", ("landing", "contact")
 # A crash is reported within this time of its greatest deceleration.
@@ -19,8 +22,9 @@ def run_landings(options: Namespace) -> int:
     cases = [draw_case(seed, LANDINGS) for seed in range(first, first + options.landings)]
     cases += [draw_case(seed, FALLS) for seed in range(first, first + options.falls)]
     parameters = {"landings": options.landings, "falls": options.falls, "first_seed": first}
-    rows = rows_of(Campaign("landings", parameters, cases, fly_to_the_ground), Workers(options.jobs), options.out)
-    print("\n".join(table(rows)))
+    rows = rows_of(Campaign("landings", parameters, cases, fly_to_the_ground), Workers(options.jobs))
+    write_rows(rows, options.out)
+    print(text_of(rows))
     return 1 if any(row["wrong"] for row in rows) else 0
 
 
@@ -79,25 +83,17 @@ def judged(is_fall: bool, touched_us: int | None, hardest_us: int | None, report
     return first, f"{late_s:.2f} s late" if late_s > CRASH_WITHIN_S else ""
 
 
-# --- the table
-
-
-def table(rows: Sequence[Row]) -> Iterator[str]:
+def text_of(rows: Sequence[Row]) -> str:
     """By way and by rate how the ground was reported, then every flight of which something is wrong."""
-    yield f"{'':<16}{'flights':>8}{'wrong':>7}  the ground reported first as"
-    for name, is_fall in (("landings", False), ("falls", True)):
-        chosen = [row for row in rows if (row["way"] in FALLS) is is_fall]
-        yield _line(name, chosen)
-        for key in ("way", "imu_hz", "ground"):
-            for value in dict.fromkeys(row[key] for row in chosen):
-                yield _line(f"  {value}", [row for row in chosen if row[key] == value])
-    yield "Bars: 0 landings reported as a collision; every fall reported as a crash within 0.2 s of the hardest moment."
-    for row in rows:
-        if row["wrong"]:
-            yield str(row)
+    frame = pd.DataFrame(rows)
+    is_fall, text = frame["way"].isin(FALLS), ""
+    for name, some in (("landings", frame[~is_fall]), ("falls", frame[is_fall])):
+        text += by_each(some.assign(all=name), ("all", "way", "imu_hz", "ground"), _figures) + "\n"
+    text += "Bars: no landing reported as a collision; every fall as a crash within 0.2 s of the hardest moment.\n"
+    return text + "\n".join(str(row) for row in rows if row["wrong"])
 
 
-def _line(name: str, rows: Sequence[Row]) -> str:
-    outcomes = Counter(row["outcome"] for row in rows).most_common()
-    wrong = sum(bool(row["wrong"]) for row in rows)
-    return f"{name:<16}{len(rows):>8}{wrong:>7}  " + ", ".join(f"{outcome} {number}" for outcome, number in outcomes)
+def _figures(flights: pd.DataFrame) -> Row:
+    outcomes = Counter(flights["outcome"]).most_common()
+    said = ", ".join(f"{outcome} {number}" for outcome, number in outcomes)
+    return {"flights": len(flights), "wrong": flights["wrong"].astype(bool).sum(), "the ground reported first as": said}

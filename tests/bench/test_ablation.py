@@ -4,7 +4,7 @@ import importlib
 
 import pytest
 
-from bench.studies.ablation import detections_campaign, detections_table, flights_table, work_out_heard
+from bench.studies.ablation import flights_table
 from bench.studies.rules import RULES, Rule, switched
 from companion.reflex import attitude_law, halfspace
 
@@ -71,24 +71,3 @@ def test_the_table_counts_what_is_lost_without_a_rule():
     assert [cell.strip() for cell in trust.split("|")][3:6] == ["2", "+1", "+2"]
     hand = next(line for line in lines if line.startswith("| hand"))
     assert [cell.strip() for cell in hand.split("|")][3:] == ["0", "+0", "+0", *["–"] * 5, ""]
-
-
-@pytest.mark.slow
-def test_a_drawn_hit_is_heard_with_and_without_each_rule():
-    # Given a hit, and the rule by which alone the detector hears velocities
-    heard = detections_campaign(1, 71_003, ("trust", "hand")).cases
-    assert {one.kind for one in heard} == {"plain", "hand", "flight"}
-    said = work_out_heard(heard[0])
-    assert set(said["with"]) == {"50", "100", "246"}
-    assert all(set(entry) == {"found", "ms", "false"} for entry in said["with"].values())
-    assert set(said["without"]) <= {"trust", "hand"}
-
-
-def test_the_detectors_table_counts_hits_alarms_and_what_came_sooner():
-    found, late, missed = ({"found": f, "ms": ms, "false": 0} for f, ms in ((True, 4.0), (True, 40.0), (False, None)))
-    cases = [
-        {"kind": "plain", "with": {"50": found, "246": found}, "without": {"trust": {"50": missed, "246": late}}},
-        {"kind": "hand", "with": {"50": {"false": 0}}, "without": {"hand": {"50": {"false": 1}}}},
-    ]
-    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in detections_table(RULES, cases).splitlines()]
-    assert ["trust", "1", "+1", "+0", "1"] in lines and ["hand", "1", "+0", "-1", "0"] in lines

@@ -9,7 +9,7 @@ import pytest
 from bench.fly.by_hand.hand_pilot import wishes
 from bench.fly.by_hand.stick_logs import LoggedSticks, StickLogError, logs_with_sticks, moved
 from bench.fly.by_hand.watched import STICKS_S
-from bench.studies.hand import HandCase, agile, fly_by_hand, table
+from bench.studies.hand import HandCase, agile, fly_by_hand, text_of
 from sim_vehicle.airframe import load_built_in
 
 
@@ -96,10 +96,10 @@ def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():
         return {**vehicle, "watched_s": 3600.0, "tilt_deg": [20.0, 35.0, 50.0], "touched": False, "reported": reported}
 
     in_the_air, after = {"kind": "wall", "since_touch_s": None}, {"kind": "floor", "since_touch_s": 0.1}
-    lines = list(table([row(50, [in_the_air]), row(100, [after]), row(250, [])]))
+    lines = text_of([row(50, [in_the_air]), row(100, [after]), row(250, [])]).splitlines()
     # Then the rates' lines show one, none and none
-    assert [line.split()[4] for line in lines[1:4]] == ["1", "0", "0"]
-    assert lines[1].endswith("wall 1")
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[2:5]]
+    assert [(row[0], row[3], row[6]) for row in cells] == [("50", "1", "wall 1"), ("100", "0", ""), ("250", "0", "")]
     assert sum("seed 1" in line for line in lines) == 1
 
 

@@ -6,7 +6,8 @@ from copy import copy
 
 import pytest
 
-from bench.detectors.lateral import LateralConfig, LateralDetector
+from bench.detectors.contact import Threshold
+from bench.detectors.lateral import LateralDetector
 from companion.messages import ImuSample
 from companion.reflex.detector import Phase, Situation
 
@@ -36,8 +37,8 @@ def averaged(contact_at_us: int, speed_m_s: float, window_us: int, every_us: int
         yield ImuSample(end_us, (mean * c + wobble - 0.44, mean * s + wobble, -9.81), (0.0, 0.0, 0.0))
 
 
-def run(samples, window_us=4000, off=lambda sample: None, **config):
-    detector = LateralDetector(LateralConfig(**config), window_us)
+def run(samples, window_us=4000, off=lambda sample: None):
+    detector = LateralDetector(Threshold(threshold_m_s2=4.0), window_us)
     state, impacts, states = detector.initial(), [], []
     for sample in samples:
         state, impact = detector.step(state, sample, Situation(off(sample)))

@@ -1,18 +1,17 @@
 """Parameter identification: the arm's response by eq. 2, in closed form and in the simulated vehicle."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 
 from bench.fly.cruise import AFTER_S, HeadOnHit, head_on
+from bench.rows.paper import Floats
 from bench.studies.paper.claims import claim
 from bench.studies.paper.figures import CONTACT, finish, mark_paper, new_figure
-from bench.studies.paper.flights import StudyFlight, StudyResult
-from bench.studies.paper.study import StudyFindings
-from bench.studies.paper.track import Floats
+from bench.studies.paper.study import Findings, Study
 from sim_vehicle.airframe import load_built_in
 
 # The paper, section IV.
@@ -50,31 +49,17 @@ class SpringResponse:
         """When b_s l' + k_s l is back at zero: from here on the wall would have to pull."""
         return 2.0 * self.peak_s
 
-    def fold_m(self, time_s: Floats) -> Floats:
-        phase = self._frequency_rad_s * time_s
-        fold: Floats = self.speed_m_s / self._frequency_rad_s * np.exp(-self._decay_per_s * time_s) * np.sin(phase)
-        return fold
-
-    def rate_m_s(self, time_s: Floats) -> Floats:
-        phase = self._frequency_rad_s * time_s
-        ratio = self._decay_per_s / self._frequency_rad_s
-        rate: Floats = self.speed_m_s * np.exp(-self._decay_per_s * time_s) * (np.cos(phase) - ratio * np.sin(phase))
-        return rate
-
-    def at(self, time_s: float) -> tuple[float, float]:
+    def at(self, time_s: float | Floats) -> tuple[Floats, Floats]:
         """Fold (m) and its rate (m/s)."""
-        return float(self.fold_m(np.array(time_s))), float(self.rate_m_s(np.array(time_s)))
+        phase, left = self._frequency_rad_s * np.asarray(time_s), self.speed_m_s * np.exp(-self._decay_per_s * time_s)
+        turn = np.sin(phase) / self._frequency_rad_s
+        return left * turn, left * (np.cos(phase) - self._decay_per_s * turn)
 
 
 PAPERS = SpringResponse(DAMPING_PER_S, STIFFNESS_PER_S2, IMPACT_M_S)
 
 
-def flights(seeds: int) -> list[StudyFlight]:
-    """Nothing flies: a single hit is enough."""
-    return []
-
-
-def conclude(results: Sequence[StudyResult]) -> StudyFindings:
+def _conclude(flights: pd.DataFrame) -> Findings:
     airframe = load_built_in("foldable")
     arms, single = airframe.arms, head_on(airframe, IMPACT_M_S)
     peak_m, _ = PAPERS.at(PAPERS.peak_s)
@@ -83,24 +68,23 @@ def conclude(results: Sequence[StudyResult]) -> StudyFindings:
         claim("damping", arms.damping_per_s),
         claim("stiffness", arms.stiffness_per_s2),
         claim("fold", arms.fold_max_m),
-        claim("peak fold", single.hit.max_fold_m, peak_m),
-        claim("speed back", single.hit.rebound_speed_m_s / IMPACT_M_S, -free_m_s / IMPACT_M_S),
+        claim("peak fold", single.hit.max_fold_m, float(peak_m)),
+        claim("speed back", single.hit.rebound_speed_m_s / IMPACT_M_S, -float(free_m_s) / IMPACT_M_S),
         claim("contact", single.hit.contact_duration_s, PAPERS.force_free_s),
     )
-    return StudyFindings("Parameter identification", rows, {"arm.png": _figure(single, arms)})
+    return Findings(rows, {"arm.png": _figure(single, 1e3 * arms.hysteresis_m)})
 
 
-def _figure(single: HeadOnHit, arms: Any) -> Any:
+def _figure(single: HeadOnHit, rests_mm: float) -> Figure:
     figure, axes = new_figure(1, 1, "An arm folds and unfolds: head-on hit at 1.4 m/s", width=8.0, height=4.2)
     axis = axes[0, 0]
     time_s = np.linspace(0.0, PAPERS.half_period_s, 400)
-    fold_mm, pushed = 1e3 * PAPERS.fold_m(time_s), time_s <= PAPERS.force_free_s
+    fold_mm, pushed = 1e3 * PAPERS.at(time_s)[0], time_s <= PAPERS.force_free_s
     pulls = {"linestyle": "--", "label": "eq. 2, wall would have to pull"}
     axis.plot(time_s[pushed], fold_mm[pushed], color="tab:orange", linewidth=4, label="eq. 2, wall pushes")
     axis.plot(time_s[~pushed], fold_mm[~pushed], color="tab:orange", **pulls)
     axis.plot(single.time_s, 1e3 * single.fold_m, color="tab:blue", marker=".", label="simulated arm")
     mark_paper(axis, 1e3 * FOLD_MAX_M, f"paper: l_max = {1e3 * FOLD_MAX_M:g} mm, the stop")
-    rests_mm = 1e3 * arms.hysteresis_m
     axis.axhline(rests_mm, color="tab:green", linestyle=":", label=f"δl = {rests_mm:g} mm")
     axis.axvline(0.0, color=CONTACT, linewidth=1.1, label="first contact")
     axis.axvline(single.hit.contact_duration_s, color=CONTACT, linewidth=1.1, linestyle="--", label="wall lets go")
@@ -109,3 +93,6 @@ def _figure(single: HeadOnHit, arms: Any) -> Any:
     finish(axis, "", "fold of the arm l [mm]")
     axis.legend(fontsize=8)
     return figure
+
+
+ARM = Study("Parameter identification", lambda seeds: [], _conclude)

@@ -2,42 +2,45 @@
 
 from argparse import Namespace
 
+import pandas as pd
 from matplotlib.figure import Figure
 
-from bench.fly.campaign import Workers, worked_out
-from bench.rows.tables import Page
-from bench.studies.paper import arm, causes, directions, flight_tests, imu_rate, scenarios, single
-from bench.studies.paper.claims import ClaimRow, rows_text, verdict_text
-from bench.studies.paper.flights import fly
-from bench.studies.paper.study import Study, sampling_text
+from bench.fly.campaign import Campaign, Workers, rows_of
+from bench.rows.paper import fly
+from bench.rows.tables import Page, table
+from bench.studies.paper import arm, rigid, scenarios, single, walls
+from bench.studies.paper.claims import Claim, verdict_text
+from bench.studies.paper.study import sampling_text
 
-STUDIES: tuple[Study, ...] = (
-    arm,
+STUDIES = (
+    arm.ARM,
     scenarios.SAMPLE,
     scenarios.EXPERIMENT,
-    flight_tests,
-    causes,
-    directions,
-    imu_rate,
-    single,
+    walls.FLIGHT_TESTS,
+    rigid.WHY,
+    walls.ANY_SIDE,
+    rigid.SAMPLING,
+    single.OTHERS,
 )
 
 
 def run_paper(options: Namespace) -> int:
     """Fly everything and write it. 0 when it is written, whatever it says."""
     page = Page(options.out, "paper")
-    planned = [study.flights(options.seeds) for study in STUDIES]
-    results = worked_out(fly, [flight for flights in planned for flight in flights], Workers(options.jobs))
+    planned = [(study.title, flight) for study in STUDIES for flight in study.flights(options.seeds)]
+    campaign = Campaign("paper", {"seeds": options.seeds}, [flight for _, flight in planned], fly)
+    rows = pd.DataFrame(rows_of(campaign, Workers(options.jobs)))
+    rows.insert(0, "study", [title for title, _ in planned])
     parts: dict[str, str] = {}
     pictures: dict[str, Figure] = {}
-    rows: list[ClaimRow] = []
-    for study, flights in zip(STUDIES, planned, strict=True):
-        flown, results = results[: len(flights)], results[len(flights) :]
+    claims: list[Claim] = []
+    for study in STUDIES:
+        flown = rows[rows["study"] == study.title]
         found = study.conclude(flown)
-        parts[found.title] = f"{sampling_text(flown)}\n\n{rows_text(found.rows)}" if flown else rows_text(found.rows)
+        parts[study.title] = (f"{sampling_text(flown)}\n\n" if len(flown) else "") + table(found.rows)
         parts |= found.tables
         pictures |= found.pictures
-        rows += found.rows
-    page.write("The paper's numbers beside ours", options.typed, parts, pictures)
-    print(verdict_text(rows))
+        claims += found.rows
+    page.write("The paper's numbers beside ours", options.typed, parts, pictures, rows.drop(columns="track"))
+    print(verdict_text(claims))
     return 0

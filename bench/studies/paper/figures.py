@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from bench.studies.paper.track import StudyTrack
+from bench.fly.campaign import Json
 
 CENTRE = {"color": "tab:blue", "linewidth": 1.8}
 ASKED = {"color": "tab:orange", "linewidth": 1.4, "linestyle": "--"}
@@ -24,40 +24,40 @@ def new_figure(rows: int, columns: int, title: str, width: float = 5.2, height: 
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def draw_position(axis: Any, track: StudyTrack, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
+def draw_position(axis: Any, track: Json, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
     """Where the centre was, where it was asked to be, and the wall."""
-    asked_s, asked_m = np.append(track.setpoint_at_s, end_s), np.append(track.setpoint_m, track.setpoint_m[-1])
+    asked_s, asked_m = [*track["setpoint_at_s"], end_s], [*track["setpoint_m"], track["setpoint_m"][-1]]
     axis.plot(asked_s, asked_m, drawstyle="steps-post", label="setpoint sent", **ASKED)
-    axis.plot(track.time_s, track.place_m, label="vehicle's centre", **CENTRE)
-    axis.axhline(track.touch_m, color=WALL, linewidth=1.0, linestyle=":", label="centre when the guards touch")
-    axis.axhspan(track.wall_m, track.wall_m + 50.0, facecolor=WALL, alpha=0.35, hatch="//", label="wall")
-    if track.targets_m:
-        target_m = track.targets_m[0]
+    axis.plot(track["time_s"], track["place_m"], label="vehicle's centre", **CENTRE)
+    axis.axhline(track["touch_m"], color=WALL, linewidth=1.0, linestyle=":", label="centre when the guards touch")
+    axis.axhspan(track["wall_m"], track["wall_m"] + 50.0, facecolor=WALL, alpha=0.35, hatch="//", label="wall")
+    if track["targets_m"]:
+        target_m = track["targets_m"][0]
         axis.axhline(target_m, color=TARGET, linewidth=1.0, label="recovery setpoint (eq. 3)")
-    shown = track.place_m[(track.time_s >= start_s) & (track.time_s <= end_s)]
-    low_m = min([float(shown.min(initial=track.touch_m)), *track.targets_m[:1]])
-    axis.set_ylim(low_m - 0.15, max(track.wall_m, float(shown.max())) + 0.25)
+    places = zip(track["time_s"], track["place_m"], strict=True)
+    shown_m = [track["touch_m"], *(place_m for time_s, place_m in places if start_s <= time_s <= end_s)]
+    axis.set_ylim(min(*shown_m, *track["targets_m"][:1]) - 0.15, max(*shown_m, track["wall_m"]) + 0.25)
     axis.set_xlim(start_s, end_s)
     mark_moments(axis, track)
     finish(axis, title, "distance from take-off point\ninto the wall [m]")
 
 
-def draw_velocity(axis: Any, track: StudyTrack, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
+def draw_velocity(axis: Any, track: Json, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
     """Speed into the wall; negative is away from it."""
-    axis.plot(track.time_s, track.speed_m_s, label="vehicle's centre", **CENTRE)
+    axis.plot(track["time_s"], track["speed_m_s"], label="vehicle's centre", **CENTRE)
     axis.axhline(0.0, color="0.7", linewidth=0.8)
     axis.set_xlim(start_s, end_s)
     mark_moments(axis, track)
     finish(axis, title, "velocity into the wall [m/s]")
 
 
-def draw_fold(axis: Any, track: StudyTrack, title: str, start_s: float = -0.05, end_s: float = 0.35) -> None:
-    """How far each arm is folded."""
+def draw_fold(axis: Any, track: Json, title: str) -> None:
+    """How far each arm is folded, while the vehicle touches."""
     for arm, (name, style) in enumerate(
         (("front right", "-"), ("rear left", "-."), ("front left", "--"), ("rear right", ":"))
     ):
-        axis.plot(track.time_s, 1e3 * track.fold_m[:, arm], style, label=f"{name} arm", linewidth=1.6)
-    axis.set_xlim(start_s, end_s)
+        axis.plot(track["time_s"], 1e3 * np.array(track["fold_m"])[:, arm], style, label=f"{name} arm", linewidth=1.6)
+    axis.set_xlim(-0.05, 0.3)
     mark_moments(axis, track)
     finish(axis, title, "fold of the arm [mm]")
 
@@ -80,20 +80,20 @@ def mark_paper(axis: Any, value: float, text: str, is_time: bool = False, above:
     )
 
 
-def mark_moments(axis: Any, track: StudyTrack) -> None:
+def mark_moments(axis: Any, track: Json) -> None:
     """First touch and detection as lines; further contacts as ticks along the bottom."""
     axis.axvline(0.0, color=CONTACT, linewidth=1.1, label="first contact")
-    if track.detections_s:
-        late_ms = 1e3 * track.detections_s[0]
+    if track["detections_s"]:
+        late_ms = 1e3 * track["detections_s"][0]
         axis.axvline(
-            track.detections_s[0],
+            track["detections_s"][0],
             color=DETECTED,
             linewidth=1.1,
             linestyle="--",
             label=f"hit detected, {late_ms:.1f} ms",
         )
     low, high = axis.get_xlim()
-    further = [time_s for time_s in track.contacts_s[NAMED_CONTACTS:] if low <= time_s <= high]
+    further = [time_s for time_s in track["contacts_s"][NAMED_CONTACTS:] if low <= time_s <= high]
     if further:
         axis.plot(
             further,

@@ -22,7 +22,6 @@ HIT = {
     "closing_m_s": 2.0,
     "climbing_m_s": 0.0,
     "steepness": 0.0,
-    "bearing_deg": 0.0,
     "seen": True,
     "again": 0,
     "returned": 0,
