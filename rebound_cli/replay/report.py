@@ -55,13 +55,15 @@ def replay_log(
 
     `modes`: those in which the guard may take over; None: it watches whoever flies.
     """
-    recorded_hz = shaking(log).rate_hz
+    shakes = shaking(log)
+    recorded_hz = shakes.rate_hz
     if rate_hz is not None:
         log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
         if len(log.imu()) < 2:
             raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
+        shakes = shaking(log)
     findings = watch_log(log, config, listen=listen, modes=modes)
-    return Replay(log, config.detector, recorded_hz, shaking(log), findings, _losses(log, config), None)
+    return Replay(log, config.detector, recorded_hz, shakes, findings, _losses(log, config), None)
 
 
 def replay_flight(log: Log, recording: Recording, listener: Listener | None = None) -> Replay:

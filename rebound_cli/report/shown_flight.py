@@ -29,7 +29,7 @@ from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
 from rebound_cli.results import run_folder
 from rebound_cli.results.flight_log import FlightLog, flight_log_of, flight_log_of_log, read_flight_log
-from rebound_cli.results.truth_match import FlightTruth, Time, index_of_hit
+from rebound_cli.results.truth_match import FlightTruth, Time, index_of_hit, read_truth
 from sim_vehicle.scene import Scene
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def _in_folder(
         events=list(run_folder.read_records(folder / run_folder.EVENTS_NAME, event_lines)),
         summary=summary,
         scene=_scene(folder),
-        truth=_truth(folder / run_folder.TRUTH_NAME),
+        truth=read_truth(folder / run_folder.TRUTH_NAME),
         patches=_patches(folder / run_folder.OBSTACLES_NAME),
     )
 
@@ -180,14 +180,6 @@ def _scene(folder: Path) -> Scene | None:
         return None
     document = load_document(file)
     return validated(Scene, document, document.data.get("sim") or {}, ("sim",))
-
-
-def _truth(path: Path) -> FlightTruth | None:
-    if not path.exists():
-        return None
-    from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
-
-    return FlightTruth(*load_truth(path), load_faults(path), load_stalls(path))
 
 
 def _patches(path: Path) -> Sequence[Patch]:
