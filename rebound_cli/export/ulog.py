@@ -156,10 +156,13 @@ def positions_us(log: Log) -> list[int]:
 
 
 def _own_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
-    """What the companion knew and PX4 did not: its events, its hits, its setpoints."""
-    texts = [(float(e["time_us"]), _WARNING if e["kind"] in HIT_KINDS else _INFO, e) for e in flight.events]
-    for time_us, (_, level, event) in zip(boot_us(log, [at for at, *_ in texts]), texts, strict=True):
-        yield Row(int(time_us), None, (level, f"[rebound] {event.get('text', '')}"))
+    """What was said, and what the companion knew and PX4 did not: its events, its hits, its setpoints."""
+    texts = [(at_us, _INFO, text) for at_us, text in flight.log.texts]
+    for event in flight.events:
+        level = _WARNING if event["kind"] in HIT_KINDS else _INFO
+        texts.append((event["time_us"], level, f"[rebound] {event.get('text', '')}"))
+    for time_us, (_, *said) in zip(boot_us(log, [at_us for at_us, *_ in texts]), texts, strict=True):
+        yield Row(int(time_us), None, said)
     for impact in flight.findings.impacts:
         # Words have no place in a topic: they are in the event's text.
         hit = {name: value for name, value in finding_data(impact).items() if not isinstance(value, str)}
@@ -191,9 +194,6 @@ def new_ulog(flight: ShownFlight, log: Log) -> bytes:
         for kind, name, fields, values in _TOPICS
         if type(one.sample) is kind
     ]
-    said = flight.log.texts
-    times_us = boot_us(log, [at_us for at_us, _ in said])
-    rows += [Row(int(time_us), None, (_INFO, text)) for time_us, (_, text) in zip(times_us, said, strict=True)]
     rows += _own_rows(flight, log)
     rows += _true_rows(flight, log)
     started_us = min(row.boot_us for row in rows)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from pymavlink.DFReader import DFReader_binary, DFReader_text
+from pymavlink.mavutil import mode_mapping_acm
 
 from companion import messages
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4
@@ -58,40 +59,30 @@ _OTHER_FIRMWARE = {"Plane": 1, "Rover": 10, "Sub": 12, "Blimp": 7, "AntennaTrack
 _QUADROTOR, _HELICOPTER = 2, 4
 _FRAMES = {2: 13, 3: 14, 4: 14, 5: 13, 6: 4, 7: 15, 8: 3, 9: 3, 10: 23, 11: 4, 12: 29, 13: 4, 14: 35}
 
-# Copter's mode numbers (ArduCopter/mode.h) to the modes of PX4 that do the same. By what sticks ask for: STABILIZED, an
-# attitude and a thrust; ALTCTL, an attitude and a climb rate; POSCTL, a velocity.
+# Copter's modes (ArduCopter/mode.h; pymavlink has their numbers) to the modes of PX4 that do the same. By what sticks
+# ask for: STABILIZED, an attitude and a thrust; ALTCTL, an attitude and a climb rate; POSCTL, a velocity.
 _MANUAL, _ALTCTL, _ACRO, _STABILIZED = (main << 16 for main in (1, 2, 5, 7))
 _AUTO_TAKEOFF, _AUTO_MISSION, _AUTO_RTL, _AUTO_FOLLOW = (4 << 16 | sub << 24 for sub in (2, 4, 5, 8))
 _MODES = {
-    0: ("STABILIZE", _STABILIZED),
-    1: ("ACRO", _ACRO),
-    2: ("ALT_HOLD", _ALTCTL),
-    3: ("AUTO", _AUTO_MISSION),
-    4: ("GUIDED", OFFBOARD),
-    5: ("LOITER", POSCTL),
-    6: ("RTL", _AUTO_RTL),
-    7: ("CIRCLE", POSCTL),
-    8: ("POSITION", _STABILIZED),  # until 3.2: holds its place, with the throttle by hand
-    9: ("LAND", AUTO_LAND),
-    10: ("OF_LOITER", POSCTL),
-    11: ("DRIFT", _STABILIZED),
-    13: ("SPORT", _ALTCTL),
-    14: ("FLIP", _ACRO),
-    15: ("AUTOTUNE", _ALTCTL),
-    16: ("POSHOLD", POSCTL),
-    17: ("BRAKE", AUTO_LOITER),
-    18: ("THROW", _AUTO_TAKEOFF),
-    19: ("AVOID_ADSB", AUTO_LOITER),
-    20: ("GUIDED_NOGPS", OFFBOARD),
-    21: ("SMART_RTL", _AUTO_RTL),
-    22: ("FLOWHOLD", POSCTL),
-    23: ("FOLLOW", _AUTO_FOLLOW),
-    24: ("ZIGZAG", POSCTL),
-    25: ("SYSTEMID", _STABILIZED),
-    27: ("AUTO_RTL", _AUTO_RTL),
-    28: ("TURTLE", _MANUAL),
+    mode: px4
+    for px4, modes in (
+        (_MANUAL, "TURTLE"),
+        # Until 3.2 POSITION holds its place, with the throttle by hand.
+        (_STABILIZED, "STABILIZE POSITION DRIFT SYSTEMID"),
+        (_ACRO, "ACRO FLIP"),
+        (_ALTCTL, "ALT_HOLD SPORT AUTOTUNE"),
+        (POSCTL, "LOITER CIRCLE OF_LOITER POSHOLD FLOWHOLD ZIGZAG"),
+        (OFFBOARD, "GUIDED GUIDED_NOGPS"),
+        (AUTO_LOITER, "BRAKE AVOID_ADSB"),
+        (AUTO_LAND, "LAND"),
+        (_AUTO_TAKEOFF, "THROW"),
+        (_AUTO_MISSION, "AUTO"),
+        (_AUTO_RTL, "RTL SMART_RTL AUTO_RTL"),
+        (_AUTO_FOLLOW, "FOLLOW"),
+    )
+    for mode in modes.split()
 }
-_MODE_NUMBERS = {name.replace("_", ""): number for number, (name, _) in _MODES.items()}
+_MODE_NUMBERS = {name.replace("_", ""): number for number, name in mode_mapping_acm.items()}
 
 # EV.Id (LogEvent in AP_Logger.h).
 _ARMED, _DISARMED, _LAND_COMPLETE, _NOT_LANDED = 10, 11, 18, 28
@@ -418,7 +409,7 @@ def _heartbeats(events: Topic, modes: Topic) -> Iterator[LoggedSample]:
     news += [(time_us, event, 0) for time_us, event in arming]
     for time_us, event, number in sorted(news, key=lambda item: item[0]):
         if event is None:
-            mode = _MODES.get(number, ("", 0))[1]
+            mode = _MODES.get(mode_mapping_acm.get(number, ""), 0)
         elif event == _ARMED and armed:
             # Most logs of 2014 end with the disarming, before it is written, and go on with the next arming.
             yield _heartbeat(time_us, False, mode)

@@ -105,14 +105,6 @@ class Span:
         return (self.end_us - self.start_us) * 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class Happening:
-    """A line of the timeline that is no impact."""
-
-    at_us: int
-    text: str
-
-
 @dataclass(slots=True)
 class Findings:
     """Grows step by step."""
@@ -120,7 +112,7 @@ class Findings:
     impacts: list[Finding] = field(default_factory=list)
     blind: list[Span] = field(default_factory=list)
     off: list[Span] = field(default_factory=list)
-    happenings: list[Happening] = field(default_factory=list)
+    happenings: list[tuple[int, str]] = field(default_factory=list)  # the timeline without impacts: when and what
     flown_us: int = 0  # armed and in the air
     watched_us: int = 0  # of that, with a detector that was on and saw
     promised: float = 0.0  # false alarms in that time, by the detector's own statistic
@@ -179,7 +171,7 @@ class Findings:
             (self.blind if name == "blind" else self.off).append(Span(start_us, at_us, first_reason))
 
     def tell(self, at_us: int, text: str) -> None:
-        self.happenings.append(Happening(at_us, text))
+        self.happenings.append((at_us, text))
 
     def close(self, at_us: int) -> None:
         self._note_span("blind", None, at_us)

@@ -157,7 +157,7 @@ def replayed_flight(replay: Replay, config: CompanionConfig, listener: Listener)
         config=config,
         findings=replay.findings,
         listener=listener,
-        events=[{"time_us": one.at_us, "kind": _kind(one.text), "text": one.text, "data": {}} for one in told],
+        events=[{"time_us": at_us, "kind": _kind(text), "text": text, "data": {}} for at_us, text in told],
     )
 
 
