@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion import messages
-from rebound_cli.logs.log import Demand, Log, LoggedSample
+from rebound_cli.logs.log import QUADROTOR, Demand, Log, LoggedSample
 from rebound_cli.logs.ulog import NAV_STATES
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.shown_flight import ShownFlight
@@ -29,8 +29,8 @@ _LETTERS = {"float": "f", "double": "d", "uint8_t": "B", "uint32_t": "I", "uint6
 # Of a logged message: Linux's levels, as digits.
 _WARNING, _INFO = b"4", b"6"
 _UNSET = (math.nan,) * 3
-# MAV_STATE of a failsafe; vehicle_status.NAVIGATION_STATE_MAX, which is no mode; MAV_TYPE.
-_CRITICAL, _NO_MODE, _QUADROTOR = 5, 31, 2
+# MAV_STATE of a failsafe; vehicle_status.NAVIGATION_STATE_MAX, which is no mode.
+_CRITICAL, _NO_MODE = 5, 31
 
 _POSITION = "float x;float y;float z;float vx;float vy;float vz"
 _VALID = "bool xy_valid;bool z_valid;bool v_xy_valid;bool v_z_valid"
@@ -200,7 +200,7 @@ def new_ulog(flight: ShownFlight, log: Log) -> bytes:
     head = _MAGIC + struct.pack("<Q", started_us) + _message("B", bytes(_FLAG_BITS_SIZE))
     head += _keyed("I", "char[7] sys_name", b"Rebound")
     kinds = (one.sample.vehicle_type for one in heard if isinstance(one.sample, messages.Heartbeat))
-    kind = next(kinds, _QUADROTOR)
+    kind = next(kinds, QUADROTOR)
     head += _keyed("P", "int32_t MAV_TYPE", struct.pack("<i", kind))
     return _with_rows(head, rows)
 

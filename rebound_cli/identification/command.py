@@ -5,7 +5,7 @@ import math
 from argparse import Namespace
 from pathlib import Path
 
-from rebound_cli.documents import load_document, parse_document, validated, write_text
+from rebound_cli.documents import load_document, parse_document, refuse_existing, validated, write_text
 from rebound_cli.identification.fit import Identified, Number, Spring, identify
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
@@ -18,8 +18,7 @@ from sim_vehicle.airframe import Airframe, load_built_in, with_base
 def run_identify(options: Namespace) -> int:
     """Print what the hits show and, with --out, write it as an airframe file. Raises IdentificationError."""
     out: Path | None = options.out
-    if out is not None and out.exists():
-        raise IdentificationError(f"{out} exists already: give --out another name.")
+    refuse_existing(out)
     found = identify([_hit(path) for path in options.data])
     mass_kg = _mass_kg(options)
     print(report_text(found), end="")

@@ -21,9 +21,19 @@ from pymavlink.DFReader import DFReader_binary, DFReader_text
 from pymavlink.mavutil import mode_mapping_acm
 
 from companion import messages
-from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
-from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, in_order, multicopter, slow_velocity, vector
+from rebound_cli.logs.log import (
+    QUADROTOR,
+    Demand,
+    Log,
+    LogError,
+    LoggedSample,
+    heartbeat,
+    in_order,
+    multicopter,
+    slow_velocity,
+    vector,
+)
 from rebound_cli.logs.topic import Floats, Topic
 
 # Each binary message begins with these two bytes; 128 is the type of FMT, whose own begins with a type and a length.
@@ -56,7 +66,7 @@ _COSTS = {
 _FIRMWARE = re.compile(r"(?:Ardu|APM:)?(Copter|Plane|Rover|Sub|Blimp|AntennaTracker) ?[vV]\d")
 _OTHER_FIRMWARE = {"Plane": 1, "Rover": 10, "Sub": 12, "Blimp": 7, "AntennaTracker": 5}
 # FRAME_CLASS to MAV_TYPE (AP_Motors_Class.h). Firmware without it is of one frame, and only helicopters are told here.
-_QUADROTOR, _HELICOPTER = 2, 4
+_HELICOPTER = 4
 _FRAMES = {2: 13, 3: 14, 4: 14, 5: 13, 6: 4, 7: 15, 8: 3, 9: 3, 10: 23, 11: 4, 12: 29, 13: 4, 14: 35}
 
 # Copter's modes (ArduCopter/mode.h; pymavlink has their numbers) to the modes of PX4 that do the same. By what sticks
@@ -106,8 +116,6 @@ _FIX_3D = 3
 _METRES_PER_DEGREE = math.radians(6_371_000.0)
 # AHRS_EKF_TYPE to that estimator's message; EKF1 is of the one before them.
 _ESTIMATORS = {2: "NKF1", 3: "XKF1"}
-# MAV_STATE
-_STANDBY, _ACTIVE = 3, 4
 # The estimator's own word, SS (nav_filter_status): horizontal and vertical velocity are good.
 _GOOD = {"horizontal velocity": 2, "vertical velocity": 4}
 # INS_ACCEL_FILTER's default, and what 0 means to INS_MPU6K_FILTER, which had this place until 3.3.
@@ -239,7 +247,7 @@ def _vehicle(path: Path, texts: Sequence[str], parameters: _Parameters) -> str:
     told = next(((text, found[1]) for text in texts if (found := _FIRMWARE.match(text))), None)
     if told is None:
         raise LogError(f"{path}: it does not say what vehicle it is of: no message with ArduPilot's name and version.")
-    kind = _OTHER_FIRMWARE.get(told[1]) or _FRAMES.get(int(parameters.get("FRAME_CLASS", 0)), _QUADROTOR)
+    kind = _OTHER_FIRMWARE.get(told[1]) or _FRAMES.get(int(parameters.get("FRAME_CLASS", 0)), QUADROTOR)
     if any(text.startswith("Frame: HELI") for text in texts):
         kind = _HELICOPTER
     return f"{told[0]}, {multicopter(path, kind).vehicle_type}"
@@ -412,15 +420,9 @@ def _heartbeats(events: Topic, modes: Topic) -> Iterator[LoggedSample]:
             mode = _MODES.get(mode_mapping_acm.get(number, ""), 0)
         elif event == _ARMED and armed:
             # Most logs of 2014 end with the disarming, before it is written, and go on with the next arming.
-            yield _heartbeat(time_us, False, mode)
+            yield LoggedSample(time_us, heartbeat(QUADROTOR, False, mode))
         armed = armed if event is None else event == _ARMED
-        yield _heartbeat(time_us, armed, mode)
-
-
-def _heartbeat(time_us: int, armed: bool, mode: int) -> LoggedSample:
-    status = _ACTIVE if armed else _STANDBY
-    beat = messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, _QUADROTOR, MAV_AUTOPILOT_PX4, armed, mode, status)
-    return LoggedSample(time_us, beat)
+        yield LoggedSample(time_us, heartbeat(QUADROTOR, armed, mode))
 
 
 def _landed_states(topic: Topic, started_us: int) -> Iterator[LoggedSample]:

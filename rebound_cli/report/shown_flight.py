@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -130,7 +129,7 @@ def _in_folder(
     folder: Path, settings: Mission | GuardConfig, findings: Findings, listener: Listener, event_lines: str
 ) -> ShownFlight:
     """All but the log."""
-    summary = _summary(folder)
+    summary = run_folder.read_summary(folder)
     return ShownFlight(
         name=str((summary or {}).get("mission", folder.resolve().name)),
         started_at_us=0,
@@ -164,13 +163,6 @@ def replayed_flight(replay: Replay, config: CompanionConfig, listener: Listener)
 def _kind(text: str) -> str:
     """Of a line of a foreign log's timeline."""
     return "mode" if text.startswith("mode ") else text if text in ("armed", "disarmed", "landed", "took off") else ""
-
-
-def _summary(folder: Path) -> Mapping[str, Any] | None:
-    """None of a flight that was cut off."""
-    with suppress(FileNotFoundError, ValueError):
-        return dict(json.loads((folder / run_folder.SUMMARY_NAME).read_text(encoding="utf-8")))
-    return None
 
 
 def _scene(folder: Path) -> Scene | None:

@@ -5,17 +5,15 @@ import math
 import textwrap
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from companion.errors import ConfigurationError
 from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
-from rebound_cli.documents import parse_document, validated, write_text
+from rebound_cli.documents import parse_document, refuse_existing, validated, write_text
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import console_for
 from rebound_cli.logs.log import Log, LogError
@@ -23,7 +21,7 @@ from rebound_cli.logs.reader import read_log
 from rebound_cli.logs.shaking import FLYING, Stage, clipped
 from rebound_cli.replay.recording import log_file
 from rebound_cli.replay.report import Replay, replay_log
-from rebound_cli.results.run_folder import SUMMARY_NAME
+from rebound_cli.results.run_folder import read_summary
 from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
 SCHEMA = 2
@@ -41,8 +39,7 @@ _LEAST_FLYING_S = 3.0
 def run_tune(options: Namespace) -> int:
     """Print what the flights say and the settings; with --out write these. Raises LogError, ConfigurationError."""
     console, out = console_for(options.json), options.out
-    if out is not None and out.exists():
-        raise ConfigurationError(f"{out} exists already: give --out another name.")
+    refuse_existing(out)
     config = companion_settings(options.companion, (), options.detector)
     flights = [read_healthy(path, config) for path in options.logs]
     logs = [flight.log for flight in flights]
@@ -70,7 +67,7 @@ def read_healthy(path: Path, config: CompanionConfig) -> Replay:
     Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing.
     """
     log = read_log(log_file(path))
-    hits = _told_hits(path)
+    hits = len((read_summary(path) or {}).get("collisions", ()))
     wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else crash(log)
     if wrong is not None:
         raise LogError(f"{path}: not a healthy flight, {wrong}; tune learns from flights without a hit or a crash.")
@@ -81,13 +78,6 @@ def read_healthy(path: Path, config: CompanionConfig) -> Replay:
     if flying_s < _LEAST_FLYING_S:
         raise LogError(f"{path}: too short a flight to learn from; a minute in the air is a good one.")
     return flight
-
-
-def _told_hits(folder: Path) -> int:
-    """Collisions that the summary of our own flight tells; 0 where there is none to read."""
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return len(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8"))["collisions"])
-    return 0
 
 
 def crash(log: Log) -> str | None:
