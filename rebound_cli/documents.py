@@ -144,6 +144,12 @@ def write_text(path: Path, text: str) -> None:
         raise DocumentError(f"{path}: cannot be written: {error.strerror}.") from error
 
 
+def refuse_existing(out: Path | None) -> None:
+    """Before long work whose file would take another's place. Raises DocumentError."""
+    if out is not None and out.exists():
+        raise DocumentError(f"{out} exists already: give --out another name.")
+
+
 def _line(node: yaml.Node) -> int:
     return int(node.start_mark.line) + 1
 

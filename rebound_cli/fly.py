@@ -28,7 +28,7 @@ from rebound_cli.results import run_folder
 from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
-from rebound_cli.results.truth_match import FlightTruth
+from rebound_cli.results.truth_match import read_truth
 from rebound_cli.simulation.compiling import prepare_vehicle
 from rebound_cli.simulation.vehicle_process import READY_WORDS, VehicleProcess
 
@@ -146,8 +146,6 @@ def _fly_connected(
 
 def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -> Flown:
     """A simulated vehicle of our own; or its body, for the PX4 that the person starts, at the connection `px4`."""
-    from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
-
     waits = ""
     if px4 is None:
         own, words = udp_in("127.0.0.1", 0), READY_WORDS
@@ -169,11 +167,7 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
             pass
         flown = _fly_connected(flight, px4 or own, ConfirmAtOnce())
         vehicle.check_running()
-    path = flight.folder / run_folder.TRUTH_NAME
-    if not path.exists():
-        # PX4 never flew.
-        return flown
-    return replace(flown, truth=FlightTruth(*load_truth(path), load_faults(path), load_stalls(path)))
+    return replace(flown, truth=read_truth(flight.folder / run_folder.TRUTH_NAME))
 
 
 def _fly_lockstep(flight: Flight) -> Flown:

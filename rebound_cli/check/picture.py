@@ -1,7 +1,7 @@
 """A mission from above and from the side: the ways, the fence, and the simulated world's obstacles."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from companion.fence import Fence
-from companion.flight.plan import describe_after_recovery, describe_limit
-from companion.mission.items import program
 from companion.mission.model import Mission
 from rebound_cli.check.legs import FlownLeg
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches, footprint
@@ -44,9 +42,10 @@ def draw_mission(path: Path, mission: Mission, scene: Scene, legs: Sequence[Flow
     above, side = figure.subplots(1, 2)
     _draw_from_above(above, mission, scene, legs)
     _draw_heights(side, mission.fence, legs)
-    policies = "\n".join(_policies(mission, scene))
+    moves = any(obstacle.motion for _, obstacle in scene.obstacles())
+    clock = "Obstacles' times: s since the vehicle's boot, which is some seconds before arming." if moves else None
     shown = above.get_legend_handles_labels()
-    figure.legend(*shown, loc="outside lower center", ncols=8, fontsize=8, title=policies, title_fontsize=9)
+    figure.legend(*shown, loc="outside lower center", ncols=8, fontsize=8, title=clock, title_fontsize=9)
     known = legs[-1].ends_s
     lasts = "" if known is None else f", {known:.0f} s"
     figure.suptitle(f"Mission '{mission.name}': {sum(flown.length_m for flown in legs):.0f} m{lasts} if nothing is hit")
@@ -68,46 +67,12 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, legs: Sequence[F
         if flown.meets:
             label = None if any(before.meets for before in legs[:number]) else "would be hit"
             axis.plot(*points[flown.meets.index, 1::-1], "x", color=_MEETING, label=label, linestyle="none")
-    for number, (start_ned_m, end_ned_m) in enumerate(after_hits(mission, legs)):
-        along = {"linestyle": ":", "color": _MEETING, "marker": "v", "markevery": [1], "markersize": 5}
-        label = "then flies or lands here" if number == 0 else None
-        axis.plot(*np.array([start_ned_m, end_ned_m])[:, 1::-1].T, label=label, **along)
     for (north, east), numbers in ends(legs).items():
         axis.annotate(", ".join(numbers), (east, north), **_BESIDE)
     axis.plot([0.0], [0.0], "^", color="black", label="arming position")
     axis.set(title="From above; numbers are items", xlabel="east [m]", ylabel="north [m]")
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(alpha=0.3)
-
-
-def after_hits(mission: Mission, legs: Sequence[FlownLeg]) -> list[tuple[Floats, Floats]]:
-    """From where each way would be hit to where the mission goes on after the recovery, if it is the first hit."""
-    found = []
-    for number, flown in enumerate(legs):
-        if flown.meets is not None:
-            policy = flown.leg.step.item.on_collision or mission.on_collision
-            then = policy.after_max_hits if policy.max_hits == 1 else policy.then
-            here = flown.points_ned_m[flown.meets.index]
-            following = [later.points_ned_m[-1] for later in legs[number + 1 :] if later.length_m]
-            goes_to = {
-                **dict.fromkeys(("hold", "continue"), (following or [here])[0]),
-                **dict.fromkeys(("retry", "detour"), flown.points_ned_m[-1]),
-                "return": np.zeros(3),
-            }
-            found.append((here, goes_to.get(then, here)))
-    return found
-
-
-def _policies(mission: Mission, scene: Scene) -> Iterator[str]:
-    """What follows a hit, wherever it is; and by which clock obstacles move."""
-    general = mission.on_collision
-    yield f"On a hit: recover, then {describe_after_recovery(general)}; {describe_limit(general)}."
-    for step in program(mission.items):
-        policy = step.item.on_collision
-        if policy is not None:
-            yield f"In item {step.label}: then {describe_after_recovery(policy)}; {describe_limit(policy)}."
-    if any(obstacle.motion for _, obstacle in scene.obstacles()):
-        yield "Obstacles' times: s since the vehicle's boot, which is some seconds before arming."
 
 
 def ends(legs: Sequence[FlownLeg]) -> dict[tuple[float, float], list[str]]:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion import messages
-from rebound_cli.logs.log import Demand, Log, LoggedSample
+from rebound_cli.logs.log import QUADROTOR, Demand, Log, LoggedSample
 from rebound_cli.logs.ulog import NAV_STATES
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.shown_flight import ShownFlight
@@ -29,8 +29,8 @@ _LETTERS = {"float": "f", "double": "d", "uint8_t": "B", "uint32_t": "I", "uint6
 # Of a logged message: Linux's levels, as digits.
 _WARNING, _INFO = b"4", b"6"
 _UNSET = (math.nan,) * 3
-# MAV_STATE of a failsafe; vehicle_status.NAVIGATION_STATE_MAX, which is no mode; MAV_TYPE.
-_CRITICAL, _NO_MODE, _QUADROTOR = 5, 31, 2
+# MAV_STATE of a failsafe; vehicle_status.NAVIGATION_STATE_MAX, which is no mode.
+_CRITICAL, _NO_MODE = 5, 31
 
 _POSITION = "float x;float y;float z;float vx;float vy;float vz"
 _VALID = "bool xy_valid;bool z_valid;bool v_xy_valid;bool v_z_valid"
@@ -156,10 +156,13 @@ def positions_us(log: Log) -> list[int]:
 
 
 def _own_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
-    """What the companion knew and PX4 did not: its events, its hits, its setpoints."""
-    texts = [(float(e["time_us"]), _WARNING if e["kind"] in HIT_KINDS else _INFO, e) for e in flight.events]
-    for time_us, (_, level, event) in zip(boot_us(log, [at for at, *_ in texts]), texts, strict=True):
-        yield Row(int(time_us), None, (level, f"[rebound] {event.get('text', '')}"))
+    """What was said, and what the companion knew and PX4 did not: its events, its hits, its setpoints."""
+    texts = [(at_us, _INFO, text) for at_us, text in flight.log.texts]
+    for event in flight.events:
+        level = _WARNING if event["kind"] in HIT_KINDS else _INFO
+        texts.append((event["time_us"], level, f"[rebound] {event.get('text', '')}"))
+    for time_us, (_, *said) in zip(boot_us(log, [at_us for at_us, *_ in texts]), texts, strict=True):
+        yield Row(int(time_us), None, said)
     for impact in flight.findings.impacts:
         # Words have no place in a topic: they are in the event's text.
         hit = {name: value for name, value in finding_data(impact).items() if not isinstance(value, str)}
@@ -191,16 +194,13 @@ def new_ulog(flight: ShownFlight, log: Log) -> bytes:
         for kind, name, fields, values in _TOPICS
         if type(one.sample) is kind
     ]
-    said = flight.log.texts
-    times_us = boot_us(log, [at_us for at_us, _ in said])
-    rows += [Row(int(time_us), None, (_INFO, text)) for time_us, (_, text) in zip(times_us, said, strict=True)]
     rows += _own_rows(flight, log)
     rows += _true_rows(flight, log)
     started_us = min(row.boot_us for row in rows)
     head = _MAGIC + struct.pack("<Q", started_us) + _message("B", bytes(_FLAG_BITS_SIZE))
     head += _keyed("I", "char[7] sys_name", b"Rebound")
     kinds = (one.sample.vehicle_type for one in heard if isinstance(one.sample, messages.Heartbeat))
-    kind = next(kinds, _QUADROTOR)
+    kind = next(kinds, QUADROTOR)
     head += _keyed("P", "int32_t MAV_TYPE", struct.pack("<i", kind))
     return _with_rows(head, rows)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder
 from rebound_cli.live.console import console_for
-from rebound_cli.results.run_folder import EVENTS_NAME, RunFolderError, read_records
+from rebound_cli.results.run_folder import EVENTS_NAME, RunFolderError, read_records, read_summary
 
 
 def run_list(options: Namespace) -> int:
@@ -30,7 +30,7 @@ def run_show(options: Namespace) -> int:
     told = overview(flight)
     events = list(read_records(flight.folder / EVENTS_NAME, "".join(flight.event_lines())))
     if options.json:
-        print(json.dumps({**told, "summary": flight.summary(), "events": events}, indent=2))
+        print(json.dumps({**told, "summary": read_summary(flight.folder), "events": events}, indent=2))
         return 0
     console = console_for(False)
     console.print(f"{told['name']}: {told['end']}; {told['hits']} hits, {told['size_bytes'] / 1e6:.1f} MB")
@@ -46,7 +46,7 @@ def overview(flight: KeptFlight) -> dict[str, Any]:
         ends = list(read_records(flight.folder / EVENTS_NAME, "".join([*lines[:1], *lines[-1:]])))
     except RunFolderError:
         lines, ends = [], []
-    summary = flight.summary()
+    summary = read_summary(flight.folder)
     end = "cut off" if summary is None else str(summary.get("reason") or summary.get("outcome"))
     return {
         "name": flight.name,

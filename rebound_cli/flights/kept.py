@@ -5,15 +5,13 @@ Files are looked at and removed where the log is written, not in the flight's ow
 
 import errno
 import fcntl
-import json
 import os
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from companion.errors import ReboundError
 from companion.mission.config import DiskConfig
@@ -91,12 +89,6 @@ class KeptFlight:
             return False
         shutil.rmtree(going, ignore_errors=True)
         return True
-
-    def summary(self) -> Mapping[str, Any] | None:
-        """None of a flight that is not over, or was cut off."""
-        with suppress(OSError, ValueError):
-            return dict(json.loads((self.folder / run_folder.SUMMARY_NAME).read_text(encoding="utf-8")))
-        return None
 
 
 def hits_in(lines: Sequence[str]) -> int:

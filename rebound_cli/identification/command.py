@@ -5,7 +5,7 @@ import math
 from argparse import Namespace
 from pathlib import Path
 
-from rebound_cli.documents import load_document, parse_document, validated, write_text
+from rebound_cli.documents import load_document, parse_document, refuse_existing, validated, write_text
 from rebound_cli.identification.fit import Identified, Number, Spring, identify
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
@@ -18,8 +18,7 @@ from sim_vehicle.airframe import Airframe, load_built_in, with_base
 def run_identify(options: Namespace) -> int:
     """Print what the hits show and, with --out, write it as an airframe file. Raises IdentificationError."""
     out: Path | None = options.out
-    if out is not None and out.exists():
-        raise IdentificationError(f"{out} exists already: give --out another name.")
+    refuse_existing(out)
     found = identify([_hit(path) for path in options.data])
     mass_kg = _mass_kg(options)
     print(report_text(found), end="")
@@ -57,10 +56,10 @@ def report_text(found: Identified) -> str:
     """Markdown: the hits and the numbers."""
     rows = [
         f"{hit.name} | {hit.at_s:.2f} s | {hit.guards} | {hit.speed_in_m_s:.3f} m/s | {hit.speed_out_m_s:.3f} ± "
-        f"{hit.speed_sigma_m_s:.3f} m/s | {hit.ratio:.2f} | {hit.along_in_m_s:.2f}, {hit.along_out_m_s:.2f} m/s"
+        f"{hit.speed_sigma_m_s:.3f} m/s | {hit.ratio:.2f}"
         for hit in found.hits
     ]
-    head = "hit | at | guards | in | out | ratio | along the wall, in and out"
+    head = "hit | at | guards | in | out | ratio"
     table = [f"| {head} |", "|" + "---|" * (head.count("|") + 1), *(f"| {row} |" for row in rows), ""]
     return "\n".join([*table, *_numbers(found)]) + "\n"
 
@@ -78,8 +77,6 @@ def _numbers(found: Identified) -> list[str]:
         )
     if found.stop_m is not None:
         lines.append(f"- stop of the arms met after {1e3 * found.stop_m:.0f} mm")
-    if found.friction is not None:
-        lines.append(f"- friction along the wall at least {_text(found.friction, 2)}")
     return lines
 
 
@@ -92,10 +89,6 @@ def airframe_text(found: Identified, name: str, mass_kg: float, base_name: str, 
     scale = mass_kg / base.mass_kg
     inertia = ", ".join(f"{scale * value:.5g}" for value in base.inertia_kg_m2)
     description = f"Contact identified from {', '.join(hit.name for hit in found.hits)}"
-    friction = found.friction
-    surface = ""
-    if friction is not None:
-        surface = f"\n\nsurface: {{guard_friction: {friction.value:.3f}}}   # at least; ± {friction.sigma:.3f}"
     return f"""\
 # Number of hits: {len(found.hits)}. Made by `rebound identify`; ± is one standard deviation.
 based_on: {base_name}
@@ -108,7 +101,7 @@ inertia_kg_m2: [{inertia}]
 motors: {{max_thrust_n: {scale * base.motors.max_thrust_n:.4g}}}
 
 arms:
-{_rigid(found) if found.spring is None else _sprung(found, found.spring, base_name, base)}{surface}
+{_rigid(found) if found.spring is None else _sprung(found, found.spring, base_name, base)}
 """
 
 

@@ -63,28 +63,11 @@ def _phase(ratio: float) -> float:
 
 def fit_restitution(hits: Sequence[Hit]) -> Number:
     """The mean ratio; its standard error from the spread of the hits, or from the noise if there is one."""
-    noise = [hit.speed_sigma_m_s * math.hypot(1, hit.ratio) / hit.speed_in_m_s for hit in hits]
-    return _mean([hit.ratio for hit in hits], noise)
-
-
-def fit_friction(hits: Sequence[Hit]) -> Number | None:
-    """Coulomb's coefficient at least: change of speed along the wall over change across it, of oblique hits.
-
-    A guard that stops sliding, because the hit has set the vehicle turning, rolls off with less than that.
-    """
-    oblique = [hit for hit in hits if abs(hit.along_in_m_s) > hit.speed_in_m_s / 2]
-    if not oblique:
-        return None
-    noise = [1.5 * h.speed_sigma_m_s / h.normal_change_m_s for h in oblique]
-    found = _mean([(abs(h.along_in_m_s) - abs(h.along_out_m_s)) / h.normal_change_m_s for h in oblique], noise)
-    return Number(max(0.0, found.value), found.sigma)
-
-
-def _mean(values: Sequence[float], noise: Sequence[float]) -> Number:
-    sigma = math.hypot(*noise) / len(values)
-    if len(values) > 1:
-        sigma = max(sigma, float(np.std(values, ddof=1)) / math.sqrt(len(values)))
-    return Number(float(np.mean(values)), sigma)
+    ratios = [hit.ratio for hit in hits]
+    sigma = math.hypot(*(hit.speed_sigma_m_s * math.hypot(1, hit.ratio) / hit.speed_in_m_s for hit in hits)) / len(hits)
+    if len(hits) > 1:
+        sigma = max(sigma, float(np.std(ratios, ddof=1)) / math.sqrt(len(hits)))
+    return Number(float(np.mean(ratios)), sigma)
 
 
 def _linear(design: Floats, measured: Floats) -> tuple[Floats, Floats]:
@@ -155,7 +138,6 @@ class Identified:
     hits: Sequence[Hit]
     restitution: Number
     spring: Spring | None
-    friction: Number | None
 
     @property
     def deepest_m(self) -> float:
@@ -169,4 +151,4 @@ class Identified:
 
 
 def identify(hits: Sequence[Hit]) -> Identified:
-    return Identified(hits, fit_restitution(hits), fit_spring(hits), fit_friction(hits))
+    return Identified(hits, fit_restitution(hits), fit_spring(hits))

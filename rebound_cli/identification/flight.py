@@ -75,7 +75,6 @@ def _hit(name: str, log: FlightLog, touch: int, release: int) -> Hit | None:
     speed_in, speed_out = float(-arriving @ away), float(leaving @ away)
     if speed_in < _SLOWEST_HIT_M_S or speed_out <= 0:
         return None
-    along = np.array([-away[1], away[0]])
     pushed = force[:, :2].sum(axis=0)
     push, stop_m = _push(log, touch, pushed / np.linalg.norm(pushed), speed_in)
     return Hit(
@@ -84,8 +83,6 @@ def _hit(name: str, log: FlightLog, touch: int, release: int) -> Hit | None:
         speed_in_m_s=speed_in,
         speed_out_m_s=speed_out,
         speed_sigma_m_s=_CARRIED_SIGMA_M_S if is_clipped else _SPEED_SIGMA_M_S,
-        along_in_m_s=float(arriving @ along),
-        along_out_m_s=float(leaving @ along),
         guards=guards_at(float(np.arctan2(pushed[1], pushed[0]))),
         push=push,
         stop_m=stop_m,

@@ -27,15 +27,13 @@ class Push:
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """One hit. Speeds are of the centre of mass; `along` is the horizontal component in the wall's face."""
+    """One hit. Speeds are of the centre of mass, across the wall's face."""
 
     name: str
     at_s: float  # of the data's own clock
     speed_in_m_s: float  # the greatest towards the wall before it
     speed_out_m_s: float  # the greatest away from the wall after it
     speed_sigma_m_s: float  # standard deviation of either speed
-    along_in_m_s: float
-    along_out_m_s: float
     guards: int  # that meet the wall: 2 head-on, 1 with the nose turned by 45 degrees
     push: Push | None = None
     stop_m: float | None = None  # depth at which the stop of the arms was met, if it was

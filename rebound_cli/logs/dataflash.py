@@ -18,11 +18,22 @@ from typing import Any
 
 import numpy as np
 from pymavlink.DFReader import DFReader_binary, DFReader_text
+from pymavlink.mavutil import mode_mapping_acm
 
 from companion import messages
-from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
-from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, in_order, multicopter, slow_velocity, vector
+from rebound_cli.logs.log import (
+    QUADROTOR,
+    Demand,
+    Log,
+    LogError,
+    LoggedSample,
+    heartbeat,
+    in_order,
+    multicopter,
+    slow_velocity,
+    vector,
+)
 from rebound_cli.logs.topic import Floats, Topic
 
 # Each binary message begins with these two bytes; 128 is the type of FMT, whose own begins with a type and a length.
@@ -55,43 +66,33 @@ _COSTS = {
 _FIRMWARE = re.compile(r"(?:Ardu|APM:)?(Copter|Plane|Rover|Sub|Blimp|AntennaTracker) ?[vV]\d")
 _OTHER_FIRMWARE = {"Plane": 1, "Rover": 10, "Sub": 12, "Blimp": 7, "AntennaTracker": 5}
 # FRAME_CLASS to MAV_TYPE (AP_Motors_Class.h). Firmware without it is of one frame, and only helicopters are told here.
-_QUADROTOR, _HELICOPTER = 2, 4
+_HELICOPTER = 4
 _FRAMES = {2: 13, 3: 14, 4: 14, 5: 13, 6: 4, 7: 15, 8: 3, 9: 3, 10: 23, 11: 4, 12: 29, 13: 4, 14: 35}
 
-# Copter's mode numbers (ArduCopter/mode.h) to the modes of PX4 that do the same. By what sticks ask for: STABILIZED, an
-# attitude and a thrust; ALTCTL, an attitude and a climb rate; POSCTL, a velocity.
+# Copter's modes (ArduCopter/mode.h; pymavlink has their numbers) to the modes of PX4 that do the same. By what sticks
+# ask for: STABILIZED, an attitude and a thrust; ALTCTL, an attitude and a climb rate; POSCTL, a velocity.
 _MANUAL, _ALTCTL, _ACRO, _STABILIZED = (main << 16 for main in (1, 2, 5, 7))
 _AUTO_TAKEOFF, _AUTO_MISSION, _AUTO_RTL, _AUTO_FOLLOW = (4 << 16 | sub << 24 for sub in (2, 4, 5, 8))
 _MODES = {
-    0: ("STABILIZE", _STABILIZED),
-    1: ("ACRO", _ACRO),
-    2: ("ALT_HOLD", _ALTCTL),
-    3: ("AUTO", _AUTO_MISSION),
-    4: ("GUIDED", OFFBOARD),
-    5: ("LOITER", POSCTL),
-    6: ("RTL", _AUTO_RTL),
-    7: ("CIRCLE", POSCTL),
-    8: ("POSITION", _STABILIZED),  # until 3.2: holds its place, with the throttle by hand
-    9: ("LAND", AUTO_LAND),
-    10: ("OF_LOITER", POSCTL),
-    11: ("DRIFT", _STABILIZED),
-    13: ("SPORT", _ALTCTL),
-    14: ("FLIP", _ACRO),
-    15: ("AUTOTUNE", _ALTCTL),
-    16: ("POSHOLD", POSCTL),
-    17: ("BRAKE", AUTO_LOITER),
-    18: ("THROW", _AUTO_TAKEOFF),
-    19: ("AVOID_ADSB", AUTO_LOITER),
-    20: ("GUIDED_NOGPS", OFFBOARD),
-    21: ("SMART_RTL", _AUTO_RTL),
-    22: ("FLOWHOLD", POSCTL),
-    23: ("FOLLOW", _AUTO_FOLLOW),
-    24: ("ZIGZAG", POSCTL),
-    25: ("SYSTEMID", _STABILIZED),
-    27: ("AUTO_RTL", _AUTO_RTL),
-    28: ("TURTLE", _MANUAL),
+    mode: px4
+    for px4, modes in (
+        (_MANUAL, "TURTLE"),
+        # Until 3.2 POSITION holds its place, with the throttle by hand.
+        (_STABILIZED, "STABILIZE POSITION DRIFT SYSTEMID"),
+        (_ACRO, "ACRO FLIP"),
+        (_ALTCTL, "ALT_HOLD SPORT AUTOTUNE"),
+        (POSCTL, "LOITER CIRCLE OF_LOITER POSHOLD FLOWHOLD ZIGZAG"),
+        (OFFBOARD, "GUIDED GUIDED_NOGPS"),
+        (AUTO_LOITER, "BRAKE AVOID_ADSB"),
+        (AUTO_LAND, "LAND"),
+        (_AUTO_TAKEOFF, "THROW"),
+        (_AUTO_MISSION, "AUTO"),
+        (_AUTO_RTL, "RTL SMART_RTL AUTO_RTL"),
+        (_AUTO_FOLLOW, "FOLLOW"),
+    )
+    for mode in modes.split()
 }
-_MODE_NUMBERS = {name.replace("_", ""): number for number, (name, _) in _MODES.items()}
+_MODE_NUMBERS = {name.replace("_", ""): number for number, name in mode_mapping_acm.items()}
 
 # EV.Id (LogEvent in AP_Logger.h).
 _ARMED, _DISARMED, _LAND_COMPLETE, _NOT_LANDED = 10, 11, 18, 28
@@ -115,8 +116,6 @@ _FIX_3D = 3
 _METRES_PER_DEGREE = math.radians(6_371_000.0)
 # AHRS_EKF_TYPE to that estimator's message; EKF1 is of the one before them.
 _ESTIMATORS = {2: "NKF1", 3: "XKF1"}
-# MAV_STATE
-_STANDBY, _ACTIVE = 3, 4
 # The estimator's own word, SS (nav_filter_status): horizontal and vertical velocity are good.
 _GOOD = {"horizontal velocity": 2, "vertical velocity": 4}
 # INS_ACCEL_FILTER's default, and what 0 means to INS_MPU6K_FILTER, which had this place until 3.3.
@@ -248,7 +247,7 @@ def _vehicle(path: Path, texts: Sequence[str], parameters: _Parameters) -> str:
     told = next(((text, found[1]) for text in texts if (found := _FIRMWARE.match(text))), None)
     if told is None:
         raise LogError(f"{path}: it does not say what vehicle it is of: no message with ArduPilot's name and version.")
-    kind = _OTHER_FIRMWARE.get(told[1]) or _FRAMES.get(int(parameters.get("FRAME_CLASS", 0)), _QUADROTOR)
+    kind = _OTHER_FIRMWARE.get(told[1]) or _FRAMES.get(int(parameters.get("FRAME_CLASS", 0)), QUADROTOR)
     if any(text.startswith("Frame: HELI") for text in texts):
         kind = _HELICOPTER
     return f"{told[0]}, {multicopter(path, kind).vehicle_type}"
@@ -418,18 +417,12 @@ def _heartbeats(events: Topic, modes: Topic) -> Iterator[LoggedSample]:
     news += [(time_us, event, 0) for time_us, event in arming]
     for time_us, event, number in sorted(news, key=lambda item: item[0]):
         if event is None:
-            mode = _MODES.get(number, ("", 0))[1]
+            mode = _MODES.get(mode_mapping_acm.get(number, ""), 0)
         elif event == _ARMED and armed:
             # Most logs of 2014 end with the disarming, before it is written, and go on with the next arming.
-            yield _heartbeat(time_us, False, mode)
+            yield LoggedSample(time_us, heartbeat(QUADROTOR, False, mode))
         armed = armed if event is None else event == _ARMED
-        yield _heartbeat(time_us, armed, mode)
-
-
-def _heartbeat(time_us: int, armed: bool, mode: int) -> LoggedSample:
-    status = _ACTIVE if armed else _STANDBY
-    beat = messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, _QUADROTOR, MAV_AUTOPILOT_PX4, armed, mode, status)
-    return LoggedSample(time_us, beat)
+        yield LoggedSample(time_us, heartbeat(QUADROTOR, armed, mode))
 
 
 def _landed_states(topic: Topic, started_us: int) -> Iterator[LoggedSample]:

@@ -20,6 +20,9 @@ WANTED = {
     MessageId.ODOMETRY: messages.Odometry,
     MessageId.VIBRATION: messages.Vibration,
 }
+# MAV_STATE, as PX4 fills HEARTBEAT.system_status; MAV_TYPE where a log names none.
+_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5
+QUADROTOR = 2
 # No battery lasts so long: a time stamp further from the middle of the log is damage.
 _LONGEST_US = 24 * 3600 * 1_000_000
 # Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
@@ -113,9 +116,15 @@ def in_order(heard: Iterable[LoggedSample], middle_us: float) -> tuple[LoggedSam
     return tuple(sorted((h for h in heard if abs(h.at_us - middle_us) < _LONGEST_US), key=lambda h: h.at_us))
 
 
+def heartbeat(vehicle_type: int, armed: bool, custom_mode: int = 0, is_failing: bool = False) -> Heartbeat:
+    """As a PX4 of that MAV_TYPE would send it."""
+    status = _CRITICAL if is_failing else _ACTIVE if armed else _STANDBY
+    return Heartbeat(1, AUTOPILOT_COMPONENT_ID, vehicle_type, MAV_AUTOPILOT_PX4, armed, custom_mode, status)
+
+
 def multicopter(path: Path, vehicle_type: int) -> Identity:
     """Of a log by its MAV_TYPE. Raises LogError for any other vehicle."""
-    identity = identify(Heartbeat(1, AUTOPILOT_COMPONENT_ID, vehicle_type, MAV_AUTOPILOT_PX4, False, 0, 0))
+    identity = identify(heartbeat(vehicle_type, False))
     if isinstance(identity, str):
         raise LogError(f"{path}: {identity}; collisions are looked for in multicopters' logs alone.")
     return identity

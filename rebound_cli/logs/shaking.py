@@ -55,6 +55,10 @@ class Shaking:
         """Samples a second; gaps count for nothing."""
         return 1e6 / self.interval_us
 
+    def lasted_s(self, *stages: Stage) -> float:
+        """How long it was in these."""
+        return sum(stage in stages for stage in self.stages) * self.interval_us * 1e-6
+
     def during(self, stage: Stage) -> Floats:
         """Departures in this stage."""
         departures: Floats = self.departure_frd_m_s2[self.stages == stage]

@@ -16,8 +16,19 @@ import numpy.typing as npt
 from pyulog import ULog
 
 from companion import messages
-from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS
-from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, in_order, multicopter, slow_velocity, vector
+from companion.link.vehicle import MULTICOPTERS
+from rebound_cli.logs.log import (
+    QUADROTOR,
+    Demand,
+    Log,
+    LogError,
+    LoggedSample,
+    heartbeat,
+    in_order,
+    multicopter,
+    slow_velocity,
+    vector,
+)
 from rebound_cli.logs.topic import Floats, Topic
 
 _NAMES = [
@@ -40,13 +51,11 @@ _LATE_US = 1_000_000
 # Every ULog message begins with its size and its type.
 _HEADER_SIZE = 3
 
-# MAV_STATE, as PX4 fills HEARTBEAT.system_status.
-_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5
 # vehicle_status.arming_state, the same number since 2015; position_setpoint.type.
 _ARMED, _TAKEOFF, _LAND = 2, 3, 4
-# MAV_TYPE where a log names none, that of a VTOL that does not say which, and of what vehicle_status.vehicle_type
-# counts beside rotary wings: fixed wings and rovers.
-_QUADROTOR, _VTOL, _OTHER_TYPES = 2, 19, {2: 1, 3: 10}
+# MAV_TYPE of a VTOL that does not say which, and of what vehicle_status.vehicle_type counts beside rotary wings: fixed
+# wings and rovers.
+_VTOL, _OTHER_TYPES = 19, {2: 1, 3: 10}
 # vehicle_status.nav_state to the parts of HEARTBEAT.custom_mode (px4_custom_mode.h, get_px4_custom_mode): main modes
 # MANUAL 1, ALTCTL 2, POSCTL 3, ACRO 5, OFFBOARD 6, STABILIZED 7, ALTITUDE_CRUISE 11; under AUTO 4 TAKEOFF 2, LOITER 3,
 # MISSION 4, RTL 5, LAND 6, FOLLOW 8, PRECLAND 9, VTOL_TAKEOFF 10, EXTERNAL1 to 8 from 11 on; under POSCTL ORBIT 1,
@@ -137,7 +146,7 @@ def _check_multicopter(path: Path, status: Topic | None, parameters: Mapping[str
         _OTHER_TYPES.get(int(last("vehicle_type") or 0), 0),
         _VTOL if vtol is not None and vtol.all() else 0,
     ]
-    kind = next((kind for kind in kinds if kind and kind not in MULTICOPTERS), max(kinds) or _QUADROTOR)
+    kind = next((kind for kind in kinds if kind and kind not in MULTICOPTERS), max(kinds) or QUADROTOR)
     multicopter(path, kind)
 
 
@@ -253,11 +262,8 @@ def _heartbeat(topic: Topic) -> Iterator[LoggedSample]:
         return
     columns = [none if (c := topic.column(n)) is None else c for n in ("nav_state", "failsafe", "system_type")]
     for time_us, arm, state, acts, kind in zip(topic.time_us.tolist(), arming, *columns, strict=True):
-        status = _CRITICAL if acts > 0 else _ACTIVE if arm == _ARMED else _STANDBY
-        kind = int(kind) if int(kind) in MULTICOPTERS else _QUADROTOR
-        mode = _MODES.get(int(state), 0)
-        beat = messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, bool(arm == _ARMED), mode, status)
-        yield LoggedSample(time_us, beat)
+        kind = int(kind) if int(kind) in MULTICOPTERS else QUADROTOR
+        yield LoggedSample(time_us, heartbeat(kind, bool(arm == _ARMED), _MODES.get(int(state), 0), acts > 0))
 
 
 def _demand(topic: Topic) -> Iterator[LoggedSample]:

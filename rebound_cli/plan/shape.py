@@ -16,7 +16,7 @@ BESIDE_THE_WAY = (*range(195, 198), 200, 201, *range(203, 207), 214, *range(530,
 QUADROTOR = 2
 MULTICOPTERS = (QUADROTOR, 3, 4, 13, 14, 15, 29, 35, 43)
 # MAV_FRAME
-FRAME_ABOVE_SEA, FRAME_ABOVE_HOME, FRAME_WITHOUT_PLACE = (0, 5), (3, 6), 2
+FRAME_ABOVE_SEA, FRAME_ABOVE_HOME = (0, 5), (3, 6)
 
 # Far beyond any angle, height or time that means something, and small enough to be computed with.
 _MOST = 1e7

@@ -13,7 +13,7 @@ from companion.preflight import Preflight, PreflightItem, SerialLine, Verdict, f
 from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
-from companion.shell.files import write_whole
+from rebound_cli.documents import write_text
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.signed_connection import open_signed
@@ -47,10 +47,7 @@ def run_preflight(options: Namespace) -> int:
         if options.fix:
             found = _fix(console, preflight, connection, clock, found, options.yes)
         if options.card is not None:
-            try:
-                write_whole(options.card, card(preflight.survey, found, options.connect).encode())
-            except OSError as error:
-                raise ConfigurationError(f"{options.card}: cannot be written: {error.strerror}.") from error
+            write_text(options.card, card(preflight.survey, found, options.connect))
             console.print(f"\nThe card of the first flight is {options.card}.")
     finally:
         connection.close()

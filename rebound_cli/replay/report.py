@@ -55,13 +55,15 @@ def replay_log(
 
     `modes`: those in which the guard may take over; None: it watches whoever flies.
     """
-    recorded_hz = shaking(log).rate_hz
+    shakes = shaking(log)
+    recorded_hz = shakes.rate_hz
     if rate_hz is not None:
         log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
         if len(log.imu()) < 2:
             raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
+        shakes = shaking(log)
     findings = watch_log(log, config, listen=listen, modes=modes)
-    return Replay(log, config.detector, recorded_hz, shaking(log), findings, _losses(log, config), None)
+    return Replay(log, config.detector, recorded_hz, shakes, findings, _losses(log, config), None)
 
 
 def replay_flight(log: Log, recording: Recording, listener: Listener | None = None) -> Replay:
@@ -92,7 +94,7 @@ def report_text(replay: Replay) -> str:
     log, rate_hz = replay.log, replay.shaking.rate_hz
     recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
     headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
-    told: list[tuple[int, list[str]]] = [(h.at_us, [h.text]) for h in replay.findings.happenings]
+    told: list[tuple[int, list[str]]] = [(at_us, [text]) for at_us, text in replay.findings.happenings]
     told += [(at_us, [f"the vehicle's own log: {text}"]) for at_us, text in log.marks]
     if replay.reproduction is None:
         # Each interval in which a guard would have left a hit to whoever flies.
@@ -212,7 +214,7 @@ def report_data(replay: Replay) -> dict[str, Any]:
         "collisions": len(findings.collisions),
         "crashes": len(findings.crashes),
         "impacts": [_finding_data(replay, finding) for finding in findings.impacts],
-        "happenings": [{"at_s": _seconds(replay, h.at_us), "text": h.text} for h in findings.happenings],
+        "happenings": [{"at_s": _seconds(replay, at_us), "text": text} for at_us, text in findings.happenings],
         "watched_share": findings.watched_share,
         **{name: [_span_data(replay, span) for span in getattr(findings, name)] for name in ("blind", "off")},
         "noise_rms_frd_m_s2": replay.shaking.noise_data(),

@@ -105,14 +105,6 @@ class Span:
         return (self.end_us - self.start_us) * 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class Happening:
-    """A line of the timeline that is no impact."""
-
-    at_us: int
-    text: str
-
-
 @dataclass(slots=True)
 class Findings:
     """Grows step by step."""
@@ -120,7 +112,7 @@ class Findings:
     impacts: list[Finding] = field(default_factory=list)
     blind: list[Span] = field(default_factory=list)
     off: list[Span] = field(default_factory=list)
-    happenings: list[Happening] = field(default_factory=list)
+    happenings: list[tuple[int, str]] = field(default_factory=list)  # the timeline without impacts: when and what
     flown_us: int = 0  # armed and in the air
     watched_us: int = 0  # of that, with a detector that was on and saw
     promised: float = 0.0  # false alarms in that time, by the detector's own statistic
@@ -179,7 +171,7 @@ class Findings:
             (self.blind if name == "blind" else self.off).append(Span(start_us, at_us, first_reason))
 
     def tell(self, at_us: int, text: str) -> None:
-        self.happenings.append(Happening(at_us, text))
+        self.happenings.append((at_us, text))
 
     def close(self, at_us: int) -> None:
         self._note_span("blind", None, at_us)
@@ -189,18 +181,16 @@ class Findings:
 def watch_log(
     log: Log,
     config: CompanionConfig,
-    rate_hz: float | None = None,
     listen: Callable[[CollisionMonitor], None] | None = None,
     modes: Sequence[str] | None = None,
 ) -> Findings:
-    """Everything heard, in its order; `rate_hz` is what HIGHRES_IMU is asked for, None for what was recorded.
+    """Everything heard, in its order.
 
     `listen` is told of the watch before its first sample. `modes`: see `Circumstances`.
     """
-    heard = log.heard if rate_hz is None else tuple(thinned(log.heard, rate_hz))
     circumstances, findings = Circumstances(config, modes), Findings()
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
-    start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
+    start_us = last_us = next(item.at_us for item in log.heard if isinstance(item.sample, messages.ImuSample))
     monitor = start_monitor(_sampled_as(log, config), start_us)
     if listen is not None:
         listen(monitor)
@@ -213,7 +203,7 @@ def watch_log(
         findings.note(monitor, situation, now_us)
         circumstances.note(result.impacts)
 
-    for at_us, group in groupby(heard, key=lambda item: max(item.at_us, start_us)):
+    for at_us, group in groupby(log.heard, key=lambda item: max(item.at_us, start_us)):
         last_poll_us = min(at_us, last_us + _MOST_POLLS * POLL_INTERVAL_US)
         for poll_us in range(last_us + POLL_INTERVAL_US, last_poll_us, POLL_INTERVAL_US):
             circumstances.hear((), poll_us)

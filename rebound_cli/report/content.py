@@ -141,12 +141,10 @@ def _on_both_clocks(columns: Columns, boot_us: Floats) -> Columns:
 
 def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
     """What the detector made of each IMU sample of the log; NaN of those it never got."""
-    tested, boot_us = flight.listener.tested, flight.log.imu_time_boot_us
+    tested = flight.listener.tested
     # Of a stamp that came twice, after a reboot, the last.
-    order = np.argsort(tested.time_boot_us, kind="stable")
-    stamps_us = np.append(-1.0, np.take(tested.time_boot_us, order))
-    places = np.searchsorted(stamps_us, boot_us, side="right") - 1
-    never = stamps_us[places] != boot_us
+    row_of = {stamp_us: row for row, stamp_us in enumerate(np.ravel(tested.time_boot_us).tolist())}
+    rows = [row_of.get(boot_us, -1) for boot_us in flight.log.imu_time_boot_us.tolist()]
     columns = {
         "phase": tested.phase,
         "side": tested.side_m_s2,
@@ -154,10 +152,7 @@ def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
         "beyond": tested.beyond_thrust_m_s2,
         "beyond_threshold": tested.beyond_threshold_m_s2,
     }
-    return {
-        name: np.where(never, np.nan, np.append(np.nan, np.take(column, order))[places])
-        for name, column in columns.items()
-    }
+    return {name: np.append(column, np.nan)[rows] for name, column in columns.items()}
 
 
 def _packed(

@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +28,7 @@ from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
 from rebound_cli.results import run_folder
 from rebound_cli.results.flight_log import FlightLog, flight_log_of, flight_log_of_log, read_flight_log
-from rebound_cli.results.truth_match import FlightTruth, Time, index_of_hit
+from rebound_cli.results.truth_match import FlightTruth, Time, index_of_hit, read_truth
 from sim_vehicle.scene import Scene
 
 if TYPE_CHECKING:
@@ -130,7 +129,7 @@ def _in_folder(
     folder: Path, settings: Mission | GuardConfig, findings: Findings, listener: Listener, event_lines: str
 ) -> ShownFlight:
     """All but the log."""
-    summary = _summary(folder)
+    summary = run_folder.read_summary(folder)
     return ShownFlight(
         name=str((summary or {}).get("mission", folder.resolve().name)),
         started_at_us=0,
@@ -141,7 +140,7 @@ def _in_folder(
         events=list(run_folder.read_records(folder / run_folder.EVENTS_NAME, event_lines)),
         summary=summary,
         scene=_scene(folder),
-        truth=_truth(folder / run_folder.TRUTH_NAME),
+        truth=read_truth(folder / run_folder.TRUTH_NAME),
         patches=_patches(folder / run_folder.OBSTACLES_NAME),
     )
 
@@ -157,20 +156,13 @@ def replayed_flight(replay: Replay, config: CompanionConfig, listener: Listener)
         config=config,
         findings=replay.findings,
         listener=listener,
-        events=[{"time_us": one.at_us, "kind": _kind(one.text), "text": one.text, "data": {}} for one in told],
+        events=[{"time_us": at_us, "kind": _kind(text), "text": text, "data": {}} for at_us, text in told],
     )
 
 
 def _kind(text: str) -> str:
     """Of a line of a foreign log's timeline."""
     return "mode" if text.startswith("mode ") else text if text in ("armed", "disarmed", "landed", "took off") else ""
-
-
-def _summary(folder: Path) -> Mapping[str, Any] | None:
-    """None of a flight that was cut off."""
-    with suppress(FileNotFoundError, ValueError):
-        return dict(json.loads((folder / run_folder.SUMMARY_NAME).read_text(encoding="utf-8")))
-    return None
 
 
 def _scene(folder: Path) -> Scene | None:
@@ -180,14 +172,6 @@ def _scene(folder: Path) -> Scene | None:
         return None
     document = load_document(file)
     return validated(Scene, document, document.data.get("sim") or {}, ("sim",))
-
-
-def _truth(path: Path) -> FlightTruth | None:
-    if not path.exists():
-        return None
-    from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
-
-    return FlightTruth(*load_truth(path), load_faults(path), load_stalls(path))
 
 
 def _patches(path: Path) -> Sequence[Patch]:

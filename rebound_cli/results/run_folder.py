@@ -204,6 +204,13 @@ def read_text(path: Path) -> str:
         raise RunFolderError(f"{path}: cannot be read: {reason}.") from error
 
 
+def read_summary(folder: Path) -> dict[str, Any] | None:
+    """None of a flight that is not over, or was cut off."""
+    with suppress(OSError, ValueError):
+        return dict(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8")))
+    return None
+
+
 def write_yaml(path: Path, data: Any) -> None:
     write_whole(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -55,6 +56,15 @@ class FlightTruth:
         past_m = (position_ned_m - place_ned_m) @ np.array(hit.normal_ned)
         lost_m = position_ned_m[:, 2] - hit.contact_position_ned_m[2]
         return max(float(past_m.max()), 0.0), max(float(lost_m.max()), 0.0)
+
+
+def read_truth(path: Path) -> FlightTruth | None:
+    """None where a simulator has left none: of a real vehicle, or of a PX4 that never flew."""
+    if not path.exists():
+        return None
+    from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
+
+    return FlightTruth(*load_truth(path), load_faults(path), load_stalls(path))
 
 
 @dataclass(frozen=True, slots=True)

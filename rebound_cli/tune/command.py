@@ -5,25 +5,23 @@ import math
 import textwrap
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from companion.errors import ConfigurationError
 from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
-from rebound_cli.documents import parse_document, validated, write_text
+from rebound_cli.documents import parse_document, refuse_existing, validated, write_text
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import console_for
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
-from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
+from rebound_cli.logs.shaking import FLYING, Stage, clipped
 from rebound_cli.replay.recording import log_file
-from rebound_cli.replay.watching import Findings, watch_log
-from rebound_cli.results.run_folder import SUMMARY_NAME
+from rebound_cli.replay.report import Replay, replay_log
+from rebound_cli.results.run_folder import read_summary
 from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
 SCHEMA = 2
@@ -41,21 +39,21 @@ _LEAST_FLYING_S = 3.0
 def run_tune(options: Namespace) -> int:
     """Print what the flights say and the settings; with --out write these. Raises LogError, ConfigurationError."""
     console, out = console_for(options.json), options.out
-    if out is not None and out.exists():
-        raise ConfigurationError(f"{out} exists already: give --out another name.")
+    refuse_existing(out)
     config = companion_settings(options.companion, (), options.detector)
     flights = [read_healthy(path, config) for path in options.logs]
     logs = [flight.log for flight in flights]
     found = margins(logs, config)
-    tuning = Tuning(config.detector, flights, found, advise(logs, config, found))
-    text = settings_text(tuning.advice, ", ".join(path.name for path in options.logs))
+    advice = advise(logs, config, found)
+    text = settings_text(advice, ", ".join(path.name for path in options.logs))
     # Read as `rebound fly` will read it before anybody has it.
     document = parse_document(text, str(out or "the settings"))
     validated(CompanionConfig, document, document.data["companion"], ("companion",))
     if options.json:
-        print(json.dumps(tuning_data(tuning), indent=2))
+        print(json.dumps(tuning_data(flights, found, advice), indent=2))
     else:
-        console.print(tuning_text(tuning))
+        parts = [*map(_flight_rows, flights), _margin_rows(found, advice)]
+        console.print("\n\n".join("\n".join(part) for part in parts) + "\n")
         console.print(text.rstrip())
     if out is not None:
         write_text(out, text)
@@ -63,50 +61,23 @@ def run_tune(options: Namespace) -> int:
     return 0
 
 
-@dataclass(frozen=True, slots=True)
-class Healthy:
-    """A flight without a collision, and what the detector made of it."""
+def read_healthy(path: Path, config: CompanionConfig) -> Replay:
+    """A flight without a collision, and what the detector made of it.
 
-    log: Log
-    shaking: Shaking
-    findings: Findings
-
-    @property
-    def in_air_s(self) -> float:
-        return float(np.sum(self.shaking.stages != Stage.GROUND)) * self.shaking.interval_us * 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class Tuning:
-    """All that was worked out."""
-
-    detector: str
-    flights: Sequence[Healthy]
-    margins: Sequence[Margin]
-    advice: Advice
-
-
-def read_healthy(path: Path, config: CompanionConfig) -> Healthy:
-    """Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing."""
+    Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing.
+    """
     log = read_log(log_file(path))
-    hits = _told_hits(path)
+    hits = len((read_summary(path) or {}).get("collisions", ()))
     wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else crash(log)
     if wrong is not None:
         raise LogError(f"{path}: not a healthy flight, {wrong}; tune learns from flights without a hit or a crash.")
-    shakes = shaking(log)
-    flying_s = sum(stage in FLYING for stage in shakes.stages) * shakes.interval_us * 1e-6
+    flight = replay_log(log, config, None)
+    flying_s = flight.shaking.lasted_s(*FLYING)
     if not flying_s:
         raise LogError(f"{path}: no flight in it, only the ground, a take-off and a landing.")
     if flying_s < _LEAST_FLYING_S:
         raise LogError(f"{path}: too short a flight to learn from; a minute in the air is a good one.")
-    return Healthy(log, shakes, watch_log(log, config))
-
-
-def _told_hits(folder: Path) -> int:
-    """Collisions that the summary of our own flight tells; 0 where there is none to read."""
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return len(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8"))["collisions"])
-    return 0
+    return flight
 
 
 def crash(log: Log) -> str | None:
@@ -130,15 +101,14 @@ def crash(log: Log) -> str | None:
     return None
 
 
-def tuning_text(tuning: Tuning) -> str:
-    parts = [*map(_flight_rows, tuning.flights), _margin_rows(tuning)]
-    return "\n\n".join("\n".join(part) for part in parts) + "\n"
+def _in_air_s(flight: Replay) -> float:
+    return flight.shaking.lasted_s(*(stage for stage in Stage if stage is not Stage.GROUND))
 
 
-def _flight_rows(flight: Healthy) -> Iterator[str]:
+def _flight_rows(flight: Replay) -> Iterator[str]:
     log, found, shaking = flight.log, flight.findings, flight.shaking
     rows = [
-        f"{log.path}: {log.vehicle}, {flight.in_air_s:.0f} s in the air, IMU at {shaking.rate_hz:.0f} Hz",
+        f"{log.path}: {log.vehicle}, {_in_air_s(flight):.0f} s in the air, IMU at {shaking.rate_hz:.0f} Hz",
         f"  {'':<16}{'noise x, y, z, RMS':<26}{'largest departure sideways, along z':<36}[m/s^2]",
     ]
     for stage, noise in shaking.noise_m_s2().items():
@@ -158,37 +128,38 @@ def _flight_rows(flight: Healthy) -> Iterator[str]:
         yield textwrap.fill(row, _WIDTH, subsequent_indent="    ") if len(row) > _WIDTH else row
 
 
-def _margin_rows(tuning: Tuning) -> Iterator[str]:
-    yield f"detector '{tuning.detector}': the largest sign of a hit in these flights, as a share of each threshold"
-    for margin in tuning.margins:
+def _margin_rows(found: Sequence[Margin], advice: Advice) -> Iterator[str]:
+    title = "the largest sign of a hit in these flights, as a share of each threshold"
+    yield f"detector '{advice.config.detector}': {title}"
+    for margin in found:
         share = f"below {SHARES[0]:g}" if margin.share is None else f"{margin.share:.2f}"
         alarm = "   a false alarm" if (margin.share or 0.0) >= 1.0 else ""
         yield f"  {margin.setting:<28}{margin.value:<10g}{share}{alarm}"
-    if left := tuning.advice.false_alarms_left:
+    if left := advice.false_alarms_left:
         yield f"  with the settings below still {left} false alarms: this vehicle is not made quiet by thresholds"
 
 
-def tuning_data(tuning: Tuning) -> dict[str, Any]:
+def tuning_data(flights: Sequence[Replay], found: Sequence[Margin], advice: Advice) -> dict[str, Any]:
     """The same for a program; SI units, body FRD."""
     return {
         "schema": SCHEMA,
-        "detector": tuning.detector,
-        "flights": [_flight_data(flight) for flight in tuning.flights],
-        "margins": [asdict(margin) for margin in tuning.margins],
+        "detector": advice.config.detector,
+        "flights": [_flight_data(flight) for flight in flights],
+        "margins": [asdict(margin) for margin in found],
         "settings": [
             {"place": ".".join(("companion", *place)), "value": value, "reason": reason}
-            for place, (value, reason) in tuning.advice.settings.items()
+            for place, (value, reason) in advice.settings.items()
         ],
-        "false_alarms_left": tuning.advice.false_alarms_left,
+        "false_alarms_left": advice.false_alarms_left,
     }
 
 
-def _flight_data(flight: Healthy) -> dict[str, Any]:
+def _flight_data(flight: Replay) -> dict[str, Any]:
     count, how = clipped(flight.log)
     return {
         "log": str(flight.log.path),
         "vehicle": flight.log.vehicle,
-        "in_air_s": round(flight.in_air_s, 2),
+        "in_air_s": round(_in_air_s(flight), 2),
         "imu_rate_hz": round(flight.shaking.rate_hz, 2),
         "noise_rms_frd_m_s2": flight.shaking.noise_data(),
         "clipped_samples": count,

@@ -11,7 +11,7 @@ import yaml
 from matplotlib.figure import Figure
 
 from rebound_cli.check.legs import flown_legs
-from rebound_cli.check.picture import after_hits, ends
+from rebound_cli.check.picture import ends
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.documents import parse_document
 from rebound_cli.figure.ground import draw_obstacles, footprint
@@ -104,40 +104,6 @@ sim:
     # its western side is met on the way east, the end of its way, and its southern side where it stands at first
     assert met[1][1] == pytest.approx(1.5 - 0.2, abs=0.15) and met[2][0] == 0.0
     assert met[4][0] == pytest.approx(-10.5 - 0.2, abs=0.15)
-
-
-@pytest.mark.parametrize(
-    ("policy", "goes_on_at"),
-    [
-        # the next item's end, the same item's again, home, or no further: there it lands
-        ("{then: hold}", [0, 4, -2]),
-        ("{then: retry}", [6, 0, -2]),
-        ("{then: return}", [0, 0, 0]),
-        ("{then: land}", None),
-        ("{then: retry, max_hits: 1, after_max_hits: return}", [0, 0, 0]),
-    ],
-)
-def test_where_the_mission_goes_on_after_a_hit(policy, goes_on_at):
-    document = parse_document(
-        f"""
-name: t
-items:
-  - takeoff: {{height_m: 2}}
-  - go_to: {{position_ned_m: [6, 0, -2]}}
-    on_collision: {policy}
-  - hold: {{duration_s: 1}}
-  - go_to: {{position_ned_m: [0, 4, -2]}}
-  - land:
-sim:
-  walls: [{{point_ned_m: [4, 0, -2], normal_ned: [-1, 0, 0], width_m: 1, height_m: 2}}]
-""",
-        "t.yaml",
-    )
-    world = world_from(document)
-    mission = mission_from(document, world)
-    ((here, there), *_) = after_hits(mission, flown_legs(mission, world))
-    assert here[0] == pytest.approx(3.8, abs=0.15)
-    assert there.tolist() == pytest.approx(here.tolist() if goes_on_at is None else goes_on_at)
 
 
 def test_a_moving_obstacle_is_drawn_where_it_begins_and_ends_with_its_way_between():

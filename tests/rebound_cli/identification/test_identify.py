@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rebound_cli.documents import load_document, validated
-from rebound_cli.identification.fit import fit_friction, fit_restitution, fit_spring
+from rebound_cli.identification.fit import fit_restitution, fit_spring
 from rebound_cli.identification.hit import Hit, Push, guards_at
 from sim_vehicle.airframe import Airframe, with_base
 from tests.rebound_cli.command import WALL, assert_one_clear_sentence, run_here
@@ -26,11 +26,7 @@ def pressed(speed_m_s, guards=2, noise_m_s2=0.0, seed=1):
         depth_m += speed * step_s
     since_s, depth, speeds, pushes = np.array(rows[200:-1:400]).T
     noise = noise_m_s2 * np.random.default_rng(seed).standard_normal(len(pushes))
-    return Hit("hit", 0.0, speed_m_s, -speed, 0.0, 0.0, 0.0, guards, Push(since_s, depth, speeds, pushes + noise))
-
-
-def slid(speed_m_s, along_in_m_s, along_out_m_s):
-    return Hit("slid", 0.0, speed_m_s, 0.9 * speed_m_s, 0.01, along_in_m_s, along_out_m_s, guards=2)
+    return Hit("hit", 0.0, speed_m_s, -speed, 0.0, guards, Push(since_s, depth, speeds, pushes + noise))
 
 
 @pytest.mark.parametrize("guards", [1, 2])
@@ -56,15 +52,9 @@ def test_the_sigma_of_a_single_hits_damping_is_how_far_it_scatters():
 
 
 def test_a_contact_that_no_sample_resolves_has_a_restitution_and_no_spring():
-    assert fit_spring([slid(1.2, 0.0, 0.0)]) is None
-    assert fit_restitution([slid(1.2, 0.0, 0.0)]).value == pytest.approx(0.9)
-
-
-def test_friction_is_what_an_oblique_hit_loses_along_the_wall():
-    # Given a guard that slides throughout with Coulomb's 0.15, and a head-on hit, which shows none
-    oblique = slid(1.0, 4.0, 4.0 - 0.15 * 1.9)
-    assert fit_friction([oblique, slid(1.0, 0.1, 0.1)]).value == pytest.approx(0.15)
-    assert fit_friction([slid(1.0, 0.1, 0.1)]) is None
+    short = Hit("short", 0.0, 1.2, 0.9 * 1.2, 0.01, guards=2)
+    assert fit_spring([short]) is None
+    assert fit_restitution([short]).value == pytest.approx(0.9)
 
 
 def test_the_guards_that_meet_the_wall():

@@ -62,12 +62,16 @@ def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile
     assert companion.told == ["yes"]
 
 
-@pytest.mark.parametrize("line", [b"n\n", b"\n", b"yessir\n"])
-def test_all_but_a_yes_is_a_no(typed, line):
-    reads, types = typed
+# The last one is the end of input.
+@pytest.mark.parametrize("line", [b"n\n", b"\n", b"yessir\n", None])
+def test_all_but_a_yes_is_a_no(line):
+    reads, writes = os.pipe()
     companion: Any = Planned()
     person = AskPerson(Console(io.StringIO()), reads)
-    types(line)
+    if line is not None:
+        os.write(writes, line)
+    os.close(writes)
     for _ in range(2):
         person.poll(companion)
+    os.close(reads)
     assert companion.told == ["the plan was not confirmed"]

@@ -71,36 +71,24 @@ def read_or_refused(path, content):
         watch_log(log, CompanionConfig())
 
 
+LOGS = {
+    "log.ulg": ULOG,
+    "log.tlog": TELEMETRY,
+    "log.bin": dataflash_file.dataflash(*DATAFLASH),
+    "log.log": dataflash_file.text(*DATAFLASH),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes, cuts)
 @example([], 1.0)
-def test_a_damaged_px4_log(tmp_path, spots, kept):
-    read_or_refused(tmp_path / "log.ulg", damaged(ULOG, spots, kept))
-
-
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(changes, cuts)
-@example([], 1.0)
-def test_a_damaged_telemetry_log(tmp_path, spots, kept):
-    read_or_refused(tmp_path / "log.tlog", damaged(TELEMETRY, spots, kept))
-
-
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(changes, cuts)
-@example([], 1.0)
-def test_a_damaged_ardupilot_log(tmp_path, spots, kept):
-    read_or_refused(tmp_path / "log.bin", damaged(dataflash_file.dataflash(*DATAFLASH), spots, kept))
-
-
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(changes, cuts)
-@example([], 1.0)
-def test_a_damaged_ardupilot_log_in_text(tmp_path, spots, kept):
-    read_or_refused(tmp_path / "log.log", damaged(dataflash_file.text(*DATAFLASH), spots, kept))
+def test_a_damaged_log_of_each_kind(tmp_path, name, spots, kept):
+    read_or_refused(tmp_path / name, damaged(LOGS[name], spots, kept))
 
 
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=300), st.sampled_from(["log.ulg", "log.tlog", "log.bin", "log.log"]))
+@given(st.binary(max_size=300), st.sampled_from(list(LOGS)))
 def test_bytes_from_anywhere(tmp_path, content, name):
     read_or_refused(tmp_path / name, content)
 
@@ -118,8 +106,7 @@ def test_a_head_that_ends_in_a_damaged_message(tmp_path):
 @pytest.mark.parametrize("length", [0, 1, 2])
 def test_a_message_of_no_length_is_no_endless_loop(tmp_path, length):
     # Given a format that says that its messages are shorter than their own head
-    content = dataflash_file.dataflash(*DATAFLASH)
-    spoilt = content.replace(b"\xa3\x95\x80\x83", b"\xa3\x95\x80\x83" + bytes([length]))
+    spoilt = LOGS["log.bin"].replace(b"\xa3\x95\x80\x83", b"\xa3\x95\x80\x83" + bytes([length]))
     (tmp_path / "log.bin").write_bytes(spoilt)
     with pytest.raises(LogError, match="has no length"):
         read_log(tmp_path / "log.bin")
@@ -127,7 +114,7 @@ def test_a_message_of_no_length_is_no_endless_loop(tmp_path, length):
 
 def test_a_hole_in_a_log_prints_nothing(tmp_path, capfd):
     # Given a log that lacks some bytes in the middle of its messages
-    content = dataflash_file.dataflash(*DATAFLASH)
+    content = LOGS["log.bin"]
     middle = len(content) // 2
     (tmp_path / "log.bin").write_bytes(content[:middle] + content[middle + 33 :])
     # When it is read, then nothing comes out on the way, not even from compiled code

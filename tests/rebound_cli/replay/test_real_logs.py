@@ -15,6 +15,7 @@ from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.reader import read_log
 from rebound_cli.main import main
+from rebound_cli.replay.report import replay_log
 from rebound_cli.replay.watching import watch_log
 
 DATA = os.environ.get("REBOUND_DATA")
@@ -53,7 +54,7 @@ def scaled(log, factor):
 @pytest.mark.parametrize("rate_hz", [None, 100.0, 50.0])
 @pytest.mark.parametrize("name", HEALTHY)
 def test_no_healthy_flight_is_taken_for_a_collision(name, rate_hz):
-    assert watch_log(log_of(name), FUSED, rate_hz).collisions == []
+    assert replay_log(log_of(name), FUSED, rate_hz).findings.collisions == []
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])

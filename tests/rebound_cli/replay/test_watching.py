@@ -27,7 +27,7 @@ def test_a_hit_is_found_with_what_was_known_then():
 def test_a_flight_without_a_hit_has_none_and_its_story_is_told():
     findings = watch_log(flight(hit_us=None), LATERAL)
     assert findings.impacts == [] and findings.blind == []
-    assert [happening.text for happening in findings.happenings if "from" not in happening.text] == [
+    assert [text for _, text in findings.happenings if "from" not in text] == [
         "mode OFFBOARD",
         "armed",
         "took off",

@@ -41,10 +41,6 @@ def test_every_simulated_flight_leaves_one_below_two_megabytes(wall_page):
     assert len(wall_page.encode()) < 2 * MEGABYTE
 
 
-def test_it_is_made_of_the_folder_alone_and_is_the_same_each_time(wall, wall_page):
-    assert page(wall) == wall_page
-
-
 def test_it_loads_nothing(opened):
     # Given every element that could
     assert opened.attributes("src") == [] and opened.attributes("href") == []

@@ -15,7 +15,7 @@ from rebound_cli.logs.log import LoggedSample
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
 from rebound_cli.tune.command import crash
-from rebound_cli.tune.settings import RESERVE, advise, margins, settings_text
+from rebound_cli.tune.settings import RESERVE, advise, margins
 from tests.rebound_cli.command import WALL
 from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 from tests.rebound_cli.replay.flying import LATERAL, flight
@@ -169,10 +169,3 @@ def test_a_crash_and_our_own_flight_with_a_hit_are_refused(wall_flight, tmp_path
     assert code == 1 and text == "" and "not a healthy flight, it fell at 5.0 s" in error
     code, text, error = tune(capsys, wall_flight[0])
     assert code == 1 and text == "" and "its summary tells 1 collision;" in error
-
-
-def test_every_detectors_settings_can_be_written():
-    config = CompanionConfig()
-    log = flight(hit_us=None)
-    text = settings_text(advise([log], config, margins([log], config)), "x.ulg")
-    assert CompanionConfig.model_validate(yaml.safe_load(text)["companion"]).detector == config.detector
