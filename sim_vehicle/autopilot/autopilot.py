@@ -13,7 +13,6 @@ from sim_vehicle.autopilot.messages import (
     Command,
     CommandAck,
     FlightInput,
-    GlobalTarget,
     PositionTarget,
     Result,
     Severity,
@@ -92,7 +91,7 @@ class Autopilot:
 
     def receive(self, message: FlightInput) -> None:
         """Take a setpoint, sticks or a target to follow."""
-        if isinstance(message, PositionTarget | GlobalTarget):
+        if isinstance(message, PositionTarget):
             self.setpoint(message)
         elif isinstance(message, AttitudeTarget):
             self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
@@ -101,7 +100,7 @@ class Autopilot:
         else:
             self.navigator.follow(message)
 
-    def setpoint(self, target: PositionTarget | GlobalTarget) -> None:
+    def setpoint(self, target: PositionTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""
         is_flown, attitude = self.modes.flown is Mode.OFFBOARD, self._estimate.attitude_wxyz
         refusal = self._offboard.take_position(target, self._now_us, is_flown, attitude, self.home_ned_m)

@@ -15,7 +15,7 @@ from sim_vehicle.setpoint import TrajectorySetpoint
 
 # What PX4's simulated receiver states (sensor_gps_sim).
 _HDOP_CENTI, _VDOP_CENTI, _SPEED_ACCURACY_MM_S = 70, 110, 400
-_UNKNOWN_16, _UNKNOWN_8 = 0xFFFF, 0xFF
+_UNKNOWN_16 = 0xFFFF
 # ESTIMATOR_STATUS.flags: everything but "constant position" (bit 7).
 _ALL_KNOWN = 0x37F
 # Innovation test ratios of a filter that fits its sensors; the built-in estimate has none of its own.

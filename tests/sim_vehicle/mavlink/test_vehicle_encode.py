@@ -1,7 +1,6 @@
 """What the messages contain, and the silent rule of STATUSTEXT."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
@@ -18,10 +17,10 @@ from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
-from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Estimate, attitude_of_yaw
+from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, STANDING, attitude_of_yaw
 
 SECOND = 1_000_000
-SAMPLE = Estimate(
+SAMPLE = STANDING._replace(
     time_boot_us=12_345_678,
     specific_force_frd_m_s2=(0.5, -0.25, -9.75),
     angular_velocity_frd_rad_s=(0.125, 0.25, -0.5),
@@ -60,8 +59,8 @@ def test_what_a_standing_vehicle_says_of_itself(build, expected):
 
 
 def test_pitching_up_is_positive_and_right_wing_down_rolls_positive():
-    nose_up = replace(SAMPLE, attitude_wxyz=(math.cos(0.1), 0.0, math.sin(0.1), 0.0))
-    right_down = replace(SAMPLE, attitude_wxyz=(math.cos(0.1), math.sin(0.1), 0.0, 0.0))
+    nose_up = SAMPLE._replace(attitude_wxyz=(math.cos(0.1), 0.0, math.sin(0.1), 0.0))
+    right_down = SAMPLE._replace(attitude_wxyz=(math.cos(0.1), math.sin(0.1), 0.0, 0.0))
     state = telemetry()
     state.sample = nose_up
     assert read_back(encode.attitude(state)).pitch == pytest.approx(0.2)
