@@ -9,7 +9,7 @@ from typing import Protocol
 
 from sim_vehicle.autopilot.commander.arming import Reason
 from sim_vehicle.autopilot.commander.commander import Commander
-from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, Vector3
+from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Command, Result, Severity
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
@@ -17,6 +17,7 @@ from sim_vehicle.autopilot.navigator.mission import MissionCommand
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import Vector3
 
 NAV_TAKEOFF = 22
 DO_ORBIT = 34

@@ -11,7 +11,6 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     Arrival,
     Kind,
     NavigatorTarget,
-    Vector3,
     View,
     climbs_to,
     takeoff_acceptance,
@@ -25,7 +24,7 @@ from sim_vehicle.autopilot.navigator.mission_feasibility import MissionCheck
 from sim_vehicle.autopilot.navigator.rtl import Return
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.setpoint import TrajectorySetpoint, Vector3
 
 # The navigator listens to the position at 20 Hz.
 PERIOD_US = 50_000

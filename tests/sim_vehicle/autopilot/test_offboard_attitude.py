@@ -27,7 +27,8 @@ def leaning(roll_deg: float) -> tuple[float, float, float, float]:
 
 
 def global_target(frame: int, north: float, east: float, altitude_m: float, **others: object) -> PositionTarget:
-    return target(frame=frame, is_global=True, **{"place": (*place(north, east), altitude_m), **others})
+    fields: dict[str, Any] = {"place": (*place(north, east), altitude_m), **others}
+    return target(frame=frame, is_global=True, **fields)
 
 
 def stream(flight: Flight, message: Any, seconds: float) -> None:
