@@ -12,7 +12,7 @@ from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.decode import Decoder
-from sim_vehicle.mavlink.encode import Encoder, Message, diagonal_covariance
+from sim_vehicle.mavlink.encode import Encoder, Message, diagonal_covariance, units_of
 from sim_vehicle.mavlink.streams import aiding
 
 # PX4 reads neither of them.
@@ -106,9 +106,7 @@ def _gps(fix: HilGps) -> Message:
     return dialect.MAVLink_hil_gps_message(
         fix.time_us,
         _FIX_3D,
-        round(1e7 * fix.place.latitude_deg),
-        round(1e7 * fix.place.longitude_deg),
-        round(1e3 * fix.place.altitude_m),
+        *units_of(fix.place),
         accuracy_cm,
         accuracy_cm,
         round(100 * speed_m_s),

@@ -155,7 +155,7 @@ class MissionFlight:
     def _is_over(self, item: StoredItem, view: View) -> bool:
         command = item.command
         if self._work is Work.ITEM:
-            if command in (kinds.LAND, kinds.VTOL_LAND):
+            if command == kinds.LAND:
                 return view.landed
             if command == kinds.LOITER_UNLIMITED:
                 return False

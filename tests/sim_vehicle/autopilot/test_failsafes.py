@@ -218,7 +218,7 @@ def test_a_ground_station_that_comes_back_does_not_end_the_return_but_a_mode_doe
     assert flown(flight) is Mode.RETURN
     assert set_mode(flight, Mode.LOITER) is Result.ACCEPTED
     flight.fly(0.1)
-    assert (flown(flight), flight.autopilot.system_status) == (Mode.LOITER, 4)
+    assert (flown(flight), flight.autopilot.commander.system_status) == (Mode.LOITER, 4)
 
 
 @pytest.mark.parametrize(("value", "mode"), [(1, Mode.LOITER), (2, Mode.RETURN), (3, Mode.LAND), (5, Mode.TERMINATION)])
@@ -268,10 +268,10 @@ def test_a_flight_that_lasts_too_long_returns():
 def test_a_mode_chosen_in_the_delay_takes_over_at_once():
     flight = with_ground_station(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0)
     flight.fly(8.5)
-    assert flown(flight) is Mode.LOITER and flight.autopilot.system_status == 5
+    assert flown(flight) is Mode.LOITER and flight.autopilot.commander.system_status == 5
     assert set_mode(flight, Mode.LAND) is Result.ACCEPTED
     flight.fly(6.0)
-    assert (flown(flight), flight.autopilot.system_status) == (Mode.LAND, 4)
+    assert (flown(flight), flight.autopilot.commander.system_status) == (Mode.LAND, 4)
 
 
 def test_sticks_take_over_from_a_failsafe():
@@ -281,7 +281,7 @@ def test_sticks_take_over_from_a_failsafe():
     assert flown(flight) is Mode.RETURN
     sticks(flight, 0.3, pitch=1.0)
     assert (flown(flight), flight.autopilot.modes.intended) == (Mode.POSCTL, Mode.POSCTL)
-    assert flight.autopilot.system_status == 4
+    assert flight.autopilot.commander.system_status == 4
 
 
 @pytest.mark.parametrize(("mask", "mode", "taken"), [(1, Mode.LOITER, True), (0, Mode.LOITER, False)])
@@ -297,7 +297,7 @@ def test_terminated_is_for_good():
     flight = hovering(5.0)
     assert flight.ask(DO_FLIGHTTERMINATION, 0) is Result.DENIED
     assert flight.ask(DO_FLIGHTTERMINATION, 1) is Result.ACCEPTED
-    assert flight.autopilot.system_status == 8
+    assert flight.autopilot.commander.system_status == 8
     assert not flight.autopilot.motors_run
     flight.fly(2.0)
     assert flight.height_m == 0.0
@@ -330,7 +330,7 @@ def test_without_gps_the_position_is_lost_after_a_while_and_the_vehicle_descends
     flight.fly(0.2)
     assert (flown(flight), flight.autopilot.modes.intended) == (Mode.DESCEND, Mode.LOITER)
     flight.fly_until(lambda: not flight.autopilot.arming.armed, 15.0)
-    assert not flight.autopilot.checks_pass
+    assert not flight.autopilot.commander.checks_pass
 
 
 @pytest.mark.parametrize(("value", "arms"), [(0, False), (1, True)])
