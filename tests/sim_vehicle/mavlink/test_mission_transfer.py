@@ -35,7 +35,7 @@ def sending() -> Exchange:
 
 
 def said(exchange: Exchange) -> str:
-    return exchange.transfer.texts[-1].text
+    return exchange.said[-1]
 
 
 def test_an_uploaded_list_comes_back_as_it_went():
