@@ -8,6 +8,7 @@ from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Identity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.hil.slow_sensors import SlowSensors
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
 from sim_vehicle.mavlink.link import Link, LinkOptions
@@ -20,7 +21,7 @@ from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.layout import PlantState
-from sim_vehicle.plant.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene, check_start_is_free
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
@@ -229,7 +230,7 @@ class SimulatedVehicle:
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
 
-    def _publish(self, sample: PlantOutput) -> bool:
+    def _publish(self, sample: Estimate) -> bool:
         """Hand the sample to the streams; whether position and velocity are published with it."""
         telemetry = self._telemetry
         telemetry.sample = sample

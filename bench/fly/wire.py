@@ -16,6 +16,7 @@ from companion.messages import MessageId, Sample
 from companion.reflex.detector import Situation
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
 from sim_vehicle.autopilot.messages import Identity
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.faults.spec import WireFault
 from sim_vehicle.faults.wire import Wire as FaultyWire
 from sim_vehicle.mavlink.encode import Encoder
@@ -24,7 +25,7 @@ from sim_vehicle.mavlink.streams.topics import Topic
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.physics.layout import HIT_IMPULSE, HIT_START_US
-from sim_vehicle.plant.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant
 
 Floats = npt.NDArray[np.float64]
 Vector3 = tuple[float, float, float]
@@ -44,8 +45,8 @@ LOOK_EVERY_US = 1000
 class VehicleRecording:
     """One entry an interval in each list. `published` is the state estimate as of 8 ms, as PX4 publishes it."""
 
-    samples: list[PlantOutput] = field(default_factory=list)
-    published: list[PlantOutput] = field(default_factory=list)
+    samples: list[Estimate] = field(default_factory=list)
+    published: list[Estimate] = field(default_factory=list)
     asked_attitudes: list[Floats] = field(default_factory=list)
     """Rotation matrices that the position control asked for."""
     situations: list[Situation] = field(default_factory=list)
@@ -55,7 +56,7 @@ class VehicleRecording:
     """Views of the plant's state, taken once: looking a field up costs microseconds."""
     _impulse: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
 
-    def add(self, plant: Plant, sample: PlantOutput, situation: Situation, mass_kg: float) -> None:
+    def add(self, plant: Plant, sample: Estimate, situation: Situation, mass_kg: float) -> None:
         """Take an interval that the plant has just advanced by."""
         latest = self.published[-1] if self.published else sample
         is_due = sample.time_boot_us - latest.time_boot_us >= POSITION_PERIOD_US

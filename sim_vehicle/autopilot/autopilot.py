@@ -3,7 +3,7 @@
 from enum import IntEnum
 
 from sim_vehicle.autopilot import commands, flight_commands
-from sim_vehicle.autopilot.commander.commander import Commander, SystemStatus
+from sim_vehicle.autopilot.commander.commander import Commander
 from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, ManualFlight
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
@@ -13,7 +13,6 @@ from sim_vehicle.autopilot.messages import (
     Command,
     CommandAck,
     FlightInput,
-    GlobalTarget,
     PositionTarget,
     Result,
     Severity,
@@ -24,7 +23,7 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.autopilot.offboard import OffboardControl
-from sim_vehicle.estimator.estimate import Estimate, Vector3, yaw_of
+from sim_vehicle.estimator.estimate import Estimate, yaw_of
 from sim_vehicle.parameters.airframe_values import origin_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint
@@ -92,7 +91,7 @@ class Autopilot:
 
     def receive(self, message: FlightInput) -> None:
         """Take a setpoint, sticks or a target to follow."""
-        if isinstance(message, PositionTarget | GlobalTarget):
+        if isinstance(message, PositionTarget):
             self.setpoint(message)
         elif isinstance(message, AttitudeTarget):
             self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
@@ -101,10 +100,10 @@ class Autopilot:
         else:
             self.navigator.follow(message)
 
-    def setpoint(self, target: PositionTarget | GlobalTarget) -> None:
+    def setpoint(self, target: PositionTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""
         is_flown, attitude = self.modes.flown is Mode.OFFBOARD, self._estimate.attitude_wxyz
-        refusal = self._offboard.take_position(target, self._now_us, is_flown, attitude, self.home_ned_m)
+        refusal = self._offboard.take_position(target, self._now_us, is_flown, attitude, self.navigator.view.home_ned_m)
         if refusal is not None:
             self.texts.append(refusal)
 
@@ -122,7 +121,7 @@ class Autopilot:
         """As after a while on the way in HOLD: armed, off the ground, with a demand for the motors."""
         self.detector.begin_in_flight()
         self._takeoff.state = TakeoffState.FLIGHT
-        home = self.home_ned_m, self.home_yaw_rad
+        home = self.navigator.view.home_ned_m, self.navigator.view.home_yaw_rad
         self._look()
         self.commander.arm()
         self.navigator.set_home(*home)
@@ -268,36 +267,6 @@ class Autopilot:
             self.say(Severity.INFO, "Landing detected")
 
     # --- what is shown -----------------------------------------------------------------------------------
-
-    @property
-    def home_ned_m(self) -> Vector3:
-        """HOME_POSITION, local NED."""
-        return self.navigator.view.home_ned_m
-
-    @property
-    def home_yaw_rad(self) -> float:
-        """Heading at home."""
-        return self.navigator.view.home_yaw_rad
-
-    @property
-    def home_set_us(self) -> int:
-        """When home was set."""
-        return self.navigator.home_set_us
-
-    @property
-    def auto_target_ned_m(self) -> Vector3 | None:
-        """Where a mode that flies by itself is going, local NED; None in all other modes and on the ground."""
-        return None if self.detector.landed else self.navigator.shown_target_ned_m
-
-    @property
-    def checks_pass(self) -> bool:
-        """Whether the vehicle could be armed in its present mode."""
-        return self.commander.checks_pass
-
-    @property
-    def system_status(self) -> SystemStatus:
-        """HEARTBEAT.system_status."""
-        return self.commander.system_status
 
     @property
     def landed_state(self) -> LandedState:

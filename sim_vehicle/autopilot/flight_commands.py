@@ -9,7 +9,7 @@ from typing import Protocol
 
 from sim_vehicle.autopilot.commander.arming import Reason
 from sim_vehicle.autopilot.commander.commander import Commander
-from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, Vector3
+from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Command, Result, Severity
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
@@ -17,6 +17,7 @@ from sim_vehicle.autopilot.navigator.mission import MissionCommand
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import Vector3
 
 NAV_TAKEOFF = 22
 DO_ORBIT = 34
@@ -24,8 +25,6 @@ DO_CHANGE_SPEED = 178
 DO_FLIGHTTERMINATION = 185
 DO_CHANGE_ALTITUDE = 186
 DO_REPOSITION = 192
-DO_SET_ROI_LOCATION, DO_SET_ROI_WPNEXT_OFFSET, DO_SET_ROI_NONE, DO_SET_ROI = 195, 196, 197, 201
-NAV_ROI = 80
 MISSION_START = 300
 
 _SWITCH_MODE = 1
@@ -138,11 +137,6 @@ def _terminate(command: Command, flight: CommandedVehicle) -> Result:
     return flight.request_mode(Mode.TERMINATION)
 
 
-def _look_at(command: Command, flight: CommandedVehicle) -> Result:
-    """PX4 takes every region of interest; this vehicle, like one without a gimbal, ignores it."""
-    return Result.ACCEPTED
-
-
 def _place(command: Command, flight: CommandedVehicle) -> Vector3 | None:
     latitude_deg, longitude_deg = _given(command.param5), _given(command.param6)
     if latitude_deg is None or longitude_deg is None:
@@ -161,10 +155,5 @@ HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     DO_FLIGHTTERMINATION: _terminate,
     DO_CHANGE_ALTITUDE: _change_altitude,
     DO_REPOSITION: _reposition,
-    DO_SET_ROI: _look_at,
-    DO_SET_ROI_LOCATION: _look_at,
-    DO_SET_ROI_WPNEXT_OFFSET: _look_at,
-    DO_SET_ROI_NONE: _look_at,
-    NAV_ROI: _look_at,
     MISSION_START: _start_mission,
 }

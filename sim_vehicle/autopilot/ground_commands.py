@@ -13,6 +13,8 @@ from sim_vehicle.geography import Place
 
 DO_SET_HOME = 179
 DO_SET_ACTUATOR = 187
+# NAV_ROI and the kinds of DO_SET_ROI: PX4 takes every region of interest, and without a gimbal looks nowhere.
+REGIONS_OF_INTEREST = (80, 195, 196, 197, 201)
 PREFLIGHT_STORAGE = 245
 PREFLIGHT_REBOOT_SHUTDOWN = 246
 RUN_PREARM_CHECKS = 401
@@ -94,11 +96,10 @@ def _leave_unanswered(command: Command, flight: CommandedVehicle) -> None:
 
 HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     DO_SET_HOME: _set_home,
-    DO_SET_ACTUATOR: _accept,
     PREFLIGHT_STORAGE: _storage,
     PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
-    RUN_PREARM_CHECKS: _accept,
     INJECT_FAILURE: _inject_failure,
+    **dict.fromkeys((DO_SET_ACTUATOR, RUN_PREARM_CHECKS, *REGIONS_OF_INTEREST), _accept),
     **dict.fromkeys(UNANSWERED, _leave_unanswered),
 }
 

@@ -7,6 +7,7 @@ It has no sensor for the ground, so a descent that stalls on an obstacle looks l
 import math
 
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import Vector3
 
 # On the ground the thresholds widen, so that idling motors do not look like a takeoff.
 WIDER_WHEN_LANDED = 2.5
@@ -20,8 +21,6 @@ STAGE_US = 1_000_000 // 3
 # Specific force below this for this long is a fall, never a landing.
 FREE_FALL_M_S2 = 2.0
 FREE_FALL_US = 300_000
-
-Vector3 = tuple[float, float, float]
 
 
 class _Stage:

@@ -5,8 +5,9 @@ commander's offboardCheck.cpp and PositionControl::_inputValid; the delays are m
 """
 
 import math
+from dataclasses import replace
 
-from sim_vehicle.autopilot.messages import AttitudeTarget, GlobalTarget, PositionTarget, Severity, StatusText
+from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, Severity, StatusText
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
@@ -97,8 +98,8 @@ def trajectory_setpoint(target: PositionTarget, attitude_wxyz: Quaternion) -> Tr
     return TrajectorySetpoint(position, velocity, acceleration, target.yaw_rad, target.yaw_rate_rad_s)
 
 
-def local_target(target: GlobalTarget, origin: Origin, home_ned_m: Vector3) -> PositionTarget | StatusText | None:
-    """The same in local NED, or why it is refused; None where it counts as none without a word.
+def local_target(target: PositionTarget, origin: Origin, home_ned_m: Vector3) -> PositionTarget | StatusText | None:
+    """A global one in local NED, or why it is refused; None where it counts as none without a word.
 
     Between v1.15 and v1.17 PX4 takes the height above home for one below the sea in frame 6: `position[2] = home.alt -
     alt - ref_alt`. This vehicle does what the frame means.
@@ -116,15 +117,7 @@ def local_target(target: GlobalTarget, origin: Origin, home_ned_m: Vector3) -> P
         return _refused("force not supported", _GLOBAL)
     if position == FREE and target.velocity_m_s == FREE and target.acceleration_m_s2 == FREE:
         return None
-    return PositionTarget(
-        frame=FRAME_LOCAL_NED,
-        position_m=position,
-        velocity_m_s=target.velocity_m_s,
-        acceleration_m_s2=target.acceleration_m_s2,
-        yaw_rad=target.yaw_rad,
-        yaw_rate_rad_s=target.yaw_rate_rad_s,
-        is_force=False,
-    )
+    return replace(target, frame=FRAME_LOCAL_NED, position_m=position, is_global=False)
 
 
 def attitude_setpoint(target: AttitudeTarget) -> AttitudeSetpoint | RatesSetpoint | None:
@@ -207,17 +200,14 @@ class OffboardControl:
 
     def take_position(
         self,
-        target: PositionTarget | GlobalTarget,
+        target: PositionTarget,
         now_us: int,
         is_flown: bool,
         attitude_wxyz: Quaternion,
         home_ned_m: Vector3,
     ) -> StatusText | None:
         """Take a setpoint, valid or not, whatever the mode; why it was refused, where PX4 says so."""
-        if isinstance(target, GlobalTarget):
-            local = local_target(target, self._origin, home_ned_m)
-        else:
-            local = refusal(target) or target
+        local = local_target(target, self._origin, home_ned_m) if target.is_global else refusal(target) or target
         if not isinstance(local, PositionTarget):
             return local
         self._signal.heard(now_us, needs_place=(local.position_m, local.velocity_m_s) != (FREE, FREE))

@@ -43,7 +43,7 @@ class ChangeableVehicle(SimulatedVehicle):
     @property
     def may_arm(self) -> bool:
         """Whether its checks would let it be armed now."""
-        return self._autopilot.checks_pass
+        return self._autopilot.commander.checks_pass
 
     @property
     def mode(self) -> str:

@@ -1,35 +1,34 @@
-"""What the autopilot knows of itself: the part of the plant's output that is not truth."""
+"""What the vehicle's own software may know of itself at the end of an interval."""
 
 import math
-from typing import Protocol
+from typing import NamedTuple
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-class Estimate(Protocol):
-    """One inertial sample and the state estimated at its time. World NED, body FRD, SI units."""
+class Estimate(NamedTuple):
+    """One inertial sample and the state estimated at its time. World NED, body FRD, SI units.
 
-    @property
-    def time_boot_us(self) -> int: ...
-    @property
-    def specific_force_frd_m_s2(self) -> Vector3: ...
-    @property
-    def angular_velocity_frd_rad_s(self) -> Vector3: ...
-    @property
-    def clipping_counts(self) -> tuple[int, int, int]: ...
-    @property
-    def position_ned_m(self) -> Vector3: ...
-    @property
-    def velocity_ned_m_s(self) -> Vector3: ...
-    @property
-    def attitude_wxyz(self) -> Quaternion: ...
-    @property
-    def thrust_fraction(self) -> float: ...
-    @property
-    def motor_fractions(self) -> Quaternion: ...
-    @property
-    def reset_counter(self) -> int: ...
+    A tuple: one is made every 4 ms.
+    """
+
+    time_boot_us: int
+    specific_force_frd_m_s2: Vector3
+    """Mean over the interval of the raw samples, each clipped first."""
+    angular_velocity_frd_rad_s: Vector3
+    clipping_counts: tuple[int, int, int]
+    """Clipped raw samples per axis since boot."""
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3
+    attitude_wxyz: Quaternion
+    thrust_fraction: float
+    """Commanded collective thrust over the greatest."""
+    motor_fractions: Quaternion
+    """Thrust commanded of each motor over its greatest, in motor order."""
+    reset_counter: int = 0
+    """How often the estimator has let its position or velocity jump."""
 
 
 def yaw_of(attitude_wxyz: Quaternion) -> float:

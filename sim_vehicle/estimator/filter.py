@@ -5,8 +5,6 @@ filterpy's `ExtendedKalmanFilter` estimates the error of a state that is carried
 an attitude stays one.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 from filterpy.kalman import ExtendedKalmanFilter
@@ -41,24 +39,6 @@ FIRST_TILT_RAD = 0.03
 # It begins where its local frame begins.
 FIRST_POSITION_M = 0.01
 FIRST_VELOCITY_M_S = 0.01
-
-FLOW_NAME, RANGE_NAME, HEADING_NAME, CAPTURE_NAME, REST_NAME = "flow", "range", "heading", "capture", "rest"
-
-
-@dataclass(slots=True)
-class Innovations:
-    """Of one sensor: NIS = y' S^-1 y, whose mean over a consistent filter is the number of its values."""
-
-    dimension: int
-    count: int = 0
-    total: float = 0.0
-    rejected: int = 0
-
-    def add(self, nis: float, accepted: bool) -> None:
-        """Count one innovation, whether it was fused or not."""
-        self.count += 1
-        self.total += nis
-        self.rejected += not accepted
 
 
 class ErrorFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types
@@ -106,7 +86,6 @@ class NavigationFilter:
         first[D_GYROSCOPE : D_GYROSCOPE + 3] = imu.gyroscope_bias_rad_s
         first[D_ACCELEROMETER : D_ACCELEROMETER + 3] = imu.accelerometer_bias_m_s2
         ekf.P = np.diag(first**2)
-        self.innovations: dict[str, Innovations] = {}
 
     @property
     def covariance(self) -> Floats:
@@ -125,7 +104,7 @@ class NavigationFilter:
     def fuse_flow(self, flow_rad: tuple[float, float], noise_rad: float, gate: float) -> bool:
         """Angle by which the ground has moved past, turns taken out, since `begin_flow`."""
         innovation = np.array(flow_rad) - self.nominal[FLOW : FLOW + 2]
-        return self._fuse(FLOW_NAME, innovation, _PICK_FLOW, noise_rad**2, gate)
+        return self._fuse(innovation, _PICK_FLOW, noise_rad**2, gate)
 
     def begin_flow(self) -> None:
         """Begin the integral of a new flow sample."""
@@ -136,27 +115,27 @@ class NavigationFilter:
         """Distance along the down axis to the ground."""
         row = np.empty((1, ERROR_ROWS))
         innovation = np.array([distance_m - down_range(self.nominal, row[0])])
-        return self._fuse(RANGE_NAME, innovation, row, noise_m**2, gate)
+        return self._fuse(innovation, row, noise_m**2, gate)
 
     def fuse_heading(self, yaw_rad: float, noise_rad: float, gate: float) -> bool:
         """Heading of the nose."""
         row = np.empty((1, ERROR_ROWS))
         innovation = np.array([wrapped(yaw_rad - heading(self.nominal, row[0]))])
-        return self._fuse(HEADING_NAME, innovation, row, noise_rad**2, gate)
+        return self._fuse(innovation, row, noise_rad**2, gate)
 
     def fuse_position(self, position_ned_m: Vector3, noise_m: float, gate: float) -> bool:
         """Position as motion capture sees it."""
         innovation = np.array(position_ned_m) - self.nominal[POSITION : POSITION + 3]
-        return self._fuse(CAPTURE_NAME, innovation, _PICK_POSITION, noise_m**2, gate)
+        return self._fuse(innovation, _PICK_POSITION, noise_m**2, gate)
 
     def fuse_rest(self, mean_rates_frd_rad_s: Floats, speed_noise_m_s: float, rate_noise_rad_s: float) -> None:
         """The vehicle stands still: no velocity, and what the gyroscope shows is its bias."""
         still = -self.nominal[VELOCITY : VELOCITY + 3]
-        self._fuse(REST_NAME, still, _PICK_VELOCITY, speed_noise_m_s**2, np.inf)
+        self._fuse(still, _PICK_VELOCITY, speed_noise_m_s**2, np.inf)
         bias = mean_rates_frd_rad_s - self.nominal[GYROSCOPE_BIAS : GYROSCOPE_BIAS + 3]
-        self._fuse(REST_NAME, bias, _PICK_GYROSCOPE, rate_noise_rad_s**2, np.inf)
+        self._fuse(bias, _PICK_GYROSCOPE, rate_noise_rad_s**2, np.inf)
 
-    def _fuse(self, name: str, innovation: Floats, h: Floats, variance: float, gate: float) -> bool:
+    def _fuse(self, innovation: Floats, h: Floats, variance: float, gate: float) -> bool:
         """Correct by ``innovation`` = h error + noise, unless one of its values lies beyond the gate."""
         ekf, size = self._ekf, len(innovation)
         r = variance * _UNIT[size]
@@ -166,11 +145,6 @@ class NavigationFilter:
         if accepted:
             ekf.update(innovation, lambda _: h, lambda _: _NOTHING[size], R=r)
             correct(self.nominal, ekf.x)
-        weight = ekf.SI if accepted else np.linalg.inv(s)
-        statistics = self.innovations.get(name)
-        if statistics is None:
-            statistics = self.innovations[name] = Innovations(size)
-        statistics.add(float(innovation @ weight @ innovation), accepted)
         return accepted
 
     # --- resets ---------------------------------------------------------------------------------------------

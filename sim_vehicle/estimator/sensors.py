@@ -91,11 +91,6 @@ class FlowSensor:
         spec = self._spec
         return spec.distance_min_m <= seen[DISTANCE] <= spec.distance_max_m and seen[FASTEST] <= spec.rate_max_rad_s
 
-    @property
-    def distance_m(self) -> float:
-        """True distance along the down axis at the last interval."""
-        return float(self._camera[DISTANCE])
-
 
 class RangeSensor:
     """A LeddarOne that looks along the body's down axis."""

@@ -66,7 +66,6 @@ class Exchange:
         self.motor_fractions: Quadruple = MOTORS_STOPPED
         """PX4's last word, zero before its first and after it has gone."""
         self.overdue_answers = 0
-        self.late_answers = 0
         self._sent_time_us = 0
         self._sent_at_us = 0
         self._connected_at_us = 0
@@ -108,9 +107,7 @@ class Exchange:
             self._move(ExchangeEvent.ANSWERED)
         elif self.phase is ExchangePhase.AWAITING and controls.time_us == self._sent_time_us:
             self._move(ExchangeEvent.ANSWERED)
-        else:
-            # An answer to a sample before the last: sent while booting, or given up already.
-            self.late_answers += 1
+        # Any other is one to a sample before the last: sent while booting, or given up already.
 
     def look_at_clock(self, now_us: int) -> None:
         """Give up an answer that is overdue, and say when PX4 does not begin to answer at all."""

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText
 from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
+from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -86,7 +87,7 @@ def heartbeat(state: Telemetry) -> Message:
         dialect.MAV_AUTOPILOT_PX4,
         base_mode(mode, autopilot.arming.armed, autopilot.signal.ever_arrived),
         NUMBERS[mode].custom_mode,
-        autopilot.system_status,
+        autopilot.commander.system_status,
         3,
     )
 
@@ -221,6 +222,11 @@ def status_texts(text: StatusText, number: int) -> Iterator[Message]:
 
 def boot_ms(estimate: Estimate) -> int:
     return (estimate.time_boot_us // 1000) & 0xFFFFFFFF
+
+
+def units_of(place: Place) -> tuple[int, int, int]:
+    """Latitude and longitude in 1e-7 degrees, altitude in millimetres."""
+    return round(1e7 * place.latitude_deg), round(1e7 * place.longitude_deg), round(1e3 * place.altitude_m)
 
 
 @lru_cache(maxsize=2)

@@ -4,6 +4,8 @@ Source of units, frames and field bits: PX4's simulation/simulator_mavlink/Simul
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -12,7 +14,7 @@ from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.decode import Decoder
-from sim_vehicle.mavlink.encode import Encoder, Message, diagonal_covariance
+from sim_vehicle.mavlink.encode import Encoder, Message, diagonal_covariance, units_of
 from sim_vehicle.mavlink.streams import aiding
 
 # PX4 reads neither of them.
@@ -42,7 +44,7 @@ class HilEncoder:
 
     def packet(self, message: ToPx4) -> bytes:
         """The message as a MAVLink 2 packet."""
-        return self._encoder.packet(_filled(message))
+        return self._encoder.packet(_FILLED[type(message)](message))
 
 
 class HilDecoder:
@@ -54,20 +56,6 @@ class HilDecoder:
     def push(self, data: bytes) -> list[ActuatorControls]:
         """The answers completed by ``data``; PX4's greeting (HEARTBEAT, COMMAND_LONG) is dropped."""
         return [_answer(packet) for packet in self._decoder.push(data)]
-
-
-def _filled(message: ToPx4) -> Message:
-    if isinstance(message, HilSensor):
-        return _sensor(message)
-    if isinstance(message, HilGps):
-        return _gps(message)
-    if isinstance(message, MotionCapture):
-        return _motion_capture(message)
-    if isinstance(message, FlowSample):
-        return aiding.hil_optical_flow(message)
-    if isinstance(message, RangeSample):
-        return aiding.distance_looking_down(message)
-    return _state(message)
 
 
 def _sensor(sample: HilSensor) -> Message:
@@ -106,9 +94,7 @@ def _gps(fix: HilGps) -> Message:
     return dialect.MAVLink_hil_gps_message(
         fix.time_us,
         _FIX_3D,
-        round(1e7 * fix.place.latitude_deg),
-        round(1e7 * fix.place.longitude_deg),
-        round(1e3 * fix.place.altitude_m),
+        *units_of(fix.place),
         accuracy_cm,
         accuracy_cm,
         round(100 * speed_m_s),
@@ -141,6 +127,16 @@ def _state(state: HilState) -> Message:
     return aiding.hil_state(
         state.time_us, state.attitude_wxyz, state.angular_velocity_frd_rad_s, state.place, state.velocity_ned_m_s
     )
+
+
+_FILLED: dict[type[Any], Callable[[Any], Message]] = {
+    HilSensor: _sensor,
+    HilGps: _gps,
+    MotionCapture: _motion_capture,
+    FlowSample: aiding.hil_optical_flow,
+    RangeSample: aiding.distance_looking_down,
+    HilState: _state,
+}
 
 
 def _answer(message: Message) -> ActuatorControls:

@@ -70,7 +70,6 @@ class Outbox:
         self._waiting = 0.0
         self._now_us = now_us
         self._packets: list[bytes] = []
-        self.lost = 0
 
     def send(self, message: Message) -> None:
         """Make a packet of the message."""
@@ -80,7 +79,6 @@ class Outbox:
         """Send a packet as it is, be it somebody else's."""
         if self._bytes_per_us is not None:
             if not self.has_room(len(packet)):
-                self.lost += 1
                 return
             self._waiting += len(packet)
         self._packets.append(packet)

@@ -47,6 +47,11 @@ class Telemetry:
         """Where the local frame lies on the Earth."""
         return self.autopilot.origin
 
+    @property
+    def home_ned_m(self) -> Vector3:
+        """HOME_POSITION."""
+        return self.autopilot.navigator.view.home_ned_m
+
     def parameter(self, name: str) -> float:
         """The value of a parameter that counts now."""
         return self.autopilot.parameters[name]

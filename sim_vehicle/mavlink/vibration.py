@@ -7,7 +7,7 @@ the third, coning, is about raw samples that do not get here.
 
 import math
 
-Vector3 = tuple[float, float, float]
+from sim_vehicle.setpoint import Vector3
 
 _KEPT = 0.99
 _ADDED = 1.0 - _KEPT

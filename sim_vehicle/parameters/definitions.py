@@ -23,7 +23,6 @@ class Definition:
     default: float
     least: float | None
     most: float | None
-    unit: str
     needs_reboot: bool
     """Whether a new value counts only after the next reboot."""
 
@@ -55,6 +54,5 @@ def _definition(row: dict[str, str]) -> Definition:
         default=number(row["default"]),
         least=number(row["min"]) if row["min"] else None,
         most=number(row["max"]) if row["max"] else None,
-        unit=row["unit"],
         needs_reboot=row["needs_reboot"] == "yes",
     )

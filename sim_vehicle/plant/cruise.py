@@ -1,7 +1,8 @@
 """A flight that begins in the air, for studies of single hits: steady, straight, towards something."""
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.plant.plant import Plant, PlantOutput
+from sim_vehicle.estimator.estimate import Estimate
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.world import Vector3
@@ -46,6 +47,6 @@ class Cruise:
             yaw_rad=self._yaw_rad,
         )
 
-    def step(self, setpoint: TrajectorySetpoint | None = None) -> PlantOutput:
+    def step(self, setpoint: TrajectorySetpoint | None = None) -> Estimate:
         """Fly one interval, straight on or to a setpoint of the caller's."""
         return self.plant.step(setpoint or self.setpoint(), armed=True)

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.gains import PositionGains
+from sim_vehicle.estimator.estimate import Estimate, Quaternion
 from sim_vehicle.faults.plan import Faults
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.physics.asked import AskedSetpoint
@@ -34,29 +35,6 @@ from sim_vehicle.world import Vector3, World
 
 if TYPE_CHECKING:
     from sim_vehicle.estimator.onboard import OnboardEstimator
-
-Quadruple = tuple[float, float, float, float]
-
-
-class PlantOutput(NamedTuple):
-    """What the vehicle's own software may know at the end of an interval. A tuple: one is made every 4 ms."""
-
-    time_boot_us: int
-    specific_force_frd_m_s2: Vector3
-    """Mean over the interval of the raw samples, each clipped first."""
-    angular_velocity_frd_rad_s: Vector3
-    clipping_counts: tuple[int, int, int]
-    """Clipped raw samples per axis since boot."""
-    position_ned_m: Vector3
-    velocity_ned_m_s: Vector3
-    acceleration_ned_m_s2: Vector3
-    attitude_wxyz: Quadruple
-    thrust_fraction: float
-    """Commanded collective thrust over the greatest."""
-    motor_fractions: Quadruple
-    """Thrust commanded of each motor over its greatest, in motor order."""
-    reset_counter: int = 0
-    """How often the estimator has let its position or velocity jump."""
 
 
 def _onboard_estimator(airframe: Airframe, faces: Floats, body: Floats, seed: int) -> "OnboardEstimator":
@@ -198,20 +176,20 @@ class Plant:
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
 
-    def step(self, setpoint: Setpoint | None, armed: bool) -> PlantOutput:
+    def step(self, setpoint: Setpoint | None, armed: bool) -> Estimate:
         """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
         motors = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
         if setpoint is not None:
             self._asked.take(setpoint)
         return self._advance(motors)
 
-    def drive(self, motor_fractions: Quadruple) -> PlantOutput:
+    def drive(self, motor_fractions: Quaternion) -> Estimate:
         """Advance one interval under an autopilot from outside: thrust asked of each motor over its greatest."""
         self._motor_command_n[:] = motor_fractions
         self._motor_command_n *= self._motor_max_n
         return self._advance(MOTORS_DRIVEN)
 
-    def _advance(self, motors: int) -> PlantOutput:
+    def _advance(self, motors: int) -> Estimate:
         around = self._around
         if around.world.movers:
             around.move(int(self.state.time_us))
@@ -252,12 +230,12 @@ class Plant:
             estimate[0:6] += self.disturbance.estimate_jump
         report_estimate(self._body, estimate, acceleration, self._frame_offset_ned_m, self._report)
 
-    def _output(self) -> PlantOutput:
+    def _output(self) -> Estimate:
         onboard, faults, report = self.onboard, self.faults, self._report.tolist()
         fx, fy, fz, p, q, r, clip_x, clip_y, clip_z, px, py, pz, vx, vy, vz, *others = report[KNOWN]
         qw, qx, qy, qz, ax, ay, az, m1, m2, m3, m4 = others
         resets = 0 if onboard is None else onboard.reset_counter
-        return PlantOutput(
+        return Estimate(
             int(report[0]) - self.booted_at_us,
             (fx, fy, fz),
             (p, q, r),

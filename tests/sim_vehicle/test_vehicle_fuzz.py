@@ -22,7 +22,7 @@ def state(client: Client) -> tuple:
         autopilot.modes.intended,
         autopilot.arming.armed,
         parameters.sets,
-        autopilot.home_ned_m,
+        autopilot.navigator.view.home_ned_m,
         client.vehicle._signing.key,
         autopilot.wants_reboot,
     )

@@ -73,7 +73,6 @@ class Commander:
         self._sticks_lost_at_arming = True
         self._ever_requested = False
         self._tipping = TippingDetector(parameters)
-        self._taken_off_us: int | None = None
 
     # --- requests --------------------------------------------------------------------------------------------
 
@@ -100,7 +99,6 @@ class Commander:
             self._say(Severity.INFO, f"Armed by {reason}")
             self._battery_at_arming = self.battery.warning
             self._sticks_lost_at_arming = self.sticks.sticks is None
-            self._taken_off_us = None
             self._navigator.view.armed = True
             self._navigator.set_home_here()
             self._navigator.enter(self.modes.flown)
@@ -183,8 +181,6 @@ class Commander:
 
     def _disarm_by_itself(self) -> None:
         landed = self._detector.landed
-        if not landed and self._taken_off_us is None:
-            self._taken_off_us = self._now_us
         if landed and self.arming.taken_off and self._navigator.mission_is_in_progress:
             return
         reason = self.arming.disarm_by_itself(self._now_us, landed)
@@ -245,10 +241,9 @@ class Commander:
 
     @property
     def _flight_time_is_over(self) -> bool:
-        most_s = self._parameters["COM_FLT_TIME_MAX"]
-        if most_s <= 0 or self._taken_off_us is None or not self.arming.armed:
-            return False
-        return self._now_us - self._taken_off_us > 1e6 * most_s
+        most_s, arming = self._parameters["COM_FLT_TIME_MAX"], self.arming
+        flies = arming.armed and arming.taken_off
+        return most_s > 0 and flies and self._now_us - arming.taken_off_at_us > 1e6 * most_s
 
     # --- what there is ---------------------------------------------------------------------------------------
 

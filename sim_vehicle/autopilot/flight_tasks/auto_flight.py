@@ -2,10 +2,10 @@
 
 import math
 
-from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, Vector3, towards, turned_towards
+from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.setpoint import TrajectorySetpoint, Vector3
 
 
 class AutoFlight:
@@ -14,14 +14,14 @@ class AutoFlight:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._smoother = Smoother(parameters)
-        self._yaw_rad = self._asked_yaw_rad = 0.0
+        self._asked_yaw_rad = 0.0
         self.cruise_m_s: float | None = None
         """As DO_CHANGE_SPEED asked for; None for MPC_XY_CRUISE."""
 
     def start(self, view: View, at_rest: bool = False) -> None:
         """Begin where the vehicle is."""
         self._smoother.start(view.position_ned_m, (0.0, 0.0, 0.0) if at_rest else view.velocity_ned_m_s)
-        self._yaw_rad = self._asked_yaw_rad = view.yaw_rad
+        self._smoother.yaw_rad = self._asked_yaw_rad = view.yaw_rad
 
     def demand(self, target: NavigatorTarget, view: View, step_s: float) -> TrajectorySetpoint | None:
         """The next setpoint; None lets the motors idle."""
@@ -32,17 +32,8 @@ class AutoFlight:
             return self._climb(target, view, step_s)
         if target.kind is Kind.LAND:
             return self.descend(target.position_ned_m, view, land_speed_m_s(view.height_m, self._parameters), step_s)
-        return self._fly(target, view, step_s)
-
-    def _fly(self, target: NavigatorTarget, view: View, step_s: float) -> TrajectorySetpoint:
-        smoother = self._smoother
-        smoother.advance(target.position_ned_m, step_s, self._cruise_m_s(target))
-        return TrajectorySetpoint(
-            position_ned_m=smoother.position_ned_m,
-            velocity_ned_m_s=smoother.velocity_ned_m_s,
-            acceleration_ned_m_s2=smoother.acceleration_ned_m_s2,
-            yaw_rad=self._yaw_rad,
-        )
+        self._smoother.advance(target.position_ned_m, step_s, self._cruise_m_s(target))
+        return self._smoother.setpoint
 
     def _cruise_m_s(self, target: NavigatorTarget) -> float:
         wanted = target.speed_m_s or self.cruise_m_s or self._parameters["MPC_XY_CRUISE"]
@@ -59,7 +50,7 @@ class AutoFlight:
         wanted = max(self._smoother.vertical_velocity(v_down, down - height, step_s), -most_m_s)
         v_down = towards(v_down, wanted, most_m_s2 * step_s)
         self._smoother.start((north, east, height), (0.0, 0.0, v_down))
-        return TrajectorySetpoint((north, east, None), (0.0, 0.0, v_down), yaw_rad=self._yaw_rad)
+        return TrajectorySetpoint((north, east, None), (0.0, 0.0, v_down), yaw_rad=self._smoother.yaw_rad)
 
     def descend(self, place_ned_m: Vector3, view: View, speed_m_s: float, step_s: float) -> TrajectorySetpoint:
         """Sink at that speed over a place."""
@@ -70,7 +61,7 @@ class AutoFlight:
         north, east, _ = smoother.position_ned_m
         v_north, v_east, _ = smoother.velocity_ned_m_s
         smoother.start((north, east, view.position_ned_m[2]), (v_north, v_east, v_down))
-        return TrajectorySetpoint((north, east, None), (v_north, v_east, v_down), yaw_rad=self._yaw_rad)
+        return TrajectorySetpoint((north, east, None), (v_north, v_east, v_down), yaw_rad=smoother.yaw_rad)
 
     def _turn(self, target: NavigatorTarget, view: View, step_s: float) -> None:
         """As the target says, else towards its place; within NAV_ACC_RAD of that the nose stays as it is."""
@@ -81,8 +72,7 @@ class AutoFlight:
             to_north, to_east = target.position_ned_m[0] - north, target.position_ned_m[1] - east
             if math.hypot(to_north, to_east) > self._parameters["NAV_ACC_RAD"]:
                 self._asked_yaw_rad = math.atan2(to_east, to_north)
-        most_rad = math.radians(self._parameters["MPC_YAWRAUTO_MAX"]) * step_s
-        self._yaw_rad = turned_towards(self._yaw_rad, self._asked_yaw_rad, most_rad)
+        self._smoother.turn(self._asked_yaw_rad, step_s)
 
 
 def land_speed_m_s(height_m: float, parameters: Parameters) -> float:

@@ -6,7 +6,7 @@ flown when it turns; the place to be moves at most at FLW_TGT_MAX_VEL instead.
 
 import math
 
-from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, turned_towards
+from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import FollowTarget
 from sim_vehicle.geography import Origin, Place
@@ -29,7 +29,6 @@ class Follow:
         self._target: FollowTarget | None = None
         self._heard_us = 0
         self._course_rad = 0.0
-        self._yaw_rad = 0.0
 
     def heard(self, target: FollowTarget, now_us: int) -> None:
         """FOLLOW_TARGET."""
@@ -41,12 +40,12 @@ class Follow:
     def start(self, view: View) -> None:
         """Begin where the vehicle is."""
         self._smoother.start(view.position_ned_m, view.velocity_ned_m_s)
-        self._yaw_rad = view.yaw_rad
+        self._smoother.yaw_rad = view.yaw_rad
 
     def demand(self, view: View, step_s: float) -> TrajectorySetpoint:
         """The next setpoint; without a target the vehicle stays."""
-        place = self._smoother.position_ned_m
-        parameters = self._parameters
+        smoother, parameters = self._smoother, self._parameters
+        place = smoother.position_ned_m
         if self._target is not None and view.now_us - self._heard_us < _TARGET_LOST_US:
             age_s = 1e-6 * (view.now_us - self._heard_us)
             v_north, v_east, _ = self._target.velocity_ned_m_s
@@ -60,11 +59,6 @@ class Follow:
                 east + distance_m * math.sin(angle_rad),
                 view.home_ned_m[2] - parameters["FLW_TGT_HT"],
             )
-            yaw_rad = math.atan2(east - view.position_ned_m[1], north - view.position_ned_m[0])
-            most_rad = math.radians(parameters["MPC_YAWRAUTO_MAX"]) * step_s
-            self._yaw_rad = turned_towards(self._yaw_rad, yaw_rad, most_rad)
-        smoother = self._smoother
+            smoother.turn(math.atan2(east - view.position_ned_m[1], north - view.position_ned_m[0]), step_s)
         smoother.advance(place, step_s, parameters["FLW_TGT_MAX_VEL"])
-        return TrajectorySetpoint(
-            smoother.position_ned_m, smoother.velocity_ned_m_s, smoother.acceleration_ned_m_s2, self._yaw_rad
-        )
+        return smoother.setpoint

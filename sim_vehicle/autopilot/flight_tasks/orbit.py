@@ -6,10 +6,10 @@ Source: PX4's FlightTaskOrbit.cpp (its sticks and its other headings left out).
 import math
 from dataclasses import dataclass
 
-from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards, turned_towards
-from sim_vehicle.autopilot.flight_tasks.target import Vector3, View
+from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards
+from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.setpoint import TrajectorySetpoint, Vector3
 
 RADIUS_MIN_M = 1.0
 ACCELERATION_MAX_M_S2 = 2.0
@@ -36,7 +36,6 @@ class Orbit:
         self._radius_m = RADIUS_MIN_M
         self._speed_m_s = 1.0
         """Positive: clockwise."""
-        self._yaw_rad = 0.0
         self._slewed_m_s = 0.0
         self._approaches = True
 
@@ -44,7 +43,7 @@ class Orbit:
         """Begin round the place where the vehicle is."""
         self._centre_ned_m = view.position_ned_m
         self._radius_m, self._speed_m_s = RADIUS_MIN_M, 1.0
-        self._yaw_rad = view.yaw_rad
+        self._smoother.yaw_rad = view.yaw_rad
         self._approach(view)
 
     def change(
@@ -96,11 +95,8 @@ class Orbit:
         north, east, down = self._centre_ned_m
         place = (north + self._radius_m * out_north, east + self._radius_m * out_east, down)
         self._smoother.advance(place, step_s, self._parameters["MPC_XY_CRUISE"])
-        self._turn(math.atan2(-out_east, -out_north), step_s)
-        smoother = self._smoother
-        return TrajectorySetpoint(
-            smoother.position_ned_m, smoother.velocity_ned_m_s, smoother.acceleration_ned_m_s2, self._yaw_rad
-        )
+        self._smoother.turn(math.atan2(-out_east, -out_north), step_s)
+        return self._smoother.setpoint
 
     def _round(self, view: View, step_s: float) -> TrajectorySetpoint:
         out_north, out_east = self._outward(view)
@@ -108,12 +104,12 @@ class Orbit:
         speed, outside_m = self._slewed_m_s, self._radius_m - view.distance_m(self._centre_ned_m)
         v_north, v_east = -out_east * speed + outside_m * out_north, out_north * speed + outside_m * out_east
         inward_m_s2 = speed * speed / self._radius_m
-        self._turn(math.atan2(-out_east, -out_north), step_s)
+        self._smoother.turn(math.atan2(-out_east, -out_north), step_s)
         return TrajectorySetpoint(
             (None, None, self._centre_ned_m[2]),
             (v_north, v_east, 0.0),
             (-out_north * inward_m_s2, -out_east * inward_m_s2, None),
-            self._yaw_rad,
+            self._smoother.yaw_rad,
             speed / self._radius_m,
         )
 
@@ -121,7 +117,3 @@ class Orbit:
         north, east = view.position_ned_m[0] - self._centre_ned_m[0], view.position_ned_m[1] - self._centre_ned_m[1]
         length = math.hypot(north, east)
         return (north / length, east / length) if length > 0.0 else (1.0, 0.0)
-
-    def _turn(self, yaw_rad: float, step_s: float) -> None:
-        most_rad = math.radians(self._parameters["MPC_YAWRAUTO_MAX"]) * step_s
-        self._yaw_rad = turned_towards(self._yaw_rad, yaw_rad, most_rad)

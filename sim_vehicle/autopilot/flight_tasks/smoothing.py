@@ -6,8 +6,7 @@ Source: PX4's lib/motion_planning (PositionSmoothing) and its parameters, which 
 import math
 
 from sim_vehicle.parameters.store import Parameters
-
-Vector3 = tuple[float, float, float]
+from sim_vehicle.setpoint import TrajectorySetpoint, Vector3
 
 # PX4 limits jerk too, and so brakes with about half of the greatest acceleration on average.
 BRAKE_SHARE = 0.5
@@ -25,13 +24,21 @@ def stop_point(position_ned_m: Vector3, velocity_ned_m_s: Vector3, parameters: P
 
 
 class Smoother:
-    """Position, velocity and acceleration of the moving setpoint, local NED."""
+    """Position, velocity, acceleration and heading of the moving setpoint, local NED."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self.position_ned_m: Vector3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
         self.acceleration_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
+        self.yaw_rad = 0.0
+
+    @property
+    def setpoint(self) -> TrajectorySetpoint:
+        """Where it is now."""
+        return TrajectorySetpoint(
+            self.position_ned_m, self.velocity_ned_m_s, self.acceleration_ned_m_s2, yaw_rad=self.yaw_rad
+        )
 
     def start(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Begin where the vehicle is, as fast as it is."""
@@ -60,6 +67,12 @@ class Smoother:
         )
         self.position_ned_m = (north + v_north * step_s, east + v_east * step_s, down + v_down * step_s)
 
+    def turn(self, yaw_rad: float, step_s: float) -> None:
+        """Turn on the short way towards a heading, as fast as MPC_YAWRAUTO_MAX."""
+        most_rad = math.radians(self._parameters["MPC_YAWRAUTO_MAX"]) * step_s
+        difference = math.remainder(yaw_rad - self.yaw_rad, 2 * math.pi)
+        self.yaw_rad = math.remainder(self.yaw_rad + towards(0.0, difference, most_rad), 2 * math.pi)
+
     def vertical_velocity(self, velocity_down_m_s: float, distance_down_m: float, step_s: float) -> float:
         """The next downward velocity of a setpoint ``distance_down_m`` away from its height."""
         parameters = self._parameters
@@ -75,12 +88,6 @@ class Smoother:
 def towards(value: float, target: float, most: float) -> float:
     """``value`` moved to ``target`` by at most ``most``."""
     return min(max(target, value - most), value + most)
-
-
-def turned_towards(yaw_rad: float, target_rad: float, most_rad: float) -> float:
-    """``yaw_rad`` turned the short way by at most ``most_rad``."""
-    difference = math.remainder(target_rad - yaw_rad, 2 * math.pi)
-    return math.remainder(yaw_rad + towards(0.0, difference, most_rad), 2 * math.pi)
 
 
 def _braking_speed(distance_m: float, acceleration_m_s2: float, most_m_s: float, step_s: float) -> float:

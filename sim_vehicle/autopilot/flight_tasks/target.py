@@ -4,10 +4,9 @@ import math
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from sim_vehicle.estimator.estimate import Quaternion, yaw_of
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.parameters.store import Parameters
-
-Vector3 = tuple[float, float, float]
+from sim_vehicle.setpoint import Quaternion, Vector3
 
 _MICROSECONDS = 1e6
 # FlightTaskAuto wants to take off where the way to its target climbs faster than this.

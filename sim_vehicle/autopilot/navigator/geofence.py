@@ -7,12 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sim_vehicle.autopilot.flight_tasks.target import Vector3, View
+from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import Vector3
 
 # GEOFENCE_CHECK_INTERVAL_US.
 CHECK_PERIOD_US = 200_000

@@ -14,7 +14,6 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     Arrival,
     Kind,
     NavigatorTarget,
-    Vector3,
     View,
     takeoff_acceptance,
 )
@@ -24,6 +23,7 @@ from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, pla
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import Vector3
 
 # A mission of jumps alone ends where it has jumped more often than it has items.
 _MOST_JUMPS_PER_ITEM = 1
@@ -155,7 +155,7 @@ class MissionFlight:
     def _is_over(self, item: StoredItem, view: View) -> bool:
         command = item.command
         if self._work is Work.ITEM:
-            if command in (kinds.LAND, kinds.VTOL_LAND):
+            if command == kinds.LAND:
                 return view.landed
             if command == kinds.LOITER_UNLIMITED:
                 return False

@@ -11,7 +11,6 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     Arrival,
     Kind,
     NavigatorTarget,
-    Vector3,
     View,
     climbs_to,
     takeoff_acceptance,
@@ -21,11 +20,11 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, P
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.autopilot.navigator.mission import MissionFlight
-from sim_vehicle.autopilot.navigator.mission_feasibility import MissionCheck
+from sim_vehicle.autopilot.navigator.mission_feasibility import problem_of
 from sim_vehicle.autopilot.navigator.rtl import Return
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.setpoint import TrajectorySetpoint, Vector3
 
 # The navigator listens to the position at 20 Hz.
 PERIOD_US = 50_000
@@ -224,9 +223,11 @@ class Navigator:
             self.mission.forget()
 
     def _check_mission(self) -> None:
-        check = MissionCheck(self._parameters, self._origin, self.fence, self.view)
-        self._missions.progress.valid = check.passes(self._missions.mission.items)
-        self.mission.texts += [StatusText(Severity.CRITICAL, text) for text in (*check.problems, *check.warnings)]
+        items = self._missions.mission.items
+        problem = problem_of(items, self._origin, self.fence, self.view)
+        self._missions.progress.valid = bool(items) and problem is None
+        if problem is not None:
+            self._say(Severity.CRITICAL, problem)
 
     def demand(self, step_s: float) -> TrajectorySetpoint | None:
         """The next setpoint of the mode; None lets the motors idle."""

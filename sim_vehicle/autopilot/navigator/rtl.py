@@ -6,13 +6,14 @@ Sources: PX4's navigator rtl.cpp and rtl_direct.cpp for multicopters, with RTL_T
 import math
 from enum import Enum, auto
 
-from sim_vehicle.autopilot.flight_tasks.target import Acceptance, Arrival, Kind, NavigatorTarget, Vector3, View
+from sim_vehicle.autopilot.flight_tasks.target import Acceptance, Arrival, Kind, NavigatorTarget, View
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import Vector3
 
 # RTL::findClosestSafePoint: rally points this near to home are home, and one must be nearer by this much.
 _SAME_AS_HOME_M = 10.0

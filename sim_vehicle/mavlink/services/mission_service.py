@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.mission_transfer import MESSAGES, MissionTransfer, TransferState
+from sim_vehicle.mavlink.services.mission_transfer import MESSAGES, MissionTransfer
 from sim_vehicle.mavlink.services.service import Channel, Handler
 
 # MISSION_CURRENT is repeated once a second, and MISSION_ITEM_REACHED with it as often as this.
@@ -25,8 +25,7 @@ class MissionService:
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
-        self._autopilot = board.autopilot
-        self._transfer = MissionTransfer(board.autopilot.missions)
+        self._transfer = MissionTransfer(board.autopilot.missions, link.send, board.autopilot.say)
         self._report = ProgressReport(board.autopilot.missions)
         self.handlers: Mapping[int, Handler] = dict.fromkeys(MESSAGES, self._receive)
 
@@ -34,17 +33,10 @@ class MissionService:
         """Repeats, time-outs, and what the mission has come to."""
         for message in self._report.update(now_us):
             self._link.send(message)
-        if self._transfer.state is not TransferState.IDLE:
-            self._send(self._transfer.update(now_us))
+        self._transfer.update(now_us)
 
     def _receive(self, packet: dialect.MAVLink_message) -> None:
-        self._send(self._transfer.receive(packet, self._link.now_us))
-
-    def _send(self, answers: list[Message]) -> None:
-        for answer in answers:
-            self._link.send(answer)
-        self._autopilot.texts += self._transfer.texts
-        self._transfer.texts.clear()
+        self._transfer.receive(packet, self._link.now_us)
 
 
 class ProgressReport:

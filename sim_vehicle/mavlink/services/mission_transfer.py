@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.messages import Severity
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore, Plan
 from sim_vehicle.mavlink.encode import Message
@@ -48,11 +48,12 @@ class TransferState(Enum):
 class MissionTransfer:
     """Messages and the time in; answers and texts out. The lists themselves are the store's."""
 
-    def __init__(self, store: MissionStore) -> None:
+    def __init__(
+        self, store: MissionStore, send: Callable[[Message], None], say: Callable[[Severity, str], None]
+    ) -> None:
+        """``send`` takes the answers, ``say`` what ground stations are told."""
         self.state = TransferState.IDLE
-        self.texts: list[StatusText] = []
-        self._store = store
-        self._answers: list[Message] = []
+        self._store, self._send, self._tell = store, send, say
         self._now_us = 0
         self._peer = _NOBODY
         self._type: int = MissionType.MISSION
@@ -65,27 +66,16 @@ class MissionTransfer:
         self._sent_us: int | None = None
         self._heard_us: int | None = None
 
-    def receive(self, message: Packet, now_us: int) -> list[Message]:
+    def receive(self, message: Packet, now_us: int) -> None:
         """Take a message that is addressed to this vehicle."""
         self._now_us = now_us
         _HANDLERS[_NEW_KIND.get(message.id, message.id), self.state](self, message)
-        return self._taken()
 
-    def update(self, now_us: int) -> list[Message]:
+    def update(self, now_us: int) -> None:
         """Let time pass: repeats and time-outs."""
         self._now_us = now_us
-        if self.state is not TransferState.IDLE:
-            self._wait()
-        return self._taken()
-
-    def _taken(self) -> list[Message]:
-        answers, self._answers = self._answers, []
-        return answers
-
-    # --- time ------------------------------------------------------------------------------------------------
-
-    def _wait(self) -> None:
-        now_us = self._now_us
+        if self.state is TransferState.IDLE:
+            return
         is_quiet = self._sent_us is not None and now_us - self._sent_us > RETRY_US
         if self.state is TransferState.RECEIVING and is_quiet and not self._is_over():
             self._ask_for_next()
@@ -116,7 +106,7 @@ class MissionTransfer:
 
     def _send_count(self) -> None:
         self._sent_us = self._now_us
-        self._answers.append(dialect.MAVLink_mission_count_message(*self._peer, self._count, self._type))
+        self._send(dialect.MAVLink_mission_count_message(*self._peer, self._count, self._type))
 
     def _send_item(self, message: Packet) -> None:
         if _peer(message) != self._peer:
@@ -133,7 +123,7 @@ class MissionTransfer:
         if (is_next or number == self._next - 1) and number < len(items):
             self._sent_us = self._now_us
             around = (self._peer, number, self._store.current == number, self._type, self._is_int)
-            self._answers.append(wire.item_message(items[number], *around))
+            self._send(wire.item_message(items[number], *around))
             return
         self.state = TransferState.IDLE
         self._acknowledge(MissionResult.ERROR)
@@ -160,7 +150,7 @@ class MissionTransfer:
     def _begin_upload(self, message: Packet) -> None:
         self._heard_us = self._now_us
         if self._store.uploading:
-            self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+            self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
             return
         self._peer, self._type, self._checksum = _peer(message), message.mission_type, 0
         self._store.progress.reached = -1
@@ -180,7 +170,7 @@ class MissionTransfer:
     def _repeat_request(self, message: Packet) -> None:
         self._heard_us = self._now_us
         if _peer(message) != self._peer:
-            self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+            self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
         elif self._next == 0:
             self._ask_for_next()
         else:
@@ -189,14 +179,14 @@ class MissionTransfer:
 
     def _refuse_upload(self, message: Packet) -> None:
         self._say("WPM: IGN MISSION_COUNT: Busy")
-        self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+        self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
 
     def _ask_for_next(self) -> None:
         self._sent_us = self._now_us
         request = dialect.MAVLink_mission_request_int_message
         if not self._is_int:
             request = dialect.MAVLink_mission_request_message
-        self._answers.append(request(*self._peer, self._next, self._type))
+        self._send(request(*self._peer, self._next, self._type))
 
     def _take_item(self, message: Packet) -> None:
         if not self._is_from_partner(message):
@@ -280,7 +270,7 @@ class MissionTransfer:
         for kind in kinds:
             if kind in MOST_ITEMS:
                 self._store.replace(MissionType(kind), Plan(), 0)
-        self._answers.append(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ACCEPTED, self._type))
+        self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ACCEPTED, self._type))
 
     def _set_current(self, message: Packet) -> None:
         if not self._store.choose(message.seq):
@@ -291,10 +281,10 @@ class MissionTransfer:
             self._say("REJ. WP CMD: partner id mismatch")
 
     def _acknowledge(self, result: MissionResult) -> None:
-        self._answers.append(dialect.MAVLink_mission_ack_message(*self._peer, result, self._type))
+        self._send(dialect.MAVLink_mission_ack_message(*self._peer, result, self._type))
 
     def _say(self, text: str, severity: Severity = Severity.CRITICAL) -> None:
-        self.texts.append(StatusText(severity, text))
+        self._tell(severity, text)
 
 
 def _peer(packet: Packet) -> tuple[int, int]:
@@ -302,7 +292,7 @@ def _peer(packet: Packet) -> tuple[int, int]:
 
 
 def _refused(text: str, severity: Severity = Severity.CRITICAL) -> Callable[[MissionTransfer, Any], None]:
-    return lambda transfer, message: transfer.texts.append(StatusText(severity, text))
+    return lambda transfer, message: transfer._say(text, severity)
 
 
 # The table: what a message means in each state.

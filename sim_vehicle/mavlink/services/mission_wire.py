@@ -33,12 +33,7 @@ _KEPT: dict[int, str] = {
     kinds.LAND: "-k-h",
     kinds.TAKEOFF: "---h",
     kinds.LOITER_TO_ALTITUDE: "bk-b",
-    kinds.ROI: "----",
-    kinds.DO_SET_ROI: "----",
     kinds.DO_SET_ROI_LOCATION: "----",
-    kinds.VTOL_TAKEOFF: "---h",
-    kinds.VTOL_LAND: "---h",
-    kinds.CONDITION_GATE: "----",
     kinds.FENCE_RETURN_POINT: "----",
     kinds.FENCE_POLYGON_INCLUSION: "n---",
     kinds.FENCE_POLYGON_EXCLUSION: "n---",
@@ -46,7 +41,6 @@ _KEPT: dict[int, str] = {
     kinds.FENCE_CIRCLE_EXCLUSION: "k---",
     kinds.RALLY_POINT: "----",
     kinds.ARM_DISARM: "n---",
-    kinds.DO_AUTOTUNE_ENABLE: "nn--",
 }
 _DEGREES_PER_UNIT = 1e-7
 
@@ -59,7 +53,6 @@ class MissionResult(IntEnum):
     UNSUPPORTED_FRAME = 2
     UNSUPPORTED = 3
     NO_SPACE = 4
-    INVALID_PARAM1 = 6
     CANCELLED = 15
 
 
@@ -85,20 +78,13 @@ def _with_place(packet: ItemPacket, scale: float) -> StoredItem | MissionResult:
     kept = _KEPT.get(packet.command)
     if kept is None:
         return MissionResult.UNSUPPORTED
-    one, *others = (_kept(rule, value) for rule, value in zip(kept, _params(packet), strict=True))
-    if packet.command in (kinds.ROI, kinds.DO_SET_ROI):
-        one = float(_whole(packet.param1))
-        if one not in (kinds.ROI_LOCATION, kinds.ROI_NONE):
-            return MissionResult.INVALID_PARAM1
-    return _item(packet, (one, *others), packet.x * scale, packet.y * scale)
+    params = tuple(_kept(rule, value) for rule, value in zip(kept, _params(packet), strict=True))
+    return _item(packet, params, packet.x * scale, packet.y * scale)
 
 
 def _without_place(packet: ItemPacket) -> StoredItem | MissionResult:
     if packet.command not in kinds.WITHOUT_POSITION:
         return MissionResult.UNSUPPORTED
-    of_roi = (kinds.ROI_NONE, kinds.ROI_WPNEXT, kinds.ROI_WPINDEX)
-    if packet.command in (kinds.ROI, kinds.DO_SET_ROI) and _whole(packet.param1) not in of_roi:
-        return MissionResult.INVALID_PARAM1
     return _item(packet, _params(packet), packet.x, packet.y)
 
 
@@ -108,8 +94,7 @@ def _params(packet: ItemPacket) -> tuple[float, ...]:
 
 def _item(packet: ItemPacket, params: tuple[float, ...], x: float, y: float) -> StoredItem:
     p1, p2, p3, p4 = params
-    command = kinds.DO_SET_ROI if packet.command == kinds.ROI else packet.command
-    return StoredItem(packet.frame, command, packet.autocontinue, (p1, p2, p3, p4, x, y, packet.z))
+    return StoredItem(packet.frame, packet.command, packet.autocontinue, (p1, p2, p3, p4, x, y, packet.z))
 
 
 def _kept(rule: str, value: float) -> float:

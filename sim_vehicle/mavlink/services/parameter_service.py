@@ -1,10 +1,10 @@
-"""The parameter protocol: list, read, set, and PX4's hash of all values.
+"""The parameter protocol: list, read, set.
 
-Source: PX4's mavlink/mavlink_parameters.cpp. What is wrong (a name, an index, a type) is not answered.
+Source: PX4's mavlink/mavlink_parameters.cpp. What is wrong (a name, an index, a type) is not answered. There is no
+_HASH_CHECK, which spares a ground station a list that it has kept.
 """
 
 import struct
-import zlib
 from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
@@ -20,15 +20,12 @@ _MARKER_V2, _HEADER_V2, _HEADER_V1 = 0xFD, 10, 6
 
 _IS_WHOLE = {dialect.MAV_PARAM_TYPE_INT32: True, dialect.MAV_PARAM_TYPE_REAL32: False}
 
-HASH_NAME = "_HASH_CHECK"
-NO_INDEX = 0xFFFF
 # PX4 sends so many of a list at a time where the link is fast, and so many on a serial line.
 BURST, BURST_SERIAL = 20, 3
 # A whole PARAM_VALUE with header and checksum.
 PACKET_BYTES = 25 + 12
 # A changed value is told to everybody this long after it was set, whoever set it.
 ANNOUNCE_AFTER_US = 5_000
-_ALL_BITS = 0xFFFFFFFF
 
 
 class ParameterService:
@@ -41,7 +38,7 @@ class ParameterService:
         self._names = board.parameters.names
         self._index = {name: number for number, name in enumerate(self._names)}
         self._next: int | None = None
-        """Index of what is sent next of a list; -1 for the hash, None while no list is sent."""
+        """Index of what is sent next of a list; None while none is sent."""
         self._told = board.parameters.sets
         self._announce_at_us: int | None = None
         self.handlers: Mapping[int, Handler] = {20: self._read, 21: self._list, 23: self._set}
@@ -55,8 +52,7 @@ class ParameterService:
 
     def _list(self, packet: dialect.MAVLink_param_request_list_message) -> None:
         if packet.target_system == self._us.system:
-            # Asked again while sending, PX4 begins anew without the hash.
-            self._next = -1 if self._next is None else 0
+            self._next = 0
 
     def _read(self, packet: dialect.MAVLink_param_request_read_message) -> None:
         if packet.target_system != self._us.system:
@@ -64,18 +60,11 @@ class ParameterService:
         if packet.param_index >= 0:
             if packet.param_index < len(self._names):
                 self._send(self._names[packet.param_index])
-        elif packet.param_id == HASH_NAME:
-            self._link.send(_hash_value(self._parameters))
         elif packet.param_id in self._index:
             self._send(packet.param_id)
 
     def _set(self, packet: dialect.MAVLink_param_set_message) -> None:
         if packet.target_system != self._us.system:
-            return
-        if packet.param_id == HASH_NAME:
-            # A ground station that knows all values from its cache: it wants no more of them.
-            if self._parameters["MAV_HASH_CHK_EN"]:
-                self._next = None
             return
         definition, is_whole = self._parameters.definition(packet.param_id), _IS_WHOLE.get(packet.param_type)
         if definition is None or is_whole is not definition.is_whole:
@@ -91,10 +80,7 @@ class ParameterService:
         for _ in range(self._link.burst(BURST, BURST_SERIAL, PACKET_BYTES)):
             if self._next is None:
                 return
-            if self._next < 0:
-                self._link.send(_hash_value(self._parameters))
-            else:
-                self._send(self._names[self._next])
+            self._send(self._names[self._next])
             self._next = self._next + 1 if self._next + 1 < len(self._names) else None
 
     def _announce(self, now_us: int) -> None:
@@ -130,22 +116,3 @@ def _parameter_value(parameters: Parameters, name: str, index: int) -> dialect.M
     if definition.is_whole:
         return _WholeValue(name.encode(), int(value), dialect.MAV_PARAM_TYPE_INT32, count, index)
     return dialect.MAVLink_param_value_message(name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32, count, index)
-
-
-def _hash_value(parameters: Parameters) -> dialect.MAVLink_param_value_message:
-    value = parameter_hash(parameters)
-    signed = value - (_ALL_BITS + 1) if value >> 31 else value
-    count = len(parameters.names)
-    return _WholeValue(HASH_NAME.encode(), signed, dialect.MAV_PARAM_TYPE_UINT32, count, NO_INDEX)
-
-
-def parameter_hash(parameters: Parameters) -> int:
-    """CRC-32 over every name and the four bytes of its value, begun at 0 and never inverted (param_hash_check)."""
-    crc = _ALL_BITS
-    for name in parameters.names:
-        definition, value = parameters.definition(name), parameters.stored(name)
-        whole = definition is not None and definition.is_whole
-        crc = zlib.crc32(
-            struct.pack("<i", value) if whole else struct.pack("<f", value), zlib.crc32(name.encode(), crc)
-        )
-    return crc ^ _ALL_BITS

@@ -2,16 +2,11 @@
 
 from collections.abc import Mapping
 from math import isfinite
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import (
-    AttitudeTarget,
-    FollowTarget,
-    GlobalTarget,
-    PositionTarget,
-    StickInput,
-)
+from sim_vehicle.autopilot.messages import AttitudeTarget, FollowTarget, PositionTarget, StickInput
 from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.service import Channel, Handler
 from sim_vehicle.setpoint import Axis3
@@ -23,29 +18,26 @@ _FULL_STICK = 1000
 
 
 def position_target(packet: dialect.MAVLink_set_position_target_local_ned_message) -> PositionTarget:
+    return _target(packet, position_m=_axes(packet.type_mask, packet.x, packet.y, packet.z))
+
+
+def global_target(packet: dialect.MAVLink_set_position_target_global_int_message) -> PositionTarget:
+    place = (packet.lat_int / 1e7, packet.lon_int / 1e7, packet.alt)
+    is_open = packet.type_mask & 0x7 or not isfinite(packet.alt)
+    return _target(packet, is_global=True, place=None if is_open else place)
+
+
+def _target(packet: Any, **where: Any) -> PositionTarget:
+    """What both kinds have in common."""
     mask = packet.type_mask
     return PositionTarget(
         frame=packet.coordinate_frame,
-        position_m=_axes(mask, packet.x, packet.y, packet.z),
         velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
         acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
         yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
         yaw_rate_rad_s=_value(mask & _YAW_RATE_IGNORED, packet.yaw_rate),
         is_force=bool(mask & _FORCE_BIT),
-    )
-
-
-def global_target(packet: dialect.MAVLink_set_position_target_global_int_message) -> GlobalTarget:
-    mask = packet.type_mask
-    place = (packet.lat_int / 1e7, packet.lon_int / 1e7, packet.alt)
-    return GlobalTarget(
-        frame=packet.coordinate_frame,
-        place=None if mask & 0x7 or not isfinite(packet.alt) else place,
-        velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
-        acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
-        yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
-        yaw_rate_rad_s=_value(mask & _YAW_RATE_IGNORED, packet.yaw_rate),
-        is_force=bool(mask & _FORCE_BIT),
+        **where,
     )
 
 

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.encode import Message, units_of
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Quaternion, Vector3
 
@@ -84,9 +84,7 @@ def hil_state(
         time_us,
         *attitude_wxyz,
         *angular_velocity_frd_rad_s,
-        round(1e7 * place.latitude_deg),
-        round(1e7 * place.longitude_deg),
-        round(1e3 * place.altitude_m),
+        *units_of(place),
         *(round(100 * speed) for speed in velocity_ned_m_s),
         *_NO_AIRSPEED,
         *_NO_ACCELERATION,

@@ -27,6 +27,8 @@ _PRESENT = 0x1 | 0x2 | 0x4 | 0x8 | 0x20 | 0x4000 | 0x2000000
 _RC_RECEIVER, _GPS, _BATTERY, _PREARM_CHECK = 0x10000, 0x20, 0x2000000, 0x10000000
 _WELL = _PRESENT | 0x10 | 0x800 | 0x8000 | 0x200000 | 0x1000000
 _EXTENDED_WELL = 0x1
+# Packets dropped and errors, and the upper halves of the three bit masks.
+_NO_LINK_STATISTICS = (0,) * 8
 # COM_RC_IN_MODE: sticks of no kind are expected.
 _NO_STICKS = 4
 _LOAD_PER_MILLE = 100
@@ -43,7 +45,7 @@ def sys_status(state: Telemetry) -> Message:
     """Health as PX4's checks see it; the processor's load is a SITL's."""
     autopilot, battery = state.autopilot, state.autopilot.battery
     enabled = _PRESENT if state.parameter("COM_RC_IN_MODE") == _NO_STICKS else _PRESENT | _RC_RECEIVER
-    health = _WELL | (_PREARM_CHECK if autopilot.checks_pass else 0)
+    health = _WELL | (_PREARM_CHECK if autopilot.commander.checks_pass else 0)
     if state.gps is None:
         health &= ~_GPS
     if battery.warning:
@@ -56,14 +58,7 @@ def sys_status(state: Telemetry) -> Message:
         round(1e3 * battery.voltage_v),
         round(100 * battery.current_a),
         math.ceil(100 * battery.remaining),
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
+        *_NO_LINK_STATISTICS,
         _EXTENDED_WELL,
     )
 

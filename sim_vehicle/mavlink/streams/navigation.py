@@ -9,13 +9,13 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.encode import NAN, Message, boot_ms
+from sim_vehicle.mavlink.encode import NAN, Message, boot_ms, units_of
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import TrajectorySetpoint
 
 # What PX4's simulated receiver states (sensor_gps_sim).
 _HDOP_CENTI, _VDOP_CENTI, _SPEED_ACCURACY_MM_S = 70, 110, 400
-_UNKNOWN_16, _UNKNOWN_8 = 0xFFFF, 0xFF
+_UNKNOWN_16 = 0xFFFF
 # ESTIMATOR_STATUS.flags: everything but "constant position" (bit 7).
 _ALL_KNOWN = 0x37F
 # Innovation test ratios of a filter that fits its sensors; the built-in estimate has none of its own.
@@ -24,14 +24,11 @@ _GOOD_RATIO = 0.05
 
 def global_position_int(state: Telemetry) -> Message:
     estimate = state.published
-    place = state.origin.place_at(estimate.position_ned_m)
     v_north, v_east, v_down = estimate.velocity_ned_m_s
     return framing.GLOBAL_POSITION_INT, framing.GLOBAL_POSITION_INT.pack(
         boot_ms(estimate),
-        round(1e7 * place.latitude_deg),
-        round(1e7 * place.longitude_deg),
-        round(1e3 * place.altitude_m),
-        round(1e3 * (state.autopilot.home_ned_m[2] - estimate.position_ned_m[2])),
+        *units_of(state.origin.place_at(estimate.position_ned_m)),
+        round(1e3 * (state.home_ned_m[2] - estimate.position_ned_m[2])),
         _int16(100 * v_north),
         _int16(100 * v_east),
         _int16(100 * v_down),
@@ -46,19 +43,17 @@ def gps_raw_int(state: Telemetry) -> Message:
         unknown = (_UNKNOWN_16,) * 4
         return dialect.MAVLink_gps_raw_int_message(state.sample.time_boot_us, 0, 0, 0, 0, *unknown, satellites)
     v_north, v_east, _ = fix.velocity_ned_m_s
-    altitude_mm, accuracy_mm = round(1e3 * fix.place.altitude_m), round(1e3 * fix.accuracy_m)
+    place, accuracy_mm = units_of(fix.place), round(1e3 * fix.accuracy_m)
     return dialect.MAVLink_gps_raw_int_message(
         fix.time_us,
         dialect.GPS_FIX_TYPE_3D_FIX,
-        round(1e7 * fix.place.latitude_deg),
-        round(1e7 * fix.place.longitude_deg),
-        altitude_mm,
+        *place,
         _HDOP_CENTI,
         _VDOP_CENTI,
         min(round(100 * math.hypot(v_north, v_east)), _UNKNOWN_16 - 1),
         _heading_centidegrees(math.atan2(v_east, v_north)),
         int(state.parameter("SIM_GPS_USED")),
-        altitude_mm,
+        place[2],
         accuracy_mm,
         accuracy_mm,
         _SPEED_ACCURACY_MM_S,
@@ -66,25 +61,20 @@ def gps_raw_int(state: Telemetry) -> Message:
 
 
 def gps_global_origin(state: Telemetry) -> Message:
-    place = state.origin.place
-    return dialect.MAVLink_gps_global_origin_message(
-        round(1e7 * place.latitude_deg), round(1e7 * place.longitude_deg), round(1e3 * place.altitude_m), 0
-    )
+    return dialect.MAVLink_gps_global_origin_message(*units_of(state.origin.place), 0)
 
 
 def home_position(state: Telemetry) -> Message:
-    home = state.autopilot.home_ned_m
-    place, yaw = state.origin.place_at(home), state.autopilot.home_yaw_rad
+    navigator = state.autopilot.navigator
+    home, yaw = state.home_ned_m, navigator.view.home_yaw_rad
     return dialect.MAVLink_home_position_message(
-        round(1e7 * place.latitude_deg),
-        round(1e7 * place.longitude_deg),
-        round(1e3 * place.altitude_m),
+        *units_of(state.origin.place_at(home)),
         *home,
         (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)),
         0.0,
         0.0,
         0.0,
-        state.autopilot.home_set_us,
+        navigator.home_set_us,
     )
 
 
@@ -98,7 +88,7 @@ def altitude(state: Telemetry) -> Message:
         state.air.altitude_m if state.air is not None else NAN,
         origin_m + height_m,
         height_m,
-        height_m + state.autopilot.home_ned_m[2],
+        height_m + state.home_ned_m[2],
         NAN if seen is None else height_m - seen,
         NAN if seen is None else seen,
     )
@@ -131,8 +121,9 @@ def estimator_status(state: Telemetry) -> Message:
 
 def position_target_global_int(state: Telemetry) -> Message | None:
     """Where a mode that flies by itself is going; nothing in all others."""
-    target, applied = state.autopilot.auto_target_ned_m, state.autopilot.applied
-    if target is None:
+    autopilot, applied = state.autopilot, state.autopilot.applied
+    target = autopilot.navigator.shown_target_ned_m
+    if target is None or autopilot.detector.landed:
         return None
     flown = applied if isinstance(applied, TrajectorySetpoint) else None
     place = state.origin.place_at(target)
@@ -141,8 +132,7 @@ def position_target_global_int(state: Telemetry) -> Message | None:
         boot_ms(state.published),
         dialect.MAV_FRAME_GLOBAL_INT,
         0,
-        round(1e7 * place.latitude_deg),
-        round(1e7 * place.longitude_deg),
+        *units_of(place)[:2],
         place.altitude_m,
         *(value or 0.0 for value in velocity),
         0.0,
@@ -163,8 +153,7 @@ def orbit_execution_status(state: Telemetry) -> Message | None:
         state.published.time_boot_us,
         orbit.radius_m,
         dialect.MAV_FRAME_GLOBAL,
-        round(1e7 * place.latitude_deg),
-        round(1e7 * place.longitude_deg),
+        *units_of(place)[:2],
         place.altitude_m,
     )
 

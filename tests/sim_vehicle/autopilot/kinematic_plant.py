@@ -1,10 +1,10 @@
 """A vehicle that moves as asked, without noise: a double integrator over flat ground."""
 
 import math
-from dataclasses import dataclass, replace
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import FREE, AttitudeSetpoint, Axis3, RatesSetpoint, Setpoint, TrajectorySetpoint
 
@@ -12,21 +12,18 @@ STEP_US = 4_000
 HOVER = 0.5
 MAX_ACCELERATION_M_S2 = 6.0
 
-Vector3 = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    time_boot_us: int = 0
-    specific_force_frd_m_s2: Vector3 = (0.0, 0.0, -9.81)
-    angular_velocity_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
-    clipping_counts: tuple[int, int, int] = (0, 0, 0)
-    position_ned_m: Vector3 = (0.0, 0.0, 0.0)
-    velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
-    attitude_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    thrust_fraction: float = 0.0
-    motor_fractions: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    reset_counter: int = 0
+STANDING = Estimate(
+    time_boot_us=0,
+    specific_force_frd_m_s2=(0.0, 0.0, -9.81),
+    angular_velocity_frd_rad_s=(0.0, 0.0, 0.0),
+    clipping_counts=(0, 0, 0),
+    position_ned_m=(0.0, 0.0, 0.0),
+    velocity_ned_m_s=(0.0, 0.0, 0.0),
+    acceleration_ned_m_s2=(0.0, 0.0, 0.0),
+    attitude_wxyz=(1.0, 0.0, 0.0, 0.0),
+    thrust_fraction=0.0,
+    motor_fractions=(0.0, 0.0, 0.0, 0.0),
+)
 
 
 def attitude_of_yaw(yaw_rad: float) -> tuple[float, float, float, float]:
@@ -42,7 +39,7 @@ def moved(state: Estimate, setpoint: Setpoint | None, armed: bool) -> Estimate:
         thrust = setpoint.thrust_fraction
         up = (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
         accelerations = [9.81 * (axis == 2) - 9.81 * thrust / HOVER * up[axis] for axis in range(3)]
-        state = replace(state, attitude_wxyz=attitude)
+        state = state._replace(attitude_wxyz=attitude)
     elif setpoint is None:
         falls = 9.81 if state.position_ned_m[2] < 0.0 else 0.0
         accelerations = [0.0, 0.0, falls]
@@ -56,8 +53,7 @@ def moved(state: Estimate, setpoint: Setpoint | None, armed: bool) -> Estimate:
         position[2] = 0.0
         velocity = [0.0, 0.0, min(velocity[2], 0.0)]
     yaw = setpoint.yaw_rad if isinstance(setpoint, TrajectorySetpoint) else None
-    return replace(
-        state,
+    return state._replace(
         time_boot_us=state.time_boot_us + STEP_US,
         position_ned_m=(position[0], position[1], position[2]),
         velocity_ned_m_s=(velocity[0], velocity[1], velocity[2]),
@@ -79,7 +75,7 @@ class Flight:
     """An autopilot on the kinematic vehicle, in virtual time."""
 
     def __init__(self, start: Estimate | None = None, **parameters: float) -> None:
-        self.state = start or Estimate()
+        self.state = start or STANDING
         self.parameters = Parameters(parameters)
         self.autopilot = Autopilot(HOVER, self.state, self.parameters)
         self.acks: list[CommandAck] = []

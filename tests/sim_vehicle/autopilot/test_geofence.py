@@ -100,7 +100,7 @@ def test_a_breach_is_found_within_a_fifth_of_a_second_and_held_where_it_was_foun
     # And the pilot can leave the hold by a mode
     assert set_mode(flight, Mode.RETURN) is Result.ACCEPTED
     flight.fly(0.2)
-    assert (flight.autopilot.modes.flown, flight.autopilot.system_status) == (Mode.RETURN, 4)
+    assert (flight.autopilot.modes.flown, flight.autopilot.commander.system_status) == (Mode.RETURN, 4)
 
 
 @pytest.mark.parametrize(

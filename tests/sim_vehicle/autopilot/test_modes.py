@@ -2,19 +2,17 @@
 
 import pytest
 
-from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode, mode_from_request
+from sim_vehicle.autopilot.mode_numbers import mode_from_request
 from sim_vehicle.autopilot.modes import (
     NEEDS,
     TRANSITIONS,
     Conditions,
     Mode,
-    ModeCondition,
     ModeEvent,
     ModeState,
     Need,
     Transition,
     find_transition,
-    mode_diagram,
 )
 
 EVERYTHING = frozenset(Need)
@@ -24,35 +22,6 @@ ASKED_FOR = [row.target for row in TRANSITIONS if row.event is ModeEvent.REQUEST
 
 def armed(*missing: Need) -> Conditions:
     return Conditions(True, EVERYTHING - set(missing))
-
-
-def test_the_numbers_on_the_wire_are_those_measured():
-    # Given the table measured on PX4, main << 16 | sub << 24
-    measured = {
-        Mode.MANUAL: (0x51, 1 << 16),
-        Mode.ALTCTL: (0x51, 2 << 16),
-        Mode.POSCTL: (0x51, 3 << 16),
-        Mode.STABILIZED: (0x51, 7 << 16),
-        Mode.TAKEOFF: (0x1D, 0x02040000),
-        Mode.LOITER: (0x1D, 0x03040000),
-        Mode.MISSION: (0x1D, 0x04040000),
-        Mode.RETURN: (0x1D, 0x05040000),
-        Mode.LAND: (0x1D, 0x06040000),
-        # And those of px4_custom_mode.h
-        Mode.ORBIT: (0x1D, 0x01030000),
-        Mode.FOLLOW_TARGET: (0x1D, 0x08040000),
-        Mode.DESCEND: (0x1D, 0x06040000),
-        Mode.TERMINATION: (0x01, 10 << 16),
-    }
-    for mode, (base, custom) in measured.items():
-        assert base_mode(mode, armed=False, had_setpoint=False) == base, mode
-        assert base_mode(mode, armed=True, had_setpoint=True) == base | 0x80, mode
-        assert NUMBERS[mode].custom_mode == custom, mode
-    # And OFFBOARD, which is stabilised only once a setpoint has come
-    assert NUMBERS[Mode.OFFBOARD].custom_mode == 0x00060000
-    assert base_mode(Mode.OFFBOARD, armed=False, had_setpoint=False) == 0x01
-    assert base_mode(Mode.OFFBOARD, armed=False, had_setpoint=True) == 0x11
-    assert base_mode(Mode.OFFBOARD, armed=True, had_setpoint=True) == 0x91
 
 
 @pytest.mark.parametrize("mode", ASKED_FOR)
@@ -122,16 +91,6 @@ def test_nothing_leads_out_of_termination():
 def test_every_row_can_happen_and_no_earlier_one_hides_it(row: Transition):
     source = row.sources[0] if row.sources else Mode.LOITER
     assert find_transition(source, row.event, armed(), row.target) is row
-
-
-def test_the_diagram_shows_every_row():
-    diagram = mode_diagram()
-    assert diagram.startswith("stateDiagram-v2\n    [*] --> LOITER\n")
-    arrows = sum(len(row.sources or (None,)) for row in TRANSITIONS)
-    assert diagram.count("-->") == 1 + arrows
-    assert "    ANY_MODE --> OFFBOARD: requested [disarmed, or setpoints arrive]\n" in diagram
-    assert "    LAND --> MODE_BEFORE: disarmed\n" in diagram
-    assert ModeCondition.CAN_RUN not in diagram
 
 
 @pytest.mark.parametrize(

@@ -82,12 +82,12 @@ def hovering() -> Flight:
 def test_without_setpoints_offboard_can_be_chosen_but_not_armed():
     flight = Flight()
     assert flight.ask(DO_SET_MODE, 1, 6) is Result.ACCEPTED
-    assert flight.autopilot.system_status == 0
+    assert flight.autopilot.commander.system_status == 0
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
     assert flight.autopilot.texts[-1].text == "Arming denied: Resolve system health failures first"
     # And with them, it can
     flight.fly(0.5, UP_THERE)
-    assert flight.autopilot.system_status == 3
+    assert flight.autopilot.commander.system_status == 3
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
 
 
@@ -127,7 +127,7 @@ def test_setpoints_that_come_back_put_it_into_offboard_again():
     assert waited_s == pytest.approx(0.09, abs=0.01)
     flight.fly(3.0, UP_THERE)
     assert flight.height_m == pytest.approx(3.0, abs=0.05)
-    assert flight.autopilot.system_status == 4
+    assert flight.autopilot.commander.system_status == 4
 
 
 def test_too_slow_a_stream_flips_to_and_fro():
@@ -167,4 +167,4 @@ def test_a_pilots_change_is_not_undone_by_setpoints():
     flight.fly(3.0, target(position=(50.0, 0.0, -3.0)))
     assert flight.autopilot.modes.flown is flight.autopilot.modes.intended is Mode.LOITER
     assert abs(flight.state.position_ned_m[0]) < 0.1
-    assert flight.autopilot.system_status == 4
+    assert flight.autopilot.commander.system_status == 4

@@ -8,13 +8,13 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.autopilot import offboard
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
-from sim_vehicle.autopilot.messages import AttitudeTarget, GlobalTarget, Result, StatusText
+from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, Result, StatusText
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
+from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, place, set_mode
-from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Flight
+from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Flight, target
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 NO_RATES = (None, None, None)
@@ -26,17 +26,9 @@ def leaning(roll_deg: float) -> tuple[float, float, float, float]:
     return math.cos(half), math.sin(half), 0.0, 0.0
 
 
-def global_target(frame: int, north: float, east: float, altitude_m: float, **others: object) -> GlobalTarget:
-    fields: dict[str, object] = {
-        "frame": frame,
-        "place": (*place(north, east), altitude_m),
-        "velocity_m_s": FREE,
-        "acceleration_m_s2": FREE,
-        "yaw_rad": None,
-        "yaw_rate_rad_s": None,
-        "is_force": False,
-    }
-    return GlobalTarget(**{**fields, **others})  # type: ignore[arg-type]
+def global_target(frame: int, north: float, east: float, altitude_m: float, **others: object) -> PositionTarget:
+    fields: dict[str, Any] = {"place": (*place(north, east), altitude_m), **others}
+    return target(frame=frame, is_global=True, **fields)
 
 
 def stream(flight: Flight, message: Any, seconds: float) -> None:

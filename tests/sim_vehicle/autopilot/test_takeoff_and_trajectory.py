@@ -10,10 +10,10 @@ from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, stop_point
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
-from sim_vehicle.estimator.estimate import yaw_of
+from sim_vehicle.estimator.estimate import Estimate, yaw_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
-from tests.sim_vehicle.autopilot.kinematic_plant import Estimate, Flight, attitude_of_yaw, target
+from tests.sim_vehicle.autopilot.kinematic_plant import STANDING, Flight, attitude_of_yaw, target
 
 SECOND = 1_000_000
 DEFAULTS = Parameters()
@@ -133,7 +133,7 @@ def test_return_flies_at_px4s_height(height_m, distance_m, expected_m):
 
 def test_return_climbs_comes_home_and_lands_facing_as_it_stood():
     # Given a takeoff facing east, and a flight 12 m to the north
-    flight = taken_off(Estimate(attitude_wxyz=attitude_of_yaw(math.pi / 2)))
+    flight = taken_off(STANDING._replace(attitude_wxyz=attitude_of_yaw(math.pi / 2)))
     away = target(position=(12.0, 0.0, -2.5))
     flight.fly(0.5, away)
     flight.ask(176, 1, 6)

@@ -168,32 +168,6 @@ def test_a_reset_that_is_taken_back_before_it_happens_never_does() -> None:
     assert {message.reset_counter for message in pilot.of("ODOMETRY")} == {0}
 
 
-def acts(truth: Truth) -> bool:
-    return bool(truth.faults)
-
-
-@pytest.mark.parametrize(
-    ("request_", "for_s", "shows"),
-    [
-        (faults.other("gust", velocity_ned_m_s=(6, 0, 0)), 2.0, lambda truth: truth.speed_m_s > 0.1),
-        (faults.other("push", force_ned_n=(0, 4, 0)), 0.5, lambda truth: truth.velocity_ned_m_s[1] > 0.3),
-        (faults.other("free_fall"), 0.3, lambda truth: truth.velocity_ned_m_s[2] > 1.5),
-        (faults.other("turbulence", wind_20ft_m_s=20), 3.0, lambda truth: truth.speed_m_s > 0.05),
-        (faults.other("hand_catch"), 1.0, acts),
-        (faults.other("battery_sag", voltage_share=0.8), 1.0, lambda truth: truth.height_m < 2.5),
-        (faults.other("payload_drop", mass_kg=0.2), None, acts),
-        (faults.other("vibration", accelerometer_rms_m_s2=5.0), None, acts),
-        (faults.other("imu_stuck", axis="gyroscope_x"), 0.5, acts),
-    ],
-)
-def test_every_other_kind_of_a_mission_file(
-    request_: FaultRequest, for_s: float | None, shows: Callable[[Truth], bool]
-) -> None:
-    pilot = hovering()
-    pilot.vehicle.inject(request_, for_s=for_s)
-    pilot.vehicle.advance_until(shows, 4.0)
-
-
 @pytest.mark.parametrize(
     ("request_", "for_s", "words"),
     [

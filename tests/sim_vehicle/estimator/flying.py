@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.onboard import OnboardEstimator
-from sim_vehicle.plant.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 
@@ -42,7 +43,7 @@ class Flight:
 
     def __init__(self, airframe: Airframe, seed: int = 1, scene: Scene | None = None) -> None:
         self.plant = Plant(airframe, scene or Scene(), seed)
-        self.output: PlantOutput
+        self.output: Estimate
         for _ in range(500):
             self.output = self.plant.step(None, armed=False)
 
@@ -75,9 +76,6 @@ class Flight:
     def climb(self) -> None:
         """To `HEIGHT_M`, and still there."""
         self.fly(HOVER, 6.0)
-
-    def forget_innovations(self) -> None:
-        self.onboard.filter.innovations.clear()
 
 
 HOVER = TrajectorySetpoint(position_ned_m=(0.0, 0.0, -HEIGHT_M), yaw_rad=0.0)

@@ -64,31 +64,6 @@ def test_a_heavier_body_gets_more_torque():
         assert values(twice)[name] == pytest.approx(2 * values()[name])
 
 
-def test_indoors_it_flies_by_motion_capture_and_outdoors_by_gps():
-    indoors, outdoors = values(position="mocap"), values(position="gps")
-    assert (indoors["EKF2_GPS_CTRL"], indoors["EKF2_HGT_REF"]) == (0, 3)
-    assert outdoors["EKF2_EV_CTRL"] == 0
-    assert "EKF2_GPS_CTRL" not in outdoors
-
-
-def test_the_position_loop_is_the_airframe_files():
-    found, control = values(), FOLDABLE.control
-    assert (found["MPC_XY_P"], found["MPC_XY_VEL_P_ACC"]) == (control.position_p_per_s, control.velocity_p_per_s)
-    assert found["MPC_TILTMAX_AIR"] == pytest.approx(math.degrees(control.tilt_max_rad))
-
-
-def test_ekf2_gets_the_gyroscopes_noise_over_its_own_step():
-    """White noise of 4 ms means, averaged over EKF2's 10 ms."""
-    assert values()["EKF2_GYR_NOISE"] == pytest.approx(FOLDABLE.imu.gyroscope_noise_rad_s * math.sqrt(0.4))
-
-
-def test_a_hit_makes_no_true_place_incredible_whatever_px4_flies_by():
-    """At PX4's default gate of 5 the filter goes its own way for seconds after a hit that clipped."""
-    assert values(position="mocap")["EKF2_EVP_GATE"] >= 50
-    outdoors = values(position="gps")
-    assert min(outdoors["EKF2_GPS_P_GATE"], outdoors["EKF2_GPS_V_GATE"]) >= 50
-
-
 def test_a_tipped_vehicle_is_turned_back_by_all_that_the_built_in_loop_asks_for_at_most():
     """P_rate * (MC_*RATE_MAX) is eq. 5's k_R e_R at a right angle, w^2; and with little thrust as well."""
     found, control = values(), FOLDABLE.control
@@ -110,14 +85,3 @@ def test_every_format_has_every_parameter():
         kind = 6 if isinstance(parameter.value, int) else 9
         assert f"1\t1\t{parameter.name}\t{parameter.text}\t{kind}" in params
         assert f"param set-default {parameter.name} {parameter.text}" in airframe
-
-
-def test_by_flow_px4_is_told_of_flow_and_range_alone():
-    found = values(position="flow")
-    assert (found["EKF2_OF_CTRL"], found["EKF2_GPS_CTRL"], found["EKF2_EV_CTRL"]) == (1, 0, 0)
-    assert (found["EKF2_RNG_CTRL"], found["EKF2_HGT_REF"]) == (2, 2)
-
-
-def test_no_logger_of_px4s_holds_up_the_lockstep():
-    """The one that PX4 starts by itself waits for EKF2, which does not run at every sample; `bench/notes/px4.md`."""
-    assert values()["SDLOG_BACKEND"] == 0

@@ -125,38 +125,6 @@ def test_the_rate_of_the_inertial_sensor_changes_no_other_rate_and_no_noise_of_a
     assert rms([mean - middle for mean in means]) == pytest.approx(FOLDABLE.imu.accelerometer_noise_m_s2, rel=0.15)
 
 
-def test_more_thrust_than_weight_climbs_in_every_sensor():
-    messages = flown(new_vehicle(), 1.5, 0.95)
-    truth, fix = of_kind(messages, HilState)[-1], of_kind(messages, HilGps)[-1]
-    pressures = [sensor.air.pressure_hpa for sensor in of_kind(messages, HilSensor) if sensor.air is not None]
-    climbed_m = truth.place.altitude_m - of_kind(messages, HilState)[0].place.altitude_m
-    assert climbed_m > 1.0
-    assert truth.velocity_ned_m_s[2] < -1.0
-    assert fix.velocity_ned_m_s[2] == pytest.approx(truth.velocity_ned_m_s[2], abs=0.3)
-    assert pressures[0] - pressures[-1] == pytest.approx(0.115 * climbed_m, rel=0.2)
-
-
-@pytest.mark.parametrize(
-    ("slower", "axis", "sign"),
-    [
-        ((0, 3), 0, +1),  # front right and rear right: rolls right
-        ((1, 2), 0, -1),
-        ((0, 2), 1, -1),  # front right and front left: the nose falls
-        ((1, 3), 1, +1),
-        ((0, 1), 2, -1),  # the two that turn counter-clockwise: the nose goes left
-        ((2, 3), 2, +1),
-    ],
-)
-def test_motors_are_in_px4s_quad_x_order(slower, axis, sign):
-    vehicle = new_vehicle()
-    flown(vehicle, 0.5, 0.9)
-    first, second, third, fourth = (0.85 if motor in slower else 0.9 for motor in range(4))
-    states = of_kind([message for _ in range(10) for message in vehicle.step((first, second, third, fourth))], HilState)
-    rates = states[-1].angular_velocity_frd_rad_s
-    assert sign * rates[axis] > 0.02
-    assert all(abs(rates[other]) < 0.1 * abs(rates[axis]) for other in range(3) if other != axis)
-
-
 def rms(values: list[float]) -> float:
     return math.sqrt(sum(value * value for value in values) / len(values))
 

@@ -105,18 +105,20 @@ class Exchange:
 
     def __post_init__(self) -> None:
         source = random.Random(self.seed)
-        self.transfer = MissionTransfer(self.store)
+        self.said: list[str] = []
+        self.transfer = MissionTransfer(self.store, self._answer, lambda severity, text: self.said.append(text))
         self.there = Wire(source, self.loss, self.repeat, self.latest_us)
         self.back = Wire(source, self.loss, self.repeat, self.latest_us)
         self.now_us = 1_000_000
 
+    def _answer(self, message: object) -> None:
+        self.back.put(message, self.now_us)
+
     def step(self) -> list:
         self.now_us += STEP_US
         for message in self.there.take(self.now_us):
-            for answer in self.transfer.receive(message, self.now_us):
-                self.back.put(answer, self.now_us)
-        for answer in self.transfer.update(self.now_us):
-            self.back.put(answer, self.now_us)
+            self.transfer.receive(message, self.now_us)
+        self.transfer.update(self.now_us)
         return self.back.take(self.now_us)
 
     def ask(self, message: object) -> list:

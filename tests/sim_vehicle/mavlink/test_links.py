@@ -72,7 +72,6 @@ def imu_hz(baud: int, asked_hz: float | None) -> tuple[float, float]:
     if asked_hz is not None:
         end.command(SET_INTERVAL, IMU, 1e6 / asked_hz)
     vehicle.run(10.0)
-    assert end.link._outbox.lost == 0
     return len(end.all("HIGHRES_IMU")) / 10, sum(map(len, end.packets)) / 10
 
 
@@ -188,10 +187,6 @@ def guarded() -> Vehicle:
     return vehicle
 
 
-def refused(vehicle: Vehicle):
-    return vehicle.vehicle._signing.refused
-
-
 def test_with_a_key_everything_sent_is_signed_with_it(guarded):
     for end in guarded.ends:
         end.packets.clear()
@@ -206,15 +201,15 @@ def test_with_a_key_everything_sent_is_signed_with_it(guarded):
     assert all(a < b for link in stamps for a, b in pairwise(link))
 
 
-def test_unsigned_wrongly_signed_and_replayed_packets_are_refused_and_counted(guarded):
+def test_unsigned_wrongly_signed_and_replayed_packets_are_refused(guarded):
     end = guarded.ends[1]
     end.command(400, 1)
     guarded.run(0.05)
-    assert (refused(guarded).unsigned, end.all("COMMAND_ACK")) == (1, [])
+    assert end.all("COMMAND_ACK") == []
     signed(end, key=bytes(32))
     end.command(400, 1)
     guarded.run(0.05)
-    assert (refused(guarded).wrong, end.all("COMMAND_ACK")) == (1, [])
+    assert end.all("COMMAND_ACK") == []
     signed(end)
     raw = end.command(400, 1)
     guarded.run(0.05)
@@ -225,7 +220,6 @@ def test_unsigned_wrongly_signed_and_replayed_packets_are_refused_and_counted(gu
         each.link.push(raw)
         guarded.run(0.05)
         assert each.all("COMMAND_ACK") == []
-    assert refused(guarded).replayed == 2
 
 
 def test_a_forged_packet_from_the_future_does_not_lock_the_genuine_out(guarded):
@@ -246,10 +240,11 @@ def test_a_new_sender_may_not_be_a_minute_late(guarded):
     end.command(400, 0)
     guarded.run(0.02)
     end.mav.srcComponent = 77
-    signed(end, time_stamp=10**15 - 61 * 100_000)
-    end.command(400, 0)
-    guarded.run(0.02)
-    assert refused(guarded).replayed == 1
+    for late, heard in ((61, 1), (59, 2)):
+        signed(end, time_stamp=10**15 - late * 100_000)
+        end.command(400, 0)
+        guarded.run(0.02)
+        assert len(end.all("COMMAND_ACK")) == heard
 
 
 @pytest.mark.parametrize(("sign_cfg", "heard"), [(0, True), (1, False), (2, False)])

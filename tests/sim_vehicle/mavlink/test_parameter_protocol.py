@@ -11,10 +11,6 @@ from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, Client
 INT32, REAL32, UINT32 = 6, 9, 5
 
 
-def as_float(whole: int) -> float:
-    return struct.unpack("<f", struct.pack("<i", whole))[0]
-
-
 def whole_of(message) -> int:
     return struct.unpack_from("<i", message.get_msgbuf(), 10)[0]
 
@@ -37,31 +33,24 @@ def set_to(client: Client, name: str, value: float, kind: int, target: tuple[int
     return values(client)
 
 
-def test_the_list_is_whole_in_order_and_begins_with_the_hash():
+def test_the_list_is_whole_and_in_order():
     client = Client()
     client.send(dialect.MAVLink_param_request_list_message(1, 1))
     client.run(0.5)
-    hash_value, *rest = values(client)
-    assert (hash_value.param_id, hash_value.param_type, hash_value.param_index) == ("_HASH_CHECK", UINT32, 0xFFFF)
-    assert [message.param_index for message in rest] == list(range(hash_value.param_count))
-    assert [message.param_id for message in rest] == sorted(Parameters())
-    kinds = {message.param_id: message.param_type for message in rest}
+    listed = values(client)
+    assert [message.param_index for message in listed] == list(range(listed[0].param_count))
+    assert [message.param_id for message in listed] == sorted(Parameters())
+    kinds = {message.param_id: message.param_type for message in listed}
     assert (kinds["MAV_SYS_ID"], kinds["MPC_XY_P"]) == (INT32, REAL32)
 
 
-def test_a_list_asked_for_again_starts_anew_without_the_hash_and_the_hash_stops_it():
+def test_a_list_asked_for_again_starts_anew():
     client = Client()
-    client.send(dialect.MAVLink_param_request_list_message(1, 1))
-    client.step()
-    client.send(dialect.MAVLink_param_request_list_message(1, 1))
-    client.forget()
-    client.step()
-    assert values(client)[0].param_index == 0
-    client.send(dialect.MAVLink_param_set_message(1, 1, b"_HASH_CHECK", 0.0, UINT32))
-    client.step()
-    client.forget()
-    client.run(0.2)
-    assert values(client) == []
+    for _ in range(2):
+        client.forget()
+        client.send(dialect.MAVLink_param_request_list_message(1, 1))
+        client.step()
+        assert values(client)[0].param_index == 0
 
 
 def test_one_by_name_and_by_index():
@@ -115,16 +104,6 @@ def test_a_wrong_type_is_silently_ignored(name, kind):
     before = client.vehicle.parameters.stored(name)
     assert set_to(client, name, 2.0, kind) == []
     assert client.vehicle.parameters.stored(name) == before
-
-
-def test_the_hash_changes_with_a_value_and_comes_back_with_it():
-    client = Client()
-    (before,) = request(client, "_HASH_CHECK")
-    set_to(client, "COM_RC_IN_MODE", as_float(4), INT32)
-    (changed,) = request(client, "_HASH_CHECK")
-    set_to(client, "COM_RC_IN_MODE", as_float(1), INT32)
-    (after,) = request(client, "_HASH_CHECK")
-    assert whole_of(before) == whole_of(after) != whole_of(changed)
 
 
 def test_a_gain_changes_how_the_vehicle_flies():

@@ -12,87 +12,37 @@ from sim_vehicle.airframe import load_built_in
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.streams import KINDS
+from sim_vehicle.mavlink.streams.topics import OPTIONAL, Topic
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_MODE, TAKEOFF, Client
 
 NAN = math.nan
-# Measured on a running PX4 SITL over ten seconds, less what this vehicle has no equipment for.
-ONBOARD_HZ = {
-    "ALTITUDE": 10,
-    "ATTITUDE": 100,
-    "ATTITUDE_QUATERNION": 50,
-    "ATTITUDE_TARGET": 10,
-    "BATTERY_STATUS": 0.5,
-    "CURRENT_MODE": 0.5,
-    "ESTIMATOR_STATUS": 1,
-    "EXTENDED_SYS_STATE": 5,
-    "GLOBAL_POSITION_INT": 50,
-    "GPS_RAW_INT": 8,
-    "HEARTBEAT": 1,
-    "HIGHRES_IMU": 50,
-    "HOME_POSITION": 0.5,
-    "LOCAL_POSITION_NED": 30,
-    "MISSION_CURRENT": 1,
-    "ODOMETRY": 30,
-    "PING": 1,
-    "POSITION_TARGET_LOCAL_NED": 10,
-    "SCALED_PRESSURE": 1,
-    "SERVO_OUTPUT_RAW": 10,
-    "SYS_STATUS": 5,
-    "SYSTEM_TIME": 1,
-    "TIMESYNC": 10,
-    "VFR_HUD": 10,
-    "VIBRATION": 0.5,
-}
-GROUND_HZ = {
-    "ALTITUDE": 1,
-    "ATTITUDE": 50,
-    "ATTITUDE_QUATERNION": 50,
-    "ATTITUDE_TARGET": 50,
-    "BATTERY_STATUS": 0.5,
-    "CURRENT_MODE": 0.5,
-    "ESTIMATOR_STATUS": 0.5,
-    "EXTENDED_SYS_STATE": 1,
-    "GLOBAL_POSITION_INT": 50,
-    "GPS_RAW_INT": 5,
-    "HEARTBEAT": 1,
-    "HOME_POSITION": 0.5,
-    "LOCAL_POSITION_NED": 50,
-    "MISSION_CURRENT": 1,
-    "PING": 0.1,
-    "POSITION_TARGET_LOCAL_NED": 50,
-    "SCALED_PRESSURE": 1,
-    "SERVO_OUTPUT_RAW": 50,
-    "SYS_STATUS": 1,
-    "VFR_HUD": 4,
-    "VIBRATION": 0.1,
-}
+MISSION_CURRENT = 42
 
 
-SECONDS = 20.0
-
-
-def rates_hz(kind: LinkKind, seconds: float = SECONDS) -> dict[str, float]:
-    # Without a flow sensor and a range finder, as the vehicle was that the rates were taken from.
+@pytest.mark.parametrize("kind", [LinkKind.ONBOARD, LinkKind.GROUND])
+def test_each_links_set_is_sent_at_its_rates(kind):
+    # Without a flow sensor and a range finder
     vehicle = SimulatedVehicle(filtered(changes={"estimate": {"kind": "markov"}}), Scene(), 1)
-    link, parser = vehicle.add_link(LinkOptions(kind)), dialect.MAVLink(None)
-    counts: Counter[str] = Counter()
+    link, parser, seconds = vehicle.add_link(LinkOptions(kind)), dialect.MAVLink(None), 20.0
+    counts: Counter[int] = Counter()
     for _ in range(round(seconds * 250)):
         vehicle.advance()
-        counts.update(parser.decode(bytearray(raw)).get_type() for raw in link.take())
-    return {name: count / seconds for name, count in counts.items()}
-
-
-@pytest.mark.parametrize(("kind", "expected"), [(LinkKind.ONBOARD, ONBOARD_HZ), (LinkKind.GROUND, GROUND_HZ)])
-def test_each_links_set_is_px4s_at_px4s_rates(kind, expected):
-    measured = rates_hz(kind)
-    # Sent once, when the origin is known
-    assert measured.pop("GPS_GLOBAL_ORIGIN") == pytest.approx(1 / SECONDS)
-    assert measured.keys() == expected.keys()
-    for name, rate in expected.items():
-        assert measured[name] == pytest.approx(rate, rel=0.05, abs=1 / SECONDS), name
+        counts.update(parser.decode(bytearray(raw)).get_msgId() for raw in link.take())
+    # GPS_RAW_INT comes with each fix, the origin once; there is no orbit, no target, no flow sensor and no range finder
+    expected = {
+        **kind.rates_hz,
+        24: 8.0 if kind is LinkKind.ONBOARD else 5.0,
+        49: 1 / seconds,
+        0: 1.0,
+        MISSION_CURRENT: 1.0,
+    }
+    expected = {number: rate for number, rate in expected.items() if number not in (87, 106, 132, 360)}
+    measured = {number: count / seconds for number, count in counts.items()}
+    assert measured == pytest.approx(expected, rel=0.05, abs=1 / seconds)
 
 
 @pytest.fixture(scope="module")
@@ -106,27 +56,18 @@ def hovering() -> Client:
 
 
 @pytest.mark.parametrize(
-    ("message_id", "name"),
-    [
-        *((0, "HEARTBEAT"), (1, "SYS_STATUS"), (2, "SYSTEM_TIME"), (26, "SCALED_IMU")),
-        *((29, "SCALED_PRESSURE"), (30, "ATTITUDE"), (33, "GLOBAL_POSITION_INT"), (36, "SERVO_OUTPUT_RAW")),
-        *((49, "GPS_GLOBAL_ORIGIN"), (74, "VFR_HUD"), (83, "ATTITUDE_TARGET"), (85, "POSITION_TARGET_LOCAL_NED")),
-        *((87, "POSITION_TARGET_GLOBAL_INT"), (105, "HIGHRES_IMU"), (141, "ALTITUDE"), (147, "BATTERY_STATUS")),
-        *((148, "AUTOPILOT_VERSION"), (230, "ESTIMATOR_STATUS"), (241, "VIBRATION"), (242, "HOME_POSITION")),
-        *((245, "EXTENDED_SYS_STATE"), (264, "FLIGHT_INFORMATION"), (331, "ODOMETRY")),
-        *((375, "ACTUATOR_OUTPUT_STATUS"), (436, "CURRENT_MODE")),
-    ],
+    "kind", [kind for kind in KINDS if kind.topic not in (*OPTIONAL, Topic.GPS)], ids=lambda kind: kind.message_id
 )
-def test_every_message_can_be_asked_for(hovering, message_id, name):
+def test_every_message_can_be_asked_for(hovering, kind):
     # As on a PX4, what the stream has already sent is denied until there is a new sample
     for _ in range(40):
         hovering.forget()
-        hovering.command(REQUEST_MESSAGE, message_id)
+        hovering.command(REQUEST_MESSAGE, kind.message_id)
         hovering.step()
         if hovering.results(REQUEST_MESSAGE) == [0]:
             break
     kinds = [message.get_type() for _, message in hovering.received]
-    assert kinds.index(name) < kinds.index("COMMAND_ACK")
+    assert kinds.index(dialect.mavlink_map[kind.message_id].msgname) < kinds.index("COMMAND_ACK")
 
 
 def test_places_agree(hovering):

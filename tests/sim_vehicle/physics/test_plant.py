@@ -8,13 +8,14 @@ import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import (
     ARM_DIRECTIONS_FRD,
     ROTOR_YAW_SIGNS,
     constants_from,
     initial_state,
 )
-from sim_vehicle.plant.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.estimator.flying import filtered
@@ -27,7 +28,7 @@ def at(north: float, east: float, down: float, yaw_rad: float = 0.0) -> Trajecto
     return TrajectorySetpoint((north, east, down), NONE, NONE, yaw_rad, None)
 
 
-def flown(plant: Plant, setpoint: TrajectorySetpoint | None, seconds: float) -> list[PlantOutput]:
+def flown(plant: Plant, setpoint: TrajectorySetpoint | None, seconds: float) -> list[Estimate]:
     return [plant.step(setpoint, armed=setpoint is not None) for _ in range(round(seconds / 0.004))]
 
 
