@@ -23,7 +23,16 @@ from companion.flight.states import FINAL_STATES, State
 from companion.flight.vehicle_update import landed, note_height, situation_of, update_vehicle
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, Sample, Vector3
+from companion.messages import (
+    CommandAck,
+    LocalPosition,
+    OnboardHeartbeat,
+    Outgoing,
+    RunChecks,
+    Sample,
+    SendCommand,
+    Vector3,
+)
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
 from companion.px4_mode import mode_name
@@ -66,6 +75,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         self.started_at_us = self.now_us = now_us
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self._sample_boot_us = 0
+        self._leans = False  # the kind of setpoint that was last sent
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
 
@@ -194,6 +204,17 @@ class Core(ABC, Generic[FlightT, MachineT]):
             flight.target = target
             self._note_sent(sent, now_us)
         flight.outbox.append(self.resets.sent(setpoint))
+        self._change_kind(holds and target.lean is not None)
+
+    def _change_kind(self, leans: bool) -> None:
+        """Have PX4 change between its controllers of position and of attitude.
+
+        Within OFFBOARD it does so with its status, twice a second (Commander.cpp, updateControlMode): until then both
+        fly the vehicle, or neither does.
+        """
+        if leans != self._leans:
+            self._leans = leans
+            self.flight.outbox.append(SendCommand(RunChecks(), 0))
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         """Note a setpoint that was sent while the companion has the vehicle."""

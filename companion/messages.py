@@ -284,7 +284,14 @@ class RequestMessage:
     message_id: int
 
 
-VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage
+@dataclass(frozen=True, slots=True)
+class RunChecks:
+    """MAV_CMD_RUN_PREARM_CHECKS, which changes nothing in flight: PX4's commander acts on any command at once."""
+
+    command_id: ClassVar[int] = 401
+
+
+VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage | RunChecks
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,6 +51,8 @@ def describe(command: messages.VehicleCommand) -> str:
             return f"message {message_id} every {interval_us / 1000:g} ms"
         case messages.RequestMessage(message_id):
             return f"message {message_id}"
+        case messages.RunChecks():
+            return "run checks"
 
 
 def needs_confirmation(command: messages.VehicleCommand) -> bool:

@@ -241,4 +241,6 @@ def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
             used = (message_id, interval_us)
         case messages.RequestMessage(message_id):
             used = (message_id,)
+        case messages.RunChecks():
+            used = ()
     return used + (0.0,) * (7 - len(used))

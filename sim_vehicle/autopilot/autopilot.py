@@ -22,7 +22,7 @@ from sim_vehicle.autopilot.messages import (
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.navigator import Navigator
-from sim_vehicle.autopilot.offboard import OffboardControl
+from sim_vehicle.autopilot.offboard import STATUS_PERIOD_US, OffboardControl
 from sim_vehicle.estimator.estimate import Estimate, yaw_of
 from sim_vehicle.parameters.airframe_values import origin_of
 from sim_vehicle.parameters.store import Parameters
@@ -82,6 +82,7 @@ class Autopilot:
         self._flown = self.modes.flown
         self._sinks = False
         self._commands: list[Command] = []
+        self._status_us = first.time_boot_us
 
     # --- what comes in -----------------------------------------------------------------------------------
 
@@ -138,6 +139,9 @@ class Autopilot:
         if self.navigator.mission.commands:
             self._run_mission_commands()
         acks: list[CommandAck] = []
+        if self._commands or self._now_us - self._status_us >= STATUS_PERIOD_US:
+            self._status_us = self._now_us
+            self._offboard.status_published()
         if self._commands:
             self.navigator.notice_changes()  # a list that has just come is judged before it is to be flown
             queue, self._commands = self._commands, []

@@ -34,6 +34,9 @@ CHECK_PERIOD_US = 76_000
 # failsafe, setpoints that come back lead 0.09 s after the first of them.
 BACK_AFTER_US = 90_000
 
+# The commander publishes its status, and with it which controllers run, twice a second or when something has changed.
+STATUS_PERIOD_US = 500_000
+
 STOP = TrajectorySetpoint(velocity_ned_m_s=(0.0, 0.0, 0.0))
 
 
@@ -187,16 +190,29 @@ def _turned(vector: Axis3, attitude_wxyz: Quaternion) -> Axis3:
 
 
 class OffboardControl:
-    """The last valid setpoint that came in OFFBOARD."""
+    """The last valid setpoint that came in OFFBOARD.
+
+    An attitude counts at once. From an attitude to a position PX4 changes when its commander publishes its status
+    (Commander.cpp, updateControlMode): until then the last attitude is held.
+    """
 
     def __init__(self, signal: OffboardSignal, origin: Origin) -> None:
         self.demand: Setpoint = STOP
+        self._waiting: TrajectorySetpoint | None = None
+        self._by_attitude = False
         self._signal = signal
         self._origin = origin
 
     def begin(self, last_demand: Setpoint | None) -> None:
         """The mode was entered: until a setpoint arrives the last demand goes on, or the vehicle stops."""
-        self.demand = last_demand or STOP
+        self.demand, self._waiting = last_demand or STOP, None
+        self._by_attitude = False
+
+    def status_published(self) -> None:
+        """The controllers of the last setpoint's kind run from now on."""
+        if self._waiting is not None:
+            self.demand, self._waiting = self._waiting, None
+        self._by_attitude = not isinstance(self.demand, TrajectorySetpoint)
 
     def take_position(
         self,
@@ -212,7 +228,11 @@ class OffboardControl:
             return local
         self._signal.heard(now_us, needs_place=(local.position_m, local.velocity_m_s) != (FREE, FREE))
         if is_flown:
-            self.demand = trajectory_setpoint(local, attitude_wxyz)
+            demand = trajectory_setpoint(local, attitude_wxyz)
+            if self._by_attitude:
+                self._waiting = demand
+            else:
+                self.demand = demand
         return None
 
     def take_attitude(self, target: AttitudeTarget, now_us: int, is_flown: bool) -> None:
@@ -222,4 +242,4 @@ class OffboardControl:
             return
         self._signal.heard(now_us, needs_place=False)
         if is_flown:
-            self.demand = demand
+            self.demand, self._waiting = demand, None

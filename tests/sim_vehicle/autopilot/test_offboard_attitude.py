@@ -8,6 +8,7 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.autopilot import offboard
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.ground_commands import RUN_PREARM_CHECKS
 from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, Result, StatusText
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.plant.plant import Plant
@@ -119,6 +120,25 @@ def test_from_an_attitude_to_a_position_no_ramp_holds_it_back():
     set_mode(flight, Mode.LOITER)
     flight.fly(3.0)
     assert flight.height_m > lowest - 0.3
+
+
+@pytest.mark.parametrize("command", [None, RUN_PREARM_CHECKS])
+def test_from_an_attitude_to_a_position_it_changes_with_the_commanders_status(command):
+    # Given a vehicle that is flown by attitude
+    flight = hovering(5.0)
+    stream(flight, AttitudeTarget(LEVEL, NO_RATES, HOVER), 0.2)
+    set_mode(flight, Mode.OFFBOARD)
+    stream(flight, AttitudeTarget(LEVEL, NO_RATES, HOVER), 1.0)
+    # When a position is asked for, alone or with any command
+    flight.autopilot.receive(target(position_m=(1.0, 0.0, -5.0)))
+    if command is not None:
+        flight.ask(command)
+    steps = 0
+    while isinstance(flight.autopilot.applied, AttitudeSetpoint):
+        flight.step()
+        steps += 1
+    # Then it is flown with the commander's status, which comes twice a second, or at once
+    assert (steps * 0.004 <= 0.012) if command is not None else (0.1 < steps * 0.004 <= 0.51)
 
 
 def test_low_thrust_by_attitude_is_a_landing_without_a_commanded_descent():
