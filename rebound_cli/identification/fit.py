@@ -45,20 +45,17 @@ class Spring:
         share = math.sqrt(guards / 2)
         return self.natural_rad_s.value * share, min(self.ratio.value * share, 0.999)
 
-    def contact_time_s(self, guards: int = 2) -> float:
-        """First touch until the force is back at zero."""
-        natural, ratio = self.on(guards)
-        return _phase(ratio) / (natural * math.sqrt(1 - ratio**2))
+    def contact_time_s(self) -> float:
+        """First touch until the force is back at zero, on both guards."""
+        natural, ratio = self.on(2)
+        # The phase of the damped oscillation at that moment.
+        phase_rad = math.atan2(2 * ratio * math.sqrt(1 - ratio**2), 2 * ratio**2 - 1)
+        return phase_rad / (natural * math.sqrt(1 - ratio**2))
 
     def depth_m(self, hit: Hit) -> float:
         """How far the hit presses the spring."""
         natural, ratio = self.on(hit.guards)
         return hit.speed_in_m_s / natural * math.exp(-ratio / math.sqrt(1 - ratio**2) * math.acos(ratio))
-
-
-def _phase(ratio: float) -> float:
-    """Of the damped oscillation where its force is back at zero."""
-    return math.atan2(2 * ratio * math.sqrt(1 - ratio**2), 2 * ratio**2 - 1)
 
 
 def fit_restitution(hits: Sequence[Hit]) -> Number:
