@@ -25,20 +25,13 @@ class Spring:
 
     natural_rad_s: Number
     ratio: Number  # of damping, below 1
-    hits: int = 1
-    covariance_rad_s: float = 0.0  # of these two: one hit shows both at once
+    damping_per_s: Number
+    hits: int
 
     @property
     def stiffness_per_s2(self) -> Number:
         natural = self.natural_rad_s
         return Number(natural.value**2, 2 * natural.value * natural.sigma)
-
-    @property
-    def damping_per_s(self) -> Number:
-        natural, ratio = self.natural_rad_s, self.ratio
-        alone = (ratio.value * natural.sigma) ** 2 + (natural.value * ratio.sigma) ** 2
-        together = 2 * ratio.value * natural.value * self.covariance_rad_s
-        return Number(2 * ratio.value * natural.value, 2 * math.sqrt(max(0.0, alone + together)))
 
     def on(self, guards: int) -> tuple[float, float]:
         """Natural frequency (rad/s) and damping ratio, the latter kept below 1: more is not told apart."""
@@ -85,8 +78,9 @@ def fit_spring(hits: Sequence[Hit]) -> Spring | None:
     alone = [spring for hit in hits if (spring := _spring_of(hit)) is not None]
     if len(alone) <= 1:
         return alone[0] if alone else None
-    naturals, ratios = [spring.natural_rad_s for spring in alone], [spring.ratio for spring in alone]
-    return Spring(_median(naturals), _median(ratios), len(alone))
+    natural, ratio = _median([spring.natural_rad_s for spring in alone]), _median([spring.ratio for spring in alone])
+    sigma = 2 * math.hypot(ratio.value * natural.sigma, natural.value * ratio.sigma)
+    return Spring(natural, ratio, Number(2 * ratio.value * natural.value, sigma), len(alone))
 
 
 def _spring_of(hit: Hit) -> Spring | None:
@@ -122,10 +116,7 @@ def _from_push(hit: Hit, push: Push) -> Spring | None:
     natural = math.sqrt(stiffness)
     ratio, relative = damping / (2 * natural), stiffness_sigma / stiffness / 2
     ratio_sigma = math.hypot(damping_sigma / (2 * natural), ratio * relative)
-    # k_s and b_s are taken to be independent: the ratio falls as the frequency grows.
-    covariance_rad_s = -ratio * natural * relative**2
-    found = Number(natural, natural * relative), Number(ratio, ratio_sigma)
-    return Spring(*found, covariance_rad_s=covariance_rad_s)
+    return Spring(Number(natural, natural * relative), Number(ratio, ratio_sigma), Number(damping, damping_sigma), 1)
 
 
 @dataclass(frozen=True, slots=True)
