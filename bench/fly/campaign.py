@@ -12,7 +12,7 @@ import logging
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -20,10 +20,11 @@ from typing import Any
 
 import dask
 from distributed import Client, as_completed
+from rich.console import Console
+from rich.progress import track
 
 from companion.errors import ReboundError
 from rebound_cli import __version__
-from rebound_cli.live.console import with_progress
 
 Json = dict[str, Any]
 
@@ -112,7 +113,7 @@ def run_campaign(campaign: Campaign, workers: Workers, folder: Path = RECORDS_FO
             _write(file, campaign.head)
         try:
             found = outcomes(campaign.work_out, missing, workers)
-            for outcome in with_progress(found, len(missing), campaign.name) if missing else ():
+            for outcome in _with_progress(found, len(missing), campaign.name) if missing else ():
                 known[outcome["case"]] = _write(file, outcome)
         except KeyboardInterrupt:
             _say(f"\n{campaign.name}: broken off after {len(known)} cases; the same command goes on from there")
@@ -252,6 +253,12 @@ def _write(file: Any, entry: Json) -> Json:
     file.flush()
     read_back: Json = json.loads(line)
     return read_back
+
+
+def _with_progress(found: Iterator[Json], total: int, what: str) -> Iterable[Json]:
+    """With a bar on the terminal; in a file or a pipe nothing is drawn."""
+    console = Console(stderr=True)
+    return track(found, what, total, console=console, disable=not console.is_terminal)
 
 
 def _say(text: str) -> None:

@@ -160,8 +160,6 @@ class Ring:
         self._present, self._runs = present, present.parent
         self._config = config
         self._due_us = 0
-        self._others_bytes: int | None = None  # what the others take: they do not change
-        self._hits: dict[Path, bool] = {}
         self._has_room = True
         self.is_long = False
         """By the last look: of a vehicle at rest another record should begin, so that this one may go some day."""
@@ -176,34 +174,20 @@ class Ring:
             raise OSError(errno.ENOSPC, text)
 
     def _look(self) -> None:
+        # What a power cut left of one that was being removed.
+        for folder in self._runs.glob(f"{_GOING}*"):
+            shutil.rmtree(folder, ignore_errors=True)
         disk = shutil.disk_usage(self._runs)
         limits = limits_of(self._config, disk.total)
-        if self._others_bytes is None:
-            # What a power cut left of one that was being removed.
-            for folder in self._runs.glob(f"{_GOING}*"):
-                shutil.rmtree(folder, ignore_errors=True)
-            self._others_bytes = sum(flight.size_bytes for flight in self._others())
+        others = [flight for flight in kept_flights(self._runs) if flight.folder != self._present]
         present_bytes = size_of(self._present) if self._present.exists() else 0
-        to_go = limits.to_go(self._others_bytes + present_bytes, disk.free)
-        if to_go > 0:
-            self._remove(to_go)
-        self._has_room = shutil.disk_usage(self._runs).free >= min(LAST_BYTES, limits.keep_free)
-        self.is_long = self._has_room and present_bytes > max(limits.max_use // _FLIGHTS_A_BUDGET, LAST_BYTES)
-
-    def _others(self) -> list[KeptFlight]:
-        return [flight for flight in kept_flights(self._runs) if flight.folder != self._present]
-
-    def _remove(self, to_go: int) -> None:
-        """From the oldest on: those without a hit, then those with one."""
-        others = self._others()
-        self._others_bytes = sum(flight.size_bytes for flight in others)
-        for flight in others:
-            if flight.folder not in self._hits:
-                self._hits[flight.folder] = flight.has_hit()
-        for flight in sorted(others, key=lambda flight: self._hits[flight.folder]):
+        to_go = limits.to_go(sum(flight.size_bytes for flight in others) + present_bytes, disk.free)
+        # From the oldest on: those without a hit, then those with one.
+        for flight in sorted(others, key=KeptFlight.has_hit) if to_go > 0 else ():
             if to_go > 0 and flight.remove():
                 to_go -= flight.size_bytes
-                self._others_bytes -= flight.size_bytes
+        self._has_room = shutil.disk_usage(self._runs).free >= min(LAST_BYTES, limits.keep_free)
+        self.is_long = self._has_room and present_bytes > max(limits.max_use // _FLIGHTS_A_BUDGET, LAST_BYTES)
 
 
 def make_room_for_next(out: Path | None, config: DiskConfig) -> None:

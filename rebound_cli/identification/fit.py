@@ -25,40 +25,30 @@ class Spring:
 
     natural_rad_s: Number
     ratio: Number  # of damping, below 1
-    hits: int = 1
-    covariance_rad_s: float = 0.0  # of these two: one hit shows both at once
+    damping_per_s: Number
+    hits: int
 
     @property
     def stiffness_per_s2(self) -> Number:
         natural = self.natural_rad_s
         return Number(natural.value**2, 2 * natural.value * natural.sigma)
 
-    @property
-    def damping_per_s(self) -> Number:
-        natural, ratio = self.natural_rad_s, self.ratio
-        alone = (ratio.value * natural.sigma) ** 2 + (natural.value * ratio.sigma) ** 2
-        together = 2 * ratio.value * natural.value * self.covariance_rad_s
-        return Number(2 * ratio.value * natural.value, 2 * math.sqrt(max(0.0, alone + together)))
-
     def on(self, guards: int) -> tuple[float, float]:
         """Natural frequency (rad/s) and damping ratio, the latter kept below 1: more is not told apart."""
         share = math.sqrt(guards / 2)
         return self.natural_rad_s.value * share, min(self.ratio.value * share, 0.999)
 
-    def contact_time_s(self, guards: int = 2) -> float:
-        """First touch until the force is back at zero."""
-        natural, ratio = self.on(guards)
-        return _phase(ratio) / (natural * math.sqrt(1 - ratio**2))
+    def contact_time_s(self) -> float:
+        """First touch until the force is back at zero, on both guards."""
+        natural, ratio = self.on(2)
+        # The phase of the damped oscillation at that moment.
+        phase_rad = math.atan2(2 * ratio * math.sqrt(1 - ratio**2), 2 * ratio**2 - 1)
+        return phase_rad / (natural * math.sqrt(1 - ratio**2))
 
     def depth_m(self, hit: Hit) -> float:
         """How far the hit presses the spring."""
         natural, ratio = self.on(hit.guards)
         return hit.speed_in_m_s / natural * math.exp(-ratio / math.sqrt(1 - ratio**2) * math.acos(ratio))
-
-
-def _phase(ratio: float) -> float:
-    """Of the damped oscillation where its force is back at zero."""
-    return math.atan2(2 * ratio * math.sqrt(1 - ratio**2), 2 * ratio**2 - 1)
 
 
 def fit_restitution(hits: Sequence[Hit]) -> Number:
@@ -88,8 +78,9 @@ def fit_spring(hits: Sequence[Hit]) -> Spring | None:
     alone = [spring for hit in hits if (spring := _spring_of(hit)) is not None]
     if len(alone) <= 1:
         return alone[0] if alone else None
-    naturals, ratios = [spring.natural_rad_s for spring in alone], [spring.ratio for spring in alone]
-    return Spring(_median(naturals), _median(ratios), len(alone))
+    natural, ratio = _median([spring.natural_rad_s for spring in alone]), _median([spring.ratio for spring in alone])
+    sigma = 2 * math.hypot(ratio.value * natural.sigma, natural.value * ratio.sigma)
+    return Spring(natural, ratio, Number(2 * ratio.value * natural.value, sigma), len(alone))
 
 
 def _spring_of(hit: Hit) -> Spring | None:
@@ -125,10 +116,7 @@ def _from_push(hit: Hit, push: Push) -> Spring | None:
     natural = math.sqrt(stiffness)
     ratio, relative = damping / (2 * natural), stiffness_sigma / stiffness / 2
     ratio_sigma = math.hypot(damping_sigma / (2 * natural), ratio * relative)
-    # k_s and b_s are taken to be independent: the ratio falls as the frequency grows.
-    covariance_rad_s = -ratio * natural * relative**2
-    found = Number(natural, natural * relative), Number(ratio, ratio_sigma)
-    return Spring(*found, covariance_rad_s=covariance_rad_s)
+    return Spring(Number(natural, natural * relative), Number(ratio, ratio_sigma), Number(damping, damping_sigma), 1)
 
 
 @dataclass(frozen=True, slots=True)

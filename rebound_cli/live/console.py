@@ -3,8 +3,8 @@
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Self, TextIO, TypeVar
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Self, TextIO
 
 from rebound_cli.background import Background, at_once
 
@@ -22,7 +22,6 @@ PLAIN_STEPS = 10
 STANDING_OUT = ("detection", "hit")
 
 Fields = Sequence[tuple[str, str]]
-Item = TypeVar("Item")
 
 
 class Plain:
@@ -144,12 +143,3 @@ def state_fields(status: "Status", flight_time_s: float, link: str = "") -> Fiel
     if status.round_trip_us is not None:
         fields.append(("round trip", f"{status.round_trip_us / 1e3:.0f} ms"))
     return [*fields, ("link", link)] if link else fields
-
-
-def with_progress(items: Iterable[Item], total: int, what: str = "flights") -> Iterable[Item]:
-    """Hand the items on, with a bar on the terminal; in a file or a pipe nothing is drawn."""
-    from rich.console import Console as RichConsole
-    from rich.progress import track
-
-    console = RichConsole(stderr=True)
-    return track(items, what, total, console=console, disable=not console.is_terminal)

@@ -111,22 +111,18 @@ def _listener(path: Path) -> socket.socket:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        try:
-            listener.bind(str(path))
-        except OSError as error:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-                if error.errno != errno.EADDRINUSE or probe.connect_ex(str(path)) == 0:
-                    raise
-            # What a program that was killed has left.
-            path.unlink()
-            listener.bind(str(path))
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+            if probe.connect_ex(str(path)) == 0:
+                raise OSError(errno.EADDRINUSE, "another program answers there")
+        # What a program that was killed has left.
+        path.unlink(missing_ok=True)
+        listener.bind(str(path))
         # Before it listens nobody can connect.
         path.chmod(_OWNER_ALONE)
         listener.listen(_WAITING_CLIENTS)
     except OSError as error:
         listener.close()
-        why = "another program answers there" if error.errno == errno.EADDRINUSE else error.strerror or str(error)
-        raise StatusError(f"`rebound status` cannot ask this program at {path}: {why}.") from error
+        raise StatusError(f"`rebound status` cannot ask this program at {path}: {error.strerror or error}.") from error
     return listener
 
 

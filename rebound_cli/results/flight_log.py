@@ -1,8 +1,9 @@
 """A telemetry log as arrays: what was measured and what was asked for."""
 
+import math
 import struct
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
-from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, MessageId, Sample
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, MessageId
 from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import Demand, Log, Told
 
@@ -65,28 +66,20 @@ def read_flight_log(path: Path) -> FlightLog:
 def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
     """The same of packets with their stamps: what the companion hears of them, what it asked for, and all texts."""
     decoder = Decoder(is_packet=lambda *_: True)
-    heard, texts = list[tuple[int, Sample]](), list[tuple[int, bytes]]()
-    asked, wanted = list[Any](), list[Any]()
+    heard, texts, wanted = list[tuple[int, Told]](), list[tuple[int, bytes]](), list[Any]()
     for at_us, packet in packets:
         message_id = message_id_of(packet)
         if message_id in _MEASURED:
             decoder.listen_to(*source_of(packet))
             heard += ((at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
         elif message_id == _SET_POSITION_TARGET_LOCAL_NED:
-            asked.append((at_us, *_PLACE.unpack_from(payload_of(packet).ljust(_PLACE.size, b"\0"))))
+            place = _PLACE.unpack_from(payload_of(packet).ljust(_PLACE.size, b"\0"))
+            heard.append((at_us, Demand.of(0, place, (math.nan,) * 3)))
         elif message_id == _SET_ATTITUDE_TARGET:
             wanted.append((at_us, *_ATTITUDE.unpack_from(payload_of(packet).ljust(_ATTITUDE.size, b"\0"))))
         elif message_id == _STATUSTEXT:
             texts.append((at_us, packet))
-    setpoints, attitudes = np.array(asked, np.float64).reshape(-1, 4), np.array(wanted, np.float64).reshape(-1, 6)
-    return replace(
-        flight_log_of(heard),
-        setpoint_at_us=setpoints[:, 0],
-        setpoint_ned_m=setpoints[:, 1:],
-        wanted_at_us=attitudes[:, 0],
-        wanted=attitudes[:, 1:],
-        texts=tuple(_texts(texts)),
-    )
+    return flight_log_of(heard, wanted, _texts(texts))
 
 
 def _texts(stamped: Iterable[tuple[int, bytes]]) -> list[tuple[int, str]]:
@@ -107,7 +100,9 @@ def flight_log_of_log(log: Log) -> FlightLog:
     return flight_log_of((heard.at_us, heard.sample) for heard in log.heard)
 
 
-def flight_log_of(samples: Iterable[tuple[int, Told]]) -> FlightLog:
+def flight_log_of(
+    samples: Iterable[tuple[int, Told]], wanted: Sequence[Any] = (), texts: Iterable[tuple[int, str]] = ()
+) -> FlightLog:
     """The same of samples that were decoded already; setpoints as the vehicle tells them."""
     imu, moved, turned, asked, target = (list[Any]() for _ in range(5))
     for at_us, sample in samples:
@@ -122,10 +117,10 @@ def flight_log_of(samples: Iterable[tuple[int, Told]]) -> FlightLog:
                 target.append((at_us, *(turn or (np.nan,) * 4), thrust))
             case Demand():
                 asked.append((at_us, *(sample.position_ned_m or (np.nan, np.nan, np.nan))))
-    widths = ((imu, 8), (moved, 8), (turned, 6), (asked, 4), (target, 6))
-    i, m, t, a, c = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
+    widths = ((imu, 8), (moved, 8), (turned, 6), (asked, 4), (target, 6), (wanted, 6))
+    i, m, t, a, c, w = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
     return FlightLog(
         *(i[:, 0], i[:, 1], i[:, 2:5], i[:, 5:8], m[:, 0], m[:, 1], m[:, 2:5], m[:, 5:8]),
         *(t[:, 0], t[:, 1], t[:, 2:6], a[:, 0], a[:, 1:4]),
-        *(c[:, 0], c[:, 1:6], np.empty(0), np.empty((0, 5)), ()),
+        *(c[:, 0], c[:, 1:6], w[:, 0], w[:, 1:6], tuple(texts)),
     )

@@ -10,6 +10,8 @@ import sys
 import time
 from pathlib import Path
 
+from pymavlink import mavutil
+
 from rebound_cli.main import main
 from rebound_cli.replay.recording import read_recording, reproduce
 
@@ -89,14 +91,39 @@ def events_of(folder):
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
-def wait_for_event(folder, kind, timeout_s=30.0):
-    """Wait until the flight in `folder` has told of an event of that kind."""
+def wait_for_event(folder, kind, timeout_s=30.0, word="", count=1):
+    """The event of that kind, with that word in its text, once the flight in `folder` has told of so many."""
     end_s = time.monotonic() + timeout_s
     while time.monotonic() < end_s:
-        if any(event["kind"] == kind for event in events_of(folder)):
-            return
+        found = [event for event in events_of(folder) if event["kind"] == kind and word in event["text"]]
+        if len(found) >= count:
+            return found[-1]
         time.sleep(0.05)
-    raise AssertionError(f"no event '{kind}' within {timeout_s} s: {events_of(folder)}")
+    raise AssertionError(f"no event '{kind}' with '{word}' within {timeout_s} s: {events_of(folder)}")
+
+
+@contextlib.contextmanager
+def guarding(url, folder, *options):
+    """A guard of the vehicle there, ended as systemd ends it. Afterwards `said` is what it printed."""
+    guard = start("guard", "--connect", url, "--out", folder, *QUICK, *options)
+    try:
+        yield guard
+        guard.terminate()
+        guard.said, stderr = guard.communicate(timeout=20)
+    finally:
+        guard.kill()
+    assert guard.returncode == 0, stderr
+
+
+def taken_off(vehicle):
+    """A pilot's radio; the vehicle holds in the air by now."""
+    pilot = mavutil.mavlink_connection(vehicle.mavutil_address)
+    pilot.wait_heartbeat(timeout=10)
+    vehicle.wait_until(lambda truth: truth.may_arm, within_s=10)
+    pilot.arducopter_arm()
+    pilot.set_mode("TAKEOFF")
+    vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
+    return pilot
 
 
 def processes_naming(text):

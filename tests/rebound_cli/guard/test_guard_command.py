@@ -18,18 +18,20 @@ from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
 from tests.rebound_cli.command import (
+    QUICK,
     assert_comes_again,
     events_of,
     free_port,
+    guarding,
     run,
-    start,
+    taken_off,
     vehicle_on_air,
     wait_for_event,
 )
 
 pytestmark = pytest.mark.realtime
 
-QUICK = ("--set", "companion.streams.window_s=0.5", "--set", "companion.link.heartbeat_wait_s=30")
+PATIENT = ("--set", "companion.link.heartbeat_wait_s=30")
 
 
 @pytest.mark.parametrize(
@@ -73,18 +75,12 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     systemd.bind(str(tmp_path / "notify"))
     monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
     monkeypatch.setenv("WATCHDOG_USEC", "1000000")
-    with vehicle_on_air() as port:
-        guard = start(
-            "guard", "--connect", f"udpin://127.0.0.1:{port}", "--out", tmp_path, "--then", "previous", *QUICK
-        )
-        try:
-            wait_for_event(tmp_path, "standing_by")
-            status = ask(tmp_path / "run" / "status.sock")
-            guard.send_signal(signal.SIGTERM)
-            stdout, stderr = guard.communicate(timeout=20)
-        finally:
-            guard.kill()
-    assert guard.returncode == 0, stderr
+    with (
+        vehicle_on_air() as port,
+        guarding(f"udpin://127.0.0.1:{port}", tmp_path, *PATIENT, "--then", "previous") as guard,
+    ):
+        wait_for_event(tmp_path, "standing_by")
+        status = ask(tmp_path / "run" / "status.sock")
     assert status["command"] == "guard" and status["pid"] == guard.pid and status["folder"] == str(tmp_path)
     assert status["age_s"] < 5.0 and status["hits"] == 0
     assert not (tmp_path / "run" / "status.sock").exists()
@@ -97,8 +93,8 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     assert told.count("READY=1") == 1 == told.count("STOPPING=1") and told.count("WATCHDOG=1") > 1
     assert any(line.startswith("STATUS=state ") for line in told)
     # The present state is systemd's to show: it is no line of the journal.
-    assert "vehicle none heard yet" not in stdout and "standing_by" in stdout
-    assert "stopped by a terminate signal; 0 hits" in stdout
+    assert "vehicle none heard yet" not in guard.said and "standing_by" in guard.said
+    assert "stopped by a terminate signal; 0 hits" in guard.said
     assert [event["kind"] for event in events_of(tmp_path)][-1] == "stopped"
     assert (tmp_path / "flight.tlog").stat().st_size > 10_000
     assert_comes_again(tmp_path)
@@ -112,26 +108,19 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
 
 def test_as_the_link_it_passes_what_a_client_asks_and_is_repeated_to_the_bit(tmp_path):
     between = free_port()
-    with vehicle_on_air() as port:
-        link = ("--connect", f"udpin://127.0.0.1:{port}", "--between", f"udpin://127.0.0.1:{between}")
-        guard = start("guard", *link, "--out", tmp_path, *QUICK)
-        try:
-            client = mavutil.mavlink_connection(f"udpout:127.0.0.1:{between}", source_system=254)
-            wait_for_event(tmp_path, "standing_by")
-            # A client that asks for a slow stream, which the guard needs fast, for a parameter, and sends a setpoint
-            client.mav.heartbeat_send(6, 8, 0, 0, 4)
-            client.mav.command_long_send(1, 1, 511, 0, 31, 1_000_000, *[0] * 5)
-            assert client.recv_match(type="COMMAND_ACK", blocking=True, timeout=10).result == 0
-            client.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
-            value = client.recv_match(type="PARAM_VALUE", blocking=True, timeout=10)
-            client.mav.set_position_target_local_ned_send(0, 1, 1, 1, 0xDF8, *[0.0] * 11)
-            told = [client.recv_match(type="ATTITUDE_QUATERNION", blocking=True, timeout=10) for _ in range(20)]
-            client.close()
-            guard.send_signal(signal.SIGTERM)
-            _, stderr = guard.communicate(timeout=20)
-        finally:
-            guard.kill()
-    assert guard.returncode == 0, stderr
+    link = ("--between", f"udpin://127.0.0.1:{between}")
+    with vehicle_on_air() as port, guarding(f"udpin://127.0.0.1:{port}", tmp_path, *PATIENT, *link):
+        client = mavutil.mavlink_connection(f"udpout:127.0.0.1:{between}", source_system=254)
+        wait_for_event(tmp_path, "standing_by")
+        # A client that asks for a slow stream, which the guard needs fast, for a parameter, and sends a setpoint
+        client.mav.heartbeat_send(6, 8, 0, 0, 4)
+        client.mav.command_long_send(1, 1, 511, 0, 31, 1_000_000, *[0] * 5)
+        assert client.recv_match(type="COMMAND_ACK", blocking=True, timeout=10).result == 0
+        client.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
+        value = client.recv_match(type="PARAM_VALUE", blocking=True, timeout=10)
+        client.mav.set_position_target_local_ned_send(0, 1, 1, 1, 0xDF8, *[0.0] * 11)
+        told = [client.recv_match(type="ATTITUDE_QUATERNION", blocking=True, timeout=10) for _ in range(20)]
+        client.close()
     assert value.param_id == "MIS_TAKEOFF_ALT"
     # Then the stream is fast again
     assert told[-1].time_boot_ms - told[0].time_boot_ms < 3_000
@@ -150,18 +139,22 @@ def test_a_vehicle_at_rest_fills_one_record_after_the_other_and_one_that_is_arme
     monkeypatch.setattr(run_folder, "RUNS_FOLDER", runs)
     monkeypatch.setattr(kept, "LAST_BYTES", 100_000)
     monkeypatch.setattr(kept, "LOOK_EVERY_US", 500_000)
-    words = ("guard", "--connect", rebound_vehicle.tcp_address, "--set", "companion.disk.max_use_mb=0.8", *QUICK)
+    words = (
+        "guard",
+        "--connect",
+        rebound_vehicle.tcp_address,
+        "--set",
+        "companion.disk.max_use_mb=0.8",
+        *QUICK,
+        *PATIENT,
+    )
     while_armed = []
 
     def pilot():
         try:
             # When the vehicle stands for two records, and then flies for as long as two more
             rebound_vehicle.wait_until(lambda _: len(kept.kept_flights(runs)) == 3, within_s=60)
-            radio = mavutil.mavlink_connection(rebound_vehicle.mavutil_address)
-            radio.wait_heartbeat(timeout=10)
-            radio.arducopter_arm()
-            radio.set_mode("TAKEOFF")
-            rebound_vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
+            radio = taken_off(rebound_vehicle)
             flown = kept.kept_flights(runs)[-1].folder
             radio.close()
             rebound_vehicle.wait_until(lambda _: kept.size_of(flown) > 300_000, within_s=60)

@@ -5,12 +5,20 @@ import json
 import time
 
 import pytest
-from pymavlink import mavutil
 
 from companion.mavlink.delivery import Delivery
 from companion.shell.tlog import read_tlog
 from sim_vehicle.testing import start_vehicle
-from tests.rebound_cli.command import HOP, QUICK, SQUARE, assert_comes_again, events_of, run, start, wait_for_event
+from tests.rebound_cli.command import (
+    HOP,
+    SQUARE,
+    assert_comes_again,
+    events_of,
+    guarding,
+    run,
+    taken_off,
+    wait_for_event,
+)
 from tests.rebound_cli.live.cable import Cable
 
 pytestmark = pytest.mark.realtime
@@ -40,55 +48,33 @@ def texts(folder, kind):
     return [event["text"] for event in events_of(folder) if event["kind"] == kind]
 
 
-def wait_for_text(folder, kind, word, count=1):
-    """The event that has it."""
-    end_s = time.monotonic() + 30.0
-    while time.monotonic() < end_s:
-        found = [event for event in events_of(folder) if event["kind"] == kind and word in event["text"]]
-        if len(found) >= count:
-            return found[-1]
-        time.sleep(0.05)
-    raise AssertionError(f"no event '{kind}' with '{word}': {events_of(folder)}")
-
-
 def test_a_guard_waits_for_its_cable_recovers_over_it_and_outlasts_that_it_is_unplugged(line, tmp_path):
     # Given a guard that is up before its cable is plugged in, and a line that loses each tenth packet
     cable, vehicle = line(921_600, 0.1)
     folder = tmp_path / "run"
-    guard = start("guard", "--wait", "--connect", cable.url, "--out", folder, *QUICK)
-    try:
-        wait_for_text(folder, "link", f"Serial port {cable.name} does not exist")
+    with guarding(cable.url, folder, "--wait"):
+        wait_for_event(folder, "link", word=f"Serial port {cable.name} does not exist")
         first = cable.plug()
         wait_for_event(folder, "standing_by")
         # When a pilot flies, by a radio of their own
-        pilot = mavutil.mavlink_connection(vehicle.mavutil_address)
-        pilot.wait_heartbeat(timeout=10)
-        vehicle.wait_until(lambda truth: truth.may_arm, within_s=10)
-        pilot.arducopter_arm()
-        pilot.set_mode("TAKEOFF")
-        vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
-        wait_for_text(folder, "watching", "watching")
+        pilot = taken_off(vehicle)
+        wait_for_event(folder, "watching", word="watching")
         vehicle.hit(1.5, bearing_deg=90)
         # Then a hit is recovered from
         wait_for_event(folder, "given_back")
         # And when the cable is pulled out, and put in as another device, bytes pass again within a second
         cable.unplug()
-        wait_for_text(folder, "link", "lost, reconnecting")
+        wait_for_event(folder, "link", word="lost, reconnecting")
         second, plugged_us = cable.plug(), time.time_ns() // 1000
         assert second != first
-        assert wait_for_text(folder, "link", "connected again")["time_us"] - plugged_us < 1_000_000
+        assert wait_for_event(folder, "link", word="connected again")["time_us"] - plugged_us < 1_000_000
         # And nothing was taken over for that; the next hit is recovered from as the first
         assert len(texts(folder, "take_over")) == 1
         vehicle.wait_until(lambda truth: truth.mode == "Hold", within_s=5)
-        wait_for_text(folder, "mode", "AUTO.LOITER")
+        wait_for_event(folder, "mode", word="AUTO.LOITER")
         vehicle.hit(1.5, bearing_deg=90)
-        wait_for_text(folder, "given_back", "", count=2)
+        wait_for_event(folder, "given_back", count=2)
         pilot.close()
-        guard.terminate()
-        _, stderr = guard.communicate(timeout=20)
-    finally:
-        guard.kill()
-    assert guard.returncode == 0, stderr
     summary = json.loads((folder / "summary.json").read_text())
     # What struck it may touch it again before it is clear: part of the same recovery
     assert summary["reconnects"] == 1 and len(summary["collisions"]) >= 2
@@ -111,11 +97,6 @@ def test_a_line_that_is_too_slow_for_hits_is_told_and_nothing_is_guarded(line, t
     cable, _ = line(57_600, 0.05)
     cable.plug()
     folder = tmp_path / "run"
-    guard = start("guard", "--wait", "--connect", cable.url, "--out", folder, *QUICK)
-    try:
-        told = wait_for_text(folder, "link", "not guarded by now")
-        guard.terminate()
-        guard.communicate(timeout=20)
-    finally:
-        guard.kill()
+    with guarding(cable.url, folder, "--wait"):
+        told = wait_for_event(folder, "link", word="not guarded by now")
     assert "HIGHRES_IMU arrives at" in told["text"] and texts(folder, "standing_by") == []

@@ -12,8 +12,8 @@ import threading
 import tty
 
 import pytest
-from pymavlink import mavutil
 
+from tests.rebound_cli.command import taken_off
 from tests.rebound_cli.service.sandbox import ROOT, Sandbox, why_not
 
 pytestmark = [pytest.mark.realtime, pytest.mark.skipif(why_not() is not None, reason=str(why_not()))]
@@ -43,12 +43,7 @@ def test_installed_booted_hit_killed_hung_and_configured_wrongly(rebound_vehicle
         sandbox.wait_for(lambda: is_in(sandbox, "standing by"))
         assert "MemoryDenyWriteExecute=yes" in sandbox.file("/etc/systemd/system/rebound.service").read_text()
         # When a pilot flies
-        pilot = mavutil.mavlink_connection(rebound_vehicle.mavutil_address)
-        pilot.wait_heartbeat(timeout=10)
-        rebound_vehicle.wait_until(lambda truth: truth.may_arm, within_s=10)
-        pilot.arducopter_arm()
-        pilot.set_mode("TAKEOFF")
-        rebound_vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
+        pilot = taken_off(rebound_vehicle)
         sandbox.wait_for(lambda: is_in(sandbox, "watching"))
         assert json.loads(sandbox.rebound("status", "--json").stdout)["state"] == "watching"
         # Then a hit is recovered from
