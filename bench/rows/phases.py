@@ -1,6 +1,5 @@
 """What the companion was doing at any moment of a flight, by the events it told."""
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -33,24 +32,19 @@ _BEGUN_BY = {
 
 @dataclass(frozen=True, slots=True)
 class Phases:
-    """Times in microseconds of the vehicle's boot clock."""
+    """When each phase of a flight began, in microseconds of the vehicle's boot clock."""
 
-    begins_us: tuple[float, ...]
-    phases: tuple[MissionPhase, ...]
+    begun: tuple[tuple[float, MissionPhase], ...]
 
     def at(self, boot_us: float) -> MissionPhase:
-        index = bisect_right(self.begins_us, boot_us) - 1
-        return self.phases[index] if index >= 0 else MissionPhase.GROUND
+        return next((phase for at_us, phase in reversed(self.begun) if at_us <= boot_us), MissionPhase.GROUND)
 
     def end_of(self, boot_us: float) -> float | None:
         """When the phase of this moment ended; None if it did not."""
-        index = bisect_right(self.begins_us, boot_us) - 1
-        return next(
-            (self.begins_us[k] for k in range(index + 1, len(self.phases)) if self.phases[k] is not self.phases[index]),
-            None,
-        )
+        now = self.at(boot_us)
+        return next((at_us for at_us, phase in self.begun if at_us > boot_us and phase is not now), None)
 
 
 def phases_of(events: Sequence[Event], epoch_at_boot_us: float) -> Phases:
-    told = [(event.time_us - epoch_at_boot_us, _BEGUN_BY[event.kind]) for event in events if event.kind in _BEGUN_BY]
-    return Phases(tuple(at for at, _ in told), tuple(phase for _, phase in told))
+    told = (event for event in events if event.kind in _BEGUN_BY)
+    return Phases(tuple((event.time_us - epoch_at_boot_us, _BEGUN_BY[event.kind]) for event in told))

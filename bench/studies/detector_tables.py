@@ -6,7 +6,7 @@ import pandas as pd
 
 from bench.cases.hits import SPEEDS_M_S
 from bench.fly.watching import ASKED_HZ, FLOWN_WITH
-from bench.rows.tables import Bar, per_cent, percentile, rms, share_bar, table, text_of
+from bench.rows.tables import Bar, per_cent, rms, share_bar, table, text_of
 
 (DEFAULT,), SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
 # By airframe and rate received.
@@ -59,10 +59,10 @@ def _figures(hits: pd.DataFrame) -> dict[str, object]:
         "found [%]": per_cent(late.notna().mean(), 2),
         "between the samples": f"{between['latency_ms'].notna().sum()} / {len(between)}",
         "after the first possible sample [%]": per_cent((seen["samples_late"] > 0).mean(), 2),
-        "latency, median / 99 % [ms]": f"{text_of(percentile(late, 50))} / {text_of(percentile(late, 99))}",
+        "latency, median / 99 % [ms]": f"{text_of(late.quantile(0.5))} / {text_of(late.quantile(0.99))}",
         "false before": int(hits["false"].sum()),
         "v_c error, RMS [m/s]": text_of(rms(hits["speed_error_m_s"].dropna()), 3),
-        "normal error, median / 95 % [°]": " / ".join(text_of(percentile(normal, part), 0) for part in (50, 95)),
+        "normal error, median / 95 % [°]": " / ".join(text_of(normal.quantile(part), 0) for part in (0.5, 0.95)),
     }
 
 
