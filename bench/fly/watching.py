@@ -16,7 +16,7 @@ from companion.reflex.monitor import advance, start_monitor
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
 
-FLOWN_WITH = (BaselineConfig().detector,)
+FLOWN_WITH = BaselineConfig().detector
 """The detector of a drone."""
 
 # A hit that is reported no later than this after its first touch has been found.
@@ -35,10 +35,6 @@ class Found:
 def configuration(detector: str, settings: Mapping[str, Any]) -> BaselineConfig:
     """The vehicle's settings with the detector's name."""
     return BaselineConfig.model_validate({**settings, "detector": detector})
-
-
-def detector_names() -> tuple[str, ...]:
-    return tuple(BaselineConfig.detectors)
 
 
 def streams_asked_hz(rate: int) -> dict[MessageId, float]:

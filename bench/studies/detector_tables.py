@@ -8,7 +8,7 @@ from bench.cases.hits import SPEEDS_M_S
 from bench.fly.watching import ASKED_HZ, FLOWN_WITH
 from bench.rows.tables import Bar, per_cent, rms, share_bar, table, text_of
 
-(DEFAULT,), SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
+DEFAULT, SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
 # By airframe and rate received.
 FOUND_BARS = {("foldable", rate): 1.0 for rate in ASKED_HZ}
 FOUND_BARS |= {("rigid", 246): 1.0, ("rigid", 100): 0.995, ("rigid", 50): 0.97}

@@ -12,7 +12,7 @@ from bench.fly.cruise import fly_healthy, fly_hit, hover_in_hand
 from bench.fly.watching import ASKED_HZ, configuration, streams_asked_hz
 from bench.fly.wire import JITTERY, LINKS, VehicleRecording, heard
 from bench.rows.heard import first_possible, work_out_hand, work_out_hit
-from bench.studies.detectors import Drawing, hits_campaign
+from bench.studies.detectors import campaigns_of
 from companion.mavlink.decode import Decoder
 from companion.messages import ExtendedState, ImuSample, LandedState
 from companion.reflex.detector import Situation
@@ -73,7 +73,7 @@ def test_a_hit_is_drawn_from_its_seed_alone():
 
 def test_drawn_cases_have_a_vehicle_each_whose_detector_knows_its_sensor():
     # Given a campaign of vehicles that nobody tuned for
-    cases = hits_campaign(8, Drawing(first_seed=500, is_drawn=True)).cases
+    cases = campaigns_of(8, 0.01, 500, "drawn")[0].cases
     vehicles = [vehicle_of_hit(case) for case in cases]
     # Then each case has its own
     assert len({vehicle.airframe.mass_kg for vehicle in vehicles}) == len(cases)
