@@ -8,7 +8,7 @@ import pytest
 from bench.cases.hits import draw_case, draw_hand, vehicle_of_hit
 from bench.cases.mishaps import FlightCase
 from bench.fly import cruise
-from bench.fly.cruise import fly_healthy, fly_hit, hover_in_hand
+from bench.fly.cruise import fly_healthy, fly_hit
 from bench.fly.watching import ASKED_HZ, configuration, streams_asked_hz
 from bench.fly.wire import JITTERY, LINKS, VehicleRecording, heard
 from bench.rows.heard import first_possible, work_out_hand, work_out_hit
@@ -61,14 +61,6 @@ def without_landed_state(samples):
 
 
 # --- hits -----------------------------------------------------------------------------------------------------------
-
-
-def test_a_hit_is_drawn_from_its_seed_alone():
-    assert draw_case("plain", 7, ()) == draw_case("plain", 7, ())
-    drawn = [draw_case("plain", seed, ()) for seed in range(40)]
-    assert {case.airframe for case in drawn} == {"foldable", "rigid"}
-    first, again = (fly_hit(drawn[0], vehicle_of_hit(drawn[0]).airframe) for _ in range(2))
-    assert first[0].samples == again[0].samples and first[1] == again[1]
 
 
 def test_drawn_cases_have_a_vehicle_each_whose_detector_knows_its_sensor():
@@ -186,21 +178,6 @@ def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
 # --- hands ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [0, 2])
-def test_a_hand_holds_or_pushes_a_hovering_vehicle(seed):
-    # Given a hand that holds (first) or pushes (second)
-    case = draw_hand(seed, ())
-    recording, began_us = hover_in_hand(case, load_built_in(case.airframe))
-    samples = recording.samples
-    moved_m = [math.dist(s.position_ned_m, (0.0, 0.0, -30.0)) for s in samples if s.time_boot_us < began_us]
-    # Then it hovered until then, and nothing of it is an obstacle
-    assert samples[-1].time_boot_us > began_us + 0.8e6 and max(moved_m) < 0.3
-    assert not any(recording.contact_m_s2)
-    # And the push is felt sideways
-    felt = max(math.hypot(*s.specific_force_frd_m_s2[:2]) for s in samples if s.time_boot_us > began_us)
-    assert felt > 1.5 if case.grip == "pushed" else felt < 8.0
-
-
 # --- verdicts ---------------------------------------------------------------------------------------------------------
 
 
@@ -214,15 +191,6 @@ def test_the_default_detector_finds_them_and_lets_hands_be():
     for at_rate in work_out_hand(draw_hand(6, ("fused",)))["rates"].values():
         entry = at_rate["detectors"]["fused"]
         assert entry["collisions"] == [] and entry["told_after_ms"] is not None
-
-
-def test_the_echo_of_a_stiff_hit_does_not_turn_the_obstacle_round():
-    # Given a rigid frame's head-on hit of 2.7 m/s that fell between the samples of 50 Hz but for a faint echo
-    scored = work_out_hit(draw_case("plain", 11, ("fused",)))
-    fused = scored["rates"]["50"]["detectors"]["fused"]
-    # Then it is found, and the normal is that of something in the vehicle's way, whatever the echo would explain
-    assert scored["off_head_on_deg"] < 5.0
-    assert fused["normal_error_deg"] < 45.0
 
 
 # --- healthy flights
