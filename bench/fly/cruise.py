@@ -24,9 +24,10 @@ from bench.cases.hits import (
 from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
 from bench.cases.pilot import Pilot, PilotDemand, as_known
 from bench.fly.wire import VehicleRecording
-from companion.messages import LandedState
+from companion.messages import LandedState, Vector3
 from companion.reflex.detector import Situation
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.plant.plant import Plant
@@ -85,15 +86,7 @@ def fly_hit(
         output = cruise.step()
         steps += 1
         left -= 1
-        place = start + steps * interval_s * velocity
-        off_reason = "takeoff" if steps * interval_s < SWITCHED_ON_AFTER_S else None
-        situation = Situation(
-            off_reason=off_reason,
-            armed=True,
-            landed_state=LandedState.IN_AIR,
-            height_m=-output.position_ned_m[2],
-            setpoint_position_ned_m=_triple(place),
-        )
+        situation = _in_air(output, steps * interval_s, _triple(start + steps * interval_s * velocity))
         recording.add(plant, output, situation, airframe.mass_kg)
         if not touched and hit_row[HIT_ACTIVE] == 1.0:
             touched, left = True, round(FOLLOWED_S / interval_s)
@@ -105,7 +98,13 @@ def fly_hit(
     return recording, truth.hits[0]
 
 
-def _triple(vector: Floats) -> tuple[float, float, float]:
+def _in_air(output: Estimate, flown_s: float, asked_ned_m: Vector3 | None) -> Situation:
+    off_reason = "takeoff" if flown_s < SWITCHED_ON_AFTER_S else None
+    height_m = -output.position_ned_m[2]
+    return Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
+
+
+def _triple(vector: Floats) -> Vector3:
     return float(vector[0]), float(vector[1]), float(vector[2])
 
 
@@ -124,12 +123,7 @@ def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[VehicleRecording,
     while cruise.time_boot_us < 1e6 * (until_s + LOOKED_AFTER_S):
         setpoint = cruise.setpoint()
         output = cruise.step(setpoint)
-        situation = Situation(
-            off_reason="takeoff" if output.time_boot_us < 1e6 * SWITCHED_ON_AFTER_S else None,
-            armed=True,
-            landed_state=LandedState.IN_AIR,
-            height_m=-output.position_ned_m[2],
-        )
+        situation = _in_air(output, 1e-6 * output.time_boot_us, None)
         recording.add(cruise.plant, output, situation, airframe.mass_kg)
     return recording, 1e6 * from_s
 

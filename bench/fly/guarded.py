@@ -20,7 +20,7 @@ from bench.cases.hits import (
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle
 from bench.fly.cruise import FOLLOWED_S, PATIENCE_S
 from bench.fly.moments import Moment
-from bench.fly.watching import FOUND_WITHIN_US
+from bench.fly.wire import FOUND_WITHIN_US
 from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard

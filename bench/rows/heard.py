@@ -9,8 +9,18 @@ from bench.cases.mishaps import FlightCase
 from bench.cases.vehicles import BenchVehicle, vehicle_of
 from bench.fly.campaign import Json
 from bench.fly.cruise import fly_healthy, hit_of, hover_in_hand
-from bench.fly.watching import ASKED_HZ, FOUND_WITHIN_US, Found, configuration, streams_asked_hz, watch_all
-from bench.fly.wire import LINKS, HeardStep, VehicleRecording, heard
+from bench.fly.wire import (
+    ASKED_HZ,
+    FOUND_WITHIN_US,
+    LINKS,
+    Found,
+    HeardStep,
+    VehicleRecording,
+    configuration,
+    heard,
+    streams_asked_hz,
+    watch_all,
+)
 from companion.messages import ImuSample, Vector3
 from companion.reflex.impact import ImpactEstimate
 from sim_vehicle.truth import Hit

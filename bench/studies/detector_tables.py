@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import pandas as pd
 
 from bench.cases.hits import SPEEDS_M_S
-from bench.fly.watching import ASKED_HZ, FLOWN_WITH
+from bench.fly.wire import ASKED_HZ, FLOWN_WITH
 from bench.rows.tables import Bar, per_cent, rms, share_bar, table, text_of
 
 DEFAULT, SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
@@ -35,9 +35,6 @@ def all_tables(frames: Mapping[str, pd.DataFrame]) -> dict[str, str]:
         "By obstacle": by(usual(ours), "approach", *USUAL),
         "By speed": by(ours[ours["family"] == "plain"], "band", *USUAL),
         "By vibration": by(ours[ours["family"] == "vibration"], "vibration_m_s2", *USUAL),
-        "By the quality of the vehicle's velocity": by(
-            ours[ours["family"] == "velocity"], "velocity_noise_m_s", *USUAL
-        ),
         "Over a bad link, and struck in hover": by(hits[hits["family"].isin(["link", "struck"])], "family", *USUAL),
         "In a person's hand": hands_table(frames["hands"]),
         "Healthy flights, simulated": alarms_table(flights, "detector", "rate"),

@@ -22,12 +22,10 @@ from bench.studies.detector_tables import all_bars, all_tables
 # all seven take three times as long as these two.
 THOROUGH = ("fused", "threshold")
 COMPARED_HITS, COMPARED_FLIGHTS, COMPARED_EVERY_AT_MOST = 400, 16, 8
-# Beside the hits of the airframes as they are, one in so many again with more vibration, and with a worse velocity.
+# Beside the hits of the airframes as they are, one in so many again with more vibration.
 VARIED_SHARE = 16
 # An IMU sample's spread on each axis; four public PX4 logs of healthy flights lie between 1.2 and 4 m/s^2.
 VIBRATIONS_M_S2 = (0.05, 1.0, 2.0, 4.0)
-# Of the vehicle's velocity estimate, RMS on each axis: motion capture, GPS with RTK, plain GPS.
-VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
 # Over a bad link, of a hovering vehicle, by hand: one in so many each, by the default detector and the baseline alone.
 # No more than these, which take two minutes of one core together; a missed one in a hundred shows.
 SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
@@ -80,18 +78,14 @@ def campaigns_of(hits: int, hours: float, first_seed: int, vehicles: str) -> lis
 
 
 def hit_cases(hits: int, first: int) -> list[HitCase]:
-    """So many hits as the vehicles are, a sixteenth more of each variation, and some over a bad link and in hover."""
+    """So many hits as the vehicles are, a sixteenth more that vibrate, and some over a bad link and in hover."""
     every = _every(hits, COMPARED_HITS)
     cases = [draw_case("plain", seed, _compared(seed, every)) for seed in range(first, first + hits)]
     first += hits
     for seed in range(first, first + hits // VARIED_SHARE):
         vibration = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
         cases.append(draw_case("vibration", seed, _compared(seed, every), vibration_m_s2=vibration))
-    first += hits
-    for seed in range(first, first + hits // VARIED_SHARE):
-        noise = VELOCITY_NOISES_M_S[seed // 2 % len(VELOCITY_NOISES_M_S)]
-        cases.append(draw_case("velocity", seed, THOROUGH, velocity_noise_m_s=noise))
-    first += hits
+    first += 2 * hits
     side = _side(hits, SIDE_HITS_AT_MOST)
     cases += [draw_case("link", first + count, THOROUGH, link=JITTERY) for count in range(side)]
     cases += [draw_case("struck", first + hits + count, THOROUGH, is_struck=True) for count in range(side)]

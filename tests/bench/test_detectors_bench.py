@@ -9,8 +9,7 @@ from bench.cases.hits import draw_case, draw_hand, vehicle_of_hit
 from bench.cases.mishaps import FlightCase
 from bench.fly import cruise
 from bench.fly.cruise import fly_healthy, fly_hit
-from bench.fly.watching import ASKED_HZ, configuration, streams_asked_hz
-from bench.fly.wire import JITTERY, LINKS, VehicleRecording, heard
+from bench.fly.wire import ASKED_HZ, JITTERY, LINKS, VehicleRecording, configuration, heard, streams_asked_hz
 from bench.rows.heard import first_possible, work_out_hand, work_out_hit
 from bench.studies.detectors import campaigns_of
 from companion.mavlink.decode import Decoder
