@@ -1,6 +1,7 @@
 """Flights of the plant alone, each heard by every detector: a hit in cruise, a hand in hover, a healthy flight."""
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,12 +56,9 @@ class NoTouch(Exception):  # noqa: N818 - reads as the sentence it is
 
 def hit_of(case: HitCase, airframe: Airframe) -> tuple[VehicleRecording, Hit]:
     """The case's flight; one past a pole is flown again nearer to its middle. Raises NoTouch."""
-    for share in POLE_OFFSET_SHARES[:-1]:
-        try:
+    for share in POLE_OFFSET_SHARES[:-1] if case.approach == "pole" else ():
+        with suppress(NoTouch):
             return fly_hit(case, airframe, share)
-        except NoTouch:
-            if case.approach != "pole":
-                raise
     return fly_hit(case, airframe, POLE_OFFSET_SHARES[-1])
 
 
