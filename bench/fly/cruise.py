@@ -23,7 +23,7 @@ from bench.cases.hits import (
     velocity_towards,
 )
 from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
-from bench.cases.pilot import Pilot, PilotDemand, as_known
+from bench.cases.pilot import Pilot
 from bench.fly.wire import VehicleRecording
 from companion.messages import LandedState, Vector3
 from companion.reflex.detector import Situation
@@ -126,42 +126,31 @@ def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[VehicleRecording,
     return recording, 1e6 * from_s
 
 
-@dataclass(slots=True)
-class FlownHealthy:
-    """A recorded flight and the phase of each interval."""
-
-    recording: VehicleRecording
-    phases: list[str]
-
-
-def fly_healthy(case: FlightCase, airframe: Airframe) -> FlownHealthy:
-    """From the ground to the ground; a flight that its fault ends is recorded up to there."""
+def fly_healthy(case: FlightCase, airframe: Airframe) -> tuple[VehicleRecording, list[str]]:
+    """From the ground to the ground, or up to where its fault ends it; and the phase of each interval."""
     rng = np.random.default_rng([case.seed, 2])
     mishaps = FAMILIES[case.family](np.random.default_rng([case.seed, 4]))
     scene = Scene.model_validate({"faults": mishaps.faults})
     plant = Plant(airframe, scene, case.seed, keeps_path=False)
     pilot = Pilot(plant, airframe, rng, AIRBORNE_S)
-    flown = FlownHealthy(VehicleRecording(), [])
+    recording, phases = VehicleRecording(), list[str]()
     ground_m = plant.state.body[2]
     for asked in pilot.fly():
         output = plant.step(asked.setpoint, asked.armed)
-        flown.recording.add(plant, output, _situation(asked, ground_m - output.position_ned_m[2]), airframe.mass_kg)
-        flown.phases.append(asked.phase)
+        situation = Situation(
+            off_reason=asked.off_reason,
+            armed=asked.armed,
+            landed_state=asked.landed_state,
+            height_m=ground_m - output.position_ned_m[2],
+            descent_commanded=asked.phase in ("landing", "landed"),
+            setpoint_position_ned_m=asked.position_ned_m,
+        )
+        recording.add(plant, output, situation, airframe.mass_kg)
+        phases.append(asked.phase)
         is_lost = asked.phase not in NEAR_GROUND and ground_m - plant.state.body[2] < LOST_BELOW_M
         if is_lost or (mishaps.ends_s is not None and output.time_boot_us > 1e6 * mishaps.ends_s):
             break
-    return flown
-
-
-def _situation(asked: PilotDemand, height_m: float) -> Situation:
-    return Situation(
-        off_reason=asked.off_reason,
-        armed=asked.armed,
-        landed_state=asked.landed_state,
-        height_m=height_m,
-        descent_commanded=asked.phase in ("landing", "landed"),
-        setpoint_position_ned_m=as_known(asked.setpoint, "position_ned_m"),
-    )
+    return recording, phases
 
 
 @dataclass(frozen=True, slots=True)
