@@ -53,8 +53,6 @@ class HitCase:
     detectors: tuple[str, ...]
     vibration_m_s2: float | None = None
     """Standard deviation of an IMU sample on each axis; None: the airframe's own."""
-    velocity_noise_m_s: float | None = None
-    """RMS on each axis of the vehicle's velocity estimate; None: the airframe's own."""
     is_struck: bool = False
     """The vehicle hovers, and the obstacle comes at it with the speed."""
     link: str | None = None
@@ -86,9 +84,6 @@ def vehicle_of_hit(case: HitCase) -> BenchVehicle:
     if case.vibration_m_s2 is not None:
         imu = airframe.imu.model_copy(update={"accelerometer_noise_m_s2": case.vibration_m_s2})
         airframe = airframe.model_copy(update={"imu": imu})
-    if case.velocity_noise_m_s is not None:
-        estimate = airframe.estimate.model_copy(update={"velocity_noise_m_s": case.velocity_noise_m_s})
-        airframe = airframe.model_copy(update={"estimate": estimate})
     return BenchVehicle(airframe, vehicle.settings)
 
 

@@ -42,6 +42,12 @@ class PilotDemand:
     landed_state: LandedState = LandedState.IN_AIR
     off_reason: str | None = None
 
+    @property
+    def position_ned_m(self) -> Any:
+        """The setpoint's, as a companion that sent it knows it: None unless all of it was given."""
+        position = getattr(self.setpoint, "position_ned_m", FREE)
+        return None if None in position else position
+
 
 class Pilot:
     """Plans from where the vehicle really is. `asked_ned_m` is the latest position asked for."""
@@ -195,11 +201,3 @@ class Pilot:
 
     def _intervals(self, seconds: float) -> int:
         return round(seconds / self._step_s)
-
-
-def as_known(setpoint: Setpoint | None, part: str) -> Any:
-    """A setpoint's position or velocity as a companion that sent it knows it: None unless all of it was given."""
-    if not isinstance(setpoint, TrajectorySetpoint):
-        return None
-    vector = getattr(setpoint, part)
-    return None if None in vector else vector

@@ -35,8 +35,6 @@ class DrawnRoom:
     inside_m: float = 6.0
     """Goals that shall be free are drawn within this distance of the start."""
     ceiling_m: float | None = None
-    corners_ne_m: tuple[NorthEast, ...] = ()
-    """Of a closed room."""
 
     @property
     def is_fenced_by_walls(self) -> bool:
@@ -85,7 +83,6 @@ def _closed(draw: Draw) -> DrawnRoom:
     for along, across in reach:
         n, e = towards(towards((0.0, 0.0), turn, along), turn + 0.5 * math.pi, across)
         corners.append((round(n + draw.number(-0.2, 0.2), DIGITS), round(e + draw.number(-0.2, 0.2), DIGITS)))
-    room.corners_ne_m = tuple(corners)
     for number, (a, b) in enumerate(zip(corners, corners[1:] + corners[:1], strict=True)):
         middle = (round(0.5 * (a[0] + b[0]), DIGITS), round(0.5 * (a[1] + b[1]), DIGITS))
         along = math.atan2(b[1] - a[1], b[0] - a[0])

@@ -94,9 +94,9 @@ class When:
         return cls("mission", chance.uniform(0.0, 1.5), for_s)
 
     @classmethod
-    def recovering(cls, chance: random.Random, for_s: float = math.inf) -> When:
+    def recovering(cls, chance: random.Random) -> When:
         """At a random instant of the first 0.6 s after the hit."""
-        return cls("recovering", chance.uniform(0.0, 0.6), for_s)
+        return cls("recovering", chance.uniform(0.0, 0.6))
 
 
 class Killed(BaseException):

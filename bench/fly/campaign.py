@@ -59,19 +59,15 @@ class Campaign:
     work_out: Callable[[Any], Json]
 
     @property
-    def version(self) -> str:
-        return code_version(self.work_out.__module__)
-
-    @property
     def head(self) -> Json:
         """The first line of its record. The same for the same parameters and code."""
-        head = {"campaign": self.name, "version": self.version, "parameters": dict(self.parameters)}
-        known: Json = json.loads(json.dumps(head))
-        return known
+        version = code_version(self.work_out.__module__)
+        return {"campaign": self.name, "version": version, "parameters": dict(self.parameters)}
 
     def record_path(self, folder: Path = RECORDS_FOLDER) -> Path:
-        text = json.dumps([self.name, dict(self.parameters), self.version], sort_keys=True)
-        return folder / f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:KEY_DIGITS]}.jsonl"
+        """A file of its own for other parameters and for other code."""
+        key = hashlib.sha256(json.dumps(self.head, sort_keys=True).encode()).hexdigest()[:KEY_DIGITS]
+        return folder / f"{self.name}-{key}.jsonl"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,21 +98,21 @@ def run_campaign(campaign: Campaign, workers: Workers, folder: Path = RECORDS_FO
     """
     path = campaign.record_path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    head, known = read_record(path) if path.exists() else (None, {})
-    if head not in (None, campaign.head):
-        raise CampaignError(f"{path} holds another campaign's results; move it away.")
+    known = read_record(path) if path.exists() else {}
     missing = [(n, case) for n, case in enumerate(campaign.cases) if "result" not in known.get(n, {})]
     if known and missing:
-        _say(f"{campaign.name}: going on after {len(campaign.cases) - len(missing)} of {len(campaign.cases)} cases")
+        done = len(campaign.cases) - len(missing)
+        print(f"{campaign.name}: going on after {done} of {len(campaign.cases)} cases", file=sys.stderr)
     with path.open("a", encoding="utf-8") as file:
-        if head is None:
+        if file.tell() == 0:
             _write(file, campaign.head)
         try:
             found = outcomes(campaign.work_out, missing, workers)
             for outcome in _with_progress(found, len(missing), campaign.name) if missing else ():
                 known[outcome["case"]] = _write(file, outcome)
         except KeyboardInterrupt:
-            _say(f"\n{campaign.name}: broken off after {len(known)} cases; the same command goes on from there")
+            text = f"{campaign.name}: broken off after {len(known)} cases; the same command goes on from there"
+            print(f"\n{text}", file=sys.stderr)
             raise
     # Without what a longer campaign of the same cases has beyond them.
     ordered = {number: known[number] for number in sorted(known) if number < len(campaign.cases)}
@@ -176,8 +172,8 @@ def _outcome(function: Callable[[Any], Any], number: int, case: Any) -> Json:
         return {"case": number, "failure": f"{type(error).__name__}: {error} ({at})"}
 
 
-def read_record(path: Path) -> tuple[Json | None, dict[int, Json]]:
-    """The head of a file of results, None in an empty one, and the outcomes by case number.
+def read_record(path: Path) -> dict[int, Json]:
+    """The outcomes by case number of a file of results.
 
     Half a line at its end, of a run that was killed while it wrote, is cut off. Raises CampaignError, OSError.
     """
@@ -185,17 +181,14 @@ def read_record(path: Path) -> tuple[Json | None, dict[int, Json]]:
     whole = content[: content.rfind(b"\n") + 1]
     if len(whole) < len(content):
         path.write_bytes(whole)
-    head, found = None, {}
-    for number, line in enumerate(whole.splitlines(), start=1):
+    found = {}
+    for number, line in enumerate(whole.splitlines()[1:], start=2):
         try:
             entry = dict(json.loads(line))
-            if number == 1:
-                head = entry
-            else:
-                found[entry["case"]] = entry
+            found[entry["case"]] = entry
         except (ValueError, KeyError, TypeError) as error:
             raise CampaignError(f"{path} is damaged in line {number}; move it away.") from error
-    return head, found
+    return found
 
 
 def code_version(module: str) -> str:
@@ -259,7 +252,3 @@ def _with_progress(found: Iterator[Json], total: int, what: str) -> Iterable[Jso
     """With a bar on the terminal; in a file or a pipe nothing is drawn."""
     console = Console(stderr=True)
     return track(found, what, total, console=console, disable=not console.is_terminal)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr)

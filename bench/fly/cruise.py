@@ -1,6 +1,7 @@
 """Flights of the plant alone, each heard by every detector: a hit in cruise, a hand in hover, a healthy flight."""
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,11 +23,12 @@ from bench.cases.hits import (
     velocity_towards,
 )
 from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
-from bench.cases.pilot import Pilot, PilotDemand, as_known
+from bench.cases.pilot import Pilot
 from bench.fly.wire import VehicleRecording
-from companion.messages import LandedState
+from companion.messages import LandedState, Vector3
 from companion.reflex.detector import Situation
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.plant.plant import Plant
@@ -54,12 +56,9 @@ class NoTouch(Exception):  # noqa: N818 - reads as the sentence it is
 
 def hit_of(case: HitCase, airframe: Airframe) -> tuple[VehicleRecording, Hit]:
     """The case's flight; one past a pole is flown again nearer to its middle. Raises NoTouch."""
-    for share in POLE_OFFSET_SHARES[:-1]:
-        try:
+    for share in POLE_OFFSET_SHARES[:-1] if case.approach == "pole" else ():
+        with suppress(NoTouch):
             return fly_hit(case, airframe, share)
-        except NoTouch:
-            if case.approach != "pole":
-                raise
     return fly_hit(case, airframe, POLE_OFFSET_SHARES[-1])
 
 
@@ -85,15 +84,7 @@ def fly_hit(
         output = cruise.step()
         steps += 1
         left -= 1
-        place = start + steps * interval_s * velocity
-        off_reason = "takeoff" if steps * interval_s < SWITCHED_ON_AFTER_S else None
-        situation = Situation(
-            off_reason=off_reason,
-            armed=True,
-            landed_state=LandedState.IN_AIR,
-            height_m=-output.position_ned_m[2],
-            setpoint_position_ned_m=_triple(place),
-        )
+        situation = _in_air(output, steps * interval_s, _triple(start + steps * interval_s * velocity))
         recording.add(plant, output, situation, airframe.mass_kg)
         if not touched and hit_row[HIT_ACTIVE] == 1.0:
             touched, left = True, round(FOLLOWED_S / interval_s)
@@ -105,7 +96,13 @@ def fly_hit(
     return recording, truth.hits[0]
 
 
-def _triple(vector: Floats) -> tuple[float, float, float]:
+def _in_air(output: Estimate, flown_s: float, asked_ned_m: Vector3 | None) -> Situation:
+    off_reason = "takeoff" if flown_s < SWITCHED_ON_AFTER_S else None
+    height_m = -output.position_ned_m[2]
+    return Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
+
+
+def _triple(vector: Floats) -> Vector3:
     return float(vector[0]), float(vector[1]), float(vector[2])
 
 
@@ -124,52 +121,36 @@ def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[VehicleRecording,
     while cruise.time_boot_us < 1e6 * (until_s + LOOKED_AFTER_S):
         setpoint = cruise.setpoint()
         output = cruise.step(setpoint)
-        situation = Situation(
-            off_reason="takeoff" if output.time_boot_us < 1e6 * SWITCHED_ON_AFTER_S else None,
-            armed=True,
-            landed_state=LandedState.IN_AIR,
-            height_m=-output.position_ned_m[2],
-        )
+        situation = _in_air(output, 1e-6 * output.time_boot_us, None)
         recording.add(cruise.plant, output, situation, airframe.mass_kg)
     return recording, 1e6 * from_s
 
 
-@dataclass(slots=True)
-class FlownHealthy:
-    """A recorded flight and the phase of each interval."""
-
-    recording: VehicleRecording
-    phases: list[str]
-
-
-def fly_healthy(case: FlightCase, airframe: Airframe) -> FlownHealthy:
-    """From the ground to the ground; a flight that its fault ends is recorded up to there."""
+def fly_healthy(case: FlightCase, airframe: Airframe) -> tuple[VehicleRecording, list[str]]:
+    """From the ground to the ground, or up to where its fault ends it; and the phase of each interval."""
     rng = np.random.default_rng([case.seed, 2])
     mishaps = FAMILIES[case.family](np.random.default_rng([case.seed, 4]))
     scene = Scene.model_validate({"faults": mishaps.faults})
     plant = Plant(airframe, scene, case.seed, keeps_path=False)
     pilot = Pilot(plant, airframe, rng, AIRBORNE_S)
-    flown = FlownHealthy(VehicleRecording(), [])
+    recording, phases = VehicleRecording(), list[str]()
     ground_m = plant.state.body[2]
     for asked in pilot.fly():
         output = plant.step(asked.setpoint, asked.armed)
-        flown.recording.add(plant, output, _situation(asked, ground_m - output.position_ned_m[2]), airframe.mass_kg)
-        flown.phases.append(asked.phase)
+        situation = Situation(
+            off_reason=asked.off_reason,
+            armed=asked.armed,
+            landed_state=asked.landed_state,
+            height_m=ground_m - output.position_ned_m[2],
+            descent_commanded=asked.phase in ("landing", "landed"),
+            setpoint_position_ned_m=asked.position_ned_m,
+        )
+        recording.add(plant, output, situation, airframe.mass_kg)
+        phases.append(asked.phase)
         is_lost = asked.phase not in NEAR_GROUND and ground_m - plant.state.body[2] < LOST_BELOW_M
         if is_lost or (mishaps.ends_s is not None and output.time_boot_us > 1e6 * mishaps.ends_s):
             break
-    return flown
-
-
-def _situation(asked: PilotDemand, height_m: float) -> Situation:
-    return Situation(
-        off_reason=asked.off_reason,
-        armed=asked.armed,
-        landed_state=asked.landed_state,
-        height_m=height_m,
-        descent_commanded=asked.phase in ("landing", "landed"),
-        setpoint_position_ned_m=as_known(asked.setpoint, "position_ned_m"),
-    )
+    return recording, phases
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,10 +17,10 @@ from bench.cases.hits import (
     obstacle_before,
     vehicle_of_hit,
 )
-from bench.cases.vehicles import AIRFRAMES, BenchVehicle
+from bench.cases.vehicles import AIRFRAMES
 from bench.fly.cruise import FOLLOWED_S, PATIENCE_S
 from bench.fly.moments import Moment
-from bench.fly.watching import FOUND_WITHIN_US
+from bench.fly.wire import FOUND_WITHIN_US
 from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
@@ -105,8 +105,15 @@ class Flight:
         return result
 
 
-def begun(built: BenchVehicle, case: FlownHit, velocity: Floats, scene: Scene, keeps_path: bool) -> Flight:
-    """At HEIGHT_M, steadily on the way with this velocity."""
+def velocity_of(hit: HitCase, rng: np.random.Generator) -> Floats:
+    """The first that is drawn of a hit."""
+    heading_rad = rng.uniform(-math.pi, math.pi)
+    return hit.speed_m_s * np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
+
+
+def begun(case: FlownHit, scene: Scene, keeps_path: bool) -> Flight:
+    """At HEIGHT_M, steadily on the way with the velocity of the hit."""
+    built, velocity = vehicle_of_hit(case.hit), velocity_of(case.hit, np.random.default_rng([case.hit.seed, 1]))
     vehicle = FlyingVehicle(built.airframe, scene, case.hit.seed, keeps_path)
     vehicle.begin_in_flight((0.0, 0.0, -HEIGHT_M), (float(velocity[0]), float(velocity[1]), 0.0))
     link = vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
@@ -118,13 +125,11 @@ def begun(built: BenchVehicle, case: FlownHit, velocity: Floats, scene: Scene, k
 
 def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
     """To rest, or as long as may be; the boot time from which it rested."""
-    hit, built = case.hit, vehicle_of_hit(case.hit)
-    rng = np.random.default_rng([hit.seed, 1])
-    heading_rad, free_s = rng.uniform(-math.pi, math.pi), float(rng.uniform(*FREE_FLIGHT_S))
-    velocity = hit.speed_m_s * np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
+    hit, rng = case.hit, np.random.default_rng([case.hit.seed, 1])
+    velocity, free_s = velocity_of(hit, rng), float(rng.uniform(*FREE_FLIGHT_S))
     at, share = np.array([0.0, 0.0, -HEIGHT_M]) + free_s * velocity, POLE_OFFSET_SHARES[0]
-    scene = Scene.model_validate(obstacle_before(hit, built.airframe, at, velocity, rng, share))
-    flight = begun(built, case, velocity, scene, keeps_path=True)
+    scene = obstacle_before(hit, vehicle_of_hit(hit).airframe, at, velocity, rng, share)
+    flight = begun(case, Scene.model_validate(scene), keeps_path=True)
     return flight.vehicle, flight.guard, to_rest(flight, free_s + PATIENCE_S)
 
 
@@ -189,8 +194,7 @@ class Approach:
     """A vehicle on its way through free air; what it meets is put before it."""
 
     def __init__(self, case: FlownHit) -> None:
-        self.case, self.built = case, vehicle_of_hit(case.hit)
-        self.flight = begun(self.built, case, velocity_of(case.hit), Scene(), keeps_path=False)
+        self.case, self.flight = case, begun(case, Scene(), keeps_path=False)
 
     @property
     def is_false(self) -> bool:
@@ -220,16 +224,10 @@ class Approach:
 
     def scene(self, met: str, lead_s: float, rng: np.random.Generator) -> Scene:
         """What is to be met after so long."""
-        body, case = self.flight.vehicle.state.body, replace(self.case.hit, approach=met)
-        velocity = body[3:6].copy()
+        body, hit = self.flight.vehicle.state.body, replace(self.case.hit, approach=met)
+        velocity, airframe = body[3:6].copy(), vehicle_of_hit(hit).airframe
         at = body[:3] + lead_s * velocity
-        share = POLE_OFFSET_SHARES[0]
-        return Scene.model_validate(obstacle_before(case, self.built.airframe, at, velocity, rng, share))
-
-
-def velocity_of(hit: HitCase) -> Floats:
-    heading_rad = np.random.default_rng([hit.seed, 1]).uniform(-math.pi, math.pi)
-    return hit.speed_m_s * np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
+        return Scene.model_validate(obstacle_before(hit, airframe, at, velocity, rng, POLE_OFFSET_SHARES[0]))
 
 
 def followed(flight: Flight, patience_s: float) -> Verdict:
@@ -255,7 +253,7 @@ def again(case: FlownHit, scene: Scene) -> tuple[Verdict, bool]:
 
     And whether the guard still counts what it told of when it has decided about it.
     """
-    flight = begun(vehicle_of_hit(case.hit), case, velocity_of(case.hit), scene, keeps_path=True)
+    flight = begun(case, scene, keeps_path=True)
     verdict = followed(flight, FREE_S + MOMENTS * APART_S + LED_PATIENCE_S)
     decided_us = flight.vehicle.time_boot_us + 1e6 * DECIDED_S
     while verdict.told_us is not None and flight.vehicle.time_boot_us < decided_us:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.companion import Companion
+from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
 from rebound_cli.inputs import SimulatedWorld
@@ -122,10 +122,12 @@ class SteppedFlight:
         while self.vehicle.time_boot_us < boot_us and not self.companion.finished:
             self.fly()
 
-    def fly(self) -> None:
-        frames = self.vehicle.step(self._pending)
-        now_us = EPOCH_US + self.vehicle.time_boot_us
-        self._pending = b"".join(self.companion.step(b"".join(frames), now_us).sent_frames)
+    def fly(self) -> tuple[bytes, StepResult]:
+        """One interval; what the vehicle said in it, and what the companion made of that."""
+        said = b"".join(self.vehicle.step(self._pending))
+        result = self.companion.step(said, EPOCH_US + self.vehicle.time_boot_us)
+        self._pending = b"".join(result.sent_frames)
+        return said, result
 
     def fall(self, most_s: float) -> None:
         """Without the companion, until the vehicle is on the ground."""

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from bench.reference.api import api
 from bench.reference.commands import commands
-from bench.reference.events import events
+from bench.reference.events import events, messages
 from bench.reference.markdown import MEANINGS, code, table
-from bench.reference.messages import messages
 from bench.reference.models import airframe, companion, guard, mission, world
 from bench.reference.states import states
 

@@ -1,11 +1,14 @@
-"""The page of events, from the calls that tell them and the meaning of each kind."""
+"""The pages of events, by the calls that report them, and of MAVLink messages, by what reads and makes them."""
 
 import ast
+import inspect
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from bench.reference.markdown import MEANINGS, code, table
 from companion.guard.machine import _KINDS
+from companion.mavlink import encode, readers
 from companion.reflex.classify import TABLE
 
 ROOT = Path(__file__).parents[2]
@@ -43,3 +46,14 @@ def _calls(tree: ast.AST) -> Iterator[ast.Call]:
 
 def _name(call: ast.Call) -> str:
     return call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+
+
+def messages() -> dict[str, str]:
+    read = [(code(name), ", ".join(map(code, reader._names))) for name, reader in sorted(readers._BY_NAME.items())]
+    return {"received": table(("message", "fields"), read), "sent": ", ".join(map(code, sorted(_sent())))}
+
+
+def _sent() -> set[str]:
+    """By pymavlink's encoders and classes that the encoder names."""
+    found = re.findall(r"\.(?:MAVLink_(\w+)_message|(\w+)_encode)\b", inspect.getsource(encode))
+    return {(of_class or of_call).upper() for of_class, of_call in found}

@@ -1,6 +1,6 @@
-"""Every contact of a flight by the simulator's truth: a hit, the same surface again in its recovery, or a landing."""
+"""What happened in a flight: its phases by what was reported, its crashes and contacts by the simulator's truth."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -8,13 +8,114 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.fly.lockstep import JudgedFlight
-from bench.rows.crashes import heights_m
-from bench.rows.phases import MissionPhase, phases_of
-from companion.report import CollisionReport
+from companion.report import CollisionReport, Event
 from rebound_cli.results.truth_match import LATE_SAMPLE_US
 from sim_vehicle.truth import Hit
 
+
+class MissionPhase(Enum):
+    GROUND = "on the ground"
+    CLIMB = "take-off"
+    ITEM = "item"
+    RECOVERING = "recovering"
+    HOLDING = "holding"
+    RETURNING = "returning"
+    LANDING = "landing"
+    OVER = "over"
+
+
+_BEGUN_BY = {
+    "armed": MissionPhase.CLIMB,
+    "item": MissionPhase.ITEM,
+    "detection": MissionPhase.RECOVERING,
+    "hold": MissionPhase.HOLDING,
+    "return": MissionPhase.RETURNING,
+    "landing": MissionPhase.LANDING,
+    "done": MissionPhase.OVER,
+    "aborted": MissionPhase.OVER,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Phases:
+    """When each phase of a flight began, in microseconds of the vehicle's boot clock."""
+
+    begun: tuple[tuple[float, MissionPhase], ...]
+
+    def at(self, boot_us: float) -> MissionPhase:
+        return next((phase for at_us, phase in reversed(self.begun) if at_us <= boot_us), MissionPhase.GROUND)
+
+    def end_of(self, boot_us: float) -> float | None:
+        """When the phase of this moment ended; None if it did not."""
+        now = self.at(boot_us)
+        return next((at_us for at_us, phase in self.begun if at_us > boot_us and phase is not now), None)
+
+
+def phases_of(events: Sequence[Event], epoch_at_boot_us: float) -> Phases:
+    told = (event for event in events if event.kind in _BEGUN_BY)
+    return Phases(tuple((event.time_us - epoch_at_boot_us, _BEGUN_BY[event.kind]) for event in told))
+
+
+# --- crashes
+
 Floats = npt.NDArray[np.float64]
+
+# MPC_LAND_SPEED is 0.7 m/s; half as much again is a gust. More is a fall.
+LANDING_SPEED_MOST_M_S = 1.2
+# On the ground: the feet, or a guard of a vehicle that leans, this near to it.
+TOUCHING_M = 0.01
+# In the air: the first time the feet are this high.
+AIRBORNE_M = 0.3
+# As a mission's own default for the vehicle itself; setpoints never lie outside.
+OUTSIDE_MOST_M = 1.0
+
+
+def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
+    """Cause and details of each kind that happened."""
+    series = flight.truth.series
+    time_us, height_m = series["time_boot_us"], heights_m(flight)
+    tilt_deg = tilts_deg(series["attitude_wxyz"])
+    if tilt_deg.max() > 90.0:
+        yield "tumbled", f"leant by {tilt_deg.max():.0f} deg {flight.at(time_us[int(tilt_deg.argmax())])}"
+    airborne = np.flatnonzero(height_m > AIRBORNE_M)
+    if len(airborne) == 0:
+        return
+    touching = np.flatnonzero(height_m[airborne[0] :] < TOUCHING_M)
+    if len(touching) and not tilt_deg.max() > 90.0:
+        index = int(airborne[0] + touching[0])
+        sink_m_s = float(series["velocity_ned_m_s"][index - 1, 2])
+        if sink_m_s > LANDING_SPEED_MOST_M_S:
+            yield "fell", f"reached the ground with {sink_m_s:.1f} m/s {flight.at(time_us[index])}"
+        phase = phases_of(flight.events, flight.truth.epoch_at_boot_us).at(float(time_us[index]))
+        if phase not in (MissionPhase.LANDING, MissionPhase.OVER):
+            yield "touched the ground", f"while {phase.value} {flight.at(time_us[index])}"
+    fence, start = flight.mission.fence, np.array(flight.start_ned_m)
+    places = series["position_ned_m"][:: max(1, len(time_us) // 2000)] - start
+    outside_m = max(fence.outside_by_m((float(n), float(e), float(d))) for n, e, d in places)
+    if outside_m > OUTSIDE_MOST_M:
+        yield "left the fence", f"by {outside_m:.1f} m"
+
+
+def heights_m(flight: JudgedFlight) -> Floats:
+    """Of the lowest part above the ground, (n,): the feet, or where the vehicle leans by more the rim of a guard."""
+    series = flight.truth.series
+    w, x, y, z = series["attitude_wxyz"].T
+    # By how much a metre along body x and y is lower.
+    along_x, along_y = np.abs(2.0 * (x * z - w * y)), np.abs(2.0 * (y * z + w * x))
+    depth_m = flight.arm_m * np.sqrt(0.5) * (along_x + along_y) + flight.guard_m * np.hypot(along_x, along_y)
+    heights: Floats = -series["position_ned_m"][:, 2] - np.maximum(flight.standing_m, depth_m)
+    return heights
+
+
+def tilts_deg(attitude_wxyz: Floats) -> Floats:
+    """Between the body's down and the world's, (n,)."""
+    cosine = 1.0 - 2.0 * (attitude_wxyz[:, 1] ** 2 + attitude_wxyz[:, 2] ** 2)
+    tilts: Floats = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return tilts
+
+
+# --- contacts
+
 
 # A guard that bounces, before the companion has told of the first touch or while nobody has noticed it: one hit.
 FOLLOWS_WITHIN_US = 250_000

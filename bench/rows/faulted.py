@@ -13,7 +13,7 @@ from bench.fly.air import FAILED, HANDED_OVER, KILLED, Fault, Injector
 from bench.fly.campaign import Json
 from bench.fly.faulted import FaultedFlight
 from bench.fly.lockstep import NOTICED_M_S, STANDS_M, JudgedFlight, judged_flight
-from bench.rows.crashes import AIRBORNE_M, crashes, heights_m, tilts_deg
+from bench.rows.contacts import AIRBORNE_M, crashes, heights_m, tilts_deg
 from companion.shell.tlog import read_tlog
 from rebound_cli.replay.recording import read_recording, reproduce
 from rebound_cli.results import run_folder

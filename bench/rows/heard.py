@@ -9,8 +9,18 @@ from bench.cases.mishaps import FlightCase
 from bench.cases.vehicles import BenchVehicle, vehicle_of
 from bench.fly.campaign import Json
 from bench.fly.cruise import fly_healthy, hit_of, hover_in_hand
-from bench.fly.watching import ASKED_HZ, FOUND_WITHIN_US, Found, configuration, streams_asked_hz, watch_all
-from bench.fly.wire import LINKS, HeardStep, VehicleRecording, heard
+from bench.fly.wire import (
+    ASKED_HZ,
+    FOUND_WITHIN_US,
+    LINKS,
+    Found,
+    HeardStep,
+    VehicleRecording,
+    configuration,
+    heard,
+    streams_asked_hz,
+    watch_all,
+)
 from companion.messages import ImuSample, Vector3
 from companion.reflex.impact import ImpactEstimate
 from sim_vehicle.truth import Hit
@@ -98,11 +108,11 @@ def work_out_hand(case: HandCase) -> Json:
 def work_out_flight(case: FlightCase) -> Json:
     """Fly it, let every detector hear it at every rate, list what they report."""
     vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
-    flown = fly_healthy(case, vehicle.airframe)
-    samples, rates = flown.recording.samples, {}
-    for rate, arrived in _heard(flown.recording, case.seed):
-        phase_at, entries = {step.time_boot_us: flown.phases[step.index] for step in arrived}, {}
-        for name, (found, touches, blind) in _watched(case.detectors, vehicle, flown.recording, arrived):
+    recording, phases = fly_healthy(case, vehicle.airframe)
+    samples, rates = recording.samples, {}
+    for rate, arrived in _heard(recording, case.seed):
+        phase_at, entries = {step.time_boot_us: phases[step.index] for step in arrived}, {}
+        for name, (found, touches, blind) in _watched(case.detectors, vehicle, recording, arrived):
             alarms = [
                 [round(1e-6 * f.time_boot_us, 3), phase_at[f.time_boot_us], f.first.impact.kind.value] for f in found
             ]

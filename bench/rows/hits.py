@@ -7,8 +7,8 @@ import numpy as np
 
 from bench.fly.campaign import Json
 from bench.fly.guarded import FREE_S, MOST_RECOVERY_S, Approach, FlownHit, Verdict, again, fly
-from bench.fly.watching import FOUND_WITHIN_US
-from bench.rows.crashes import tilts_deg
+from bench.fly.wire import FOUND_WITHIN_US
+from bench.rows.contacts import tilts_deg
 from bench.rows.recovered import CAME_BACK_M
 from companion.report import CollisionReport
 from rebound_cli.results.truth_match import LATE_SAMPLE_US, FlightTruth

@@ -8,9 +8,7 @@ import numpy.typing as npt
 
 from bench.fly.campaign import Json
 from bench.fly.lockstep import JudgedFlight
-from bench.rows.contacts import JudgedContact, Role
-from bench.rows.crashes import tilts_deg
-from bench.rows.phases import phases_of
+from bench.rows.contacts import JudgedContact, Role, phases_of, tilts_deg
 from companion.reflex.halfspace import away_from
 from companion.report import CollisionReport
 from rebound_cli.results.summary import LONGEST_RECOVERY_S

@@ -80,12 +80,6 @@ def rms(values: Iterable[float]) -> float:
     return float(np.sqrt(np.mean(numbers**2))) if len(numbers) else math.nan
 
 
-def percentile(values: Iterable[float], percent: float) -> float:
-    """Of what there is; NaN of nothing."""
-    numbers = [value for value in values if value is not None and not math.isnan(value)]
-    return float(np.percentile(numbers, percent)) if numbers else math.nan
-
-
 def at_most(events: float, of: float) -> float:
     """The share that is not exceeded with the confidence, by Clopper and Pearson."""
     return float(beta.ppf(CONFIDENCE, events + 1, of - events)) if events < of else 1.0

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping
 import pandas as pd
 
 from bench.cases.hits import SPEEDS_M_S
-from bench.fly.watching import ASKED_HZ, FLOWN_WITH
-from bench.rows.tables import Bar, per_cent, percentile, rms, share_bar, table, text_of
+from bench.fly.wire import ASKED_HZ, FLOWN_WITH
+from bench.rows.tables import Bar, per_cent, rms, share_bar, table, text_of
 
-(DEFAULT,), SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
+DEFAULT, SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
 # By airframe and rate received.
 FOUND_BARS = {("foldable", rate): 1.0 for rate in ASKED_HZ}
 FOUND_BARS |= {("rigid", 246): 1.0, ("rigid", 100): 0.995, ("rigid", 50): 0.97}
@@ -35,9 +35,6 @@ def all_tables(frames: Mapping[str, pd.DataFrame]) -> dict[str, str]:
         "By obstacle": by(usual(ours), "approach", *USUAL),
         "By speed": by(ours[ours["family"] == "plain"], "band", *USUAL),
         "By vibration": by(ours[ours["family"] == "vibration"], "vibration_m_s2", *USUAL),
-        "By the quality of the vehicle's velocity": by(
-            ours[ours["family"] == "velocity"], "velocity_noise_m_s", *USUAL
-        ),
         "Over a bad link, and struck in hover": by(hits[hits["family"].isin(["link", "struck"])], "family", *USUAL),
         "In a person's hand": hands_table(frames["hands"]),
         "Healthy flights, simulated": alarms_table(flights, "detector", "rate"),
@@ -59,10 +56,10 @@ def _figures(hits: pd.DataFrame) -> dict[str, object]:
         "found [%]": per_cent(late.notna().mean(), 2),
         "between the samples": f"{between['latency_ms'].notna().sum()} / {len(between)}",
         "after the first possible sample [%]": per_cent((seen["samples_late"] > 0).mean(), 2),
-        "latency, median / 99 % [ms]": f"{text_of(percentile(late, 50))} / {text_of(percentile(late, 99))}",
+        "latency, median / 99 % [ms]": f"{text_of(late.quantile(0.5))} / {text_of(late.quantile(0.99))}",
         "false before": int(hits["false"].sum()),
         "v_c error, RMS [m/s]": text_of(rms(hits["speed_error_m_s"].dropna()), 3),
-        "normal error, median / 95 % [°]": " / ".join(text_of(percentile(normal, part), 0) for part in (50, 95)),
+        "normal error, median / 95 % [°]": " / ".join(text_of(normal.quantile(part), 0) for part in (0.5, 0.95)),
     }
 
 

@@ -2,17 +2,17 @@
 
 import math
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import pandas as pd
 
-from bench.cases.hits import draw_case, draw_hand
+from bench.cases.hits import HandCase, HitCase, draw_case, draw_hand
 from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
 from bench.cases.vehicles import AIRFRAMES
+from bench.detectors.config import BaselineConfig
 from bench.fly.campaign import Campaign, Json, Results, Workers, run_campaign
-from bench.fly.watching import detector_names
 from bench.fly.wire import JITTERY
 from bench.rows.heard import work_out_flight, work_out_hand, work_out_hit
 from bench.rows.tables import Page, bars_text, summary_text
@@ -22,12 +22,10 @@ from bench.studies.detector_tables import all_bars, all_tables
 # all seven take three times as long as these two.
 THOROUGH = ("fused", "threshold")
 COMPARED_HITS, COMPARED_FLIGHTS, COMPARED_EVERY_AT_MOST = 400, 16, 8
-# Beside the hits of the airframes as they are, one in so many again with more vibration, and with a worse velocity.
+# Beside the hits of the airframes as they are, one in so many again with more vibration.
 VARIED_SHARE = 16
 # An IMU sample's spread on each axis; four public PX4 logs of healthy flights lie between 1.2 and 4 m/s^2.
 VIBRATIONS_M_S2 = (0.05, 1.0, 2.0, 4.0)
-# Of the vehicle's velocity estimate, RMS on each axis: motion capture, GPS with RTK, plain GPS.
-VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
 # Over a bad link, of a hovering vehicle, by hand: one in so many each, by the default detector and the baseline alone.
 # No more than these, which take two minutes of one core together; a missed one in a hundred shows.
 SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
@@ -36,34 +34,11 @@ FLIGHT_S = AIRBORNE_S + 40.0
 OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "normal_error_deg")
 
 
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """The seed of the first case, and whether each case has a vehicle of its own."""
-
-    first_seed: int = 0
-    is_drawn: bool = False
-
-    def campaign(
-        self, name: str, size: Mapping[str, float], cases: Sequence[Any], work_out: Callable[[Any], Json]
-    ) -> Campaign:
-        parameters = {**size, "first_seed": self.first_seed, "vehicles": "drawn" if self.is_drawn else "named"}
-        drawn = [replace(case, is_drawn=self.is_drawn) for case in cases]
-        return Campaign(name, parameters, drawn, work_out)
-
-
-NAMED = Drawing()
-
-
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
-    drawing = Drawing(options.first_seed, options.vehicles == "drawn")
-    page = Page(options.out, "drawn" if drawing.is_drawn else "detection")
+    page = Page(options.out, "drawn" if options.vehicles == "drawn" else "detection")
     workers = Workers(options.jobs, options.scheduler)
-    campaigns = [
-        hits_campaign(options.hits, drawing),
-        hands_campaign(options.hits, drawing),
-        flights_campaign(options.hours, drawing),
-    ]
+    campaigns = campaigns_of(options.hits, options.hours, options.first_seed, options.vehicles)
     results = {campaign.name: run_campaign(campaign, workers) for campaign in campaigns}
     frames = {campaign.name: rows(campaign, results[campaign.name]) for campaign in campaigns}
     bars, failed = all_bars(frames), "\n".join(filter(None, (results[one.name].text(one) for one in campaigns)))
@@ -88,47 +63,48 @@ def rows(campaign: Campaign, results: Results) -> pd.DataFrame:
     return frame.reindex(columns=[*frame.columns, *(name for name in OF_FOUND if name not in frame.columns)])
 
 
-def hits_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
-    """So many hits as the vehicles are, a sixteenth more of each variation, and some over a bad link and in hover."""
-    every, first = _every(hits, COMPARED_HITS), drawing.first_seed
-    seeds = range(first, first + hits)
-    cases = [draw_case("plain", seed, _compared(seed, every)) for seed in seeds]
+def campaigns_of(hits: int, hours: float, first_seed: int, vehicles: str) -> list[Campaign]:
+    """Hits, hands and healthy flights by the named vehicles, or each by one of its own."""
+
+    def campaign(name: str, size: dict[str, float], cases: Sequence[Any], work_out: Callable[[Any], Json]) -> Campaign:
+        drawn = [replace(case, is_drawn=vehicles == "drawn") for case in cases]
+        return Campaign(name, {**size, "first_seed": first_seed, "vehicles": vehicles}, drawn, work_out)
+
+    return [
+        campaign("hits", {"hits": hits}, hit_cases(hits, first_seed), work_out_hit),
+        campaign("hands", {"hits": hits}, hand_cases(hits, first_seed), work_out_hand),
+        campaign("flights", {"hours": hours}, flight_cases(hours, first_seed), work_out_flight),
+    ]
+
+
+def hit_cases(hits: int, first: int) -> list[HitCase]:
+    """So many hits as the vehicles are, a sixteenth more that vibrate, and some over a bad link and in hover."""
+    every = _every(hits, COMPARED_HITS)
+    cases = [draw_case("plain", seed, _compared(seed, every)) for seed in range(first, first + hits)]
     first += hits
     for seed in range(first, first + hits // VARIED_SHARE):
         vibration = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
         cases.append(draw_case("vibration", seed, _compared(seed, every), vibration_m_s2=vibration))
-    first += hits
-    for seed in range(first, first + hits // VARIED_SHARE):
-        noise = VELOCITY_NOISES_M_S[seed // 2 % len(VELOCITY_NOISES_M_S)]
-        cases.append(draw_case("velocity", seed, THOROUGH, velocity_noise_m_s=noise))
-    first += hits
+    first += 2 * hits
     side = _side(hits, SIDE_HITS_AT_MOST)
     cases += [draw_case("link", first + count, THOROUGH, link=JITTERY) for count in range(side)]
     cases += [draw_case("struck", first + hits + count, THOROUGH, is_struck=True) for count in range(side)]
-    return drawing.campaign("hits", {"hits": hits}, cases, work_out_hit)
+    return cases
 
 
-def hands_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
+def hand_cases(hits: int, first: int) -> list[HandCase]:
     """A hand's grips on a hovering vehicle, as many as belong to so many hits."""
-    first, count = drawing.first_seed, 2 * _side(hits, HANDS_AT_MOST // 2)
-    cases = [draw_hand(seed, THOROUGH) for seed in range(first, first + count)]
-    return drawing.campaign("hands", {"hits": hits}, cases, work_out_hand)
+    return [draw_hand(seed, THOROUGH) for seed in range(first, first + 2 * _side(hits, HANDS_AT_MOST // 2))]
 
 
-def flights_campaign(hours: float, drawing: Drawing = NAMED) -> Campaign:
+def flight_cases(hours: float, first: int) -> list[FlightCase]:
     """At least so many hours of flight, airframes in turn."""
     count = max(2, math.ceil(3600.0 * hours / FLIGHT_S))
     families, every = list(FAMILIES), _every(count, COMPARED_FLIGHTS)
-    cases = [
-        FlightCase(
-            family=families[seed // 2 % len(families)],
-            seed=seed,
-            airframe=AIRFRAMES[seed % 2],
-            detectors=_compared(seed, every),
-        )
-        for seed in range(drawing.first_seed, drawing.first_seed + count)
+    return [
+        FlightCase(families[seed // 2 % len(families)], seed, AIRFRAMES[seed % 2], _compared(seed, every))
+        for seed in range(first, first + count)
     ]
-    return drawing.campaign("flights", {"hours": hours}, cases, work_out_flight)
 
 
 def _side(hits: int, at_most: int) -> int:
@@ -141,10 +117,6 @@ def _every(cases: int, compared: int) -> int:
     return max(1, min(COMPARED_EVERY_AT_MOST, cases // compared))
 
 
-def _is_turn(seed: int, every: int) -> bool:
-    """In pairs, so that both airframes have their turns."""
-    return seed // 2 % every == 0
-
-
 def _compared(seed: int, every: int) -> tuple[str, ...]:
-    return detector_names() if _is_turn(seed, every) else THOROUGH
+    """In pairs, so that both airframes have their turns."""
+    return tuple(BaselineConfig.detectors) if seed // 2 % every == 0 else THOROUGH

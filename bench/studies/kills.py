@@ -143,13 +143,13 @@ def _lead(flights: Sequence[Json]) -> str:
 def kills_table(kills: pd.DataFrame) -> str:
     """By the instant of the kill after the touch."""
     first, last = (round(edge / BIN_S) for edge in KILLED_S)
-    since = kills["kill_s"] / BIN_S
-    bins = {
-        f"{n * BIN_S * 1e3:.0f} to {(n + 1) * BIN_S * 1e3:.0f} ms": (n <= since) & (since < n + 1)
+    edges = [
+        (f"{1e3 * n * BIN_S:.0f} to {1e3 * (n + 1) * BIN_S:.0f} ms", n * BIN_S, (n + 1) * BIN_S)
         for n in range(first, last)
-    }
-    bins |= {"**before the touch**": since < 0.0, "**after it**": since >= 0.0}
-    return table([{"killed": name, **_cells(kills[inside])} for name, inside in bins.items()])
+    ]
+    edges += [("**before the touch**", -math.inf, 0.0), ("**after it**", 0.0, math.inf)]
+    since_s = kills["kill_s"]
+    return table([{"killed": name, **_cells(kills[(low <= since_s) & (since_s < high)])} for name, low, high in edges])
 
 
 def _cells(kills: pd.DataFrame) -> dict[str, Any]:

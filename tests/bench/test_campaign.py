@@ -132,12 +132,6 @@ def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
         run_campaign(campaign(0), Workers(), tmp_path)
 
 
-def test_a_file_of_another_campaign_is_refused(tmp_path):
-    campaign().record_path(tmp_path).write_text('{"campaign":"walks"}\n')
-    with pytest.raises(CampaignError, match="another campaign"):
-        run_campaign(campaign(), Workers(), tmp_path)
-
-
 def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(running, "CONNECT_TIMEOUT_S", 0.5)
     with pytest.raises(CampaignError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
@@ -148,11 +142,3 @@ def test_of_a_longer_campaigns_record_a_shorter_one_takes_its_own_cases(tmp_path
     run_campaign(campaign(), Workers(), tmp_path)
     shorter = Campaign("throws", {"cases": 30}, campaign().cases[:12], throw)
     assert set(run_campaign(shorter, Workers(), tmp_path).results) == {*range(12)} - {4}
-
-
-def test_the_record_grows_one_line_a_case(tmp_path):
-    run_campaign(campaign(), Workers(), tmp_path)
-    (path,) = Path(tmp_path).iterdir()
-    head, *lines = [json.loads(line) for line in path.read_text().splitlines()]
-    assert head["parameters"] == {"cases": 30}
-    assert [line["case"] for line in lines] == list(range(30))

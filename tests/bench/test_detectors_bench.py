@@ -1,16 +1,21 @@
 """The detectors' bench: its short cut past the autopilot, its truth, its verdicts."""
 
+import math
+
+import numpy as np
 import pytest
 
-from bench.cases.hits import draw_case, vehicle_of_hit
-from bench.fly.cruise import fly_hit
-from bench.fly.watching import ASKED_HZ, configuration, streams_asked_hz
-from bench.fly.wire import VehicleRecording, heard
-from bench.rows.heard import first_possible
-from bench.studies.detectors import Drawing, hits_campaign
+from bench.cases.hits import draw_case, draw_hand, vehicle_of_hit
+from bench.cases.mishaps import FlightCase
+from bench.fly import cruise
+from bench.fly.cruise import fly_healthy, fly_hit
+from bench.fly.wire import ASKED_HZ, JITTERY, LINKS, VehicleRecording, configuration, heard, streams_asked_hz
+from bench.rows.heard import first_possible, work_out_hand, work_out_hit
+from bench.studies.detectors import campaigns_of
 from companion.mavlink.decode import Decoder
-from companion.messages import ExtendedState
+from companion.messages import ExtendedState, ImuSample, LandedState
 from companion.reflex.detector import Situation
+from sim_vehicle.airframe import load_built_in
 from sim_vehicle.plant.plant import Plant
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 
@@ -57,17 +62,9 @@ def without_landed_state(samples):
 # --- hits -----------------------------------------------------------------------------------------------------------
 
 
-def test_a_hit_is_drawn_from_its_seed_alone():
-    assert draw_case("plain", 7, ()) == draw_case("plain", 7, ())
-    drawn = [draw_case("plain", seed, ()) for seed in range(40)]
-    assert {case.airframe for case in drawn} == {"foldable", "rigid"}
-    first, again = (fly_hit(drawn[0], vehicle_of_hit(drawn[0]).airframe) for _ in range(2))
-    assert first[0].samples == again[0].samples and first[1] == again[1]
-
-
 def test_drawn_cases_have_a_vehicle_each_whose_detector_knows_its_sensor():
     # Given a campaign of vehicles that nobody tuned for
-    cases = hits_campaign(8, Drawing(first_seed=500, is_drawn=True)).cases
+    cases = campaigns_of(8, 0.01, 500, "drawn")[0].cases
     vehicles = [vehicle_of_hit(case) for case in cases]
     # Then each case has its own
     assert len({vehicle.airframe.mass_kg for vehicle in vehicles}) == len(cases)
@@ -118,3 +115,114 @@ def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
     assert first_us[50] - hit.contact_at_boot_us <= 24_000
     # And where no force reaches the floor, the hit fell between the samples
     assert first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1e6).time_boot_us is None
+
+
+# --- a bad link -------------------------------------------------------------------------------------------------------
+
+
+def sent_and_arrived(fault, seed=4):
+    case = draw_case("link", 0, ())
+    recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
+    sent, arrived = (heard(recording, streams_asked_hz(246), seed, one) for one in (None, fault))
+    return recording, hit, sent, arrived
+
+
+def imu_stamps(heard):
+    return [s.time_boot_us for step in heard for s in step.samples if isinstance(s, ImuSample)]
+
+
+def test_a_bad_link_delays_loses_and_reorders_and_adds_nothing():
+    # Given what a vehicle sent, over a link with jitter, loss and packets that are overtaken
+    recording, _, sent, arrived = sent_and_arrived(LINKS[JITTERY])
+    before, after = imu_stamps(sent), imu_stamps(arrived)
+    # Then about one in a hundred is missing, what comes is what was sent, some of it after its followers
+    assert 0.0 < 1.0 - len(after) / len(before) < 0.04
+    assert set(after) < set(before) and len(set(after)) == len(after)
+    assert after != sorted(after)
+    # And nothing comes before it was sent, or later than jitter and overtaking can make it
+    late_us = [step.time_boot_us - s.time_boot_us for step in arrived for s in step.samples if isinstance(s, ImuSample)]
+    assert min(late_us) >= 0 and 8_000 < max(late_us) <= 31_000
+    # And each arrival is in the interval whose situation the companion knows by then
+    assert all(recording.samples[step.index].time_boot_us <= step.time_boot_us for step in arrived)
+    # And the same seed loses the same
+    assert sent_and_arrived(LINKS[JITTERY])[3] == arrived
+
+
+def test_a_link_that_only_delays_shows_the_hit_by_so_much_later():
+    # Given a link on which everything takes 50 ms
+    fault = LINKS[JITTERY].model_copy(update={"jitter_s": 0.0, "loss": 0.0, "reorder": 0.0, "delay_s": 0.05})
+    recording, hit, sent, arrived = sent_and_arrived(fault)
+    touch_us = hit.contact_at_boot_us
+    # Then the first sample that shows the hit is the same one, heard 50 ms later, to the millisecond
+    direct = first_possible(recording, sent, touch_us, 1.5).time_boot_us
+    delayed = first_possible(recording, arrived, touch_us, 1.5).time_boot_us
+    assert 50_000 <= delayed - direct <= 51_000
+
+
+# --- struck in hover --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
+    # Given an obstacle of any kind that comes at a hovering vehicle
+    case = draw_case("struck", seed, (), is_struck=True)
+    _, hit = fly_hit(case, vehicle_of_hit(case).airframe)
+    # Then it is the obstacle that moves, at the speed asked for, and it meets the vehicle head-on or at a slant
+    assert 0.5 <= case.speed_m_s <= 3.0
+    assert math.hypot(*hit.impact_velocity_ned_m_s) < 0.15
+    assert math.hypot(*hit.surface_velocity_ned_m_s) == pytest.approx(case.speed_m_s, rel=0.01)
+    assert sum(v * n for v, n in zip(hit.surface_velocity_ned_m_s, hit.normal_ned, strict=True)) > 0.0
+
+
+# --- hands ------------------------------------------------------------------------------------------------------------
+
+
+# --- verdicts ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_default_detector_finds_them_and_lets_hands_be():
+    # Given a hit over a bad link, an obstacle that comes, and a hand
+    for settings in ({"link": JITTERY}, {"is_struck": True}):
+        scored = work_out_hit(draw_case("any", 1, ("fused",), **settings))
+        # Then the hits are found at every rate, with no alarm before, and the hand is no collision
+        for at_rate in scored["rates"].values():
+            assert "latency_ms" in at_rate["detectors"]["fused"] and at_rate["detectors"]["fused"]["false"] == 0
+    for at_rate in work_out_hand(draw_hand(6, ("fused",)))["rates"].values():
+        entry = at_rate["detectors"]["fused"]
+        assert entry["collisions"] == [] and entry["told_after_ms"] is not None
+
+
+# --- healthy flights
+
+
+def test_a_healthy_flight_goes_from_the_ground_to_the_ground_and_is_hard(monkeypatch):
+    # Given a pilot with half a minute in the air
+    monkeypatch.setattr(cruise, "AIRBORNE_S", 30.0)
+    recording, flown_phases = fly_healthy(FlightCase("calm", 0, "foldable", ()), load_built_in("foldable"))
+    samples, situations = recording.samples, recording.situations
+    phases = np.array(flown_phases)
+    # Then it begins and ends on the ground, motors off at the end, after a landing that was felt
+    assert (phases[0], phases[-1]) == ("ground", "landed")
+    assert situations[-1].landed_state is LandedState.ON_GROUND and situations[-1].armed is False
+    assert abs(samples[-1].position_ned_m[2] - samples[0].position_ned_m[2]) < 0.1
+    felt = [math.hypot(*s.specific_force_frd_m_s2) for s, p in zip(samples, phases, strict=True) if p == "landing"]
+    assert max(felt) > 18.0
+    # And only in take-off and on the ground nothing is to be reported
+    off = {phase for phase, now in zip(phases, situations, strict=True) if now.off_reason is not None}
+    assert off == {"ground", "takeoff"}
+    # And no obstacle was ever touched
+    assert not any(recording.contact_m_s2)
+
+
+def test_a_flip_goes_all_the_way_round_and_is_caught(monkeypatch):
+    # Given a pilot who knows nothing but flips
+    for manoeuvre in ("_dash", "_jump", "_stop", "_slalom", "_spin", "_hover"):
+        monkeypatch.setattr(cruise.Pilot, manoeuvre, cruise.Pilot._flip)
+    monkeypatch.setattr(cruise, "AIRBORNE_S", 4.0)
+    recording, flown_phases = fly_healthy(FlightCase("calm", 3, "rigid", ()), load_built_in("rigid"))
+    # Then the vehicle was upside down on the way, and upright soon after
+    upright = [1 - 2 * (s.attitude_wxyz[1] ** 2 + s.attitude_wxyz[2] ** 2) for s in recording.samples]
+    phases = flown_phases
+    flipped = [u for u, phase in zip(upright, phases, strict=True) if phase == "flip"]
+    assert min(flipped) < -0.95
+    assert upright[len(phases) - 1 - phases[::-1].index("caught")] > 0.95

@@ -9,7 +9,7 @@ from bench.cases.hits import draw_case, draw_hand
 from bench.cases.mishaps import FlightCase
 from bench.fly import cruise
 from bench.fly.campaign import Campaign, Results
-from bench.fly.watching import ASKED_HZ
+from bench.fly.wire import ASKED_HZ
 from bench.main import main
 from bench.rows.tables import MET, MISSED, REPORTED, Bar, per_cent, summary_text
 from bench.studies import detectors

@@ -12,7 +12,7 @@ from bench.detectors.config import BaselineMission
 from bench.fly.cruise import head_on
 from bench.main import main
 from bench.rows.paper import StudyFlight, ends_the_one_before, fly, share_received
-from bench.studies.paper import arm, command, rigid, scenarios, single, walls
+from bench.studies.paper import command, rigid, scenarios, single, walls
 from bench.studies.paper.claims import CLAIMS, FAILED, PASSED, claim
 from bench.studies.paper.study import sampling_text
 from sim_vehicle.airframe import load_built_in
@@ -58,7 +58,7 @@ def test_a_row_that_is_not_a_number_differs():
 
 
 def test_the_closed_form_solves_eq_2():
-    response = arm.SpringResponse(30.0, 500.0, 1.4)
+    response = single.SpringResponse(30.0, 500.0, 1.4)
     step_s = 1e-5
     for time_s in (0.001, 0.02, 0.05, 0.09):
         (before, _), (now, rate), (after, _) = (response.at(time_s + shift) for shift in (-step_s, 0.0, step_s))
@@ -71,7 +71,7 @@ def test_the_closed_form_solves_eq_2():
 
 
 def test_parameter_identification_agrees_with_eq_2():
-    assert verdicts(arm.ARM, pd.DataFrame()) == {PASSED}
+    assert verdicts(single.ARM, pd.DataFrame()) == {PASSED}
 
 
 def verdicts(study, flights):
@@ -187,7 +187,7 @@ def test_the_papers_own_numbers_are_drawn_where_its_text_gives_any(sample):
     # 1 to 2.5 m/s, half of it back in metres
     axes = walls.FLIGHT_TESTS.conclude(like(sample, walls.FLIGHT_TESTS)).pictures["flight_tests_rigid.png"].axes
     assert sorted({speed for axis in axes[4:] for speed in papers_numbers(axis)}) == [1.0, 1.5, 2.0, 2.5]
-    assert papers_numbers(arm.ARM.conclude(pd.DataFrame()).pictures["arm.png"].axes[0]) == [30.0]
+    assert papers_numbers(single.ARM.conclude(pd.DataFrame()).pictures["arm.png"].axes[0]) == [30.0]
 
 
 @pytest.mark.parametrize("study", [rigid.WHY, rigid.SAMPLING], ids=lambda study: study.title)

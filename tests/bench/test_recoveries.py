@@ -2,11 +2,9 @@
 
 import pytest
 
-from bench.cases.missions import MissionCase
 from bench.cases.walls import into_a_wall
 from bench.fly.lockstep import fly
 from bench.rows.contacts import contacts_of
-from bench.rows.judge import work_out_mission
 from bench.rows.recovered import recoveries
 from companion.mission.model import Mission
 from rebound_cli.inputs import with_guards
@@ -56,11 +54,3 @@ def test_a_clipped_hit_that_the_vehicle_has_not_seen_whole_leads_neither_into_th
     assert flight["clear_m"] > 0.3
     # At 4 m/s it is thrown up by 0.6 m/s, which shows when the estimate begins to be put right, after 0.16 s
     assert flight["risen_m"] < 0.25 and flight["lost_m"] < 0.1
-
-
-def test_a_motion_that_is_at_first_too_much_for_the_hit_is_looked_at_again():
-    """The estimate swings past the rebound by 0.1 m/s, for one sample: no setpoint was found anew."""
-    hit = work_out_mission(MissionCase(15591, "rigid"))["hits"][0]
-    assert 2.3 < hit["speed_m_s"] < 2.6
-    assert hit["past_m"] < 0.15
-    assert hit["settled_s"] < 4.0

@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 from bench.fly.campaign import Campaign, Workers, rows_of
 from bench.rows.paper import fly
 from bench.rows.tables import Page, table
-from bench.studies.paper import arm, rigid, scenarios, single, walls
+from bench.studies.paper import rigid, scenarios, single, walls
 from bench.studies.paper.claims import Claim, verdict_text
 from bench.studies.paper.study import sampling_text
 
 STUDIES = (
-    arm.ARM,
+    single.ARM,
     scenarios.SAMPLE,
     scenarios.EXPERIMENT,
     walls.FLIGHT_TESTS,

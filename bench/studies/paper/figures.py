@@ -13,9 +13,6 @@ PAPER = {"color": "tab:purple", "linewidth": 1.3, "linestyle": "-."}
 WALL, CONTACT, DETECTED, TARGET = "tab:brown", "0.35", "tab:red", "tab:green"
 DPI = 100
 
-# Later contacts of a flight that hits again and again are marked by small ticks alone.
-NAMED_CONTACTS = 1
-
 
 def new_figure(rows: int, columns: int, title: str, width: float = 5.2, height: float = 3.6) -> tuple[Figure, Any]:
     """Without pyplot: no window, no global state. The axes are always a two-dimensional array."""
@@ -62,18 +59,16 @@ def draw_fold(axis: Any, track: Json, title: str) -> None:
     finish(axis, title, "fold of the arm [mm]")
 
 
-def mark_paper(axis: Any, value: float, text: str, is_time: bool = False, above: bool = False) -> None:
-    """A number of the paper's own text, across the picture and in words below it; upright where it is a time."""
-    line = axis.axvline if is_time else axis.axhline
-    line(value, label="the paper's own number", **PAPER)
-    at, turn = ((value, 0.97), axis.get_xaxis_transform()) if is_time else ((0.98, value), axis.get_yaxis_transform())
+def mark_paper(axis: Any, value: float, text: str, above: bool = False) -> None:
+    """A number of the paper's own text, across the picture and in words."""
+    axis.axhline(value, label="the paper's own number", **PAPER)
     axis.annotate(
         text,
-        at,
-        xycoords=turn,
-        xytext=(4, 0) if is_time else (0, 3 if above else -3),
+        (0.98, value),
+        xycoords=axis.get_yaxis_transform(),
+        xytext=(0, 3 if above else -3),
         textcoords="offset points",
-        ha="left" if is_time else "right",
+        ha="right",
         va="bottom" if above else "top",
         color=PAPER["color"],
         fontsize=8,
@@ -93,7 +88,7 @@ def mark_moments(axis: Any, track: Json) -> None:
             label=f"hit detected, {late_ms:.1f} ms",
         )
     low, high = axis.get_xlim()
-    further = [time_s for time_s in track["contacts_s"][NAMED_CONTACTS:] if low <= time_s <= high]
+    further = [time_s for time_s in track["contacts_s"][1:] if low <= time_s <= high]
     if further:
         axis.plot(
             further,
@@ -106,9 +101,9 @@ def mark_moments(axis: Any, track: Json) -> None:
         )
 
 
-def finish(axis: Any, title: str, label: str, x_label: str = "time since the first contact [s]") -> None:
+def finish(axis: Any, title: str, label: str) -> None:
     axis.set_title(title, fontsize=10)
-    axis.set_xlabel(x_label)
+    axis.set_xlabel("time since the first contact [s]")
     axis.set_ylabel(label)
     axis.grid(alpha=0.3)
 

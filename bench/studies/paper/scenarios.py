@@ -10,7 +10,6 @@ from bench.cases.walls import GAMMA_S, approach, pinned
 from bench.fly.campaign import Json
 from bench.rows.paper import StudyFlight
 from bench.rows.tables import rms
-from bench.studies.paper.arm import FOLD_MAX_M
 from bench.studies.paper.claims import claim
 from bench.studies.paper.figures import (
     add_legend,
@@ -22,6 +21,7 @@ from bench.studies.paper.figures import (
     mark_paper,
     new_figure,
 )
+from bench.studies.paper.single import FOLD_MAX_M
 from bench.studies.paper.study import Findings, Study
 from rebound_cli.inputs import load_mission_document
 

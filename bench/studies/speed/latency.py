@@ -14,6 +14,7 @@ from pathlib import Path
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
+from bench.fly.lockstep import SteppedFlight
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
@@ -27,7 +28,6 @@ from rebound_cli.results.timing import undisturbed
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
-from sim_vehicle.vehicle import SimulatedVehicle
 
 SET_ATTITUDE_TARGET = 82
 BUSY_LOOPS = 2
@@ -62,18 +62,14 @@ def recorded(number: int) -> Recorded:
     """The flight of that number up to its hit, and what the vehicle says after it to whoever does nothing."""
     mission = mission_of(number)
     scene = Scene.model_validate(mission.sim or {})
-    companion, vehicle = Companion(mission), SimulatedVehicle(load_built_in(scene.airframe), scene, scene.seed)
-    companion.confirm_plan()
+    flight = SteppedFlight(mission, scene, load_built_in(scene.airframe))
     said: list[bytes] = []
-    pending = b""
-    while not companion.finished:
-        said.append(b"".join(vehicle.step(pending)))
-        result = companion.step(said[-1], _now_us(len(said) - 1))
-        pending = b"".join(result.sent_frames)
+    while not flight.companion.finished:
+        heard, result = flight.fly()
+        said.append(heard)
         if any(event.kind == "detection" for event in result.events):
-            hit = len(said) - 1
-            said += [b"".join(vehicle.step(b"")) for _ in range(AFTER)]
-            return Recorded(number, said, hit)
+            after = [b"".join(flight.vehicle.step(b"")) for _ in range(AFTER)]
+            return Recorded(number, [*said, *after], len(said) - 1)
     raise AssertionError("the vehicle never met the wall")
 
 

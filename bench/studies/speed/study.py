@@ -19,7 +19,7 @@ from rebound_cli.inputs import load_mission_document, mission_from, world_from
 
 CODE = (*FLOWN, "rebound_cli")
 MISSION = ROOT / "missions" / "wall.yaml"
-_REPEATS = 2000
+REPEATS = 2000
 
 
 def fly() -> tuple[float, float]:
@@ -38,13 +38,13 @@ def fly() -> tuple[float, float]:
     return virtual_s / flown.wall_clock_s, virtual_s / processor_s
 
 
-def parse_us(repeats: int = _REPEATS) -> float:
+def parse_us() -> float:
     """One HIGHRES_IMU through pymavlink's own parser, whose checksum is fastcrc's: median microseconds."""
     link = dialect.MAVLink(None, 1, 1)
     force, rates, field, air = (0.1, -0.2, -9.8), (0.01, 0.02, -0.03), (0.2, 0.0, 0.4), (950.0, 0.0, 490.0, 20.0)
     packet = bytes(dialect.MAVLink_highres_imu_message(12_345_678, *force, *rates, *field, *air, 0x3F, 0).pack(link))
     spent = []
-    for _ in range(repeats):
+    for _ in range(REPEATS):
         begun = perf_counter_ns()
         link.parse_buffer(packet)
         spent.append(perf_counter_ns() - begun)

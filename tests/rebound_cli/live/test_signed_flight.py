@@ -113,8 +113,6 @@ def test_forged_and_replayed_packets_on_the_link_change_nothing_of_a_signed_flig
     # And it was counted by both, and told
     assert set(quiet.refused) <= {"old"}
     assert min(loud.refused[reason] for reason in ("unsigned", "forged", "replayed")) > 500
-    refused = loud.vehicle._signing.refused
-    assert refused.unsigned > 500 and refused.replayed > 500
     told = [event["text"] for event in events_of(folder) if event["kind"] == "link"]
     assert any("without a signature are refused" in text for text in told)
 
