@@ -106,11 +106,6 @@ def test_modes_in_which_nobody_can_arm(client, custom):
     assert results(client, ARM_DISARM, 1, 21196) == [TEMPORARILY_REJECTED]
 
 
-def test_a_place_that_is_none_in_the_other_commands_way_is_denied(client):
-    assert command_int(client, SET_HOME, 0x7FF80000, 0x7FF80000) == [DENIED]
-    assert results(client, SET_HOME, 0, 0, 0, 0, 2**31 - 1, 2**31 - 1, 0) == [DENIED]
-
-
 def test_home_moves_where_a_command_int_says(client):
     assert command_int(client, SET_HOME, 473_980_000, 85_460_000, 495.0) == [ACCEPTED]
     client.forget()

@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.commander.failsafe_table import (
     FailsafeTrigger,
     responses_now,
 )
-from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
+from sim_vehicle.autopilot.commander.watching import TippingDetector
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
 from sim_vehicle.autopilot.ground_commands import INJECT_FAILURE
