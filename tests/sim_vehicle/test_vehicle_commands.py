@@ -148,7 +148,7 @@ def test_parameters_outlive_a_reboot_and_some_count_only_then(client):
     link = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
     for name, whole in (("MAV_SYS_ID", 42), ("IMU_INTEG_RATE", 400)):
         message = dialect.MAVLink_param_set_message(1, 1, name.encode(), 0.0, 6)
-        client.send_raw(message._pack(link, message.crc_extra, _whole_set(name, whole)))
+        client.push(message._pack(link, message.crc_extra, _whole_set(name, whole)))
     client.run(1.1)
     assert client.last("HEARTBEAT").get_srcSystem() == 1
     reboot(client)
