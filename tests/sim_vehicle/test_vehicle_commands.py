@@ -9,6 +9,7 @@ from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_IN
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 NAN = math.nan
+PREARM_CHECK = 0x10000000
 SET_HOME, STORAGE, REBOOT, INJECT_FAILURE = 179, 245, 246, 420
 
 
@@ -100,7 +101,11 @@ def test_only_what_is_addressed_to_us_is_answered(client, target, ours):
 
 @pytest.mark.parametrize("custom", [(1, 1), (1, 4, 4), (1, 4, 6), (1, 4, 5), (1, 3)])
 def test_modes_in_which_nobody_can_arm(client, custom):
+    client.run(0.3)
+    assert client.last("SYS_STATUS").onboard_control_sensors_health & PREARM_CHECK
     assert results(client, SET_MODE, *custom) == [ACCEPTED, ACCEPTED]
+    client.run(0.3)
+    assert not client.last("SYS_STATUS").onboard_control_sensors_health & PREARM_CHECK
     assert results(client, ARM_DISARM, 1) == [TEMPORARILY_REJECTED]
     # Force changes nothing
     assert results(client, ARM_DISARM, 1, 21196) == [TEMPORARILY_REJECTED]

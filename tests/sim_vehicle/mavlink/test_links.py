@@ -100,7 +100,8 @@ def test_answers_go_where_they_were_asked_for_and_texts_where_a_ground_station_i
     vehicle.run(0.1)
     companion.command(400, 1)
     vehicle.run(0.5)
-    assert [ack.command for ack in companion.all("COMMAND_ACK")] == [400]
+    (ack,) = companion.all("COMMAND_ACK")
+    assert (ack.command, ack.target_system, ack.target_component) == (400, 1, 191)
     assert station.all("COMMAND_ACK") == []
     assert [text.text for text in station.all("STATUSTEXT")] == ["Armed by external command\t"]
     assert companion.all("STATUSTEXT") == []

@@ -93,6 +93,7 @@ def test_what_a_hovering_vehicle_says_of_itself(hovering):
     assert motors.servo5_raw == 900
     target = hovering.last("ATTITUDE_TARGET")
     assert math.hypot(*target.q) == pytest.approx(1.0) and target.q[0] == pytest.approx(1.0, abs=0.05)
+    assert 100 * target.thrust == pytest.approx(hovering.last("VFR_HUD").throttle, abs=10)
     field = hovering.last("HIGHRES_IMU")
     # The field of Zurich: 0.2 gauss north, 0.43 down; the nose points north
     assert (field.xmag, field.zmag) == (pytest.approx(0.21, abs=0.03), pytest.approx(0.43, abs=0.03))
@@ -203,6 +204,7 @@ def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
     shown = client.all("ORBIT_EXECUTION_STATUS")
     assert len(shown) == pytest.approx(10, abs=1)
     assert (shown[-1].radius, shown[-1].frame) == (-6.0, 0)
+    assert client.last("HEARTBEAT").custom_mode == 0x01030000
     assert (shown[-1].x, shown[-1].y) == pytest.approx((473_977_420, 85_455_940), abs=30)
     client.command(SET_MODE, 1, 4, 3)
     client.run(0.3)
