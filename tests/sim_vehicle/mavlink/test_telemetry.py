@@ -204,7 +204,8 @@ def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
     shown = client.all("ORBIT_EXECUTION_STATUS")
     assert len(shown) == pytest.approx(10, abs=1)
     assert (shown[-1].radius, shown[-1].frame) == (-6.0, 0)
-    assert client.last("HEARTBEAT").custom_mode == 0x01030000
+    heartbeat = client.last("HEARTBEAT")
+    assert (heartbeat.custom_mode, heartbeat.system_status) == (0x01030000, dialect.MAV_STATE_ACTIVE)
     assert (shown[-1].x, shown[-1].y) == pytest.approx((473_977_420, 85_455_940), abs=30)
     client.command(SET_MODE, 1, 4, 3)
     client.run(0.3)
