@@ -34,8 +34,6 @@ Commander::handle_command runs the checks for every command from outside, as a S
 # The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, PROTOCOL_VERSION, HOME_POSITION,
 # FLIGHT_INFORMATION, STORAGE_INFORMATION.
 REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, REQUEST_PROTOCOL_VERSION: 300, 410: 242, 528: 264, 525: 261}
-# Not a number as a whole one; and the whole number that means none, as a float.
-_NAN_AS_WHOLE, _NONE_AS_FLOAT = 0x7FF80000 / 1e7, (2_147_483_520.0, 2_147_483_648.0)
 MESSAGE_INTERVAL_ID = 244
 
 NO_ID = -1
@@ -66,8 +64,6 @@ def is_for_us(command: Command, us: Identity) -> bool:
 
 def receive(command: Command, streams: StreamControl) -> tuple[Result | None, bool]:
     """The receiver's part: its answer, if it has one, and whether the commander gets the command."""
-    if _is_misspelt(command):
-        return Result.DENIED, False
     if command.command == SET_MESSAGE_INTERVAL:
         return _set_interval(command, streams), False
     if command.command == GET_MESSAGE_INTERVAL:
@@ -80,14 +76,6 @@ def receive(command: Command, streams: StreamControl) -> tuple[Result | None, bo
     if command.command == DO_SET_MODE:
         return Result.ACCEPTED, True
     return None, True
-
-
-def _is_misspelt(command: Command) -> bool:
-    """Whether a place is given in the other kind of command's way to say that there is none."""
-    place = command.param5, command.param6
-    if command.frame is not None:
-        return place == (_NAN_AS_WHOLE, _NAN_AS_WHOLE)
-    return all(_NONE_AS_FLOAT[0] <= value <= _NONE_AS_FLOAT[1] for value in place)
 
 
 def answer(command: Command, result: Result) -> CommandAck:

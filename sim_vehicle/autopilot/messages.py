@@ -59,8 +59,6 @@ class Command:
     """Latitude in degrees, where it is one; a COMMAND_LONG carries it with 24 bits only."""
     param6: float = 0.0
     param7: float = 0.0
-    frame: int | None = None
-    """MAV_FRAME of a COMMAND_INT; None for a COMMAND_LONG."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,14 +3,14 @@
 import math
 import random
 from collections import deque
+from enum import Enum, auto
 
 import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator.downward import DownwardSensors
 from sim_vehicle.estimator.filter import NavigationFilter
-from sim_vehicle.estimator.optics import distance_below
-from sim_vehicle.estimator.resets import ResetClock
 from sim_vehicle.estimator.rest import STILL_SPEED_M_S, RestDetector
 from sim_vehicle.estimator.samples import (
     NO_QUALITY,
@@ -19,7 +19,7 @@ from sim_vehicle.estimator.samples import (
     RangeSample,
     Sample,
 )
-from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, FlowSensor, RangeSensor
+from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor
 from sim_vehicle.estimator.strapdown import (
     D_ATTITUDE,
     D_POSITION,
@@ -33,7 +33,6 @@ from sim_vehicle.estimator.strapdown import (
 )
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
 from sim_vehicle.physics.layout import GRAVITY_M_S2
-from sim_vehicle.physics.rotation import matrix_from_quaternion
 
 Floats = npt.NDArray[np.float64]
 
@@ -41,6 +40,14 @@ Floats = npt.NDArray[np.float64]
 _OWN_SEED = 0xF10
 # After a position reset by motion capture: the speed by which the vehicle went astray unseen.
 _SPEED_AFTER_RESET_M_S = 1.0
+
+
+class _Aided(Enum):
+    """What can be lost and found."""
+
+    VELOCITY = auto()
+    HEIGHT = auto()
+    POSITION = auto()
 
 
 class OnboardEstimator:
@@ -51,18 +58,15 @@ class OnboardEstimator:
         sensors, interval_us = airframe.sensors, airframe.imu.integration_interval_us
         rng = random.Random(seed ^ _OWN_SEED)
         self._airframe = airframe
-        self._faces = faces
         self._interval_us = interval_us
         self._step_s = 1e-6 * interval_us
-        self.flow_sensor = FlowSensor(sensors.optical_flow, faces, interval_us, rng)
-        self._range_sensor = RangeSensor(sensors.range_finder, interval_us, rng)
+        self._downward = DownwardSensors(sensors, faces, interval_us, rng)
         self._compass = CompassSensor(sensors.compass, interval_us, rng)
         self._cameras = CaptureSensor(sensors.motion_capture, interval_us, rng)
         self._has_cameras = sensors.motion_capture.fitted
         self._rest = RestDetector(interval_us)
         # At least one sample behind, so that the output predictor always has one to go by.
         self._slots = max(math.ceil(sensors.delay_s / self._step_s - 1e-9), 1) + 1
-        self._rotation = np.empty((3, 3))
         self._share = 1 - math.exp(-self._step_s / SLOPE_TIME_CONSTANT_S)
         self._now = np.zeros(NOMINAL_ROWS + 3)
         self._clipped = np.zeros(3)
@@ -74,7 +78,7 @@ class OnboardEstimator:
 
     def start(self, body: Floats, time_us: int) -> None:
         """Begin anew, at a place, speed and tilt that are known and with the heading that the sensors show."""
-        sensors, tuning = self._airframe.sensors, self._airframe.estimator
+        sensors = self._airframe.sensors
         heads_by = sensors.motion_capture if self._has_cameras else sensors.compass
         half_rad = heads_by.noise_rad * self._seed_yaw_noise / 2
         cos, sin = math.cos(half_rad), math.sin(half_rad)
@@ -85,14 +89,11 @@ class OnboardEstimator:
         self._samples[:, FORCE + 2] = -GRAVITY_M_S2
         self._head = 0
         self._waiting: deque[Sample] = deque()
-        self._velocity_clock = ResetClock(tuning.reset_after_s, time_us)
-        self._height_clock = ResetClock(tuning.reset_after_s, time_us)
-        self._position_clock = ResetClock(tuning.reset_after_s, time_us)
+        self._fused_us = dict.fromkeys(_Aided, time_us)
 
     def look_at(self, faces: Floats) -> None:
         """Camera and beam see another world from now on."""
-        self._faces = faces
-        self.flow_sensor.look_at(faces)
+        self._downward.look_at(faces)
 
     def update(
         self,
@@ -130,16 +131,12 @@ class OnboardEstimator:
 
     def _sense(self, time_us: int, body: Floats) -> None:
         sensors, waiting = self._airframe.sensors, self._waiting
-        if sensors.optical_flow.fitted:
-            flow = self.flow_sensor.observe(time_us, body)
-            if flow is not None:
-                self.flow = flow
-                waiting.append(flow)
-        if sensors.range_finder.fitted and self._range_sensor.is_due(time_us):
-            matrix_from_quaternion(body, self._rotation)
-            distance_m = distance_below(body, self._rotation, self._faces)
-            self.range = self._range_sensor.observe(time_us, distance_m)
-            waiting.append(self.range)
+        for sample in self._downward.observe(time_us, body):
+            if isinstance(sample, FlowSample):
+                self.flow = sample
+            else:
+                self.range = sample
+            waiting.append(sample)
         if sensors.compass.fitted:
             heading = self._compass.observe(time_us, body)
             if heading is not None:
@@ -175,34 +172,42 @@ class OnboardEstimator:
             sample.flow_frd_rad[1] - sample.gyroscope_frd_rad[1],
         )
         noise_rad = math.hypot(spec.noise_rad_s, spec.gyroscope_noise_rad_s) * seconds
-        if self._velocity_clock.is_due(sample.time_us):
+        if self._is_lost(_Aided.VELOCITY, sample.time_us):
             self.filter.reset_horizontal_velocity(flow_rad, seconds, noise_rad)
             self.reset_counter += 1
         elif not self.filter.fuse_flow(flow_rad, noise_rad, self._airframe.estimator.flow_gate):
             return
-        self._velocity_clock.fused(sample.time_us)
+        self._fused_us[_Aided.VELOCITY] = sample.time_us
 
     def _fuse_range(self, sample: RangeSample) -> None:
         if sample.distance_m is None:
             return
         noise_m, gate = self._airframe.sensors.range_finder.noise_m, self._airframe.estimator.range_gate
         if not self.filter.fuse_range(sample.distance_m, noise_m, gate):
-            if not self._height_clock.is_due(sample.time_us):
+            if not self._is_lost(_Aided.HEIGHT, sample.time_us):
                 return
             self.filter.reset_height(sample.distance_m, noise_m)
             self.reset_counter += 1
-        self._height_clock.fused(sample.time_us)
+        self._fused_us[_Aided.HEIGHT] = sample.time_us
 
     def _fuse_capture(self, sample: CaptureSample) -> None:
         spec, gate = self._airframe.sensors.motion_capture, self._airframe.estimator.capture_gate
         if not self.filter.fuse_position(sample.position_ned_m, spec.noise_m, gate):
-            if not self._position_clock.is_due(sample.time_us):
+            if not self._is_lost(_Aided.POSITION, sample.time_us):
                 return
             self.filter.reset_position(sample.position_ned_m, spec.noise_m, _SPEED_AFTER_RESET_M_S)
             self.reset_counter += 1
         self.filter.fuse_heading(sample.yaw_rad, spec.noise_rad, self._airframe.estimator.heading_gate)
-        self._position_clock.fused(sample.time_us)
-        self._velocity_clock.fused(sample.time_us)
+        self._fused_us[_Aided.POSITION] = sample.time_us
+        self._fused_us[_Aided.VELOCITY] = sample.time_us
+
+    def _is_lost(self, what: _Aided, now_us: int) -> bool:
+        """Whether nothing was fused for so long that the next good sample resets what it measures.
+
+        PX4 does the same (EKF2's `no_aid_timeout_max`, optical_flow_control.cpp) and counts each reset in
+        ODOMETRY.reset_counter, so that whoever flies by the estimate knows that it has jumped.
+        """
+        return now_us - self._fused_us[what] > round(1e6 * self._airframe.estimator.reset_after_s)
 
     def _fuse_rest(self, sample: Floats, flies: bool, horizon_us: int) -> None:
         mean_rates = self._rest.update(sample, flies)
@@ -210,4 +215,4 @@ class OnboardEstimator:
             return
         noise_rad_s = self._airframe.imu.gyroscope_noise_rad_s / math.sqrt(self._rest.samples)
         self.filter.fuse_rest(mean_rates, STILL_SPEED_M_S, noise_rad_s)
-        self._velocity_clock.fused(horizon_us)
+        self._fused_us[_Aided.VELOCITY] = horizon_us

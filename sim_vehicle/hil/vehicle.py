@@ -4,8 +4,8 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe, Imu
+from sim_vehicle.estimator.downward import DownwardSensors
 from sim_vehicle.geography import Origin
-from sim_vehicle.hil.downward import DownwardSensors
 from sim_vehicle.hil.earth import air_at
 from sim_vehicle.hil.messages import Air, HilSensor, HilState, Quadruple, ToPx4
 from sim_vehicle.hil.sensors import (
@@ -58,7 +58,9 @@ class HilVehicle:
         self._gps = Gps(airframe, rng, self._origin)
         self._cameras = Cameras(rng)
         self.interval_us = self._plant.interval_us
-        self._downward = DownwardSensors(airframe, self._plant.seen_faces, self.interval_us, random.Random(~seed))
+        self._downward = DownwardSensors(
+            airframe.sensors, self._plant.seen_faces, self.interval_us, random.Random(~seed)
+        )
         # Taken once: looking a record's field up costs microseconds.
         self._body = self._plant.state.body
         self.time_boot_us = 0
@@ -82,7 +84,7 @@ class HilVehicle:
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
         if self._is_due(MOTION_CAPTURE_PERIOD_US):
             messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
-        messages += self._downward.observe(now_us, self._body, self._plant.seen_faces)
+        messages += self._downward.observe(now_us, self._body)
         if self._is_due(STATE_PERIOD_US):
             place = self._origin.place_at(position_ned_m)
             messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))

@@ -3,9 +3,9 @@
 import math
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.control.gains import PositionGains
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import Vector3
 
 _MICROSECONDS = 1_000_000
 
@@ -46,19 +46,19 @@ def with_parameters(airframe: Airframe, parameters: Parameters) -> Airframe:
     return airframe.model_copy(update={"imu": imu})
 
 
-def position_gains(parameters: Parameters) -> PositionGains:
-    """What the parameters say now, for the position control."""
+def position_gains(parameters: Parameters) -> dict[str, float | Vector3]:
+    """What the parameters say now of the position control, by the names of `physics.layout.Gains`."""
     p = parameters
-    return PositionGains(
-        position_p_per_s=(p["MPC_XY_P"], p["MPC_XY_P"], p["MPC_Z_P"]),
-        velocity_p_per_s=(p["MPC_XY_VEL_P_ACC"], p["MPC_XY_VEL_P_ACC"], p["MPC_Z_VEL_P_ACC"]),
-        velocity_i_per_s2=(p["MPC_XY_VEL_I_ACC"], p["MPC_XY_VEL_I_ACC"], p["MPC_Z_VEL_I_ACC"]),
-        velocity_d=(p["MPC_XY_VEL_D_ACC"], p["MPC_XY_VEL_D_ACC"], p["MPC_Z_VEL_D_ACC"]),
-        tilt_max_rad=math.radians(p["MPC_TILTMAX_AIR"]),
-        speed_max_m_s=p["MPC_XY_VEL_MAX"],
-        climb_max_m_s=p["MPC_Z_VEL_MAX_UP"],
-        descent_max_m_s=p["MPC_Z_VEL_MAX_DN"],
-    )
+    return {
+        "position_p": (p["MPC_XY_P"], p["MPC_XY_P"], p["MPC_Z_P"]),
+        "velocity_p": (p["MPC_XY_VEL_P_ACC"], p["MPC_XY_VEL_P_ACC"], p["MPC_Z_VEL_P_ACC"]),
+        "velocity_i": (p["MPC_XY_VEL_I_ACC"], p["MPC_XY_VEL_I_ACC"], p["MPC_Z_VEL_I_ACC"]),
+        "velocity_d": (p["MPC_XY_VEL_D_ACC"], p["MPC_XY_VEL_D_ACC"], p["MPC_Z_VEL_D_ACC"]),
+        "tilt_max_rad": math.radians(p["MPC_TILTMAX_AIR"]),
+        "speed_max_m_s": p["MPC_XY_VEL_MAX"],
+        "climb_max_m_s": p["MPC_Z_VEL_MAX_UP"],
+        "descent_max_m_s": p["MPC_Z_VEL_MAX_DN"],
+    }
 
 
 def origin_of(parameters: Parameters) -> Origin:

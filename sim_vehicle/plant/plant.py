@@ -1,14 +1,13 @@
 """The plant: a state of arrays, moved by the kernels one IMU interval at a time."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.control.gains import PositionGains
 from sim_vehicle.estimator.estimate import Estimate, Quaternion
 from sim_vehicle.faults.plan import Faults
 from sim_vehicle.faults.spec import Fault
@@ -92,17 +91,10 @@ class Plant:
         if scene.faults:
             self._begin_faults(scene.faults)
 
-    def tune(self, gains: PositionGains) -> None:
-        """Change the gains and limits of the position control."""
-        record = self._constants
-        record.position_p[:] = gains.position_p_per_s
-        record.velocity_p[:] = gains.velocity_p_per_s
-        record.velocity_i[:] = gains.velocity_i_per_s2
-        record.velocity_d[:] = gains.velocity_d
-        record.tilt_max_rad = gains.tilt_max_rad
-        record.speed_max_m_s = gains.speed_max_m_s
-        record.climb_max_m_s = gains.climb_max_m_s
-        record.descent_max_m_s = gains.descent_max_m_s
+    def tune(self, gains: Mapping[str, float | Vector3]) -> None:
+        """Change gains and limits of the inner loops, by their names in `Gains`."""
+        for name, value in gains.items():
+            self._constants_box[name] = value
 
     def take_over(self, other: "Plant") -> None:
         """Go on where ``other`` is, as the same body with other software or another inertial sensor."""

@@ -43,7 +43,7 @@ def test_every_kind_of_message_with_senseless_content_is_survived_in_flight():
     for number in range(6_000):
         kind = KINDS[number % len(KINDS)]
         payload = addressed_to(kind, random_payload(kind, chance), chance.choice((0, 1)), chance.choice((0, 1)))
-        client.send_raw(packet(kind, payload, link, v1=chance.random() < 0.1))
+        client.push(packet(kind, payload, link, v1=chance.random() < 0.1))
         if number % 4 == 0:
             client.step()
     client.vehicle._signing.key = None
@@ -64,7 +64,7 @@ def test_what_is_not_for_this_vehicle_changes_nothing():
         # The setpoints of a follow-me target and clocks of peers are for everybody
         if kind.id in (111, 144):
             continue
-        client.send_raw(packet(kind, payload, link))
+        client.push(packet(kind, payload, link))
         if number % 8 == 0:
             client.step()
     client.run(0.1)
@@ -85,7 +85,7 @@ def test_damaged_packets_change_nothing():
         if spoilt == raw:
             continue
         # A packet that was cut off may be completed by what follows it
-        client.send_raw(spoilt + bytes(300))
+        client.push(spoilt + bytes(300))
         if number % 8 == 0:
             client.step()
     client.run(0.1)
@@ -133,7 +133,7 @@ def scripted(seed: int, steps: int = 1_500) -> bytes:
     client.command(ARM_DISARM, 1)
     for _ in range(steps):
         client.step()
-    return b"".join(client.sent)
+    return b"".join(client.packets)
 
 
 def test_the_same_seed_gives_the_same_bytes():

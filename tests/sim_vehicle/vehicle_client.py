@@ -1,7 +1,7 @@
-"""A MAVLink client joined in memory to a simulated vehicle."""
+"""Who speaks MAVLink with a simulated vehicle in memory, and what has been heard."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
@@ -17,92 +17,56 @@ POSITION_ONLY = 0xDF8
 IGNORED = (0.0,) * 3
 
 
-class Client:
-    """Sends packets, lets virtual time pass, and keeps what came back."""
+class End:
+    """The other end of a link: sends packets, and keeps what came back and when."""
 
-    def __init__(
-        self,
-        seed: int = 1,
-        system: int = 1,
-        component: int = 191,
-        airframe: Airframe | None = None,
-        scene: Scene | None = None,
-        **more: Any,
-    ) -> None:
-        """``more``: the vehicle's own arguments."""
-        self.vehicle = SimulatedVehicle(airframe or load_built_in("foldable"), scene or Scene(), seed, **more)
-        self.sent: list[bytes] = []
+    def __init__(self, push: Callable[[bytes], None], system: int = 255, component: int = 190) -> None:
+        self.push = push
+        self.mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+        self.packets: list[bytes] = []
         self.received: list[tuple[float, Any]] = []
         self._last: dict[str, Any] = {}
-        self._link = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
         self._parser = dialect.MAVLink(None)
-        self._waiting = b""
+        self._parser.robust_parsing = True
 
-    @property
-    def time_s(self) -> float:
-        return 1e-6 * self.vehicle.time_boot_us
+    def send(self, message: Any) -> bytes:
+        raw: bytes = message.pack(self.mav)
+        self.mav.seq = (self.mav.seq + 1) % 256
+        self.push(raw)
+        return raw
 
-    def send(self, message: Any) -> None:
-        self._waiting += message.pack(self._link)
-        self._link.seq = (self._link.seq + 1) % 256
-
-    def send_raw(self, raw: bytes) -> None:
-        self._waiting += raw
-
-    def command(self, number: int, *params: float, target: tuple[int, int] = (1, 1)) -> None:
+    def command(self, number: int, *params: float, target: tuple[int, int] = (1, 1)) -> bytes:
         # A takeoff at place and height 0 would be one into the sea off Africa: not given is NaN.
         unset = math.nan if number == TAKEOFF else 0.0
         padded = [*params, *[unset] * (7 - len(params))]
-        self.send(dialect.MAVLink_command_long_message(*target, number, 0, *padded))
+        return self.send(dialect.MAVLink_command_long_message(*target, number, 0, *padded))
 
     def setpoint(self, north: float, east: float, down: float) -> None:
         fields = (north, east, down, *IGNORED, *IGNORED, 0.0, 0.0)
         self.send(dialect.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, POSITION_ONLY, *fields))
 
-    def heartbeat(self, kind: int = 18) -> None:
-        self.send(dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3))
+    def heartbeat(self, kind: int = dialect.MAV_TYPE_GCS) -> bytes:
+        return self.send(dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3))
 
-    def step(self) -> None:
-        waiting, self._waiting = self._waiting, b""
-        for raw in self.vehicle.step(waiting):
-            self.sent.append(raw)
-            message = self._parser.decode(bytearray(raw))
-            self._last[message.get_type()] = message
-            self.received.append((self.time_s, message))
-
-    def run(self, seconds: float, each_50_ms: Callable[[], None] | None = None) -> None:
-        for number in range(round(seconds * 250)):
-            if each_50_ms is not None and number % 12 == 0:
-                each_50_ms()
-            self.step()
-
-    def run_until(
-        self, condition: Callable[[], bool], at_most_s: float, each_50_ms: Callable[[], None] | None = None
-    ) -> float:
-        """Seconds until the condition holds."""
-        start_s, number = self.time_s, 0
-        while not condition():
-            assert self.time_s - start_s < at_most_s, f"not within {at_most_s} s"
-            if each_50_ms is not None and number % 12 == 0:
-                each_50_ms()
-            number += 1
-            self.step()
-        return self.time_s - start_s
+    def hear(self, packets: Iterable[bytes], time_s: float) -> None:
+        for raw in packets:
+            self.packets.append(raw)
+            for message in self._parser.parse_buffer(raw) or []:
+                self._last[message.get_type()] = message
+                self.received.append((time_s, message))
 
     def all(self, kind: str) -> list[Any]:
         return [message for _, message in self.received if message.get_type() == kind]
+
+    def times(self, kind: str) -> list[float]:
+        return [time_s for time_s, message in self.received if message.get_type() == kind]
 
     def last(self, kind: str) -> Any:
         assert kind in self._last, f"no {kind} received"
         return self._last[kind]
 
-    def rate_hz(self, kind: str, seconds: float) -> float:
-        """Received from now on."""
-        self.forget()
-        self.run(seconds)
-        return len(self.all(kind)) / seconds
-
     def forget(self) -> None:
+        self.packets.clear()
         self.received.clear()
 
     def results(self, number: int) -> list[int]:
@@ -115,6 +79,44 @@ class Client:
         message = self.last("LOCAL_POSITION_NED")
         return message.x, message.y, message.z
 
-    def speed(self) -> float:
-        message = self.last("LOCAL_POSITION_NED")
-        return math.hypot(message.vx, message.vy, message.vz)
+
+class Client(End):
+    """With a vehicle of its own, whose virtual time it lets pass."""
+
+    def __init__(
+        self,
+        seed: int = 1,
+        system: int = 1,
+        component: int = 191,
+        airframe: Airframe | None = None,
+        scene: Scene | None = None,
+        **more: Any,
+    ) -> None:
+        """``more``: the vehicle's own arguments."""
+        super().__init__(self._wait, system, component)
+        self.vehicle = SimulatedVehicle(airframe or load_built_in("foldable"), scene or Scene(), seed, **more)
+        self._waiting = b""
+
+    def _wait(self, raw: bytes) -> None:
+        self._waiting += raw
+
+    @property
+    def time_s(self) -> float:
+        return 1e-6 * self.vehicle.time_boot_us
+
+    def step(self) -> None:
+        waiting, self._waiting = self._waiting, b""
+        packets = self.vehicle.step(waiting)
+        self.hear(packets, self.time_s)
+
+    def run(self, seconds: float, each_50_ms: Callable[[], None] | None = None) -> None:
+        for number in range(round(seconds * 250)):
+            if each_50_ms is not None and number % 12 == 0:
+                each_50_ms()
+            self.step()
+
+    def rate_hz(self, kind: str, seconds: float) -> float:
+        """Received from now on."""
+        self.forget()
+        self.run(seconds)
+        return len(self.all(kind)) / seconds

@@ -8,8 +8,7 @@ from enum import StrEnum
 
 from sim_vehicle.autopilot.commander.battery import Battery
 from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
-from sim_vehicle.autopilot.commander.ground_station import GroundStation
-from sim_vehicle.autopilot.commander.positioning import Positioning
+from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.parameters.store import Parameters

@@ -10,10 +10,8 @@ from sim_vehicle.autopilot.commander.battery import Battery
 from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.commander.failsafe import Failsafe
 from sim_vehicle.autopilot.commander.failsafe_table import Action, FailsafeSituation
-from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
-from sim_vehicle.autopilot.commander.ground_station import GroundStation
 from sim_vehicle.autopilot.commander.manual_control import ManualInput
-from sim_vehicle.autopilot.commander.positioning import Positioning
+from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning, TippingDetector
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.modes import (

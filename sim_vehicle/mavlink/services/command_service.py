@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -44,23 +45,17 @@ class CommandService:
 
 def command_from_long(packet: dialect.MAVLink_command_long_message) -> Command:
     """The packet's value."""
-    return _command(packet, packet.param5, packet.param6, packet.param7, None)
+    return _command(packet, packet.param5, packet.param6, packet.param7)
 
 
 def command_from_int(packet: dialect.MAVLink_command_int_message) -> Command:
     """x and y are divided by 10^7 whatever they mean, as PX4 does; both at their greatest mean none."""
     unset = packet.x == _GREATEST_INT32 and packet.y == _GREATEST_INT32
     param5, param6 = (math.nan, math.nan) if unset else (packet.x / 1e7, packet.y / 1e7)
-    return _command(packet, param5, param6, packet.z, packet.frame)
+    return _command(packet, param5, param6, packet.z)
 
 
-def _command(
-    packet: dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message,
-    param5: float,
-    param6: float,
-    param7: float,
-    frame: int | None,
-) -> Command:
+def _command(packet: Any, param5: float, param6: float, param7: float) -> Command:
     source = (packet.get_srcSystem(), packet.get_srcComponent())
     params = (packet.param1, packet.param2, packet.param3, packet.param4, param5, param6, param7)
-    return Command(*source, packet.target_system, packet.target_component, packet.command, *params, frame)
+    return Command(*source, packet.target_system, packet.target_component, packet.command, *params)

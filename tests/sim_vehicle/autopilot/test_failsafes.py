@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.commander.failsafe_table import (
     FailsafeTrigger,
     responses_now,
 )
-from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
+from sim_vehicle.autopilot.commander.watching import TippingDetector
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
 from sim_vehicle.autopilot.ground_commands import INJECT_FAILURE
@@ -180,6 +180,12 @@ def test_a_lost_ground_station(value, mode):
     assert flown(flight) is mode
 
 
+def test_a_lost_ground_station_may_end_the_flight_at_once():
+    flight = with_ground_station(NAV_DLL_ACT=6, COM_DL_LOSS_T=5.0)
+    flight.fly(8.0)
+    assert not flight.autopilot.arming.armed and "Disarmed by failsafe" in flight.texts()
+
+
 def test_a_ground_station_that_comes_back_does_not_end_the_return_but_a_mode_does():
     flight = with_ground_station(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0, COM_FAIL_ACT_T=0.0)
     flight.fly(8.0)
@@ -214,6 +220,7 @@ def test_whoever_arms_without_sticks_does_not_lose_them():
         (3, 0.065, Mode.RETURN),
         (3, 0.04, Mode.LAND),
         (2, 0.065, Mode.LAND),
+        (1, 0.065, Mode.RETURN),
         (0, 0.04, Mode.LOITER),
     ],
 )

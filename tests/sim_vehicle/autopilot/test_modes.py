@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim_vehicle.autopilot.mode_numbers import mode_from_request
+from sim_vehicle.autopilot.mode_numbers import base_mode, mode_from_request
 from sim_vehicle.autopilot.modes import (
     NEEDS,
     TRANSITIONS,
@@ -22,6 +22,10 @@ ASKED_FOR = [row.target for row in TRANSITIONS if row.event is ModeEvent.REQUEST
 
 def armed(*missing: Need) -> Conditions:
     return Conditions(True, EVERYTHING - set(missing))
+
+
+def test_offboard_is_stabilised_once_a_setpoint_has_come():
+    assert [base_mode(Mode.OFFBOARD, armed=False, had_setpoint=had) for had in (False, True)] == [0x01, 0x11]
 
 
 @pytest.mark.parametrize("mode", ASKED_FOR)

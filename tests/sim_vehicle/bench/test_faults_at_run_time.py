@@ -17,7 +17,7 @@ def standing(**setup: Any) -> Pilot:
     """On the ground, a second after boot."""
     pilot = Pilot(LockstepVehicle(**setup))
     pilot.fly(1.0)
-    pilot.heard.clear()
+    pilot.forget()
     return pilot
 
 
@@ -65,11 +65,11 @@ def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
     cut = pilot.vehicle.inject(faults.link_cut())
     pilot.command(400, 1, 0)
     pilot.fly(1.0)
-    assert not pilot.heard and not pilot.vehicle.truth.is_armed
+    assert not pilot.received and not pilot.vehicle.truth.is_armed
     cut.remove()
     pilot.command(400, 1, 0)
     pilot.fly(0.1)
-    assert pilot.heard and pilot.vehicle.truth.is_armed
+    assert pilot.received and pilot.vehicle.truth.is_armed
 
 
 @pytest.mark.parametrize(
@@ -77,26 +77,26 @@ def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
     [
         (
             faults.packet_loss(1.0, messages=("ATTITUDE",), direction="to_companion"),
-            lambda pilot: not pilot.of("ATTITUDE"),
+            lambda pilot: not pilot.all("ATTITUDE"),
         ),
         (faults.delay(0.2), lambda pilot: pilot.vehicle.time_s - stamps(pilot)[-1] / 1e6 > 0.19),
         (faults.reordering(0.3, by_s=0.05), lambda pilot: np.any(np.diff(stamps(pilot)) < 0)),
         (faults.duplication(1.0), lambda pilot: len(stamps(pilot)) > 1.9 * len(set(stamps(pilot)))),
-        (faults.corruption(0.2), lambda pilot: len(pilot.of("BAD_DATA")) > 0.1 * len(pilot.heard)),
+        (faults.corruption(0.2), lambda pilot: len(pilot.all("BAD_DATA")) > 0.1 * len(pilot.received)),
     ],
 )
 def test_every_fault_of_the_wire(request_: FaultRequest, shows: Callable[[Pilot], bool]) -> None:
     pilot = standing()
     pilot.fly(1.0)
-    assert pilot.of("HIGHRES_IMU") and not shows(pilot)
-    pilot.heard.clear()
+    assert pilot.all("HIGHRES_IMU") and not shows(pilot)
+    pilot.forget()
     pilot.vehicle.inject(request_)
     pilot.fly(1.0)
-    assert pilot.of("HIGHRES_IMU") and shows(pilot)
+    assert pilot.all("HIGHRES_IMU") and shows(pilot)
 
 
 def stamps(pilot: Pilot) -> np.ndarray:
-    return np.array([message.time_usec for message in pilot.of("HIGHRES_IMU")])
+    return np.array([message.time_usec for message in pilot.all("HIGHRES_IMU")])
 
 
 def test_a_clock_jumps_and_jumps_back() -> None:
@@ -106,7 +106,7 @@ def test_a_clock_jumps_and_jumps_back() -> None:
     pilot.fly(1.0)
     jumps = np.diff(stamps(pilot)) / 1e6
     assert jumps.max() == pytest.approx(100.0, abs=0.03) and jumps.min() == pytest.approx(-100.0, abs=0.03)
-    pilot.heard.clear()
+    pilot.forget()
     jumped = pilot.vehicle.inject(faults.clock_jump(7.0))
     pilot.fly(0.5)
     jumped.remove()
@@ -132,31 +132,31 @@ def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -
     pilot = hovering()
     loss = pilot.vehicle.inject(faults.gps_loss(drift_m_s2=0.5))
     pilot.fly(4.0)
-    assert pilot.of("GPS_RAW_INT")[-1].fix_type < 3
+    assert pilot.all("GPS_RAW_INT")[-1].fix_type < 3
     assert astray_m(pilot) > 0.2
     loss.remove()
     pilot.fly(1.0)
-    assert pilot.of("GPS_RAW_INT")[-1].fix_type >= 3
+    assert pilot.all("GPS_RAW_INT")[-1].fix_type >= 3
     assert astray_m(pilot) < 0.1
 
 
 def astray_m(pilot: Pilot) -> float:
-    message, truth = pilot.of("LOCAL_POSITION_NED")[-1], pilot.vehicle.truth
+    message, truth = pilot.all("LOCAL_POSITION_NED")[-1], pilot.vehicle.truth
     return math.dist((message.x, message.y), truth.position_ned_m[:2])
 
 
 def test_an_estimate_is_reset_and_says_so() -> None:
     pilot = standing()
     pilot.fly(0.2)
-    before = pilot.of("ODOMETRY")[-1]
+    before = pilot.all("ODOMETRY")[-1]
     reset = pilot.vehicle.inject(faults.ekf_reset(position_jump_ned_m=(1.0, 0.0, 0.0)))
     pilot.fly(0.5)
-    after = pilot.of("ODOMETRY")[-1]
+    after = pilot.all("ODOMETRY")[-1]
     assert after.reset_counter == before.reset_counter + 1
     assert after.x - before.x == pytest.approx(1.0, abs=0.1)
     reset.remove()
     pilot.fly(0.5)
-    back = pilot.of("ODOMETRY")[-1]
+    back = pilot.all("ODOMETRY")[-1]
     assert back.reset_counter == before.reset_counter + 2
     assert back.x == pytest.approx(before.x, abs=0.1)
 
@@ -165,7 +165,7 @@ def test_a_reset_that_is_taken_back_before_it_happens_never_does() -> None:
     pilot = standing()
     pilot.vehicle.inject(faults.ekf_reset((1.0, 0.0, 0.0)), after_s=1.0, for_s=1.0).remove()
     pilot.fly(3.0)
-    assert {message.reset_counter for message in pilot.of("ODOMETRY")} == {0}
+    assert {message.reset_counter for message in pilot.all("ODOMETRY")} == {0}
 
 
 @pytest.mark.parametrize(

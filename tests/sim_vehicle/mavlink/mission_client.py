@@ -1,13 +1,15 @@
 """A ground station's side of the mission protocol, and a wire that loses, repeats and reorders packets."""
 
-import random
 from dataclasses import dataclass, field
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.mission_protocol import mission_items as commands
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.faults.spec import WireFault
+from sim_vehicle.faults.wire import Wire
 from sim_vehicle.mavlink.services.mission_transfer import MissionTransfer
 from sim_vehicle.mavlink.services.mission_wire import MissionResult
 
@@ -69,33 +71,8 @@ def of_type(answers, *types):
 
 
 @dataclass
-class Wire:
-    """One direction: packets in, the same, some or more of them out, up to 40 ms later."""
-
-    random: random.Random
-    loss: float = 0.0
-    repeat: float = 0.0
-    latest_us: int = 0
-    waiting: list[tuple[int, int, object]] = field(default_factory=list)
-    count: int = 0
-
-    def put(self, message: object, now_us: int) -> None:
-        copies = 2 if self.random.random() < self.repeat else 1
-        for _ in range(copies):
-            if self.random.random() >= self.loss:
-                self.count += 1
-                self.waiting.append((now_us + self.random.randrange(self.latest_us + 1), self.count, message))
-
-    def take(self, now_us: int) -> list:
-        due = sorted(entry[:2] for entry in self.waiting if entry[0] <= now_us)
-        messages = [next(entry[2] for entry in self.waiting if entry[:2] == key) for key in due]
-        self.waiting = [entry for entry in self.waiting if entry[0] > now_us]
-        return messages
-
-
-@dataclass
 class Exchange:
-    """Client and vehicle with a wire each way, in virtual time."""
+    """Client and vehicle with a bad wire each way, in virtual time."""
 
     store: MissionStore = field(default_factory=MissionStore)
     seed: int = 0
@@ -104,32 +81,36 @@ class Exchange:
     latest_us: int = 0
 
     def __post_init__(self) -> None:
-        source = random.Random(self.seed)
+        late = {"reorder": 0.5, "reorder_by_s": 1e-6 * self.latest_us} if self.latest_us else {}
+        bad = {"loss": self.loss, "duplicate": self.repeat, **late}
+        faults = [WireFault(kind="wire", at_s=0, **bad)] if any(bad.values()) else []
+        self.there, self.back = (Wire(faults, seed) for seed in (self.seed, ~self.seed))
+        self.asked: list[Any] = []
+        self.answers: list[Any] = []
         self.said: list[str] = []
-        self.transfer = MissionTransfer(self.store, self._answer, lambda severity, text: self.said.append(text))
-        self.there = Wire(source, self.loss, self.repeat, self.latest_us)
-        self.back = Wire(source, self.loss, self.repeat, self.latest_us)
+        self.transfer = MissionTransfer(self.store, self.answers.append, lambda _, text: self.said.append(text))
         self.now_us = 1_000_000
 
-    def _answer(self, message: object) -> None:
-        self.back.put(message, self.now_us)
-
-    def step(self) -> list:
+    def step(self) -> list[Any]:
         self.now_us += STEP_US
-        for message in self.there.take(self.now_us):
+        arrived = self.there.carry(self.asked, self.now_us)
+        self.asked.clear()
+        for message in arrived:
             self.transfer.receive(message, self.now_us)
         self.transfer.update(self.now_us)
-        return self.back.take(self.now_us)
+        back = self.back.carry(self.answers, self.now_us)
+        self.answers.clear()
+        return list(back)
 
     def ask(self, message: object) -> list:
         """One message and what comes back at once."""
-        self.there.put(message, self.now_us)
+        self.asked.append(message)
         return self.step()
 
     def upload(self, items, kind=MissionType.MISSION, within_s: float = 60.0) -> int:
         """The result that the client gets in the end."""
         said = count(len(items), kind)
-        self.there.put(said, self.now_us)
+        self.asked.append(said)
         said_us = end_us = self.now_us
         end_us += round(1e6 * within_s)
         while self.now_us < end_us:
@@ -139,16 +120,16 @@ class Exchange:
                 if answer.get_type().startswith("MISSION_REQUEST") and answer.seq < len(items):
                     said, said_us = items[answer.seq], self.now_us
                     said.mission_type = kind
-                    self.there.put(said, self.now_us)
+                    self.asked.append(said)
             if self.now_us - said_us > CLIENT_RETRY_US:
                 said_us = self.now_us
-                self.there.put(said, self.now_us)
+                self.asked.append(said)
         raise AssertionError("no acknowledgement came")
 
     def download(self, kind=MissionType.MISSION, within_s: float = 60.0):
         """The items that the client has in the end, in their order."""
         said = request_list(kind)
-        self.there.put(said, self.now_us)
+        self.asked.append(said)
         said_us, total, items = self.now_us, None, {}
         end_us = self.now_us + round(1e6 * within_s)
         while self.now_us < end_us:
@@ -161,11 +142,11 @@ class Exchange:
                 else:
                     continue
                 if len(items) == total:
-                    self.there.put(ack(MissionResult.ACCEPTED, kind), self.now_us)
+                    self.asked.append(ack(MissionResult.ACCEPTED, kind))
                     return [items[number] for number in range(total)]
                 said, said_us = request_item(len(items), kind), self.now_us
-                self.there.put(said, self.now_us)
+                self.asked.append(said)
             if self.now_us - said_us > CLIENT_RETRY_US:
                 said_us = self.now_us
-                self.there.put(said, self.now_us)
+                self.asked.append(said)
         raise AssertionError("the download did not end")

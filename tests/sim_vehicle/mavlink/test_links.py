@@ -9,43 +9,15 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.mavlink.line import Line
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
+from tests.sim_vehicle.vehicle_client import SET_INTERVAL, End
 
-IMU, SET_INTERVAL = 105, 511
+IMU = 105
 KEY = bytes(range(32))
-
-
-class End:
-    """The other end of one link."""
-
-    def __init__(self, link: Link, system: int = 255, component: int = 190) -> None:
-        self.link = link
-        self.mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
-        self.packets: list[bytes] = []
-
-    def send(self, message, v1: bool = False) -> bytes:
-        raw = message.pack(self.mav, force_mavlink1=v1)
-        self.mav.seq = (self.mav.seq + 1) % 256
-        self.link.push(raw)
-        return raw
-
-    def command(self, number: int, *params: float) -> bytes:
-        return self.send(dialect.MAVLink_command_long_message(1, 1, number, 0, *params, *[0.0] * (7 - len(params))))
-
-    def heartbeat(self, kind: int = 6) -> bytes:
-        return self.send(dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3))
-
-    @property
-    def messages(self) -> list:
-        parser = dialect.MAVLink(None)
-        return [parser.decode(bytearray(raw)) for raw in self.packets]
-
-    def all(self, kind: str) -> list:
-        return [message for message in self.messages if message.get_type() == kind]
 
 
 class Vehicle:
@@ -53,13 +25,14 @@ class Vehicle:
         self.vehicle = SimulatedVehicle(
             load_built_in("foldable"), Scene(), 1, epoch_at_boot_us=1_700_000_000_000_000, signing=signing
         )
-        self.ends = [End(self.vehicle.add_link(each)) for each in options]
+        self.links = [self.vehicle.add_link(each) for each in options]
+        self.ends = [End(link.push) for link in self.links]
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds * 250)):
             self.vehicle.advance()
-            for end in self.ends:
-                end.packets += end.link.take()
+            for end, link in zip(self.ends, self.links, strict=True):
+                end.hear(link.take(), self.vehicle.time_boot_us / 1e6)
 
 
 ONBOARD, GROUND = LinkOptions(LinkKind.ONBOARD), LinkOptions(LinkKind.GROUND)
@@ -103,7 +76,7 @@ def test_a_line_carries_what_its_parameter_plans(kind, name):
 def test_a_serial_line_begins_with_the_version():
     vehicle = Vehicle(LinkOptions(LinkKind.ONBOARD, Line(921_600)))
     vehicle.run(0.02)
-    assert vehicle.ends[0].messages[0].get_type() == "AUTOPILOT_VERSION"
+    assert vehicle.ends[0].received[0][1].get_type() == "AUTOPILOT_VERSION"
 
 
 def test_each_link_has_its_own_streams_and_numbers():
@@ -127,7 +100,8 @@ def test_answers_go_where_they_were_asked_for_and_texts_where_a_ground_station_i
     vehicle.run(0.1)
     companion.command(400, 1)
     vehicle.run(0.5)
-    assert [ack.command for ack in companion.all("COMMAND_ACK")] == [400]
+    (ack,) = companion.all("COMMAND_ACK")
+    assert (ack.command, ack.target_system, ack.target_component) == (400, 1, 191)
     assert station.all("COMMAND_ACK") == []
     assert [text.text for text in station.all("STATUSTEXT")] == ["Armed by external command\t"]
     assert companion.all("STATUSTEXT") == []
@@ -189,7 +163,7 @@ def guarded() -> Vehicle:
 
 def test_with_a_key_everything_sent_is_signed_with_it(guarded):
     for end in guarded.ends:
-        end.packets.clear()
+        end.forget()
     guarded.run(0.5)
     stamps = []
     for number, end in enumerate(guarded.ends):
@@ -216,8 +190,8 @@ def test_unsigned_wrongly_signed_and_replayed_packets_are_refused(guarded):
     assert [ack.result for ack in end.all("COMMAND_ACK")] == [0]
     # The same packet once more, on this link and on the other
     for each in guarded.ends:
-        each.packets.clear()
-        each.link.push(raw)
+        each.forget()
+        each.push(raw)
         guarded.run(0.05)
         assert each.all("COMMAND_ACK") == []
 
@@ -264,7 +238,7 @@ def test_time_stamps_begin_at_the_cards_until_a_later_one_is_heard_on_that_link(
     guarded.run(0.5)
     assert stamps(companion)[:3] == [1, 2, 3]
     # When the companion is heard with the clock's
-    companion.packets.clear()
+    companion.forget()
     signed(companion, time_stamp=10**14)
     companion.heartbeat()
     guarded.run(0.5)
@@ -273,7 +247,7 @@ def test_time_stamps_begin_at_the_cards_until_a_later_one_is_heard_on_that_link(
     # And after a restart it begins again, with no memory of what was heard
     companion.command(246, 1)
     guarded.run(3.0)
-    companion.packets.clear()
+    companion.forget()
     guarded.run(0.5)
     assert stamps(companion)[0] < 10**6
     signed(companion, time_stamp=10**13)

@@ -92,7 +92,7 @@ def test_whole_numbers_travel_byte_by_byte(whole):
     message = dialect.MAVLink_param_set_message(1, 1, b"SYS_AUTOSTART", 0.0, INT32)
     link = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
     payload = struct.pack("<iBB16sB", whole, 1, 1, b"SYS_AUTOSTART", INT32)
-    client.send_raw(bytes(message._pack(link, message.crc_extra, payload)))
+    client.push(bytes(message._pack(link, message.crc_extra, payload)))
     client.run(0.05)
     assert whole_of(values(client)[0]) == whole
     assert client.vehicle.parameters.stored("SYS_AUTOSTART") == whole

@@ -8,7 +8,6 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 from pymavlink.generator.mavcrc import x25crc
 
-from sim_vehicle.airframe import load_built_in
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
@@ -94,6 +93,7 @@ def test_what_a_hovering_vehicle_says_of_itself(hovering):
     assert motors.servo5_raw == 900
     target = hovering.last("ATTITUDE_TARGET")
     assert math.hypot(*target.q) == pytest.approx(1.0) and target.q[0] == pytest.approx(1.0, abs=0.05)
+    assert 100 * target.thrust == pytest.approx(hovering.last("VFR_HUD").throttle, abs=10)
     field = hovering.last("HIGHRES_IMU")
     # The field of Zurich: 0.2 gauss north, 0.43 down; the nose points north
     assert (field.xmag, field.zmag) == (pytest.approx(0.21, abs=0.03), pytest.approx(0.43, abs=0.03))
@@ -148,15 +148,13 @@ def test_a_hundred_metres_east_is_as_many_degrees_as_the_parallel_says():
 
 def test_the_world_lies_where_the_parameters_say():
     there = {"SIH_LOC_LAT0": -33.9, "SIH_LOC_LON0": 151.2, "SIH_LOC_H0": 20.0}
-    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, parameters=there)
-    link, parser, last = vehicle.add_link(LinkOptions(LinkKind.ONBOARD)), dialect.MAVLink(None), {}
-    for _ in range(500):
-        vehicle.advance()
-        last.update((message.get_type(), message) for message in map(parser.decode, map(bytearray, link.take())))
+    client = Client(parameters=there)
+    client.run(2.0)
     for name in ("GLOBAL_POSITION_INT", "GPS_RAW_INT"):
-        assert (last[name].lat, last[name].lon) == pytest.approx((-339_000_000, 1_512_000_000), abs=100)
-        assert last[name].alt == pytest.approx(20_000, abs=500)
-    assert last["ALTITUDE"].altitude_monotonic == pytest.approx(20.0, abs=3.0)
+        told = client.last(name)
+        assert (told.lat, told.lon) == pytest.approx((-339_000_000, 1_512_000_000), abs=100)
+        assert told.alt == pytest.approx(20_000, abs=500)
+    assert client.last("ALTITUDE").altitude_monotonic == pytest.approx(20.0, abs=3.0)
 
 
 @pytest.fixture(scope="module")
@@ -206,6 +204,8 @@ def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
     shown = client.all("ORBIT_EXECUTION_STATUS")
     assert len(shown) == pytest.approx(10, abs=1)
     assert (shown[-1].radius, shown[-1].frame) == (-6.0, 0)
+    heartbeat = client.last("HEARTBEAT")
+    assert (heartbeat.custom_mode, heartbeat.system_status) == (0x01030000, dialect.MAV_STATE_ACTIVE)
     assert (shown[-1].x, shown[-1].y) == pytest.approx((473_977_420, 85_455_940), abs=30)
     client.command(SET_MODE, 1, 4, 3)
     client.run(0.3)
@@ -242,7 +242,7 @@ def test_the_modes_that_there_are_can_be_asked_for_all_at_once_or_one_by_one():
 def test_the_version_of_the_protocol_is_told():
     client = Client(system=255, component=190)
     requested(client, 300)
-    (packet,) = [raw for raw in client.sent if raw[7:10] == (300).to_bytes(3, "little")]
+    (packet,) = [raw for raw in client.packets if raw[7:10] == (300).to_bytes(3, "little")]
     assert struct.unpack("<HHH", packet[10:-2].ljust(6, b"\0")) == (200, 100, 200)
     # Its checksum, with the seed that MAVLink's definition of PROTOCOL_VERSION yields
     checksum = x25crc(packet[1:-2])

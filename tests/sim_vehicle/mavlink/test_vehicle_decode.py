@@ -69,7 +69,7 @@ def test_commands_of_both_kinds_are_one_value():
     )
     whole = dialect.MAVLink_command_int_message(1, 1, 6, 22, 0, 0, 1.0, 2.0, 3.0, 4.0, 473977418, 85455939, 12.5)
     assert command_from_int(framing.read(packet(whole))) == Command(
-        1, 191, 1, 1, 22, 1.0, 2.0, 3.0, 4.0, 47.3977418, 8.5455939, 12.5, frame=6
+        1, 191, 1, 1, 22, 1.0, 2.0, 3.0, 4.0, 47.3977418, 8.5455939, 12.5
     )
 
 
