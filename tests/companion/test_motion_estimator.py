@@ -153,12 +153,6 @@ def test_a_contact_that_goes_on_makes_what_was_known_of_the_motion_uncertain():
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(-2.2, abs=0.2)
 
 
-def test_part_of_a_hit_that_is_missing_is_found_too():
-    # Given arms that met their stops, of which 0.7 m/s of 2.4 m/s are missing
-    *_, (_, true_m_s, _, found) = followed(PX4, 2.0, 0.2, hides=0.3, until_s=1.0)
-    assert found.motion.velocity_ned_m_s[0] == pytest.approx(true_m_s, abs=0.15)
-
-
 def test_what_the_accelerometer_has_shown_whole_the_estimate_knows_at_once():
     whole = reckoned()
     whole.note_contact(True, HIT_US)
