@@ -14,6 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from pymavlink.dialects.v20 import development as mav
+
 from companion.companion import Companion
 from companion.report import Event, FlightReport
 
@@ -106,9 +108,10 @@ class Flight(VirtualTime):
     def report(self) -> FlightReport:
         return self.companion.report()
 
-    def setpoints_since(self, time_us: int) -> list[tuple[int, bytes]]:
-        """Setpoint packets sent after `now_us` = time_us."""
-        return [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == SETPOINT_ID]
+    def setpoints_since(self, time_us: int) -> list[tuple[int, Any]]:
+        """Setpoints by place sent after `now_us` = time_us."""
+        frames = [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == SETPOINT_ID]
+        return [(t, mav.MAVLink(None).decode(bytearray(frame))) for t, frame in frames]
 
 
 def in_a_child(work: Callable[[], Any]) -> Any:

@@ -275,6 +275,13 @@ def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes
     return Flight(companion, vehicle or FakeVehicle())
 
 
+def strike(f: Flight, x_m_s2: float = 12.0, y_m_s2: float = 0.0, samples: int = 3) -> None:
+    """Something pushes the vehicle's body for a few IMU samples."""
+    for _ in range(samples):
+        f.vehicle.push_m_s2 = (x_m_s2, y_m_s2)
+        f.step()
+
+
 def at_wall(*items: Any, **changes: Any) -> Flight:
     """Up, through these items, and down; a wall stands 3 m north."""
     return flight(FakeVehicle(wall_north_m=3.0), items=[TAKEOFF, *items, LANDING], **changes)

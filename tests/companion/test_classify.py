@@ -8,7 +8,7 @@ import pytest
 from companion.messages import LocalPosition
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown, VelocityFix
-from companion.reflex.classify import FASTEST_LANDING_M_S, TABLE, classified, kind_of
+from companion.reflex.classify import FASTEST_LANDING_M_S, classified, kind_of
 from companion.reflex.config import GROUND_M, SCRAPING_M
 from companion.reflex.detector import Impact, ImpactKind, Situation
 
@@ -109,12 +109,6 @@ def test_a_wall_met_at_a_steep_tilt_high_up_is_no_crash():
     # even where its own thrust is what pushes, as along a wall that leans
     assert kind(UP, tilt_deg=60.0) is ImpactKind.FLOOR
     assert kind(UP, sinking(0.5), tilt_deg=60.0) is ImpactKind.CRASH
-
-
-def test_the_table_ends_with_a_row_for_everything_and_names_each_kind_once():
-    kinds = [row.kind for row in TABLE]
-    assert len(set(kinds)) == len(kinds)
-    assert {*kinds, ImpactKind.UNKNOWN, ImpactKind.CONTACT} == set(ImpactKind)
 
 
 def test_a_fall_is_as_fast_as_at_its_end_and_not_as_its_heights_were_in_the_mean():

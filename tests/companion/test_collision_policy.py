@@ -5,7 +5,7 @@ import pytest
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
 from companion.reflex.config import EstimateConfig
-from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight
+from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, strike
 from tests.flying import Flight
 
 ASIDE = {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0}}
@@ -17,13 +17,6 @@ def items_flown(f: Flight) -> list[int]:
 
 def speeds_m_s(f: Flight) -> list[float]:
     return [hit.impact_speed_m_s for hit in f.report.collisions]
-
-
-def strike(f: Flight) -> None:
-    """Something hits the vehicle from the south, for longer than one sample."""
-    for _ in range(3):
-        f.vehicle.push_m_s2 = (12.0, 0.0)
-        f.step()
 
 
 @pytest.mark.parametrize(

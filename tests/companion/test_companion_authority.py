@@ -69,13 +69,6 @@ def test_without_current_mode_the_heartbeat_tells_the_pilot():
     assert "pilot" in f.report.reason
 
 
-def test_own_requests_are_not_taken_for_a_pilot_even_when_confirmed_late():
-    """The vehicle obeys the second request only; until then it stays in the old mode."""
-    vehicle = FakeVehicle(obey=lambda command, count: command != 176 or count % 2 == 0)
-    f = flight(vehicle)
-    assert f.run_to_end().outcome == "completed"
-
-
 def test_a_warning_status_while_still_in_offboard_is_not_a_loss_of_control():
     f = flying_in("mission")
     f.vehicle.failsafe = True

@@ -66,7 +66,3 @@ def test_a_recovery_stays_in_the_room():
     setpoint = inside_fence(ROOM, (10.0, 0.0, 0.0), (10.0, 0.0, -1.0), (14.0, 4.0, -9.0))
     assert setpoint[2] == -3.0
     assert math.isclose(setpoint[0] - 10.0, setpoint[1]) and setpoint[0] == pytest.approx(12.0)
-
-
-def test_a_recovery_stays_above_the_floor():
-    assert inside_fence(ROUND, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 5.0))[2] == pytest.approx(0.8)

@@ -6,24 +6,19 @@ from dataclasses import replace
 
 import pytest
 
-from companion.flight.collision import CollisionRecord
-from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.context import Inputs, Target
 from companion.flight.recovering import Recover
-from companion.link.streams import StreamMonitor
-from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition
-from companion.mission.model import Mission
 from companion.motion.config import SAME_M_S
 from companion.motion.strapdown import Strapdown
 from companion.reflex.config import IMPULSE_RAD, TILT_PER_S, EstimateConfig
 from companion.reflex.laws import Contact, MotionState
 from companion.reflex.motion_estimator import MotionEstimator, tilt_ahead
 from companion.reflex.normal import Normal
+from tests.companion.test_recovering import AT, HIT_US, SOUTH, flight_with
 
-NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
+NORTH = (1.0, 0.0, 0.0)
 ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-HIT_US = 1_000_000
-AT = (3.0, 0.0, -2.0)
 # A real PX4's, and others: after how long what was hidden is put right, with which frequency and damping.
 PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)
 WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
@@ -153,12 +148,6 @@ def test_a_contact_that_goes_on_makes_what_was_known_of_the_motion_uncertain():
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(-2.2, abs=0.2)
 
 
-def test_part_of_a_hit_that_is_missing_is_found_too():
-    # Given arms that met their stops, of which 0.7 m/s of 2.4 m/s are missing
-    *_, (_, true_m_s, _, found) = followed(PX4, 2.0, 0.2, hides=0.3, until_s=1.0)
-    assert found.motion.velocity_ned_m_s[0] == pytest.approx(true_m_s, abs=0.15)
-
-
 def test_what_the_accelerometer_has_shown_whole_the_estimate_knows_at_once():
     whole = reckoned()
     whole.note_contact(True, HIT_US)
@@ -229,17 +218,8 @@ def test_a_lean_is_known_ahead_by_the_rates():
 
 
 def recovering(**hit):
-    mission = Mission.model_validate({"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
-    flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
-    flight.origin_ned_m, flight.loss_s = ZERO, 0.3
-    flight.vehicle.attitude = Attitude(HIT_US, LEVEL)
-    flight.thrust.full_m_s2 = flight.thrust.known_s = 16.0
-    estimator = reckoned(**hit)
-    record = CollisionRecord(
-        0, HIT_US, "fused", estimator.contact, (2.6, 0.0, -2.0), Normal(SOUTH, 0.2), 20.0, estimator
-    )
-    flight.collisions.append(record)
-    return flight, record, Recover(flight, 0)
+    flight = flight_with(estimator=reckoned(**hit))
+    return flight, flight.collisions[0], Recover(flight, 0)
 
 
 def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():

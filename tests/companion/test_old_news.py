@@ -26,13 +26,6 @@ def stalled(f: Flight, seconds: float, meanwhile) -> bytes:
     return waiting
 
 
-def hear(f: Flight, received: bytes) -> None:
-    result = f.companion.step(received, f.now_us)
-    f.pending = b"".join(result.sent_frames)
-    f.sent += [(f.now_us, frame) for frame in result.sent_frames]
-    f.events += result.events
-
-
 @pytest.mark.parametrize("state", ON_SETPOINTS)
 @pytest.mark.parametrize("stall_s", [1.2, 2.5])
 def test_a_pilot_who_took_over_while_the_process_stalled_keeps_the_vehicle(state, stall_s):
@@ -41,8 +34,8 @@ def test_a_pilot_who_took_over_while_the_process_stalled_keeps_the_vehicle(state
 
     waiting = stalled(f, stall_s, lambda: f.vehicle.pilot_takes(POSCTL))
     # The oldest of it comes first: in it the companion still flies.
-    hear(f, waiting[:200])
-    hear(f, waiting[200:])
+    f.hear(waiting[:200])
+    f.hear(waiting[200:])
     f.run_to("aborted", 0.3)
 
     assert f.vehicle.mode == POSCTL and modes_asked(f) == asked
@@ -53,7 +46,7 @@ def test_a_pilot_who_took_over_while_the_process_stalled_keeps_the_vehicle(state
 def test_after_a_stall_in_which_nothing_happened_the_flight_goes_on_with_the_next_report():
     f = flying_in("holding")
     since = f.now_us
-    hear(f, stalled(f, 1.05, lambda: None))
+    f.hear(stalled(f, 1.05, lambda: None))
     assert f.setpoints_since(since) == []
     f.run_for(0.12)
     assert f.setpoints_since(since) and f.state == "holding"
@@ -129,7 +122,7 @@ def test_one_forged_heartbeat_pauses_the_setpoints_and_ends_nothing(state, forge
         f.run_for(0.2)  # until EXTENDED_SYS_STATE has said that it flies
     since = f.now_us
 
-    hear(f, forged)
+    f.hear(forged)
     assert f.setpoints_since(since) == []
     f.run_for(0.3)
 
@@ -142,7 +135,7 @@ def test_one_forged_heartbeat_pauses_the_setpoints_and_ends_nothing(state, forge
 def test_another_vehicles_heartbeat_under_the_same_ids_does_not_count(other):
     f = flying_in("mission")
     for _ in range(3):
-        hear(f, heartbeat(POSCTL, False, **other))
+        f.hear(heartbeat(POSCTL, False, **other))
         f.run_for(0.1)
     assert f.state == "mission" and f.companion.status().armed
     assert len([event for event in f.events if "conflicting" in event.text]) == 1

@@ -92,12 +92,12 @@ def warning(text):
     return StatusText(Severity.WARNING, text)
 
 
-def spoken(steps, ends_at=None):
+def spoken(steps):
     """What is sent when, in tenths of a second, of texts about a subject that are told then."""
     texts, heard = Texts(), []
     for tenth in range(40):
         told = [(subject, warning(text)) for at, subject, text in steps if at == tenth]
-        heard += [(tenth, text.text) for text in texts.due(told, tenth == ends_at, EPOCH_US + tenth * 100_000)]
+        heard += [(tenth, text.text) for text in texts.due(told, False, EPOCH_US + tenth * 100_000)]
     return heard
 
 
@@ -127,10 +127,6 @@ def test_of_each_subject_one_text_a_second_is_sent_and_none_twice(told, sent):
 def test_what_a_pilot_may_have_to_act_on_warns_and_what_goes_as_planned_does_not(kind, severity):
     text = status_text(Event(EPOCH_US, kind, "something is so", {}), "test", 0)
     assert text == (None if severity is None else StatusText(Severity(severity), "Something is so"))
-
-
-def test_at_the_end_nothing_waits_any_more():
-    assert spoken([(0, "hit", "A"), (3, "hit", "B")], ends_at=5) == [(0, "A"), (5, "B")]
 
 
 def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_end_at_once():

@@ -26,18 +26,24 @@ AT = (3.0, 0.0, -2.0)
 MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
-def flight_with(loss_s: float | None = 0.3, learnt_s: float = 2.0, law: str = "adaptive") -> FlightContext:
-    """A flight that has just hit a wall in the north at 2 m/s."""
+def flight_with(
+    loss_s: float | None = 0.3,
+    learnt_s: float = 2.0,
+    law: str = "adaptive",
+    estimator: MotionEstimator | None = None,
+) -> FlightContext:
+    """A flight that has just hit a wall in the north, at 2 m/s and measured whole unless told otherwise."""
     mission = Mission.model_validate({**MISSION, "recovery": {"law": law}})
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
     flight.origin_ned_m, flight.loss_s = (0.0, 0.0, 0.0), loss_s
     flight.vehicle.attitude = Attitude(HIT_US, LEVEL)
     flight.thrust.full_m_s2, flight.thrust.known_s = 16.0, learnt_s
-    contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH)
-    estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
-    estimator.note_contact(True, HIT_US)
-    goal = (2.5, 0.0, -2.0)
-    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", contact, goal, Normal(SOUTH, 0.2), 20.0, estimator))
+    if estimator is None:
+        contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH)
+        estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
+        estimator.note_contact(True, HIT_US)
+    goal, normal = (2.5, 0.0, -2.0), Normal(SOUTH, 0.2)
+    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, goal, normal, 20.0, estimator))
     return flight
 
 

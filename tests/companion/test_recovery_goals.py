@@ -56,10 +56,6 @@ def test_the_papers_own_numbers():
     assert goal_of("paper", Contact(0, AT, ZERO, SOUTH)) == AT, "hit while hovering: stay"
 
 
-def test_eq_3_is_asked_for_at_once_and_never_changed():
-    assert not RECOVERY_LAWS["paper"].follows and not RECOVERY_LAWS["paper"].leans
-
-
 def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
     # 2 m/s at 60 degrees from the normal: 1 m/s into the wall, 1.73 along it
     touched = hit(2.0, math.radians(60))
@@ -153,18 +149,7 @@ def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
     assert in_room((), low.position_ned_m, goal) == pytest.approx((0.0, 0.0, -0.4))
 
 
-def test_the_fence_stops_a_recovery():
-    touched = Contact(0, (5.5, 0.0, -1.5), (-5.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    motion = touched.rebound(0.5)
-    goal = in_room((), touched.position_ned_m, goal_of("adaptive", touched, motion))
-    assert goal[0] == pytest.approx(6.0)
-
-
 FENCE, FENCE_AT = Fence(radius_m=5.0, max_height_m=6.0), (10.0, 0.0, 2.0)
-
-
-def test_a_setpoint_inside_the_fence_is_left_alone():
-    assert inside_fence(FENCE, FENCE_AT, (12.0, 0.0, 0.0), (11.0, 1.0, 0.0)) == (11.0, 1.0, 0.0)
 
 
 def test_the_way_back_is_shortened_at_the_fence_not_bent():
@@ -175,10 +160,6 @@ def test_the_way_back_is_shortened_at_the_fence_not_bent():
 
 def test_a_contact_outside_the_fence_is_answered_with_the_nearest_place_inside():
     assert inside_fence(FENCE, FENCE_AT, (17.0, 0.0, 0.0), (19.0, 0.0, 0.0)) == pytest.approx((15.0, 0.0, 0.0))
-
-
-def test_height_is_limited_from_the_arming_position():
-    assert inside_fence(FENCE, FENCE_AT, (10.0, 0.0, -5.0), (10.0, 0.0, -5.0))[2] == -4.0
 
 
 NORTH_WALL = Surface((3.0, 2.0, -1.5), SOUTH, 0.5)

@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from companion.mission.model import Mission, steps_to_fly
-from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.companion.fake_vehicle import FakeVehicle, flight, mission
 from tests.flying import EPOCH_US, Flight
 
 ITEMS = [
@@ -17,15 +17,15 @@ ITEMS = [
 FIRST = {"origin_ned_m": [10.0, 5.0, 0.0], "armed_at_us": EPOCH_US - 600_000_000}
 
 
-def resumed(at_step: int, boot_us: int, confirmed=True, **changes) -> Flight:
+def resumed(at_step: int, boot_us: int, items=ITEMS, **changes) -> Flight:
     """The vehicle was armed `boot_us` after its start, ten minutes ago, two metres from where it stands."""
-    resume = {"at_step": at_step, **FIRST, "armed_boot_us": boot_us, **changes}
+    resume = {"at_step": at_step, **FIRST, "armed_boot_us": boot_us}
     vehicle = FakeVehicle(start_ned_m=(12.0, 5.0, 0.0), time_us=605_000_000)
-    return flight(vehicle, confirmed, items=ITEMS, resume=resume)
+    return flight(vehicle, items=items, resume=resume | changes)
 
 
 def test_what_is_left_is_flown_from_where_its_step_begins():
-    steps = steps_to_fly(resumed(4, 0).companion._mission)
+    steps = steps_to_fly(mission(items=ITEMS, resume={"at_step": 4, **FIRST, "armed_boot_us": 0}))
     assert [step.name for step in steps] == ["takeoff", "set_speed", "go_to", "go_to", "go_to", "go_to", "land"]
     assert [step.index for step in steps] == [0, 4, 4, 4, 5, 6, 7]
     # step 4 leads from [3, 2] to [3, 0]
@@ -62,8 +62,7 @@ def test_an_interrupted_flight_says_where_to_go_on_and_a_resumed_one_too():
 
 def test_the_hits_of_before_count_for_what_the_mission_expects():
     items = [*ITEMS[:-1], {"expect": {"collisions": {"exactly": 1}}}, ITEMS[-1]]
-    resume = {"at_step": 6, **FIRST, "armed_boot_us": 5_000_000, "hits": 1}
-    f = flight(FakeVehicle(start_ned_m=(12.0, 5.0, 0.0), time_us=605_000_000), items=items, resume=resume)
+    f = resumed(6, 5_000_000, items, hits=1)
     f.run_to_end()
     assert f.event("expect").data["met"] is True
     assert f.report.outcome == "completed"

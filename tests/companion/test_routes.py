@@ -227,8 +227,3 @@ def test_a_wall_of_any_width_is_passed_after_a_few_touches_none_where_it_is_reme
 ):
     touches, is_through = explore(width_m, offset_m, error_deg)
     assert is_through and len(touches) <= most
-
-
-def test_a_wall_as_wide_as_the_fence_is_given_up_on():
-    touches, is_through = explore(24.0, 0.0, 0.0)
-    assert not is_through and len(touches) < 12

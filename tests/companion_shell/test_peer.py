@@ -40,16 +40,6 @@ def test_a_camera_pins_nothing():
     assert peer.answered == VEHICLE
 
 
-def test_a_vehicle_that_comes_back_from_another_address_is_heard_once_the_first_is_silent():
-    peer, moved = Peer(), ("192.168.4.1", 50_001)
-    peer.accepts(HEARTBEAT, VEHICLE, 0)
-    assert not peer.accepts(HEARTBEAT, moved, RELEASED_US)
-    assert peer.accepts(IMU, VEHICLE, RELEASED_US)
-    assert not peer.accepts(HEARTBEAT, moved, 2 * RELEASED_US)
-    assert peer.accepts(HEARTBEAT, moved, 2 * RELEASED_US + 1)
-    assert peer.answered == moved and not peer.accepts(IMU, VEHICLE, 2 * RELEASED_US + 2)
-
-
 @pytest.mark.parametrize(("silent_us", "is_heard"), [(490_000, False), (510_000, True)])
 def test_a_strangers_heartbeat_counts_once_the_vehicle_has_been_silent_for_half_a_second(silent_us, is_heard):
     peer = Peer()

@@ -29,7 +29,7 @@ from tests.simulated import wall
 SET_MODE, ARM, TAKEOFF = 176, 400, 22
 # From the wall's face to the centre of a vehicle that touches it with guards unfolded: 0.24 m.
 FACE_NORTH_M = 4.0
-VELOCITY_ONLY = 0xDC7
+VELOCITY_ONLY, PLACE_ONLY = 0xDC7, 0xDF8
 MANUAL_POSITION, OFFBOARD, HOLD, MISSION, LAND = (3, 0), (6, 0), (4, 3), (4, 4), (4, 6)
 # MAVSDK's Offboard repeats its last setpoint every 50 ms, for ever; in whole intervals of 4 ms.
 REPEATED_EVERY_S = 0.052
@@ -66,6 +66,10 @@ class Commanded(VirtualTime):
     def state(self) -> State:
         return State.CONNECTING if self.guard.core is None else self.guard.core.machine.state
 
+    @property
+    def mode(self) -> Any:
+        return str(self.guard.status().vehicle_mode)
+
     @abstractmethod
     def send(self, message: Any) -> None:
         """The other's message goes with the next step."""
@@ -85,6 +89,13 @@ class Commanded(VirtualTime):
         values = (0.0, 0.0, 0.0, north, east, down, *[0.0] * 5)
         boot_ms = round(1e3 * self.time_s)
         self.send(dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, VELOCITY_ONLY, *values))
+
+    def place(self, north_m: float) -> None:
+        """At PX4's take-off height, and nothing else."""
+        boot_ms, away = round(1e3 * self.time_s), [0.0] * 8
+        self.send(
+            dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, PLACE_ONLY, north_m, 0, -2.5, *away)
+        )
 
     def every(self, seconds: float, action: Callable[[], None]) -> Callable[[], None]:
         """Do it from now on, again and again; the action returned ends it."""
@@ -217,10 +228,6 @@ class GuardedFlight(Commanded):
         return list(result.events)
 
     @property
-    def mode(self) -> str:
-        return str(self.guard.status().vehicle_mode)
-
-    @property
     def position(self) -> tuple[float, float, float]:
         return self.guard.status().position_ned_m
 
@@ -319,10 +326,6 @@ class BetweenFlight(Commanded):
         mavlink = self._mavlinks.setdefault(client, dialect.MAVLink(None, *source))
         self._clients.append((client, message.pack(mavlink)))
         mavlink.seq = (mavlink.seq + 1) % 256
-
-    @property
-    def mode(self) -> str:
-        return str(self.guard.status().vehicle_mode)
 
     def _exchange(self) -> None:
         if not self.is_late:

@@ -14,9 +14,18 @@ from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS, would_move
 from companion.mavlink.packet import message_id_of, packet_length
 from companion.mavlink.signing import Signing
-from tests.guard.flying import ARM, FACE_NORTH_M, HOLD, LAND, MANUAL_POSITION, OFFBOARD, BetweenFlight, fly_a_mission
+from tests.guard.flying import (
+    ARM,
+    FACE_NORTH_M,
+    HOLD,
+    LAND,
+    MANUAL_POSITION,
+    OFFBOARD,
+    REPEATED_EVERY_S,
+    BetweenFlight,
+    fly_a_mission,
+)
 
-PLACE_ONLY = 0xDF8
 ATTITUDE_ONLY = 0x07
 TOO_LATE_S = 0.15
 LINK_BYTES_S = 2_000_000
@@ -26,16 +35,7 @@ MODES = (dialect.MAVLINK_MSG_ID_HEARTBEAT, dialect.MAVLINK_MSG_ID_CURRENT_MODE)
 def by_places(air: BetweenFlight) -> None:
     """Along the first side of a square, which the wall crosses: the place moves on at 1 m/s and waits for nobody."""
     began_s = air.time_s
-    away = [0.0] * 8
-
-    def place() -> None:
-        north = min(air.time_s - began_s, 5.0)
-        boot_ms = round(1e3 * air.time_s)
-        air.send(
-            dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, PLACE_ONLY, north, 0, -2.5, *away)
-        )
-
-    air.every(0.052, place)
+    air.every(REPEATED_EVERY_S, lambda: air.place(min(air.time_s - began_s, 5.0)))
     air.run_for(0.3)
     air.set_mode(OFFBOARD)
 
@@ -172,18 +172,7 @@ def test_a_program_that_turns_back_and_then_into_the_same_wall_again_is_stopped_
     air = hit(by_places, then="previous")
     air.stop_all()
     north = [2.0]
-    away = [0.0] * 8
-
-    def place() -> None:
-        boot_ms = round(1e3 * air.time_s)
-        frame = dialect.MAV_FRAME_LOCAL_NED
-        air.send(
-            dialect.MAVLink_set_position_target_local_ned_message(
-                boot_ms, 1, 1, frame, PLACE_ONLY, north[0], 0, -2.5, *away
-            )
-        )
-
-    air.every(0.052, place)
+    air.every(REPEATED_EVERY_S, lambda: air.place(north[0]))
     air.run_to(State.WATCHING, 10.0)
     air.run_for(3.0)
     assert air.mode == "OFFBOARD" and air.guard.status().position_ned_m[0] < 2.3

@@ -75,17 +75,6 @@ def test_offboard_is_confirmed_at_once_because_setpoints_lead(hit_in_posctl):
     assert len(hit_in_posctl.setpoints("guard", hit_s - 2.0, hit_s - 0.001)) == pytest.approx(20, abs=2)
 
 
-def test_a_hit_in_a_mission_is_given_back_to_hold_by_default():
-    air = Air()
-    mission_into_the_wall(air)
-    air.run_to(State.RECOVERING, 30.0)
-    air.run_to(State.WATCHING, 10.0)
-    assert air.event("take_over").data["mode"] == "AUTO.MISSION"
-    air.run_for(2.0)
-    assert air.mode == "AUTO.LOITER" and air.position[0] < FACE_NORTH_M - CLEAR_M
-    assert len(air.told("detection")) == 1
-
-
 def test_a_mission_is_not_given_back_to_that_would_go_on_into_what_was_hit():
     air = Air(GuardConfig(then="previous"))
     mission_into_the_wall(air)
