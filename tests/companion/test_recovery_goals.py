@@ -56,6 +56,10 @@ def test_the_papers_own_numbers():
     assert goal_of("paper", Contact(0, AT, ZERO, SOUTH)) == AT, "hit while hovering: stay"
 
 
+def test_eq_3_is_asked_for_at_once_and_never_changed():
+    assert not RECOVERY_LAWS["paper"].follows and not RECOVERY_LAWS["paper"].leans
+
+
 def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
     # 2 m/s at 60 degrees from the normal: 1 m/s into the wall, 1.73 along it
     touched = hit(2.0, math.radians(60))

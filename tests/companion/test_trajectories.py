@@ -90,6 +90,16 @@ def test_points_on_one_another_are_one_point():
         assert (nowhere.duration_s, nowhere.at(0.0)) == (0.0, (place, still, still))
 
 
+@pytest.mark.parametrize(("velocity", "duration_s", "top"), [([1, 0, 0], 3.0, 1.0), ([0, -3, 0], 2.0, 2.0)])
+def test_a_velocity_lasts_its_time_with_its_ramps(velocity, duration_s, top):
+    item = VelocityItem(velocity_ned_m_s=velocity, duration_s=duration_s)
+    trajectory = trajectory_of(item, (1.0, 1.0, -2.0), SpeedLimits(1.0, 2.0))
+    assert trajectory.duration_s == pytest.approx(duration_s)
+    middle = trajectory.at(0.5 * duration_s)[1]
+    assert math.hypot(*middle) == pytest.approx(top, abs=0.01)
+    assert np.dot(middle, velocity) > 0.0
+
+
 @pytest.mark.parametrize(
     "trajectory",
     [
