@@ -164,6 +164,16 @@ def test_the_stream_is_held_back_and_it_is_told():
     assert f.vehicle.setpoints[-1][1].x == pytest.approx(6.0), "it arrives all the same"
 
 
+def test_a_hit_may_make_the_setpoint_jump():
+    into_wall = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
+    f = in_mission(
+        into_wall, vehicle=FakeVehicle(wall_north_m=3.0), limits={"max_speed_m_s": 2.5}, recovery={"law": "paper"}
+    )
+    f.run_to("recovering")
+    f.step()
+    assert f.vehicle.setpoints[-1][1].x == pytest.approx(2.0, abs=0.15)
+
+
 def test_an_estimate_that_jumps_does_not_send_the_vehicle_flying():
     f = in_mission(abort_when={"outside_fence_by_m": None}, fence={"radius_m": 30})
     f.vehicle.position[0] += 12.0
