@@ -75,7 +75,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         self.started_at_us = self.now_us = now_us
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self._sample_boot_us = 0
-        self._leans = False  # the kind of setpoint that was last sent
+        self._leans: bool | None = None  # the kind of setpoint that PX4 flies by; None while another may send them
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
 
@@ -179,6 +179,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not (moved or follows_imu) and now_us < self._setpoint_due_us:
             return
         interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
+        self._leans = self._leans if holds else None
         due_us = self._setpoint_due_us + interval_us
         is_on_time = not (moved or follows_imu) and due_us > now_us
         self._setpoint_due_us = due_us if is_on_time else now_us + interval_us
@@ -204,7 +205,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
             flight.target = target
             self._note_sent(sent, now_us)
         flight.outbox.append(self.resets.sent(setpoint))
-        self._change_kind(holds and target.lean is not None)
+        if holds:
+            self._change_kind(target.lean is not None)
 
     def _change_kind(self, leans: bool) -> None:
         """Have PX4 change between its controllers of position and of attitude.

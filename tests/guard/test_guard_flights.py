@@ -123,7 +123,7 @@ def test_a_pilot_who_chooses_a_mode_while_the_guard_holds_has_the_vehicle_at_onc
     let_go_s = air.time_s
     air.run_for(2.0)
     assert (air.state, air.mode) == (State.STOOD_DOWN, "POSCTL")
-    assert air.setpoints("guard", let_go_s + 0.005) == []
+    assert air.sent_by("guard", "SET_", let_go_s + 0.005) == air.sent_by("guard", "COMMAND", let_go_s + 0.005) == []
     # another hit is the pilot's own affair, until somebody enables the guard again
     air.guard.core.is_enabled = True
     air.run_for(0.1)
