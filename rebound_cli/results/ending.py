@@ -4,8 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rebound_cli.results.summary import BREAKING_FORCE_N
-
 
 def ending_text(summary: Mapping[str, Any]) -> str:
     """A headline, a line for each hit, and what else happened, where it did."""
@@ -23,7 +21,7 @@ def ending_text(summary: Mapping[str, Any]) -> str:
         lines[-1] = lines[-1].removesuffix(".") + ", landed safely."
     elif summary["outcome"] == "completed":
         lines.append("Landed safely.")
-    return "\n".join(lines + _frame(collisions) + _counts(summary) + _surroundings(summary))
+    return "\n".join(lines + _counts(summary) + _surroundings(summary))
 
 
 def _headline(summary: Mapping[str, Any]) -> str:
@@ -55,16 +53,6 @@ def _collision(collision: Mapping[str, Any]) -> str:
 def impact_text(kind: str, velocity_ned_m_s: Sequence[float]) -> str:
     """What was hit, and how fast."""
     return f"{'an' if kind == 'edge' else 'a'} {kind} at {math.hypot(*velocity_ned_m_s):.2f} m/s"
-
-
-def _frame(collisions: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Whether the hardest hit would have broken it, where anybody has said what it bears."""
-    truths = [truth for collision in collisions if (truth := collision["truth"])]
-    if not any(truth["factor_of_safety"] for truth in truths):
-        return []
-    peak_n = max(truth["peak_force_n"] for truth in truths)
-    would = "have broken" if peak_n > BREAKING_FORCE_N else "not have broken"
-    return [f"The frame would {would}: {peak_n:.0f} N; the paper's stress analysis gives it {BREAKING_FORCE_N:.0f} N."]
 
 
 def _counts(summary: Mapping[str, Any]) -> list[str]:
