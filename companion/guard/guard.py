@@ -11,7 +11,7 @@ from companion.guard.core import GuardCore
 from companion.guard.states import State
 from companion.guard.watching import OWN_STREAMS, GuardConnect
 from companion.mavlink.readers import GUARD_READERS
-from companion.messages import Asked, SendCommand, SetMessageInterval
+from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
 from companion.report import CollisionReport, RoundTripReport
 
 
@@ -34,15 +34,17 @@ class Guard(Stepped[GuardCore]):
 
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
-        handler = None if self._core is None else self._core.machine.handler
-        armed = None if self._core is None else self._core.flight.vehicle.armed
-        # Whoever was behind a guard before a restart goes on, and nobody would notice a hit.
-        begins = handler is None or (isinstance(handler, GuardConnect) and handler.begins)
-        between.is_closed = self.holds or (begins and armed is not False)
-        if begins and armed:
-            between.await_choice()
-        elif armed is False:
-            between.awaits_choice = False
+        if self._core is not None:
+            between.is_closed = self.holds
+            handler, vehicle = self._core.machine.handler, self._core.flight.vehicle
+            begins = isinstance(handler, GuardConnect) and handler.begins
+            if vehicle.armed is False:
+                between.awaits_choice = False
+            elif begins and vehicle.landed is not LandedState.ON_GROUND:
+                # Whoever was behind a guard before a restart goes on, and nobody would notice a hit.
+                between.is_closed = True
+                if vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
+                    between.await_choice()
         if (setpoint := between.new_setpoint(now_us)) is not None:
             self.hear_setpoint(setpoint)
             yield "setpoint", asdict(setpoint)

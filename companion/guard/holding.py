@@ -123,7 +123,7 @@ class GiveBack:
     overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
 
     What flew before has it back where it does not lead into what was hit (see onward.leads_into). For a program's next
-    setpoint, and for sticks that are let go, the guard waits, holding; in any other case the vehicle is given back to
+    setpoint, and for sticks that are released, the guard waits, holding; in any other case the vehicle is given back to
     hold.
 
     A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on another link

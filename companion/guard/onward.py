@@ -31,7 +31,7 @@ def leads_into(guard: GuardContext, mode: int) -> str | None:
     contact = guard.collisions[-1].contact
     if not is_auto(mode):
         pushed = -along(_sticks_ned(guard), contact.normal_ned) > STICK_DEADZONE
-        return "the sticks push on into what was hit: let go of them" if pushed else None
+        return "the sticks push on into what was hit: release them" if pushed else None
     if -along(contact.velocity_ned_m_s, contact.normal_ned) < LEAST_SPEED_M_S:
         return None
     return f"{mode_name(mode)} goes on into what was hit: change it and choose it again, or choose another mode"

@@ -68,6 +68,14 @@ def test_the_first_recovery_setpoint_and_the_mode_leave_with_the_datagram_that_s
     assert sent >= {"SET_ATTITUDE_TARGET", "COMMAND_LONG"}
 
 
+def test_px4_is_made_to_change_its_controllers_with_each_kind_of_setpoint(hit_in_posctl):
+    air = hit_in_posctl
+    sent = [(at_s, m) for at_s, who, m in air.on_wire if who == "guard" and m.get_type() == "COMMAND_LONG"]
+    changes_s = [at_s for at_s, m in sent if m.command == dialect.MAV_CMD_RUN_PREARM_CHECKS]
+    # To attitudes with the hit, and to places with the hand-over
+    assert changes_s == pytest.approx([air.event_s("detection"), air.event_s("hand_over")], abs=0.005)
+
+
 def test_offboard_is_confirmed_at_once_because_setpoints_lead(hit_in_posctl):
     # measured in virtual time: command, PX4's two answers, CURRENT_MODE
     assert hit_in_posctl.event("confirmed").data["after_ms"] < 50.0
@@ -93,9 +101,9 @@ def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
     # When the vehicle has recovered
     air.run_to(State.GIVING_BACK, 10.0)
     air.run_for(3.0)
-    # Then it is held, and told why, until the stick is let go
+    # Then it is held, and told why, until the stick is released
     assert air.state is State.GIVING_BACK
-    assert air.told("not_back") == ["not given back: the sticks push on into what was hit: let go of them"]
+    assert air.told("not_back") == ["not given back: the sticks push on into what was hit: release them"]
     stick[0] = 0.0
     air.run_to(State.WATCHING, 1.0)
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
