@@ -21,6 +21,9 @@ BRAKES_M_S2 = 2.0
 # A velocity that is asked for leads somewhere: as far as in the time in which PX4 takes its setpoint for lost.
 GOES_ON_S = OTHERS_STOPPED_US * 1e-6
 
+# Standard deviations of a surface's direction that a program must stay clear of to have the vehicle back: 95 %.
+CERTAIN = 2.0
+
 
 def leads_into(guard: GuardContext, mode: int) -> str | None:
     """Why the mode would hit again; None where it would not."""
@@ -49,14 +52,17 @@ def _sticks_ned(guard: GuardContext) -> Vector3:
 
 
 def _setpoints_lead_into(guard: GuardContext) -> str | None:
-    does_lead = lead_into(guard, guard.asked or Asked())
+    does_lead = lead_into(guard, guard.asked or Asked(), CERTAIN)
     if does_lead is None:
         return "nobody knows where the program's setpoints lead: choose a mode"
     return "the program's setpoints lead into what was hit: send others, or choose a mode" if does_lead else None
 
 
-def lead_into(guard: GuardContext, asked: Asked) -> bool | None:
-    """Whether setpoints do; None where they do not say where they lead."""
+def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> bool | None:
+    """Whether setpoints do; None where they do not say where they lead.
+
+    With `deviations` also where a surface would have to bend towards them by so many standard deviations.
+    """
     latest = guard.vehicle.history.latest()
     if latest is None or (asked.place_ned_m is None and asked.velocity_ned_m_s is None):
         return None
@@ -69,7 +75,10 @@ def lead_into(guard: GuardContext, asked: Asked) -> bool | None:
     known = ObstacleMap(all_known(guard), mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     goal = (north, east, down)
     # A surface may be longer than it is known to be: who is in front of it stays there.
-    leads_behind = any(patch.off_m(here) > 0.0 and patch.off_m(goal) < known.clearance_m for patch in known.patches)
+    leads_behind = any(
+        patch.off_m(here) > 0.0 and patch.off_m(goal) - deviations * patch.bends_m(goal) < known.clearance_m
+        for patch in known.patches
+    )
     return leads_behind or known.block([here, goal])
 
 

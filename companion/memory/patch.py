@@ -58,6 +58,11 @@ class Patch:
         """How far a place is in front of the surface's plane."""
         return sum(n * (p - c) for n, p, c in zip(self.normal_ned, place_ned_m, self.centre_ned_m, strict=True))
 
+    def bends_m(self, place_ned_m: Vector3) -> float:
+        """Of a wall: one standard deviation of its plane there, because its normal is not known better."""
+        beside_m = _outside_m(self.along_m(place_ned_m), self.touched_along_m())
+        return beside_m * math.tan(min(self.normal_error_rad, MOST_ANGLE_RAD))
+
     def touched_along_m(self) -> tuple[float, float]:
         """Of a wall: from where to where it was touched."""
         return _range([self.along_m(place) for place in self.touches_ned_m])
@@ -181,14 +186,14 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     if patch.is_steep:
         beside_m = min(math.dist(place[:2], one[:2]) for one in patch.touches_ned_m)
         is_near = beside_m <= patch.assumed_beyond_m() + 2.0 * clearance_m
+        bends_m = beside_m * math.tan(min(patch.normal_error_rad, MOST_ANGLE_RAD))
     else:
         along_m, height_m = patch.along_m(place), -place[2]
-        beside_m = _outside_m(along_m, patch.touched_along_m())
+        bends_m = patch.bends_m(place)
         is_near = (
             _outside_m(along_m, patch.assumed_along_m()) <= 2.0 * clearance_m
             and _outside_m(height_m, patch.assumed_heights_m()) <= 2.0 * clearance_m
         )
-    bends_m = beside_m * math.tan(min(patch.normal_error_rad, MOST_ANGLE_RAD))
     return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + bends_m
 
 

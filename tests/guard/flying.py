@@ -90,11 +90,12 @@ class Commanded(VirtualTime):
         boot_ms = round(1e3 * self.time_s)
         self.send(dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, VELOCITY_ONLY, *values))
 
-    def place(self, north_m: float) -> None:
+    def place(self, north_m: float, east_m: float = 0.0) -> None:
         """At PX4's take-off height, and nothing else."""
-        boot_ms, away = round(1e3 * self.time_s), [0.0] * 8
+        place_ned_m, away = (north_m, east_m, -2.5), [0.0] * 8
+        boot_ms = round(1e3 * self.time_s)
         self.send(
-            dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, PLACE_ONLY, north_m, 0, -2.5, *away)
+            dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, PLACE_ONLY, *place_ned_m, *away)
         )
 
     def every(self, seconds: float, action: Callable[[], None]) -> Callable[[], None]:

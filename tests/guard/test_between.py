@@ -204,6 +204,23 @@ def test_a_program_that_turns_back_and_then_into_the_same_wall_again_is_stopped_
     assert air.guard.status().position_ned_m[0] < 1.3 and air.mode == "OFFBOARD"
 
 
+@pytest.mark.parametrize("east_m", [-8.0, 8.0])
+def test_far_beside_the_touch_a_surface_may_be_nearer_than_its_likely_direction_says(east_m):
+    # Given a program that goes far aside, 0.7 m in front of a wall of which one touch is known
+    air = hit(by_places, then="previous")
+    air.stop_all()
+    north = [FACE_NORTH_M - 0.7]
+    air.every(REPEATED_EVERY_S, lambda: air.place(north[0], east_m))
+    air.run_to(State.GIVING_BACK, 10.0)
+    air.run_for(2.0)
+    # Then it has the vehicle back when it is well in front, and not before
+    assert air.state is State.GIVING_BACK
+    north[0] -= 4.0
+    air.run_to(State.WATCHING, 1.0)
+    air.run_for(5.0)
+    assert len(air.vehicle.truth.hits) == 1
+
+
 def test_a_program_whose_setpoints_end_meanwhile_is_not_waited_for():
     air = hit(by_places, then="previous")
     air.run_to(State.GIVING_BACK, 10.0)
