@@ -13,7 +13,7 @@ from rebound_cli.results.run_folder import RESOLVED_NAME, read_records, read_tex
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.mavlink.restamp import check_messages
-from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 
 if TYPE_CHECKING:
     from companion.mission.config import CompanionConfig
@@ -122,10 +122,11 @@ def world_from(document: Document) -> SimulatedWorld:
         except FaultError as error:
             raise DocumentError(f"{document.place_of(('sim', 'faults', number, 'messages'))}: {error}") from error
     airframe = _load_airframe(scene.airframe, document)
-    try:
-        check_start_is_free(scene, airframe)
-    except SceneError as error:
-        raise DocumentError(f"{document.place_of(('sim', 'walls'))}: {_sentence(error)}") from error
+    for key, check in (("walls", check_start_is_free), ("wind_ned_m_s", check_wind_can_be_held)):
+        try:
+            check(scene, airframe)
+        except SceneError as error:
+            raise DocumentError(f"{document.place_of(('sim', key))}: {_sentence(error)}") from error
     return SimulatedWorld(scene, airframe)
 
 

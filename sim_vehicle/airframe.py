@@ -1,5 +1,6 @@
 """What a vehicle is: masses, lengths, springs, motors, sensors and gains, read from a YAML file."""
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +15,9 @@ from sim_vehicle.written import NotNegative, Part, Positive
 
 # Arms, each with a motor and a guard, and all of one length. `physics/layout.py` has their directions.
 ARMS = 4
+# Above MPC_THR_MIN and a tenth of the way to hover's thrust PX4 takes no vehicle for landed
+# (MulticopterLandDetector.cpp).
+LEAST_THRUST, LANDED_SHARE = 0.12, 0.1
 BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
 
 Fraction = Annotated[float, Field(gt=0, lt=1)]
@@ -216,9 +220,13 @@ class Airframe(Part):
     control: Control
 
     @property
+    def weight_n(self) -> float:
+        return self.mass_kg * 9.81
+
+    @property
     def hover_fraction(self) -> float:
         """Thrust to hover over the greatest thrust."""
-        return self.mass_kg * 9.81 / (ARMS * self.motors.max_thrust_n)
+        return self.weight_n / (ARMS * self.motors.max_thrust_n)
 
     @model_validator(mode="after")
     def _can_navigate(self) -> "Airframe":
@@ -235,6 +243,27 @@ class Airframe(Part):
                 f"hovering would take {100 * self.hover_fraction:.0f} % of the greatest thrust; "
                 "raise motors.max_thrust_n or lower mass_kg so that it takes at most 90 %"
             )
+        most_idle = LEAST_THRUST + LANDED_SHARE * max(0.0, self.hover_fraction - LEAST_THRUST)
+        if self.motors.idle_fraction > most_idle:
+            raise ValueError(
+                f"motors that idle at {100 * self.motors.idle_fraction:.0f} % of their thrust keep PX4 from seeing a "
+                f"landing; lower motors.idle_fraction to {math.floor(100 * most_idle) / 100:g} or less"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _stands_on_its_feet(self) -> "Airframe":
+        frame = self.geometry
+        depths_m = {
+            "the hub, geometry.hub_solid_radius_m": frame.hub_solid_radius_m,
+            "the guards, half of geometry.guard_height_m": frame.guard_height_m / 2,
+        }
+        for part, depth_m in depths_m.items():
+            if depth_m >= frame.foot_depth_m:
+                raise ValueError(
+                    f"{part}, reaches {depth_m:g} m below the centre and the feet reach {frame.foot_depth_m:g} m: "
+                    "it would begin in the ground; make it smaller or raise geometry.foot_depth_m"
+                )
         return self
 
 

@@ -1,10 +1,11 @@
 """The `sim:` part of a mission file: which airframe starts where, among which walls, in which wind."""
 
+import math
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from sim_vehicle.airframe import Airframe
+from sim_vehicle.airframe import ARMS, Airframe
 from sim_vehicle.errors import SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.obstacles import BoxSpec, Point, PoleSpec, WallSpec
@@ -86,3 +87,16 @@ def check_start_is_free(scene: Scene, airframe: Airframe) -> None:
                 f"({distance_m:.2f} m from its centre, which needs {reach_m:.2f} m); "
                 "move it or sim.start.position_ned_m"
             )
+
+
+def check_wind_can_be_held(scene: Scene, airframe: Airframe) -> None:
+    """Raise SceneError if the steady wind is more than the vehicle can lean against."""
+    push_n = airframe.drag_n_s_m * math.hypot(*scene.wind_ned_m_s[:2])
+    weight_n = airframe.weight_n + airframe.drag_n_s_m * scene.wind_ned_m_s[2]
+    leans_n = weight_n * math.tan(airframe.control.tilt_max_rad)
+    lifts_n = math.sqrt(max(0.0, (ARMS * airframe.motors.max_thrust_n) ** 2 - weight_n**2))
+    if push_n > min(leans_n, lifts_n):
+        raise SceneError(
+            f"wind_ned_m_s pushes with {push_n:.1f} N, and {airframe.name} holds against {min(leans_n, lifts_n):.1f} N; "
+            "choose less wind, or an airframe with less drag"
+        )

@@ -22,7 +22,7 @@ from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.layout import PlantState
 from sim_vehicle.plant.plant import Plant
-from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Vector3
@@ -54,9 +54,10 @@ class SimulatedVehicle:
         ``parameters``: values in place of PX4's defaults and the airframe's.
         ``signing``: the key that it has.
 
-        Raises SceneError where a wall passes through the start position.
+        Raises SceneError where a wall passes through the start position, or the wind is too strong.
         """
         check_start_is_free(scene, airframe)
+        check_wind_can_be_held(scene, airframe)
         self._airframe, self._scene, self._seed, self._keeps_path = airframe, scene, seed, keeps_path
         self._epoch_at_boot_us = epoch_at_boot_us
         self._links: list[Link] = []
