@@ -13,7 +13,6 @@ from sim_vehicle.bench.faults import FaultRequest
 from sim_vehicle.bench.timeline import TimelineEntry
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet, SimulationError, VehicleEnded
-from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import link_kind
 from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import open_port
@@ -47,12 +46,12 @@ def start_vehicle(
     _check(speed)
     parameters = {**time_outs_at(speed), **setup.pop("parameters", {})}
     bench = Bench(Setup(parameters=parameters, **setup), time.time_ns() // 1000)
-    options = LinkOptions(link_kind(streams))
+    kind = link_kind(streams)
     ports: list[Port] = []
     try:
-        udp = UdpServerPort(bench.vehicle, options, _HERE, 0)
+        udp = UdpServerPort(bench.vehicle, kind, _HERE, 0)
         ports.append(udp)
-        tcp = TcpServerPort(bench.vehicle, options, _HERE, 0)
+        tcp = TcpServerPort(bench.vehicle, kind, _HERE, 0)
         ports.append(tcp)
         ports += [open_port(bench.vehicle, address) for address in links]
     except BaseException:

@@ -113,13 +113,6 @@ def test_the_throttle_is_a_climb_and_centred_it_holds_the_height(mode):
     assert flight.height_m == pytest.approx(held_m, abs=0.05)
 
 
-def test_a_stick_within_the_dead_zone_is_centred():
-    flight = flying(Mode.POSCTL)
-    there = flight.state.position_ned_m
-    sticks(flight, 5.0, pitch=0.09, roll=-0.09, throttle=0.09)
-    assert math.dist(flight.state.position_ned_m, there) < 0.1
-
-
 def test_pulled_down_it_lands_and_disarms():
     flight = flying(Mode.POSCTL)
     for _ in range(200):

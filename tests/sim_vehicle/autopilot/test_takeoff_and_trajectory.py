@@ -6,14 +6,14 @@ import pytest
 
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
 from sim_vehicle.autopilot.flight_tasks.auto_flight import land_speed_m_s
-from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, stop_point
+from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
-from sim_vehicle.estimator.estimate import Estimate, yaw_of
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
-from tests.sim_vehicle.autopilot.kinematic_plant import STANDING, Flight, attitude_of_yaw, target
+from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
 SECOND = 1_000_000
 DEFAULTS = Parameters()
@@ -129,45 +129,6 @@ def test_landing_is_faster_high_up():
 )
 def test_return_flies_at_px4s_height(height_m, distance_m, expected_m):
     assert return_height_over(height_m, distance_m, DEFAULTS) == pytest.approx(expected_m)
-
-
-def test_return_climbs_comes_home_and_lands_facing_as_it_stood():
-    # Given a takeoff facing east, and a flight 12 m to the north
-    flight = taken_off(STANDING._replace(attitude_wxyz=attitude_of_yaw(math.pi / 2)))
-    away = target(position=(12.0, 0.0, -2.5))
-    flight.fly(0.5, away)
-    flight.ask(176, 1, 6)
-    flight.fly(12.0, away)
-    assert flight.state.position_ned_m[0] == pytest.approx(12.0, abs=0.1)
-    # When it returns
-    flight.ask(NAV_RETURN_TO_LAUNCH)
-    highest, yaws = 0.0, set()
-    while flight.autopilot.arming.armed:
-        flight.step()
-        highest = max(highest, flight.height_m)
-        yaws.add(round(math.degrees(yaw_of(flight.state.attitude_wxyz))))
-        assert flight.time_s < 120.0
-    # Then it went to 30 m, looked home (south), and landed at home facing east
-    assert highest == pytest.approx(30.0, abs=0.3)
-    assert yaws & {180, -180}
-    assert math.hypot(*flight.state.position_ned_m[:2]) < 0.1
-    assert yaw_of(flight.state.attitude_wxyz) == pytest.approx(math.pi / 2, abs=0.01)
-
-
-def test_hold_stops_where_braking_ends_and_stays():
-    flight = taken_off()
-    flight.fly(3.0)
-    moving = target(velocity=(2.0, 0.0, 0.0))
-    flight.fly(0.5, moving)
-    flight.ask(176, 1, 6)
-    flight.fly(3.0, moving)
-    place = flight.state.position_ned_m[0]
-    expected = stop_point(flight.state.position_ned_m, flight.state.velocity_ned_m_s, DEFAULTS)[0]
-    flight.ask(176, 1, 4, 3)
-    flight.fly(6.0)
-    assert flight.state.position_ned_m[0] == pytest.approx(expected, abs=0.1)
-    assert 1.0 < flight.state.position_ned_m[0] - place < 2.5
-    assert math.hypot(*flight.state.velocity_ned_m_s) < 0.02
 
 
 def test_a_smoothed_setpoint_keeps_its_limits_and_does_not_run_past():

@@ -9,7 +9,6 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.errors import ConditionNotMet, SceneError, SimulationError, VehicleEnded
-from sim_vehicle.shell.truth_file import load_faults, load_truth
 from sim_vehicle.testing import RunningVehicle, Truth, Wall, faults, start_vehicle
 
 TIMEOUT_S = 10.0
@@ -194,13 +193,3 @@ def test_a_vehicle_that_comes_to_grief_says_so(monkeypatch: pytest.MonkeyPatch) 
         vehicle.stop()
     vehicle.stop()
     assert vehicle_threads() == 0
-
-
-def test_the_truth_in_a_file(tmp_path) -> None:
-    with start_vehicle(speed=0.0) as vehicle:
-        vehicle.inject(faults.gps_loss(), for_s=0.1)
-        passes(vehicle, 0.5)
-        vehicle.save_truth(tmp_path / "truth.npz")
-    hits, series, _ = load_truth(tmp_path / "truth.npz")
-    assert hits == [] and series["time_boot_us"][-1] > 400_000
-    assert [span.kind for span in load_faults(tmp_path / "truth.npz")] == ["aiding_loss"]

@@ -12,19 +12,6 @@ from tests.sim_vehicle.vehicle_client import SET_INTERVAL, Client
 TRUTH = 115  # HIL_STATE_QUATERNION
 
 
-def test_flow_and_range_are_sent_at_ten_hertz_where_they_are_simulated():
-    wire = Client(airframe=filtered())
-    assert wire.rate_hz("OPTICAL_FLOW_RAD", 10.0) == pytest.approx(10, rel=0.03)
-    assert len(wire.all("DISTANCE_SENSOR")) == pytest.approx(100, rel=0.03)
-    distance = wire.last("DISTANCE_SENSOR")
-    assert distance.current_distance == pytest.approx(8, abs=4)
-    assert (distance.min_distance, distance.max_distance, distance.orientation) == (1, 4000, 25)
-    assert distance.signal_quality == 100
-    flow = wire.last("OPTICAL_FLOW_RAD")
-    # On its feet the camera is too near to see anything.
-    assert (flow.integration_time_us, flow.quality, flow.distance) == (100_000, 0, -1.0)
-
-
 def test_the_truth_is_sent_on_request_alone():
     scene = Scene.model_validate({"start": {"position_ned_m": [30.0, -20.0, 0.0], "yaw_deg": 90}})
     wire = Client(airframe=filtered(), scene=scene)

@@ -44,15 +44,6 @@ def test_the_list_is_whole_and_in_order():
     assert (kinds["MAV_SYS_ID"], kinds["MPC_XY_P"]) == (INT32, REAL32)
 
 
-def test_a_list_asked_for_again_starts_anew():
-    client = Client()
-    for _ in range(2):
-        client.forget()
-        client.send(dialect.MAVLink_param_request_list_message(1, 1))
-        client.step()
-        assert values(client)[0].param_index == 0
-
-
 def test_one_by_name_and_by_index():
     client = Client()
     (by_name,) = request(client, "MIS_TAKEOFF_ALT")

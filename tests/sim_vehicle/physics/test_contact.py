@@ -134,17 +134,6 @@ def test_friction_along_the_wall_is_coulombs(friction: float) -> None:
     assert along > 0
 
 
-def test_a_vehicle_beside_a_wall_passes_it(foldable: Airframe) -> None:
-    wall = {"point_ned_m": [2, 1.0, -2], "normal_ned": [-1, 0, 0], "width_m": 1.0, "height_m": 4}
-    plant = Plant(foldable, Scene.model_validate({"walls": [wall]}), seed=1)
-    plant.state.body[0:3] = [1.0, 0.0, -2.0]
-    plant.state.body[3] = 3.0
-    for _ in range(125):
-        plant.step(None, armed=False)
-    assert plant.truth.hits == []
-    assert plant.state.body[0] > 2.4
-
-
 def test_the_back_of_a_wall_is_solid_too(foldable: Airframe) -> None:
     wall = {"point_ned_m": [2, 0, -2], "normal_ned": [-1, 0, 0], "thickness_m": 0.2}
     plant = Plant(foldable, Scene.model_validate({"walls": [wall], "start": {"position_ned_m": [3, 0, 0]}}), seed=1)
