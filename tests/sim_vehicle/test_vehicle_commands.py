@@ -20,13 +20,6 @@ def results(client: Client, number: int, *params: float, target: tuple[int, int]
     return client.results(number)
 
 
-def command_int(client: Client, number: int, x: int, y: int, z: float = 0.0, param1: float = 0.0) -> list[int]:
-    client.forget()
-    client.send(dialect.MAVLink_command_int_message(1, 1, 5, number, 0, 0, param1, 0, 0, NAN, x, y, z))
-    client.run(0.02)
-    return client.results(number)
-
-
 @pytest.fixture
 def client() -> Client:
     client = Client(system=255, component=190)
@@ -109,16 +102,6 @@ def test_modes_in_which_nobody_can_arm(client, custom):
     assert results(client, ARM_DISARM, 1) == [TEMPORARILY_REJECTED]
     # Force changes nothing
     assert results(client, ARM_DISARM, 1, 21196) == [TEMPORARILY_REJECTED]
-
-
-def test_home_moves_where_a_command_int_says(client):
-    assert command_int(client, SET_HOME, 473_980_000, 85_460_000, 495.0) == [ACCEPTED]
-    client.forget()
-    client.command(410)
-    client.run(0.02)
-    home = client.last("HOME_POSITION")
-    assert (home.latitude, home.longitude, home.altitude) == (473_980_000, 85_460_000, 495_000)
-    assert home.z == pytest.approx(488.0 - 495.0)
 
 
 def reboot(client: Client) -> None:

@@ -81,36 +81,6 @@ def read_socket(connection: socket.socket, wanted: set[str]) -> Reader:
     return reader
 
 
-def test_several_clients_on_tcp_each_with_answers_of_its_own():
-    vehicle = new_vehicle()
-    port = open_port(vehicle, "tcpin://127.0.0.1:0")
-    address = ("127.0.0.1", port.local_port)
-    with served(vehicle, port), socket.create_connection(address) as first:
-        with socket.create_connection(address) as second:
-            first.sendall(REQUEST.pack(client()))
-            read_socket(first, {"AUTOPILOT_VERSION", "COMMAND_ACK", "HEARTBEAT"})
-            assert "AUTOPILOT_VERSION" not in read_socket(second, {"HEARTBEAT", "ATTITUDE"}).kinds()
-        # One hangs up, the other goes on
-        read_socket(first, {"ATTITUDE"})
-    assert len(vehicle._links) <= 2
-
-
-def test_a_udp_server_answers_each_client_at_its_address():
-    vehicle = new_vehicle()
-    port = open_port(vehicle, "udpin://127.0.0.1:0?set=onboard")
-    with (
-        served(vehicle, port),
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second,
-    ):
-        for connection in (first, second):
-            connection.connect(("127.0.0.1", port.local_port))
-            connection.send(client().heartbeat_encode(6, 8, 0, 0, 0).pack(client()))
-        first.send(REQUEST.pack(client()))
-        read_socket(first, {"AUTOPILOT_VERSION", "HIGHRES_IMU"})
-        assert "AUTOPILOT_VERSION" not in read_socket(second, {"HIGHRES_IMU", "HEARTBEAT"}).kinds()
-
-
 @pytest.mark.parametrize(("words", "kind"), [("", LinkKind.GROUND), ("?set=normal", LinkKind.NORMAL)])
 def test_an_address_says_whose_streams_it_has(words, kind):
     vehicle = new_vehicle()

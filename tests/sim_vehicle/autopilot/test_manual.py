@@ -70,13 +70,6 @@ def test_only_a_stick_that_is_moved_fast_enough_counts_as_moved():
 # --- flown -------------------------------------------------------------------------------------------------------
 
 
-def test_centred_sticks_hold_the_place():
-    flight = flying(Mode.POSCTL)
-    there = flight.state.position_ned_m
-    sticks(flight, 5.0)
-    assert math.dist(flight.state.position_ned_m, there) < 0.1
-
-
 @pytest.mark.parametrize(
     ("held", "north", "east"),
     [({"pitch": 1.0}, 1, 0), ({"pitch": -1.0}, -1, 0), ({"roll": 1.0}, 0, 1), ({"roll": -1.0}, 0, -1)],

@@ -62,15 +62,6 @@ def test_a_mission_from_the_ground_and_back_disarms_and_says_so():
     assert said.index("Mission finished, landed") < said.index("Disarmed by landing")
 
 
-def test_without_a_landing_it_holds_at_the_last_place():
-    flight = begun(TAKEOFF, NORTH)
-    flight.fly_until(lambda: flight.autopilot.missions.progress.finished, 60.0)
-    assert "Mission finished, loitering" in flight.texts()
-    flight.fly(10.0)
-    assert math.dist(north_east(flight), (20.0, 0.0)) < 0.1
-    assert flight.autopilot.modes.flown is Mode.LOITER
-
-
 def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
     # Given a hover at 5 m and a first place at 15 m
     flight = hovering(5.0)
@@ -82,12 +73,6 @@ def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
     assert "Climb to 15.0 meters above home" in flight.texts()
     reached(flight, 0)
     assert north_east(flight)[0] > 27.0
-
-
-def test_time_to_stay_is_stayed():
-    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, params=(4.0, 0.0, 0.0, math.nan)), LAND_AT_HOME)
-    flight.fly_until(lambda: math.dist(north_east(flight), (10.0, 0.0)) < 2.0, 60.0)
-    assert reached(flight, 1) == pytest.approx(4.0, abs=0.15)
 
 
 def test_loiter_time_and_delay_take_their_time():
@@ -157,14 +142,6 @@ def test_pause_holds_and_resume_goes_on_with_the_same_item():
     assert math.hypot(*flight.state.velocity_ned_m_s) < 0.05
     assert flight.autopilot.missions.current == 2
     assert set_mode(flight, Mode.MISSION) is Result.ACCEPTED
-    reached(flight, 2)
-    assert math.dist(north_east(flight), (20.0, 20.0)) < 2.1
-
-
-def test_another_current_item_is_flown_at_once():
-    flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
-    reached(flight, 0)
-    assert flight.autopilot.missions.choose(2)
     reached(flight, 2)
     assert math.dist(north_east(flight), (20.0, 20.0)) < 2.1
 

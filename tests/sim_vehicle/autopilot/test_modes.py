@@ -49,13 +49,6 @@ def test_armed_without_sticks_setpoints_and_mission_only_these_can_fly():
     }
 
 
-def test_sticks_take_over_from_every_mode_that_flies_without_them():
-    for mode in (Mode.OFFBOARD, Mode.MISSION, Mode.LOITER, Mode.LAND, Mode.RETURN):
-        assert find_transition(mode, ModeEvent.STICKS, armed()).target is Mode.POSCTL
-    assert find_transition(Mode.ALTCTL, ModeEvent.STICKS, armed()) is None
-    assert find_transition(Mode.TERMINATION, ModeEvent.STICKS, armed()) is None
-
-
 @pytest.mark.parametrize("ends_in", [Mode.LAND, Mode.RETURN, Mode.TAKEOFF, Mode.ORBIT, Mode.FOLLOW_TARGET])
 def test_after_disarming_the_mode_before_is_meant(ends_in):
     # Given a flight in OFFBOARD that went on in a mode in which nobody can arm

@@ -137,12 +137,3 @@ def test_only_setpoints_received_in_offboard_are_flown():
     # Then the vehicle stays
     assert flight.autopilot.modes.flown is Mode.OFFBOARD
     assert abs(flight.state.position_ned_m[0]) < 0.1
-
-
-def test_a_pilots_change_is_not_undone_by_setpoints():
-    flight = hovering()
-    assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
-    flight.fly(3.0, target(position=(50.0, 0.0, -3.0)))
-    assert flight.autopilot.modes.flown is flight.autopilot.modes.intended is Mode.LOITER
-    assert abs(flight.state.position_ned_m[0]) < 0.1
-    assert flight.autopilot.commander.system_status == 4

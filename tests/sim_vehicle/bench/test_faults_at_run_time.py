@@ -140,13 +140,6 @@ def test_an_estimate_is_reset_and_says_so() -> None:
     assert back.x == pytest.approx(before.x, abs=0.1)
 
 
-def test_a_reset_that_is_taken_back_before_it_happens_never_does() -> None:
-    pilot = standing()
-    pilot.vehicle.inject(faults.ekf_reset((1.0, 0.0, 0.0)), after_s=1.0, for_s=1.0).remove()
-    pilot.fly(3.0)
-    assert {message.reset_counter for message in pilot.all("ODOMETRY")} == {0}
-
-
 @pytest.mark.parametrize(
     ("request_", "for_s", "words"),
     [

@@ -36,7 +36,7 @@ def command(number: int, *params: float) -> bytes:
 
 
 def vehicle_threads() -> int:
-    return sum(thread.name == "simulated vehicle" for thread in threading.enumerate())
+    return sum(thread.name.startswith("simulated vehicle") for thread in threading.enumerate())
 
 
 def is_free(kind: int, port: int) -> bool:
@@ -63,12 +63,6 @@ def test_it_is_there_at_its_addresses_and_gone_afterwards() -> None:
         vehicle.hit(1.0)
     # What happened may be read afterwards, too
     assert vehicle.truth.time_boot_s > 0
-
-
-def test_it_ends_with_an_error_in_the_test() -> None:
-    with pytest.raises(ZeroDivisionError), start_vehicle():
-        _ = 1 / 0
-    assert vehicle_threads() == 0
 
 
 def test_a_setup_that_cannot_be_leaves_nothing_behind() -> None:

@@ -87,13 +87,6 @@ def test_a_dead_motor_lets_its_corner_fall(motor: int, roll: int, pitch: int) ->
     assert abs(p) > 1.0 and abs(q) > 1.0
 
 
-def test_a_failing_motor_gives_its_share() -> None:
-    cruise = hover({"kind": "motor_failure", "motor": 2, "thrust_share": 0.9, "between_s": [0.0, 9.0]})
-    fly(cruise, 3.0)
-    given = cruise.plant.state.motor_thrust_n / cruise.plant.state.motor_command_n
-    assert given == pytest.approx([1, 1, 0.9, 1], abs=0.01)
-
-
 def test_free_fall_is_felt_as_nothing_at_all() -> None:
     cruise = hover({"kind": "free_fall", "between_s": [0.2, 0.6]})
     outputs = fly(cruise, 0.6)
@@ -170,14 +163,6 @@ def test_vibration_has_the_strength_that_was_asked_for_at_hover(motor: int | Non
     assert raw_rms(cruise) == pytest.approx([20, 20, 20, 0.5, 0.5, 0.5], rel=spread)
 
 
-def test_vibration_beyond_the_range_clips_raw_samples_and_is_counted() -> None:
-    """A sine of 200 m/s2 RMS is beyond 156.9 for arccos(0.555) / 90 deg of the time: 62.5 %."""
-    cruise = hover({"kind": "vibration", "at_s": 0.5, "accelerometer_rms_m_s2": 200, "motor": 0})
-    assert max(fly(cruise, 0.5)[-1].clipping_counts) == 0
-    counts = fly(cruise, 1.0)[-1].clipping_counts
-    assert counts[0] / 8000 == pytest.approx(math.acos(156.9 / (200 * math.sqrt(2))) * 2 / math.pi, abs=0.05)
-
-
 def test_a_bias_and_a_stuck_axis_show_in_the_mean_sample() -> None:
     cruise = hover(
         {"kind": "imu_bias", "between_s": [0.1, 0.2], "accelerometer_frd_m_s2": [0.5, 0, 0],
@@ -230,16 +215,6 @@ def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: st
     assert bool(max(errors) > 0.2) is disturbed
 
 
-def test_an_estimate_without_gps_drifts_and_jumps_back() -> None:
-    cruise = hover({"kind": "aiding_loss", "sensor": "gps", "between_s": [0.5, 3.0], "drift_m_s2": 0.3})
-    outputs = fly(cruise, 3.0)
-    off_m = np.linalg.norm(np.array(outputs[-1].position_ned_m[:2]) - cruise.plant.state.body[:2])
-    assert off_m > 0.05 and outputs[-1].reset_counter == 0
-    back = fly(cruise, 0.004)[-1]
-    assert back.reset_counter == 1
-    assert np.linalg.norm(np.array(back.position_ned_m[:2]) - cruise.plant.state.body[:2]) < 0.03
-
-
 # --- all of them -------------------------------------------------------------------------------------------
 
 
@@ -271,9 +246,3 @@ def test_faults_repeat_for_a_seed_and_leave_the_rest_of_the_noise_alone() -> Non
 def test_faults_that_make_no_sense_are_refused(fault: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         Scene.model_validate({"faults": [fault]})
-
-
-def test_two_hands_at_once_are_refused() -> None:
-    catches = [{"kind": "hand_catch", "between_s": [1, 3]}, {"kind": "hand_catch", "between_s": [2, 4]}]
-    with pytest.raises(ValidationError, match="hand_catch act at 2 s"):
-        Scene.model_validate({"faults": catches})

@@ -7,7 +7,6 @@ from sim_vehicle.hil.exchange import (
     ANSWER_TIMEOUT_US,
     FIRST_ANSWER_WORDS,
     MOVES,
-    STARTING_PERIOD_US,
     STARTING_TIMEOUT_US,
     Exchange,
     ExchangeEvent,
@@ -34,15 +33,6 @@ def in_lockstep() -> Exchange:
     exchange.sent(4_000, 1_000)
     exchange.received(answer(4_000))
     return exchange
-
-
-def test_while_px4_boots_samples_go_out_at_a_pace_of_their_own():
-    exchange = starting(now_us=50)
-    assert exchange.next_sample_at_us() == 50
-    exchange.sent(4_000, 60)
-    assert exchange.next_sample_at_us() == 60 + STARTING_PERIOD_US
-    exchange.sent(8_000, 5_000)
-    assert exchange.phase is ExchangePhase.STARTING
 
 
 def test_the_first_answer_begins_lockstep_even_to_an_older_sample():

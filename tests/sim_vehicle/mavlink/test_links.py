@@ -69,15 +69,6 @@ def test_what_is_meant_for_others_is_passed_on_between_links():
     assert asked not in silent.packets
 
 
-def test_somebody_who_was_never_heard_gets_nothing_passed_on():
-    vehicle = Vehicle(ONBOARD, GROUND)
-    vehicle.ends[0].heartbeat()
-    vehicle.run(0.05)
-    asked = vehicle.ends[0].send(dialect.MAVLink_command_long_message(9, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
-    vehicle.run(0.05)
-    assert asked not in vehicle.ends[1].packets
-
-
 def test_a_ping_comes_back_to_its_sender():
     vehicle = Vehicle(ONBOARD)
     (end,) = vehicle.ends

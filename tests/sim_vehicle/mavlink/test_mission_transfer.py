@@ -154,15 +154,6 @@ def test_a_count_of_nothing_clears_and_so_does_clear_all():
         assert exchange.store.mission.items == () and exchange.store.mission_changes > changes
 
 
-def test_the_same_list_again_changes_nothing():
-    # As PX4 does, by its checksum: the mission that is flown goes on
-    exchange = Exchange()
-    exchange.upload(SQUARE)
-    changes = exchange.store.mission_changes
-    assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
-    assert exchange.store.mission_changes == changes
-
-
 def test_a_polygon_needs_three_corners():
     exchange = Exchange()
     corners = [wire_item(n, commands.FENCE_POLYGON_INCLUSION, params=(2.0, 0, 0, 0)) for n in range(2)]

@@ -56,11 +56,6 @@ def test_one_by_name_and_by_index():
     assert name_of_sixteen.param_id == "MPC_XY_VEL_P_ACC"
 
 
-@pytest.mark.parametrize("wrong", [{"name": "NO_SUCH"}, {"index": 9999}, {"name": ""}])
-def test_what_there_is_not_is_not_answered(wrong):
-    assert request(Client(), **wrong) == []
-
-
 @pytest.mark.parametrize("target", [(2, 1), (0, 1), (1, 191)])
 def test_a_request_for_another_or_for_everybody_is_not_answered(target):
     assert request(Client(), "MPC_XY_P", target=target) == []

@@ -83,16 +83,6 @@ def test_vibration_is_the_slow_mean_of_the_jumps():
 ARMED = StatusText(Severity.INFO, "Armed by external command")
 
 
-def test_with_one_the_text_comes_and_ends_in_a_tab():
-    link = TextLink()
-    link.heard_us = 0
-    link.add(ARMED, 0)
-    (message,) = link.due(0)
-    message = read_back(message)
-    assert message.text.rstrip("\0") == "Armed by external command\t"
-    assert (message.severity, message.id, message.chunk_seq) == (6, 0, 0)
-
-
 def test_a_long_text_comes_in_pieces():
     link = TextLink()
     link.heard_us = 0

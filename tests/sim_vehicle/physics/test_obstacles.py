@@ -164,15 +164,6 @@ def test_a_moving_obstacle_hits_as_a_standing_one_is_hit(name: str, kind: str) -
     )
 
 
-def test_a_path_is_followed() -> None:
-    path = [{"at_s": 0.1, "offset_ned_m": [0, 0, 0]}, {"at_s": 0.2, "offset_ned_m": [-1, 0, 0]}]
-    scene = {"walls": [{"point_ned_m": [2, 0, -1], "normal_ned": [-1, 0, 0], "motion": {"path": path}}]}
-    motion = Scene.model_validate(scene).walls_built()[0].motion
-    assert motion.offset_ned_m(0.0) == (0, 0, 0)
-    assert motion.offset_ned_m(0.15) == pytest.approx((-0.5, 0, 0))
-    assert motion.offset_ned_m(9.0) == (-1, 0, 0)
-
-
 @pytest.mark.parametrize(
     "part",
     [

@@ -38,13 +38,6 @@ def hovering(airframe: Airframe, seed: int = 1, **scene: object) -> Plant:
     return plant
 
 
-def test_at_rest_on_the_ground_it_feels_one_g_up() -> None:
-    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
-    last = flown(plant, None, 1.0)[-1]
-    assert last.specific_force_frd_m_s2 == pytest.approx((0, 0, -9.81), abs=0.01)
-    assert plant.state.body[2] == pytest.approx(-0.08, abs=0.005)
-
-
 @pytest.mark.parametrize("yaw_deg", [0, 90, -135])
 def test_it_holds_a_setpoint_and_a_heading(yaw_deg: float) -> None:
     plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
@@ -110,15 +103,6 @@ def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
     assert state.moment_frd_n_m == pytest.approx(expected)
 
 
-def test_hover_thrust_is_the_stated_share() -> None:
-    airframe = quiet(load_built_in("foldable"))
-    output = flown(hovering(airframe), at(0, 0, -2), 1)[-1]
-    assert output.thrust_fraction == pytest.approx(airframe.hover_fraction, abs=0.005)
-    assert load_built_in("foldable").model_copy(update={"mass_kg": 1.0}).hover_fraction == pytest.approx(
-        0.70, abs=0.001
-    )
-
-
 def test_front_motors_pitch_the_nose_up_and_right_motors_roll_left() -> None:
     """PX4's quad-x: front right, rear left, front left, rear right; the first two turn counter-clockwise."""
     assert ARM_DIRECTIONS_FRD[0] == pytest.approx([math.sqrt(0.5), math.sqrt(0.5), 0])
@@ -177,17 +161,3 @@ def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
     assert np.sqrt((error**2).mean()) >= 0.03 * 0.9
     position_error = np.array([output.position_ned_m for output in outputs]) - truth["position_ned_m"][start - 5 : -5]
     assert 0.005 < np.sqrt((position_error**2).mean()) < 0.02
-
-
-def test_a_tumble_in_free_fall_keeps_its_angular_momentum() -> None:
-    airframe = quiet(load_built_in("foldable"))
-    plant = Plant(airframe, Scene(), seed=1)
-    plant.state.body[2] = -80.0
-    plant.state.body[10:13] = [15.0, -9.0, 20.0]
-
-    def momentum() -> float:
-        return float(np.linalg.norm(np.array(airframe.inertia_kg_m2) * plant.state.body[10:13]))
-
-    before = momentum()
-    flown(plant, None, 2.0)
-    assert momentum() == pytest.approx(before, rel=1e-6)
