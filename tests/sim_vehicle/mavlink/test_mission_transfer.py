@@ -105,7 +105,6 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
     ("item", "result"),
     [
         (wire_item(0, frame=1), MissionResult.UNSUPPORTED_FRAME),
-        (wire_item(0, frame=commands.FRAME_GLOBAL_INT, is_int=False), MissionResult.UNSUPPORTED_FRAME),
         (wire_item(0, command=82), MissionResult.UNSUPPORTED),
         (wire_item(0, commands.DO_JUMP), MissionResult.UNSUPPORTED),
         (wire_item(0, commands.WAYPOINT, frame=commands.FRAME_MISSION), MissionResult.UNSUPPORTED),
@@ -183,16 +182,6 @@ def test_the_last_acknowledgement_is_given_again():
     assert MissionResult.ACCEPTED in [ack.type for ack in of_type(acks, "MISSION_ACK")]
     exchange.ask(sent(SQUARE[1]))
     assert said(exchange) == "IGN MISSION_ITEM: No transfer"
-
-
-def test_a_peer_that_wants_the_old_kind_of_item_gets_it():
-    # Given an upload to which the client answers that it does not know MISSION_REQUEST_INT
-    exchange = receiving(1)
-    asked = exchange.ask(client.ack(MissionResult.UNSUPPORTED, MISSION))
-    assert [answer.get_type() for answer in asked] == ["MISSION_REQUEST"]
-    old = wire_item(0, frame=commands.FRAME_GLOBAL_RELATIVE, x=47.397742, y=8.545594, is_int=False)
-    exchange.ask(sent(old))
-    assert exchange.store.mission.items[0].latitude_deg == pytest.approx(47.397742)
 
 
 def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
