@@ -10,27 +10,23 @@ from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
-from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
+from tests.sim_vehicle.autopilot.flying import hovering
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
 SECOND = 1_000_000
 DEFAULTS = Parameters()
 
 
-def taken_off(start: Estimate | None = None) -> Flight:
-    flight = Flight(start)
-    flight.ask(NAV_TAKEOFF)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.LOITER, 12.0)
-    return flight
-
-
-def test_takeoff_climbs_to_two_and_a_half_metres_and_holds():
+def test_takeoff_waits_for_the_motors_climbs_to_two_and_a_half_metres_and_holds():
     flight = Flight()
     flight.ask(NAV_TAKEOFF)
     flight.ask(COMPONENT_ARM_DISARM, 1)
+    left_after_s = flight.fly_until(lambda: flight.height_m > 0.01, 5.0)
+    # One second of spooling up, then the ramp from -2.45 m/s, which passes zero after 45 % of its 3 s;
+    # the first centimetre takes another 0.2 s at the speed that is allowed then
+    assert left_after_s == pytest.approx(1.0 + 1.35 + 0.2, abs=0.03)
     fastest = 0.0
     while flight.autopilot.modes.flown is Mode.TAKEOFF:
         flight.step()
@@ -41,16 +37,6 @@ def test_takeoff_climbs_to_two_and_a_half_metres_and_holds():
     assert 1.0 < fastest <= 1.55
     flight.fly(5.0)
     assert flight.height_m == pytest.approx(2.5, abs=0.02)
-
-
-def test_nothing_leaves_the_ground_before_the_motors_are_up_to_speed():
-    flight = Flight()
-    flight.ask(NAV_TAKEOFF)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    left_after_s = flight.fly_until(lambda: flight.height_m > 0.01, 5.0)
-    # One second of spooling up, then the ramp from -2.45 m/s, which passes zero after 45 % of its 3 s;
-    # the first centimetre takes another 0.2 s at the speed that is allowed then
-    assert left_after_s == pytest.approx(1.0 + 1.35 + 0.2, abs=0.03)
 
 
 def test_armed_and_left_alone_it_stays_on_the_ground_and_disarms():
@@ -96,8 +82,7 @@ def test_after_a_landing_the_ramp_begins_again():
 
 
 def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground():
-    flight = taken_off()
-    flight.fly(3.0)
+    flight = hovering(2.5)
     flight.ask(NAV_LAND)
     flight.fly(1.5)
     assert flight.state.velocity_ned_m_s[2] == pytest.approx(0.7, abs=0.01)

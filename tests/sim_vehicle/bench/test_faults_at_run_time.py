@@ -10,7 +10,7 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import FaultError
 from sim_vehicle.testing import FaultRequest, LockstepVehicle, faults
-from tests.sim_vehicle.bench.pilot import Pilot
+from tests.sim_vehicle.bench.pilot import Pilot, hovering
 
 
 def standing(**setup: Any) -> Pilot:
@@ -18,12 +18,6 @@ def standing(**setup: Any) -> Pilot:
     pilot = Pilot(LockstepVehicle(**setup))
     pilot.fly(1.0)
     pilot.forget()
-    return pilot
-
-
-def hovering(**setup: Any) -> Pilot:
-    pilot = Pilot(LockstepVehicle(**setup))
-    pilot.take_off()
     return pilot
 
 
@@ -98,13 +92,6 @@ def test_a_clock_jumps_and_jumps_back() -> None:
     pilot.fly(1.0)
     jumps = np.diff(stamps(pilot)) / 1e6
     assert jumps.max() == pytest.approx(100.0, abs=0.03) and jumps.min() == pytest.approx(-100.0, abs=0.03)
-    pilot.forget()
-    jumped = pilot.vehicle.inject(faults.clock_jump(7.0))
-    pilot.fly(0.5)
-    jumped.remove()
-    pilot.fly(0.5)
-    late_s = pilot.vehicle.time_s - stamps(pilot)[-1] / 1e6
-    assert abs(late_s) < 0.03 and np.diff(stamps(pilot)).min() == pytest.approx(-7e6, abs=0.03e6)
 
 
 def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -> None:

@@ -9,15 +9,9 @@ import pytest
 
 from sim_vehicle.errors import AirframeError, ParameterError, SceneError
 from sim_vehicle.testing import LockstepVehicle, Motion, Pole, Wall, faults
-from tests.sim_vehicle.bench.pilot import Pilot
+from tests.sim_vehicle.bench.pilot import Pilot, hovering
 
 HOVER_M = 2.5
-
-
-def hovering(**setup: Any) -> Pilot:
-    pilot = Pilot(LockstepVehicle(**setup))
-    pilot.take_off()
-    return pilot
 
 
 def pushed_north(pilot: Pilot) -> None:

@@ -10,8 +10,6 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import (
-    ARM_DIRECTIONS_FRD,
-    ROTOR_YAW_SIGNS,
     constants_from,
     initial_state,
 )
@@ -101,17 +99,6 @@ def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
 
     expected = np.cross(rates, full(state.inertia) @ rates) + full(state.inertia_rate) @ rates
     assert state.moment_frd_n_m == pytest.approx(expected)
-
-
-def test_front_motors_pitch_the_nose_up_and_right_motors_roll_left() -> None:
-    """PX4's quad-x: front right, rear left, front left, rear right; the first two turn counter-clockwise."""
-    assert ARM_DIRECTIONS_FRD[0] == pytest.approx([math.sqrt(0.5), math.sqrt(0.5), 0])
-    for motors, axis, sign in (((0, 2), 1, 1), ((0, 3), 0, -1), ((0, 1), 2, 1)):
-        plant = hovering(quiet(load_built_in("foldable")))
-        plant.state.motor_thrust_n[list(motors)] += 0.5
-        plant.step(None, armed=True)
-        assert sign * plant.state.body[10 + axis] > 0.005
-    assert ROTOR_YAW_SIGNS.sum() == 0
 
 
 def test_driven_motors_do_as_they_are_told() -> None:
