@@ -24,8 +24,8 @@ from sim_vehicle.vehicle import SimulatedVehicle
 TIMEOUT_S = 5.0
 
 
-def new_vehicle(system: int = 1) -> SimulatedVehicle:
-    return SimulatedVehicle(load_built_in("foldable"), Scene(), 1, parameters={"MAV_SYS_ID": system})
+def new_vehicle() -> SimulatedVehicle:
+    return SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
 
 
 @contextmanager

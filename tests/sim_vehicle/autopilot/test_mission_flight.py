@@ -29,8 +29,8 @@ def begun(*items: StoredItem) -> Flight:
     return flight
 
 
-def reached(flight: Flight, number: int, at_most_s: float = 60.0) -> float:
-    return flight.fly_until(lambda: flight.autopilot.missions.progress.reached >= number, at_most_s)
+def reached(flight: Flight, number: int) -> float:
+    return flight.fly_until(lambda: flight.autopilot.missions.progress.reached >= number, 60.0)
 
 
 def north_east(flight: Flight) -> tuple[float, float]:

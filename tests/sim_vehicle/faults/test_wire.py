@@ -24,12 +24,12 @@ def number_in(raw: bytes) -> int:
     return int.from_bytes(raw[10:12], "little")
 
 
-def carried(seed: int = 1, count: int = 20_000, **fault: Any) -> tuple[list[tuple[int, bytes]], Wire]:
+def carried(**fault: Any) -> tuple[list[tuple[int, bytes]], Wire]:
     """One frame every 4 ms; (time, frame) as they arrive."""
-    wire = Wire([WireFault.model_validate({"kind": "wire", "at_s": 0, **fault})], seed)
+    wire = Wire([WireFault.model_validate({"kind": "wire", "at_s": 0, **fault})], 1)
     arrived = []
-    for step in range(count + 500):
-        frames = [frame(step)] if step < count else []
+    for step in range(20_500):
+        frames = [frame(step)] if step < 20_000 else []
         arrived += [(step * STEP_US, raw) for raw in wire.carry(frames, step * STEP_US)]
     return arrived, wire
 

@@ -21,9 +21,9 @@ def answer(time_us: int, armed: bool = True, is_lockstep: bool = True) -> Actuat
     return ActuatorControls(time_us, armed, is_lockstep, HALF_THRUST)
 
 
-def starting(now_us: int = 0) -> Exchange:
+def starting() -> Exchange:
     exchange = Exchange()
-    exchange.connected(now_us)
+    exchange.connected(0)
     return exchange
 
 

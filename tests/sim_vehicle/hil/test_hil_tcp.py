@@ -64,9 +64,9 @@ DUE_IN_A_SECOND = {
 }  # fmt: skip
 
 
-def boot(px4: Px4Client, unanswered: int = 12) -> None:
+def boot(px4: Px4Client) -> None:
     """PX4's modules need some samples before the first motor command."""
-    for _ in range(unanswered):
+    for _ in range(12):
         px4.next_step()
     px4.answer([0.0] * 4, armed=False)
 

@@ -23,8 +23,8 @@ RIGHT_WING_DOWN = (HALF, HALF, 0.0, 0.0)
 FOLDABLE = load_built_in("foldable")
 
 
-def new_vehicle(sample_interval_us: int = 4_000) -> HilVehicle:
-    return HilVehicle(FOLDABLE, Scene(), seed=1, sample_interval_us=sample_interval_us)
+def new_vehicle() -> HilVehicle:
+    return HilVehicle(FOLDABLE, Scene(), seed=1, sample_interval_us=4_000)
 
 
 def flown(vehicle: HilVehicle, seconds: float, motor_fraction: float) -> list:

@@ -61,8 +61,8 @@ def ack(result, kind, peer=CLIENT):
     return sent(dialect.MAVLink_mission_ack_message(1, 1, result, kind), peer)
 
 
-def clear_all(kind, peer=CLIENT):
-    return sent(dialect.MAVLink_mission_clear_all_message(1, 1, kind), peer)
+def clear_all(kind):
+    return sent(dialect.MAVLink_mission_clear_all_message(1, 1, kind))
 
 
 def set_current(number, peer=CLIENT):
@@ -129,9 +129,11 @@ class Exchange:
                 self.asked.append(said)
         raise AssertionError("no acknowledgement came")
 
-    def download(self, kind=MissionType.MISSION):
+    def download(self):
         """The items that the client gets, in their order."""
-        (said,) = of_type(self.ask(request_list(kind)), "MISSION_COUNT")
-        items = [of_type(self.ask(request_item(n, kind)), "MISSION_ITEM_INT")[0] for n in range(said.count)]
-        self.ask(ack(MissionResult.ACCEPTED, kind))
+        (said,) = of_type(self.ask(request_list(MissionType.MISSION)), "MISSION_COUNT")
+        items = [
+            of_type(self.ask(request_item(n, MissionType.MISSION)), "MISSION_ITEM_INT")[0] for n in range(said.count)
+        ]
+        self.ask(ack(MissionResult.ACCEPTED, MissionType.MISSION))
         return items

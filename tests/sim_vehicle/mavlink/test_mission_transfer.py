@@ -17,9 +17,9 @@ MISSION = MissionType.MISSION
 SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(3, commands.LAND)]
 
 
-def receiving(count: int = 3) -> Exchange:
+def receiving() -> Exchange:
     exchange = Exchange()
-    exchange.ask(client.count(count, MISSION))
+    exchange.ask(client.count(3, MISSION))
     assert exchange.transfer.state is TransferState.RECEIVING
     return exchange
 

@@ -84,11 +84,8 @@ MESSAGES = [
 ]
 
 
-US = Identity()
-
-
-def decoder(us=US) -> Decoder:
-    return Decoder(us, READ)
+def decoder() -> Decoder:
+    return Decoder(Identity(), READ)
 
 
 def ids(messages) -> list[int]:
