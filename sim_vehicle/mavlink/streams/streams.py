@@ -76,6 +76,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(147, Topic.BATTERY, condition.battery_status),
     StreamKind(2, Topic.ALWAYS_NEW, condition.system_time),
     StreamKind(4, Topic.ALWAYS_NEW, condition.ping),
+    StreamKind(69, Topic.STICKS, condition.manual_control),
     StreamKind(29, Topic.AIR, condition.scaled_pressure),
     StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
     StreamKind(375, Topic.SAMPLE, condition.actuator_output_status),
