@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.hil.slow_sensors import SlowSensors
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
@@ -140,18 +140,18 @@ class SimulatedVehicle:
         """What really happened, never sent."""
         return self._plant.truth
 
-    def add_link(self, options: LinkOptions) -> Link:
+    def add_link(self, kind: LinkKind) -> Link:
         """One more connection, from now on."""
         number, seed = self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far
-        link = self._new_link(options, number, seed)
+        link = self._new_link(kind, number, seed)
         self._links_so_far += 1
         self._links.append(link)
         return link
 
-    def _new_link(self, options: LinkOptions, number: int, seed: int) -> Link:
+    def _new_link(self, kind: LinkKind, number: int, seed: int) -> Link:
         if needs_faulty_link(self._scene.faults):
-            return FaultyLink(options, self._board, number, seed, self._scene.faults)
-        return Link(options, self._board, number, seed)
+            return FaultyLink(kind, self._board, number, seed, self._scene.faults)
+        return Link(kind, self._board, number, seed)
 
     def remove_link(self, link: Link) -> None:
         """The connection has ended."""
@@ -161,7 +161,7 @@ class SimulatedVehicle:
         """One interval for a lone companion: apply the bytes received since the last, return the packets to send."""
         link = self._companion_link
         if link is None:
-            link = self._companion_link = self.add_link(LinkOptions(LinkKind.ONBOARD))
+            link = self._companion_link = self.add_link(LinkKind.ONBOARD)
         link.push(received)
         self.advance()
         return link.take()

@@ -29,7 +29,7 @@ from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
 # A clock that is read goes on.
@@ -261,7 +261,7 @@ class Air:
 
     def add_pilot(self) -> None:
         """A ground station with centred sticks, on a link of its own."""
-        self._pilot = self.vehicle.add_link(LinkOptions(LinkKind.GROUND))
+        self._pilot = self.vehicle.add_link(LinkKind.GROUND)
 
     def take_over(self) -> None:
         """The pilot takes position mode."""

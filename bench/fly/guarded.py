@@ -25,7 +25,7 @@ from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from rebound_cli.simulation.lockstep import EPOCH_US
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.scene import Scene
@@ -116,7 +116,7 @@ def begun(case: FlownHit, scene: Scene, keeps_path: bool) -> Flight:
     built, velocity = vehicle_of_hit(case.hit), velocity_of(case.hit, np.random.default_rng([case.hit.seed, 1]))
     vehicle = FlyingVehicle(built.airframe, scene, case.hit.seed, keeps_path)
     vehicle.begin_in_flight((0.0, 0.0, -HEIGHT_M), (float(velocity[0]), float(velocity[1]), 0.0))
-    link = vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
+    link = vehicle.add_link(LinkKind.ONBOARD)
     link.introduce()
     streams = {"highres_imu_hz": float(case.imu_hz), "window_s": WINDOW_S}
     guard = Guard(GuardConfig.model_validate({"companion": {**built.settings, "streams": streams}}))

@@ -135,7 +135,7 @@ class Autopilot:
     def run_commander(self) -> list[CommandAck]:
         """Commands, failsafes, arming: everything that can change mode or arming."""
         self._look()
-        self.commander.run(self._now_us, self._estimate.attitude_wxyz)
+        self.commander.run(self._now_us)
         if self.navigator.mission.commands:
             self._run_mission_commands()
         acks: list[CommandAck] = []

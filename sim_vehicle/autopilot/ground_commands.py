@@ -30,7 +30,7 @@ UNANSWERED = frozenset(
 
 
 # FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.
-_GPS, _BATTERY = 4, 100
+_GPS = 4
 _WELL, _OFF = 0, 1
 # PREFLIGHT_STORAGE: of its actions, those that go back to the defaults.
 _RESETS = (2, 3, 4)
@@ -73,16 +73,13 @@ def _reboot(command: Command, flight: CommandedVehicle) -> Result:
 
 
 def _inject_failure(command: Command, flight: CommandedVehicle) -> Result:
-    """No fix any more, or the charge gone; or well again."""
+    """No fix any more; or well again."""
     unit, kind = _whole(command.param1), _whole(command.param2)
-    if unit not in (_GPS, _BATTERY) or kind not in (_WELL, _OFF):
+    if unit != _GPS or kind not in (_WELL, _OFF):
         return Result.UNSUPPORTED
     if not flight.parameters["SYS_FAILURE_EN"]:
         return Result.DENIED
-    if unit == _GPS:
-        flight.commander.positioning.gps_is_off = kind == _OFF
-    else:
-        flight.commander.battery.is_forced_empty = kind == _OFF
+    flight.commander.positioning.gps_is_off = kind == _OFF
     return Result.ACCEPTED
 
 

@@ -68,19 +68,13 @@ def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
 def mode_from_request(base: int, main: int, sub: int) -> Mode | None:
     """The mode that DO_SET_MODE's three parameters name; None for one this vehicle does not know.
 
-    As Commander.cpp: AUTO without a sub mode is MISSION, POSCTL takes every sub mode for itself, and without the
-    custom flag the base mode's own bits decide.
+    As Commander.cpp: AUTO without a sub mode is MISSION, and POSCTL takes every sub mode for itself. Modes by the base
+    mode's own bits, which nobody has asked a PX4 for since there are custom modes, are unknown here.
     """
-    if base & CUSTOM_FLAG:
-        if main == _POSITION_MAIN_MODE:
-            return Mode.POSCTL
-        if main == AUTO_MAIN_MODE:
-            return _MODE_OF_CUSTOM.get(custom_mode(main, sub)) if sub > 0 else Mode.MISSION
-        return _MODE_OF_CUSTOM.get(custom_mode(main))
-    if base & AUTO_FLAG:
-        return Mode.MISSION
-    if not base & MANUAL_FLAG:
+    if not base & CUSTOM_FLAG:
         return None
-    if base & GUIDED_FLAG:
+    if main == _POSITION_MAIN_MODE:
         return Mode.POSCTL
-    return Mode.STABILIZED if base & STABILIZE_FLAG else Mode.MANUAL
+    if main == AUTO_MAIN_MODE:
+        return _MODE_OF_CUSTOM.get(custom_mode(main, sub)) if sub > 0 else Mode.MISSION
+    return _MODE_OF_CUSTOM.get(custom_mode(main))

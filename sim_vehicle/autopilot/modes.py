@@ -3,7 +3,6 @@
 Sources: commander/ModeUtil/mode_requirements.cpp, UserModeIntention.cpp and failsafe/failsafe.cpp of PX4.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from functools import cache
@@ -202,10 +201,10 @@ class ModeState:
             self._after_disarming = mode
 
 
-def mode_diagram(rows: Iterable[Transition] = TRANSITIONS) -> str:
+def mode_diagram() -> str:
     """The table as a mermaid state diagram."""
     lines = ["stateDiagram-v2", f"    [*] --> {ModeState().intended.name}"]
-    for row in rows:
+    for row in TRANSITIONS:
         sources = [mode.name for mode in row.sources] if row.sources else ["ANY_MODE"]
         target = row.target.name if row.target is not None else "MODE_BEFORE"
         lines += [f"    {source} --> {target}: {row.event}{_condition(row)}" for source in sources]

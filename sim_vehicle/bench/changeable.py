@@ -5,8 +5,9 @@ from sim_vehicle.autopilot.mode_numbers import NUMBERS
 from sim_vehicle.errors import FaultError, SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.mavlink.faulty_link import FaultyLink
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.restamp import check_messages
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import Constants
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -23,8 +24,8 @@ class ChangeableVehicle(SimulatedVehicle):
         self._faults: list[Fault] = list(scene.faults)
         super().__init__(airframe, scene, seed, epoch_at_boot_us=epoch_at_boot_us, parameters=parameters)
 
-    def _new_link(self, options: LinkOptions, number: int, seed: int) -> Link:
-        return FaultyLink(options, self._board, number, seed, self._faults)
+    def _new_link(self, kind: LinkKind, number: int, seed: int) -> Link:
+        return FaultyLink(kind, self._board, number, seed, self._faults)
 
     @property
     def constants(self) -> Constants:

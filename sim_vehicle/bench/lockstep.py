@@ -4,7 +4,6 @@ from typing import Any
 
 from sim_vehicle.bench.bench import Bench, Condition, Setup
 from sim_vehicle.errors import ConditionNotMet
-from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import link_kind
 
 
@@ -17,7 +16,7 @@ class LockstepVehicle(Bench):
         Raises AirframeError, SceneError, ParameterError and LinkAddressError.
         """
         super().__init__(Setup(**setup))
-        self._link = self.vehicle.add_link(LinkOptions(link_kind(streams)))
+        self._link = self.vehicle.add_link(link_kind(streams))
 
     def send(self, data: bytes) -> None:
         """MAVLink bytes to the vehicle, which reads them in the next interval."""

@@ -14,13 +14,13 @@ _SEA_LEVEL_PA, _SEA_LEVEL_K, _LAPSE_K_M = 101_325.0, 288.15, 0.0065
 _EXPONENT = 9.80665 / (287.0528 * _LAPSE_K_M)
 
 
-def magnetic_field_ned_gauss(home: Place = HOME, year: float = FIELD_YEAR) -> Vector3:
+def magnetic_field_ned_gauss(home: Place = HOME) -> Vector3:
     """The World Magnetic Model's field, the same all over a scene."""
     # Here: only a vehicle that is simulated needs it.
     from pygeomag import GeoMag
 
     field = GeoMag(coefficients_file=_FIELD_MODEL).calculate(
-        glat=home.latitude_deg, glon=home.longitude_deg, alt=home.altitude_m / 1000, time=year
+        glat=home.latitude_deg, glon=home.longitude_deg, alt=home.altitude_m / 1000, time=FIELD_YEAR
     )
     return field.x / _NANOTESLA_PER_GAUSS, field.y / _NANOTESLA_PER_GAUSS, field.z / _NANOTESLA_PER_GAUSS
 

@@ -26,7 +26,6 @@ Message: TypeAlias = Any
 NAN = math.nan
 _NO_OFFSET = (0.0, 0.0, 0.0, 0.0)
 _TEXT_BYTES = 50
-AUTOPILOT_VERSION_ID = 148
 # HIGHRES_IMU.fields_updated: accelerometer and gyroscope; magnetometer; pressure, its altitude and temperature.
 _INERTIAL_FIELDS, _MAGNETIC_FIELDS, _AIR_FIELDS = 0x3F, 0x1C0, 0x1A00
 
@@ -71,12 +70,6 @@ class Encoder:
         signing = self._link.signing
         signing.secret_key, signing.sign_outgoing = key, True
         signing.link_id, signing.timestamp = link_number, max(signing.timestamp, time_stamp)
-
-
-def payload_bytes(message_id: int) -> int:
-    """Length of a message's whole payload."""
-    length: int = dialect.mavlink_map[message_id].unpacker.size
-    return length
 
 
 def heartbeat(state: Telemetry) -> Message:

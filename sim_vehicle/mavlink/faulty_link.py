@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from sim_vehicle.faults.spec import ClockJump, Fault, ImuDropout, WireFault
 from sim_vehicle.faults.wire import Wire, split
 from sim_vehicle.mavlink.decode import ForeignPacket
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.restamp import Restamper, message_number
 from sim_vehicle.mavlink.services.board import Board
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
 # HIGHRES_IMU, SCALED_IMU, RAW_IMU and the second and third sensor's SCALED_IMU2 and 3.
 _INERTIAL = (105, 26, 27, 116, 129)
@@ -18,8 +19,8 @@ _INBOUND_SEED = 0x1B
 class FaultyLink(Link):
     """The same link; between it and whoever is at the other end lies the wire."""
 
-    def __init__(self, options: LinkOptions, board: Board, number: int, seed: int, faults: Sequence[Fault]) -> None:
-        super().__init__(options, board, number, seed)
+    def __init__(self, kind: LinkKind, board: Board, number: int, seed: int, faults: Sequence[Fault]) -> None:
+        super().__init__(kind, board, number, seed)
         self._outbound = Wire((), seed, message_number)
         self._inbound = Wire((), seed ^ _INBOUND_SEED, message_number)
         self._on_wire: list[tuple[Fault, Wire, WireFault]] = []

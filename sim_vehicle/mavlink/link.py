@@ -1,7 +1,6 @@
 """One MAVLink connection: packets, streams, texts, services. The links of a vehicle know nothing of each other."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -9,7 +8,7 @@ from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
-from sim_vehicle.mavlink.line import FAST_LINE, Line, Outbox
+from sim_vehicle.mavlink.outbox import Outbox
 from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.command_service import CommandService
 from sim_vehicle.mavlink.services.file_service import FileService
@@ -21,11 +20,6 @@ from sim_vehicle.mavlink.services.texts import TextLink
 from sim_vehicle.mavlink.signing import OPTIONAL
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
-from sim_vehicle.parameters.store import Parameters
-
-# Of a serial line's buffer, for the streams between the packets of a long answer.
-_RESERVED_BYTES = 1_000
-
 
 # What every link offers, a line a protocol, in the order in which they are brought up to date in an interval.
 SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
@@ -37,20 +31,11 @@ SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class LinkOptions:
-    """What a link is for, what lies under it, and whether it passes on what is meant for others (MAV_n_FORWARD)."""
-
-    kind: LinkKind
-    line: Line = FAST_LINE
-    forwards: bool = True
-
-
 class Link:
     """Bytes in, packets out. ``number`` tells the links of a vehicle apart in signatures."""
 
-    def __init__(self, options: LinkOptions, board: Board, number: int, seed: int) -> None:
-        self.options = options
+    def __init__(self, kind: LinkKind, board: Board, number: int, seed: int) -> None:
+        self.kind = kind
         self._number = number
         self._seed = seed
         self._waiting = b""
@@ -58,13 +43,12 @@ class Link:
 
     def boot(self, board: Board) -> None:
         """Begin as after switching on; nothing of the past is remembered."""
-        options, seed, line = self.options, self._seed, self._planned_line(board.parameters)
         self.now_us = board.telemetry.sample.time_boot_us
         self._board = board
         self._signing = board.signing.of_link()
         self._encoder = Encoder(board.identity)
-        self._outbox = Outbox(self._encoder, line, self.now_us)
-        self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, line)
+        self._outbox = Outbox(self._encoder)
+        self.streams = Streams(board.telemetry, board.topics, self._outbox, self.kind, self._seed)
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
         self._busy = tuple(service for service in self._services if isinstance(service, BusyService))
@@ -76,17 +60,6 @@ class Link:
         for service in self._services:
             self.handlers.update(service.handlers)
         self._decoder = Decoder(board.identity, self.handlers, self._signing)
-        if options.line.baud is not None:
-            # Over a serial port PX4 introduces itself unasked.
-            self.streams.send_now(encode.AUTOPILOT_VERSION_ID)
-
-    def _planned_line(self, parameters: Parameters) -> Line:
-        """A serial line is PX4's TELEM 1 where it serves a ground station and TELEM 2 where it serves a companion."""
-        line = self.options.line
-        if line.baud is None:
-            return line
-        name = "MAV_1_RATE" if self.options.kind is LinkKind.ONBOARD else "MAV_0_RATE"
-        return replace(line, planned_bytes_s=int(parameters[name]))
 
     def introduce(self) -> None:
         """Send HEARTBEAT now, and not only when its first second is over."""
@@ -110,13 +83,6 @@ class Link:
         """Send something that is no stream."""
         self._outbox.send(message)
 
-    def burst(self, fast: int, serial: int, size: int) -> int:
-        """How many packets of ``size`` bytes of a long answer may be sent now: at most ``serial`` on a serial line."""
-        if self.options.line.baud is None:
-            return fast
-        room = (count for count in range(serial, 0, -1) if self._outbox.has_room(count * size + _RESERVED_BYTES))
-        return next(room, 0)
-
     # --- what the vehicle's step calls, in this order ----------------------------------------------------
 
     def acknowledge(self, acks: Sequence[CommandAck]) -> None:
@@ -131,7 +97,7 @@ class Link:
             return []
         data, self._waiting = self._waiting, b""
         decoder, parameters = self._decoder, self._board.parameters
-        decoder.foreign = [] if collects_foreign and self.options.forwards else None
+        decoder.foreign = [] if collects_foreign else None
         decoder.signing_is_optional = parameters["MAV_SIGN_CFG"] == OPTIONAL
         for packet in decoder.push(data):
             self.handlers[packet.get_msgId()](packet)
@@ -139,8 +105,6 @@ class Link:
 
     def forward(self, packets: Iterable[ForeignPacket]) -> None:
         """Pass on what came over other links, if somebody here may want it."""
-        if not self.options.forwards:
-            return
         for packet in packets:
             if self._has_heard(packet.target_system, packet.target_component):
                 self._outbox.forward(packet.raw)
@@ -148,7 +112,6 @@ class Link:
     def update(self, now_us: int, texts: Sequence[StatusText]) -> None:
         """Send what is due at the end of the interval."""
         self.now_us = now_us
-        self._outbox.advance(now_us)
         if self._signing.key is not None:
             self._encoder.sign(self._signing.key, self._number, self._signing.next_stamp)
         for text in texts:

@@ -22,9 +22,8 @@ class Cruise:
         velocity_ned_m_s: Vector3,
         yaw_rad: float = 0.0,
         seed: int = 1,
-        keeps_path: bool = True,
     ) -> None:
-        self.plant = Plant(airframe, scene, seed, keeps_path)
+        self.plant = Plant(airframe, scene, seed)
         self.plant.cruise(position_ned_m, velocity_ned_m_s, yaw_rad)
         self._from = position_ned_m
         self._velocity = velocity_ned_m_s

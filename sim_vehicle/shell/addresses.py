@@ -3,7 +3,6 @@
 udpout://127.0.0.1:14550          sends to this address, unasked
 udpin://0.0.0.0:14551             waits for clients, as many as come
 tcpin://0.0.0.0:5760              the same on TCP
-serial:///dev/ttyUSB0:57600       a serial line
 
 With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins with.
 """
@@ -11,11 +10,8 @@ With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins wi
 import re
 
 from sim_vehicle.errors import LinkAddressError
-from sim_vehicle.mavlink.line import Line
-from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind, link_kind
 from sim_vehicle.shell.port import Address, Port
-from sim_vehicle.shell.serial_port import SerialPort
 from sim_vehicle.shell.tcp_port import TcpServerPort
 from sim_vehicle.shell.udp_ports import UdpPeerPort, UdpServerPort
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -26,7 +22,7 @@ GROUND_LISTEN_PORT, GROUND_PORT = 18570, 14550
 
 _ADDRESS = re.compile(r"^(?P<scheme>\w+)://(?P<rest>[^?]+)(\?set=(?P<set>\w+))?$")
 _HIGHEST_PORT = 65_535
-_FORMS = "udpout://HOST:PORT, udpin://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
+_FORMS = "udpout://HOST:PORT, udpin://HOST:PORT or tcpin://HOST:PORT"
 
 
 def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
@@ -35,18 +31,14 @@ def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
     if found is None:
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
     scheme, rest = found["scheme"], found["rest"]
-    if scheme == "serial":
-        device, baud = _split(address, rest)
-        options = LinkOptions(_kind(address, found["set"], LinkKind.ONBOARD), Line(baud), forwards=False)
-        return SerialPort(vehicle, options, device, baud)
-    options = LinkOptions(_kind(address, found["set"], LinkKind.GROUND))
+    kind = _kind(address, found["set"])
     host, port = _host_and_port(address, rest)
     if scheme == "udpout":
-        return UdpPeerPort(vehicle, options, 0, (host, port))
+        return UdpPeerPort(vehicle, kind, 0, (host, port))
     if scheme == "udpin":
-        return UdpServerPort(vehicle, options, host, port)
+        return UdpServerPort(vehicle, kind, host, port)
     if scheme == "tcpin":
-        return TcpServerPort(vehicle, options, host, port)
+        return TcpServerPort(vehicle, kind, host, port)
     raise LinkAddressError(f"{address!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
 
 
@@ -57,7 +49,7 @@ def px4_ports(
 
     ``listen_port`` 0: both listen wherever there is room.
     """
-    onboard, ground = LinkOptions(LinkKind.ONBOARD), LinkOptions(LinkKind.GROUND)
+    onboard, ground = LinkKind.ONBOARD, LinkKind.GROUND
     ground_listen_port = 0 if listen_port == 0 else GROUND_LISTEN_PORT + instance
     listen_port = COMPANION_LISTEN_PORT + instance if listen_port is None else listen_port
     ports: list[Port] = []
@@ -71,22 +63,17 @@ def px4_ports(
     return ports
 
 
-def _kind(address: str, name: str | None, default: LinkKind) -> LinkKind:
+def _kind(address: str, name: str | None) -> LinkKind:
     try:
-        return default if name is None else link_kind(name)
+        return LinkKind.GROUND if name is None else link_kind(name)
     except LinkAddressError as problem:
         raise LinkAddressError(f"{address!r}: {problem}") from problem
 
 
-def _split(address: str, rest: str) -> tuple[str, int]:
-    name, separator, number = rest.rpartition(":")
-    if not separator or not name or not number.isdecimal():
-        raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
-    return name, int(number)
-
-
 def _host_and_port(address: str, rest: str) -> tuple[str, int]:
-    host, port = _split(address, rest)
-    if port > _HIGHEST_PORT:
+    host, separator, number = rest.rpartition(":")
+    if not separator or not host or not number.isdecimal():
+        raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
+    if int(number) > _HIGHEST_PORT:
         raise LinkAddressError(f"{address!r} names no port: give one from 0 to {_HIGHEST_PORT}.")
-    return host, port
+    return host, int(number)

@@ -3,7 +3,8 @@
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, wait
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -13,13 +14,11 @@ from sim_vehicle.bench.faults import FaultRequest
 from sim_vehicle.bench.timeline import TimelineEntry
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet, SimulationError, VehicleEnded
-from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import link_kind
 from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import open_port
-from sim_vehicle.shell.control import Control
 from sim_vehicle.shell.port import Port
-from sim_vehicle.shell.realtime import serve
+from sim_vehicle.shell.realtime import RealtimePace, serve_interval
 from sim_vehicle.shell.tcp_port import TcpServerPort
 from sim_vehicle.shell.truth_file import save_truth
 from sim_vehicle.shell.udp_ports import UdpServerPort
@@ -28,8 +27,6 @@ from sim_vehicle.truth import TruthRecorder
 Answer = TypeVar("Answer")
 
 _HERE = "127.0.0.1"
-# How long an order may be late to notice that the vehicle has just ended.
-_LOOK_S = 0.1
 # Slower than this an order would wait for seconds until the next interval.
 _SLOWEST = 0.01
 
@@ -47,12 +44,12 @@ def start_vehicle(
     _check(speed)
     parameters = {**time_outs_at(speed), **setup.pop("parameters", {})}
     bench = Bench(Setup(parameters=parameters, **setup), time.time_ns() // 1000)
-    options = LinkOptions(link_kind(streams))
+    kind = link_kind(streams)
     ports: list[Port] = []
     try:
-        udp = UdpServerPort(bench.vehicle, options, _HERE, 0)
+        udp = UdpServerPort(bench.vehicle, kind, _HERE, 0)
         ports.append(udp)
-        tcp = TcpServerPort(bench.vehicle, options, _HERE, 0)
+        tcp = TcpServerPort(bench.vehicle, kind, _HERE, 0)
         ports.append(tcp)
         ports += [open_port(bench.vehicle, address) for address in links]
     except BaseException:
@@ -99,13 +96,17 @@ class RunningVehicle:
         self.mavutil_address = f"tcp:{_HERE}:{tcp_port}"
         """For pymavlink's `mavutil.mavlink_connection` and MAVProxy."""
         self.udp_port, self.tcp_port = udp_port, tcp_port
-        self._bench, self._control = bench, Control(speed)
+        self._bench, self._ports = bench, ports
+        self._pace = RealtimePace(bench.vehicle.time_boot_us, speed)
         self._waiting: list[_Waiting] = []
-        self._stopped = threading.Event()
+        self._is_paused = self._has_ended = False
         self._problem: Exception | None = None
         self._reported = False
-        self._thread = threading.Thread(target=self._fly, args=(ports,), name="simulated vehicle", daemon=True)
-        self._thread.start()
+        self._ident: int | None = None
+        # One thread flies an interval after the other, and does in between what is asked of it.
+        self._thread = ThreadPoolExecutor(1, "simulated vehicle", self._begin)
+        self._flies = True
+        self._thread.submit(self._fly)
 
     # --- what a test does --------------------------------------------------------------------------------
 
@@ -127,25 +128,32 @@ class RunningVehicle:
 
     def pause(self) -> None:
         """Let the vehicle's time and its telemetry stand still, as a paused simulator of PX4's does."""
-        self._ask(lambda: setattr(self._control, "is_paused", True))
+        self._ask(lambda: setattr(self, "_is_paused", True))
 
     def resume(self) -> None:
         """Go on where it stood."""
-        self._ask(lambda: setattr(self._control, "is_paused", False))
+        self._ask(self._go_on)
+
+    def _go_on(self) -> None:
+        self._is_paused = False
+        if not self._flies:
+            self._flies = True
+            self._pace.restart(self.speed)
+            self._thread.submit(self._fly)
 
     @property
     def is_paused(self) -> bool:
-        return self._control.is_paused
+        return self._is_paused
 
     @property
     def speed(self) -> float:
         """How many times real time, at most; 0 for as fast as it goes. May be set at any time."""
-        return self._control.speed
+        return self._pace.speed
 
     @speed.setter
     def speed(self, speed: float) -> None:
         _check(speed)
-        self._ask(lambda: setattr(self._control, "speed", speed))
+        self._ask(lambda: self._pace.restart(speed))
 
     def wait_until(self, condition: Condition, within_s: float) -> Truth:
         """Wait until a condition on the truth holds, looked at after each interval; return the truth of that moment.
@@ -196,8 +204,9 @@ class RunningVehicle:
 
     def stop(self) -> None:
         """End the thread and give the ports back. Raises VehicleEnded if it had come to grief before."""
-        self._stopped.set()
-        self._thread.join()
+        with suppress(VehicleEnded):
+            self._ask(self._end)
+        self._thread.shutdown()
         problem, self._reported = self._problem if not self._reported else None, True
         if problem is not None:
             raise self._ended() from problem
@@ -208,17 +217,26 @@ class RunningVehicle:
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    def _fly(self, ports: list[Port]) -> None:
-        bench = self._bench
+    def _begin(self) -> None:
+        self._ident = threading.get_ident()
+        self._pace.restart(self.speed)
+
+    @property
+    def _is_in_thread(self) -> bool:
+        return threading.get_ident() == self._ident
+
+    def _fly(self) -> None:
+        """One interval, and the next after what is asked for meanwhile."""
+        self._flies = not (self._is_paused or self._has_ended)
+        if not self._flies:
+            return
         try:
-            serve(bench.vehicle, ports, None, self._stopped.is_set, control=self._control, advance=self._advance)
+            serve_interval(self._bench.vehicle, self._ports, self._pace, self._advance)
         except Exception as problem:
             self._problem = problem
-        finally:
-            self._stopped.set()
-            for waiting in self._waiting:
-                waiting.future.set_exception(self._ended())
-            self._control.refuse(self._ended())
+            self._end()
+            return
+        self._thread.submit(self._fly)
 
     def _advance(self) -> None:
         self._bench.step()
@@ -226,28 +244,37 @@ class RunningVehicle:
             truth, now_us = self._bench.truth, self._bench.vehicle.time_boot_us
             self._waiting = [waiting for waiting in self._waiting if not waiting.is_over(truth, now_us)]
 
+    def _end(self) -> None:
+        """Nobody flies, waits or is listened to any more."""
+        self._has_ended = True
+        for port in self._ports:
+            port.close()
+        for waiting in self._waiting:
+            waiting.future.set_exception(self._ended())
+        self._ports, self._waiting = [], []
+
     def _ask(self, order: Callable[[], Answer]) -> Answer:
         """Let the vehicle's thread do it between two intervals."""
         if self._is_in_thread:
             # A condition that somebody waits for is looked at there.
             return order()
-        if self._stopped.is_set():
-            raise self._ended()
-        future = self._control.ask(order)
-        while not future.done():
-            # A thread that has just ended looks at nothing any more.
-            if not self._thread.is_alive():
-                self._control.refuse(self._ended())
-            wait([future], _LOOK_S)
+        try:
+            future = self._thread.submit(self._unless_ended, order)
+        except RuntimeError as problem:  # the thread takes nothing any more
+            raise self._ended() from problem
         return future.result()
 
-    @property
-    def _is_in_thread(self) -> bool:
-        return threading.current_thread() is self._thread
+    def _unless_ended(self, order: Callable[[], Answer]) -> Answer:
+        if self._has_ended:
+            raise self._ended()
+        return order()
 
     def _read(self, order: Callable[[], Answer]) -> Answer:
         """The same for what may be read after the end, too."""
-        return self._ask(order) if self._thread.is_alive() and not self._stopped.is_set() else order()
+        try:
+            return self._ask(order)
+        except VehicleEnded:
+            return order()
 
     def _ended(self) -> VehicleEnded:
         if self._problem is not None:

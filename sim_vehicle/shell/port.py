@@ -6,7 +6,8 @@ import socket
 from typing import Protocol
 
 from sim_vehicle.errors import LinkAddressError, PortInUse
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.vehicle import SimulatedVehicle
 
 Address = tuple[str, int]
@@ -15,7 +16,7 @@ LONGEST_DATAGRAM = 65_535
 
 
 class Port(Protocol):
-    """A socket or a serial line, with the links of whoever is at its other end."""
+    """A socket, with the links of whoever is at its other end."""
 
     def receive(self) -> None:
         """Hand all that has arrived to the links."""
@@ -24,15 +25,15 @@ class Port(Protocol):
         """Send what the links have ready; what cannot be sent is lost."""
 
     def close(self) -> None:
-        """Give the socket or the line back."""
+        """Give the socket back."""
 
 
-def connected(vehicle: SimulatedVehicle, options: LinkOptions) -> Link:
+def connected(vehicle: SimulatedVehicle, kind: LinkKind) -> Link:
     """A new link that says at once who is there, as PX4's streams send their first message (mavlink_stream.cpp).
 
     In lockstep, where nobody waits, HEARTBEAT comes after the link's first second.
     """
-    link = vehicle.add_link(options)
+    link = vehicle.add_link(kind)
     link.introduce()
     return link
 

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from sim_vehicle.shell.control import Control
 from sim_vehicle.shell.port import Port
 from sim_vehicle.shell.truth_file import save_truth
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -12,8 +11,6 @@ from sim_vehicle.vehicle import SimulatedVehicle
 # Lateness up to this is caught up by stepping faster, as a busy machine needs. A longer stop (a
 # suspended laptop) would end in a burst of old telemetry: there the vehicle's clock stands still instead.
 MOST_CAUGHT_UP_NS = 500_000_000
-# A pause is over as soon as somebody says so; whether to stop altogether is asked this often.
-_LOOK_WHILE_PAUSED_S = 0.05
 
 
 def serve(
@@ -22,37 +19,32 @@ def serve(
     truth_path: Path | None = None,
     stop: Callable[[], bool] = lambda: False,
     speed: float = 1.0,
-    control: Control | None = None,
-    advance: Callable[[], None] | None = None,
 ) -> None:
     """Fly until ``stop()`` is true; then close the ports and write the truth, if a path is given.
 
     ``speed``: how many times faster than the clock, at most; 0 for as fast as the machine allows.
-    ``control``: in place of a speed, from where it is changed, paused and given other orders.
-    ``advance``: in place of the vehicle's own, what one interval consists of.
     """
-    control, advance = control or Control(speed), advance or vehicle.advance
-    pace = RealtimePace(vehicle.time_boot_us, control.speed)
+    pace = RealtimePace(vehicle.time_boot_us, speed)
     try:
         while not stop():
-            control.carry_out()
-            if control.is_paused:
-                control.carry_out(_LOOK_WHILE_PAUSED_S)
-                pace.restart(control.speed)
-                continue
-            if control.speed != pace.speed:
-                pace.restart(control.speed)
-            pace.wait_until(vehicle.time_boot_us + vehicle.interval_us)
-            for port in ports:
-                port.receive()
-            advance()
-            for port in ports:
-                port.send()
+            serve_interval(vehicle, ports, pace, vehicle.advance)
     finally:
         for port in ports:
             port.close()
         if truth_path is not None:
             save_truth(truth_path, vehicle.truth, pace.epoch_at_boot_us(), pace.stalls)
+
+
+def serve_interval(
+    vehicle: SimulatedVehicle, ports: Sequence[Port], pace: "RealtimePace", advance: Callable[[], None]
+) -> None:
+    """Wait until the next interval may begin, then fly it between what has arrived and what is sent."""
+    pace.wait_until(vehicle.time_boot_us + vehicle.interval_us)
+    for port in ports:
+        port.receive()
+    advance()
+    for port in ports:
+        port.send()
 
 
 class RealtimePace:

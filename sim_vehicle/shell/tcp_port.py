@@ -3,7 +3,8 @@
 import contextlib
 import socket
 
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.shell.port import bound_socket, connected
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -15,11 +16,11 @@ _MOST_UNREAD_BYTES = 500_000
 class TcpServerPort:
     """PX4 itself speaks no TCP; this is what stands for the router or the simulator's bridge before it."""
 
-    def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, host: str, port: int) -> None:
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, host: str, port: int) -> None:
         self._listener = bound_socket(socket.SOCK_STREAM, host, port)
         self._listener.listen()
         self._vehicle = vehicle
-        self._options = options
+        self._kind = kind
         self._clients: list[_Client] = []
 
     @property
@@ -31,7 +32,7 @@ class TcpServerPort:
         # Nobody waits to be let in, or has gone again before he was.
         with contextlib.suppress(BlockingIOError, ConnectionError):
             connection, _ = self._listener.accept()
-            self._clients.append(_Client(connection, connected(self._vehicle, self._options)))
+            self._clients.append(_Client(connection, connected(self._vehicle, self._kind)))
         for client in self._clients:
             client.receive()
         self._forget_the_gone()

@@ -3,7 +3,8 @@
 import socket
 
 from sim_vehicle.errors import LinkAddressError
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.shell.port import Address, bound_socket, connected, received_datagrams, send_datagrams
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -16,14 +17,14 @@ MOST_CLIENTS = 32
 class UdpPeerPort:
     """Sends unasked to ``remote``, and from the first datagram on to its sender for good, as PX4 does."""
 
-    def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, listen_port: int, remote: Address) -> None:
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, listen_port: int, remote: Address) -> None:
         """Raises LinkAddressError for a host that nobody knows, PortInUse where ``listen_port`` cannot be had."""
         self._remote = _resolved(remote)
         # Nobody but this machine is listened to, unless another was named.
         here = "127.0.0.1" if self._remote[0].startswith("127.") else "0.0.0.0"
         self._socket = bound_socket(socket.SOCK_DGRAM, here, listen_port)
         self._has_peer = False
-        self._link = connected(vehicle, options)
+        self._link = connected(vehicle, kind)
 
     @property
     def local_port(self) -> int:
@@ -56,10 +57,10 @@ def _resolved(remote: Address) -> Address:
 class UdpServerPort:
     """Waits for clients; each that sends something gets a link of its own."""
 
-    def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, host: str, port: int) -> None:
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, host: str, port: int) -> None:
         self._socket = bound_socket(socket.SOCK_DGRAM, host, port)
         self._vehicle = vehicle
-        self._options = options
+        self._kind = kind
         self._clients: dict[Address, Link] = {}
         self._heard_us: dict[Address, int] = {}
 
@@ -75,7 +76,7 @@ class UdpServerPort:
             if link is None:
                 if len(self._clients) >= MOST_CLIENTS:
                     continue
-                link = self._clients[sender] = connected(self._vehicle, self._options)
+                link = self._clients[sender] = connected(self._vehicle, self._kind)
             self._heard_us[sender] = now_us
             link.push(datagram)
         for address, heard_us in list(self._heard_us.items()):

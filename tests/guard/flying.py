@@ -19,7 +19,6 @@ from companion.guard.guard import Guard
 from companion.guard.states import State
 from companion.report import Event
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -165,8 +164,8 @@ class GuardedFlight(Commanded):
     ) -> None:
         super().__init__(airframe, parameters, **scene)
         self.guard = Guard(config or GuardConfig())
-        self._guard_link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
-        self._other_link = self.vehicle.add_link(LinkOptions(LinkKind.NORMAL))
+        self._guard_link = self.vehicle.add_link(LinkKind.ONBOARD)
+        self._other_link = self.vehicle.add_link(LinkKind.NORMAL)
         self._other = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
         self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
         self._guards_bytes = self._others_bytes = b""
@@ -304,7 +303,7 @@ class BetweenFlight(Commanded):
         between = {"between": ("udpin://127.0.0.1:14540",)}
         self._config = (config or GuardConfig()).model_copy(update=between)
         self._begin()
-        self.link = self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
+        self.link = self.vehicle.add_link(LinkKind.ONBOARD)
         self._mavlinks: dict[str, dialect.MAVLink] = {}
         self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
         self.others_last: dict[str, Any] = {}

@@ -11,7 +11,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 START_NED_M = (2.0, -3.0, -20.0)
 
 
-@pytest.mark.parametrize("speed_m_s", [0.5, 2.0, 5.0])
+@pytest.mark.parametrize("speed_m_s", [0.5, 5.0])
 @pytest.mark.parametrize(("kind", "seed"), [("foldable", None), ("rigid", 7)])
 def test_a_vehicle_that_begins_in_flight_goes_steadily_on(kind, seed, speed_m_s):
     # Given a vehicle that begins on its way north-east
@@ -35,14 +35,3 @@ def test_a_vehicle_that_begins_in_flight_goes_steadily_on(kind, seed, speed_m_s)
     w, _, _, z = body[6:10]
     assert 2.0 * math.atan2(z, w) == pytest.approx(math.atan2(0.8, 0.6), abs=0.1)
     assert texts == []
-
-
-def test_its_motors_turn_from_the_first_interval_on():
-    vehicle = SimulatedVehicle(vehicle_of("rigid").airframe, Scene(), 3)
-    vehicle.begin_in_flight(START_NED_M, (3.0, 0.0, 0.0))
-    first = vehicle.state.motor_thrust_n.sum()
-    thrusts = []
-    for _ in range(5):
-        vehicle.step(b"")
-        thrusts.append(vehicle.state.motor_thrust_n.sum())
-    assert thrusts == pytest.approx([first] * 5, rel=0.25)

@@ -127,11 +127,11 @@ def test_every_command_with_any_parameter_is_answered_at_most_twice(airborne, co
     assert len(client.results(command)) <= 2
 
 
-def scripted(seed: int, steps: int = 1_500) -> bytes:
+def scripted(seed: int) -> bytes:
     client = Client(seed)
     client.command(TAKEOFF)
     client.command(ARM_DISARM, 1)
-    for _ in range(steps):
+    for _ in range(1_500):
         client.step()
     return b"".join(client.packets)
 

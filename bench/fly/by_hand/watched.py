@@ -14,7 +14,7 @@ from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.detector import Impact, Phase
 from companion.report import Status
 from rebound_cli.simulation.lockstep import EPOCH_US
-from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -72,8 +72,8 @@ class GuardedFlight:
     sink_at_touch_m_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self._links = [self.vehicle.add_link(LinkOptions(LinkKind.ONBOARD)) for _ in self.watchers]
-        self._station = self.vehicle.add_link(LinkOptions(LinkKind.NORMAL))
+        self._links = [self.vehicle.add_link(LinkKind.ONBOARD) for _ in self.watchers]
+        self._station = self.vehicle.add_link(LinkKind.NORMAL)
         for link in self._links:
             link.introduce()
         self._body, self._depth_m = self.vehicle.state.body, self.vehicle.state.depth_m

@@ -1,13 +1,11 @@
 """Arming and disarming, by command and by itself, and what forbids arming beside what the mode needs.
 
 Sources: PX4's Commander::arm, Commander::disarm, Commander::handleAutoDisarm and commander/HealthAndArmingChecks
-(rcAndDataLinkCheck, batteryCheck, estimatorCheck, geofenceCheck, modeCheck).
+(rcAndDataLinkCheck, estimatorCheck, geofenceCheck, modeCheck).
 """
 
 from enum import StrEnum
 
-from sim_vehicle.autopilot.commander.battery import Battery
-from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.navigator.navigator import Navigator
@@ -78,13 +76,6 @@ class Arming:
         return Reason.LANDING
 
 
-_BATTERY_TEXTS = {
-    BatteryWarning.LOW: "Low battery",
-    BatteryWarning.CRITICAL: "Critical battery",
-    BatteryWarning.EMERGENCY: "Emergency battery level",
-}
-
-
 # COM_ARM_WO_GPS: 0 refuses, 1 warns, 2 does not care.
 _NOT_WITHOUT_GPS = 0
 
@@ -92,7 +83,6 @@ _NOT_WITHOUT_GPS = 0
 def preflight_problems(
     parameters: Parameters,
     ground_station: GroundStation,
-    battery: Battery,
     navigator: Navigator,
     positioning: Positioning,
 ) -> list[StatusText]:
@@ -100,10 +90,6 @@ def preflight_problems(
     found = []
     if ground_station.lost and parameters["NAV_DLL_ACT"] > 0:
         found.append(StatusText(Severity.WARNING, "Preflight Fail: No connection to the GCS"))
-    least = parameters["COM_ARM_BAT_MIN"]
-    is_too_low = battery.remaining < least if least >= 0.0 else battery.warning >= BatteryWarning.CRITICAL
-    if is_too_low:
-        found.append(StatusText(Severity.CRITICAL, _BATTERY_TEXTS.get(battery.warning, "Low battery")))
     if positioning.is_without_gps and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
         found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
     if navigator.fence.breached:

@@ -1,10 +1,8 @@
 """The battery: drained as PX4's battery simulator drains it, its voltage pulled down by what the motors draw.
 
-Source: PX4's simulation/battery_simulator and lib/battery (thresholds, warnings, voltage between BAT1_V_EMPTY and
-BAT1_V_CHARGED a cell). PX4's simulator knows no current; here it follows from the thrust, so that voltage sags.
+Source: PX4's simulation/battery_simulator and lib/battery (voltage between BAT1_V_EMPTY and BAT1_V_CHARGED a cell).
+PX4's simulator knows no current; here it follows from the thrust, so that voltage sags.
 """
-
-from enum import IntEnum
 
 from sim_vehicle.parameters.store import Parameters
 
@@ -19,15 +17,6 @@ IDLE_CURRENT_A = 0.3
 CELL_RESISTANCE_OHM = 0.005
 
 
-class Warning(IntEnum):
-    """battery_status_s.warning; MAV_BATTERY_CHARGE_STATE is one more."""
-
-    NONE = 0
-    LOW = 1
-    CRITICAL = 2
-    EMERGENCY = 3
-
-
 class Battery:
     """Charge and voltage; full again whenever the vehicle is disarmed, as in PX4's simulation."""
 
@@ -38,24 +27,12 @@ class Battery:
         self.current_a = IDLE_CURRENT_A
         self.consumed_mah = 0.0
         self.voltage_v = 0.0
-        self.is_forced_empty = False
-        """As INJECT_FAILURE can make it."""
         self.version = 0
         """Grows with every new sample."""
         self.supply_share = 1.0
         """Voltage over what charge and current explain, where a fault has it sag."""
         self._sampled_us: int | None = None
         self._update_voltage()
-
-    @property
-    def warning(self) -> Warning:
-        """How low it is, by BAT_LOW_THR, BAT_CRIT_THR and BAT_EMERGEN_THR."""
-        parameters, remaining = self._parameters, self.remaining
-        if remaining < parameters["BAT_EMERGEN_THR"]:
-            return Warning.EMERGENCY
-        if remaining < parameters["BAT_CRIT_THR"]:
-            return Warning.CRITICAL
-        return Warning.LOW if remaining < parameters["BAT_LOW_THR"] else Warning.NONE
 
     def update(self, now_us: int, armed: bool, thrust_fraction: float) -> None:
         """Call as often as you like; it takes a sample ten times a second."""
@@ -73,9 +50,6 @@ class Battery:
         self.version += 1
 
     def _drain(self, seconds: float, armed: bool) -> None:
-        if self.is_forced_empty:
-            self.remaining = 0.0
-            return
         if not armed or not self._parameters["SIM_BAT_ENABLE"]:
             self.remaining = 1.0
             return

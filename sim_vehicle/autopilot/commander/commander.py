@@ -7,11 +7,10 @@ from enum import IntEnum
 
 from sim_vehicle.autopilot.commander.arming import Arming, Reason, preflight_problems
 from sim_vehicle.autopilot.commander.battery import Battery
-from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.commander.failsafe import Failsafe
 from sim_vehicle.autopilot.commander.failsafe_table import Action, FailsafeSituation
 from sim_vehicle.autopilot.commander.manual_control import ManualInput
-from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning, TippingDetector
+from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.modes import (
@@ -28,7 +27,6 @@ from sim_vehicle.autopilot.modes import (
 )
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.autopilot.offboard import OffboardSignal
-from sim_vehicle.estimator.estimate import Quaternion
 from sim_vehicle.parameters.store import Parameters
 
 # How often the failsafes look when nothing calls for it: PX4's commander runs every 10 ms, its checks every 100.
@@ -67,10 +65,8 @@ class Commander:
         self._detector = detector
         self._now_us = 0
         self._judged_us = -PERIOD_US
-        self._battery_at_arming = BatteryWarning.NONE
         self._sticks_lost_at_arming = True
         self._ever_requested = False
-        self._tipping = TippingDetector(parameters)
 
     # --- requests --------------------------------------------------------------------------------------------
 
@@ -95,7 +91,6 @@ class Commander:
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
         elif not was_armed:
             self._say(Severity.INFO, f"Armed by {reason}")
-            self._battery_at_arming = self.battery.warning
             self._sticks_lost_at_arming = self.sticks.sticks is None
             self._navigator.view.armed = True
             self._navigator.set_home_here()
@@ -131,7 +126,7 @@ class Commander:
 
     # --- the cycle -------------------------------------------------------------------------------------------
 
-    def run(self, now_us: int, attitude_wxyz: Quaternion) -> None:
+    def run(self, now_us: int) -> None:
         """Everything that changes mode or arming by itself; call it at every step."""
         self._now_us = now_us
         setpoints_changed = self.signal.update(now_us)
@@ -145,7 +140,8 @@ class Commander:
         if self.arming.armed:
             self._disarm_by_itself()
         if now_us - self._judged_us >= PERIOD_US or setpoints_changed:
-            self._watch(attitude_wxyz)
+            self.texts += self.ground_station.update(now_us)
+            self.positioning.update(now_us)
             self._judge()
 
     def _what_is_over(self) -> ModeEvent | None:
@@ -185,12 +181,6 @@ class Commander:
         if reason is not None:
             self._disarmed(reason)
 
-    def _watch(self, attitude_wxyz: Quaternion) -> None:
-        """The ground station, where the vehicle is, and whether it lies on its side."""
-        self.texts += self.ground_station.update(self._now_us)
-        self.positioning.update(self._now_us)
-        self._tipping.update(self._now_us, attitude_wxyz)
-
     def _judge(self) -> None:
         """Let the failsafes say what flies."""
         self._judged_us = self._now_us
@@ -208,12 +198,10 @@ class Commander:
             self._navigator.enter(decision.flown)
 
     def _situation(self) -> FailsafeSituation:
-        armed, progress = self.arming.armed, self._navigator.progress
         back = self._flies_setpoints and (self.signal.is_back or not self.failsafe.acts)
         return FailsafeSituation(
-            armed=armed,
+            armed=self.arming.armed,
             intended=self.modes.intended,
-            armed_for_us=self._now_us - self.arming.armed_at_us if armed and self._tipping.tipped_over else 0,
             mode_requested=self.modes.requested,
             sticks_moved=self.failsafe.acts and self.sticks.moving and self._sticks_override,
             sticks_lost=self.sticks.sticks is None,
@@ -221,11 +209,6 @@ class Commander:
             ground_station_lost=self.ground_station.lost,
             offboard_lost=not back,
             fence_breached=self._navigator.fence.breached,
-            battery=self.battery.warning,
-            battery_at_arming=self._battery_at_arming,
-            mission_finished=progress.finished,
-            flight_time_over=self._flight_time_is_over,
-            tipped_over=self._tipping.tipped_over,
             cannot_run=cannot_run(self._available, back),
         )
 
@@ -236,12 +219,6 @@ class Commander:
         elif not self.arming.armed:
             self._sticks_lost_at_arming = True
         return self._sticks_lost_at_arming
-
-    @property
-    def _flight_time_is_over(self) -> bool:
-        most_s, arming = self._parameters["COM_FLT_TIME_MAX"], self.arming
-        flies = arming.armed and arming.taken_off
-        return most_s > 0 and flies and self._now_us - arming.taken_off_at_us > 1e6 * most_s
 
     # --- what there is ---------------------------------------------------------------------------------------
 
@@ -271,9 +248,7 @@ class Commander:
 
     @property
     def _problems(self) -> list[StatusText]:
-        return preflight_problems(
-            self._parameters, self.ground_station, self.battery, self._navigator, self.positioning
-        )
+        return preflight_problems(self._parameters, self.ground_station, self._navigator, self.positioning)
 
     @property
     def system_status(self) -> SystemStatus:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
-from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
 
@@ -52,14 +51,7 @@ class FailsafeTrigger(StrEnum):
 
     STICKS_LOST = "manual control lost"
     GROUND_STATION_LOST = "ground station lost"
-    MISSION_OUT_OF_REACH = "mission finished, no link left"
-    FLIGHT_TIME = "flight time over"
     FENCE = "geofence breached"
-    BATTERY_LOW = "battery low"
-    BATTERY_CRITICAL = "battery critical"
-    BATTERY_EMERGENCY = "battery emergency"
-    ATTITUDE_AT_TAKEOFF = "tipped over at takeoff"
-    ATTITUDE = "tipped over"
     MODE_CANNOT_RUN = "mode cannot run"
 
 
@@ -77,8 +69,6 @@ class FailsafeSituation(NamedTuple):
 
     armed: bool
     intended: Mode
-    armed_for_us: int = 0
-    """Counts only where the vehicle has tipped over; 0 elsewhere."""
     mode_requested: bool = False
     """A mode was accepted since the last cycle, be it the same."""
     sticks_moved: bool = False
@@ -88,11 +78,6 @@ class FailsafeSituation(NamedTuple):
     ground_station_lost: bool = True
     offboard_lost: bool = True
     fence_breached: bool = False
-    battery: BatteryWarning = BatteryWarning.NONE
-    battery_at_arming: BatteryWarning = BatteryWarning.NONE
-    mission_finished: bool = False
-    flight_time_over: bool = False
-    tipped_over: bool = False
     cannot_run: frozenset[Mode] = frozenset()
     """Modes whose needs are not met, sticks left aside."""
 
@@ -103,16 +88,15 @@ class FailsafeRow:
 
     trigger: FailsafeTrigger
     counts: Callable[[FailsafeSituation, Parameters], bool]
-    parameter: str | None
-    """Its value chooses the response; without one the only response is that of 0."""
+    parameter: str
+    """Its value chooses the response."""
     responses: Mapping[int, Response]
     otherwise: Response = Response(Action.NONE)
     """For values that PX4 does not know."""
 
     def response(self, parameters: Parameters) -> Response:
         """What these parameters want."""
-        value = 0 if self.parameter is None else int(parameters[self.parameter])
-        return self.responses.get(value, self.otherwise)
+        return self.responses.get(int(parameters[self.parameter]), self.otherwise)
 
 
 def _kept(action: Action, takeover: Takeover = Takeover.AFTER_DELAY) -> Response:
@@ -138,13 +122,6 @@ _FENCE: dict[int, Response] = {
     4: _TERMINATION,
     5: _kept(Action.LAND),
 }
-_CRITICAL = {
-    0: _WARNING,
-    1: Response(Action.RETURN),
-    2: Response(Action.LAND),
-    3: Response(Action.RETURN),
-}
-_EMERGENCY = {**_CRITICAL, 3: Response(Action.LAND)}
 
 # COM_RCL_EXCEPT and COM_DLL_EXCEPT: in which modes a lost link is no matter.
 _EXCEPT_MISSION, _EXCEPT_HOLD, _EXCEPT_OFFBOARD = 1, 2, 4
@@ -156,8 +133,6 @@ _EXCEPTION_OF = {
 }
 _NO_STICKS = 4
 """COM_RC_IN_MODE: no manual control at all."""
-_TERMINATION_BREAKER = 121212
-"""CBRK_FLIGHTTERM: with this value tipping over is only a warning."""
 
 
 def _excepted(mode: Mode, mask: float) -> bool:
@@ -175,55 +150,11 @@ def _ground_station_lost(now: FailsafeSituation, parameters: Parameters) -> bool
     return now.ground_station_lost and not _excepted(now.intended, parameters["COM_DLL_EXCEPT"])
 
 
-def _out_of_reach(now: FailsafeSituation, parameters: Parameters) -> bool:
-    """Nobody could call the vehicle back, and it has nothing left to do."""
-    no_sticks = parameters["COM_RC_IN_MODE"] == _NO_STICKS or _excepted(now.intended, parameters["COM_RCL_EXCEPT"])
-    alone = no_sticks and parameters["NAV_DLL_ACT"] == 0 and now.ground_station_lost
-    return now.intended is Mode.MISSION and now.mission_finished and alone
-
-
-def _battery(level: BatteryWarning) -> Callable[[FailsafeSituation, Parameters], bool]:
-    return lambda now, parameters: now.battery is level
-
-
-def _worse_than_at_arming(now: FailsafeSituation) -> bool:
-    return now.battery > now.battery_at_arming
-
-
-def _is_taking_off(now: FailsafeSituation, parameters: Parameters) -> bool:
-    guarded_s = parameters["COM_LKDOWN_TKO"] + parameters["COM_SPOOLUP_TIME"]
-    return now.armed and now.armed_for_us < 1e6 * guarded_s
-
-
 # In PX4's order. The mode that cannot run comes last and is no row: see `Failsafe`.
 ROWS: tuple[FailsafeRow, ...] = (
     FailsafeRow(FailsafeTrigger.STICKS_LOST, _sticks_lost, "NAV_RCL_ACT", _LINK_LOSS),
     FailsafeRow(FailsafeTrigger.GROUND_STATION_LOST, _ground_station_lost, "NAV_DLL_ACT", _LINK_LOSS),
-    FailsafeRow(FailsafeTrigger.MISSION_OUT_OF_REACH, _out_of_reach, None, {0: Response(Action.RETURN)}),
-    FailsafeRow(
-        FailsafeTrigger.FLIGHT_TIME, lambda now, parameters: now.flight_time_over, None, {0: Response(Action.RETURN)}
-    ),
     FailsafeRow(FailsafeTrigger.FENCE, lambda now, parameters: now.fence_breached, "GF_ACTION", _FENCE, _WARNING),
-    FailsafeRow(FailsafeTrigger.BATTERY_LOW, _battery(BatteryWarning.LOW), None, {0: _WARNING}),
-    FailsafeRow(
-        FailsafeTrigger.BATTERY_CRITICAL, _battery(BatteryWarning.CRITICAL), "COM_LOW_BAT_ACT", _CRITICAL, _WARNING
-    ),
-    FailsafeRow(
-        FailsafeTrigger.BATTERY_EMERGENCY, _battery(BatteryWarning.EMERGENCY), "COM_LOW_BAT_ACT", _EMERGENCY, _WARNING
-    ),
-    FailsafeRow(
-        FailsafeTrigger.ATTITUDE_AT_TAKEOFF,
-        lambda now, parameters: now.tipped_over and _is_taking_off(now, parameters),
-        None,
-        {0: Response(Action.DISARM)},
-    ),
-    FailsafeRow(
-        FailsafeTrigger.ATTITUDE,
-        lambda now, parameters: now.tipped_over and not _is_taking_off(now, parameters),
-        "CBRK_FLIGHTTERM",
-        {_TERMINATION_BREAKER: _WARNING},
-        Response(Action.TERMINATE),
-    ),
 )
 
 OFFBOARD_LOSS: dict[int, tuple[Action, Mode]] = {
@@ -240,21 +171,9 @@ OFFBOARD_LOSS: dict[int, tuple[Action, Mode]] = {
 
 
 def responses_now(now: FailsafeSituation, parameters: Parameters) -> list[tuple[FailsafeTrigger, Response]]:
-    """The rows that count now."""
-    found: list[tuple[FailsafeTrigger, Response]] = []
-    for row in ROWS:
-        if not row.counts(now, parameters):
-            continue
-        response = row.response(parameters)
-        if row.trigger in _BATTERY_ACTS and not _worse_than_at_arming(now):
-            # Somebody armed with a battery already that low: he knows.
-            response = _WARNING
-        if response.action is not Action.NONE:
-            found.append((row.trigger, response))
-    return found
-
-
-_BATTERY_ACTS = (FailsafeTrigger.BATTERY_CRITICAL, FailsafeTrigger.BATTERY_EMERGENCY)
+    """The rows that count now, without those that want nothing."""
+    found = [(row.trigger, row.response(parameters)) for row in ROWS if row.counts(now, parameters)]
+    return [(trigger, response) for trigger, response in found if response.action is not Action.NONE]
 
 
 def mode_fallback(now: FailsafeSituation, parameters: Parameters, intended: Mode) -> Action:
@@ -275,16 +194,11 @@ def markdown_table() -> str:
     """The rows as the document has them."""
     lines = ["| trigger | parameter | does | ends |", "|---|---|---|---|"]
     for row in ROWS:
-        does = ", ".join(
-            f"{value}: {response.action.name.lower()}" if row.parameter else response.action.name.lower()
-            for value, response in row.responses.items()
-        )
+        does = ", ".join(f"{value}: {response.action.name.lower()}" for value, response in row.responses.items())
         if row.otherwise.action is not Action.NONE:
             does += f", else {row.otherwise.action.name.lower()}"
-        ends = sorted({r.clears.value for r in row.responses.values() if r.action > Action.WARN}) or [
-            "with the trigger"
-        ]
-        lines.append(f"| {row.trigger} | {row.parameter or ''} | {does} | {', or '.join(ends)} |")
+        ends = sorted({r.clears.value for r in row.responses.values() if r.action > Action.WARN})
+        lines.append(f"| {row.trigger} | {row.parameter} | {does} | {', or '.join(ends)} |")
     does = ", ".join(f"{value}: {action.name.lower()}" for value, (action, _) in OFFBOARD_LOSS.items())
     lines.append(f"| setpoints stopped in OFFBOARD | COM_OBL_RC_ACT | {does} | with the trigger |")
     does = "fall_back_to_altitude, fall_back_to_stabilized, return"

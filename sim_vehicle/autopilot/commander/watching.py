@@ -1,15 +1,10 @@
-"""What the commander keeps an eye on: the ground station, where the vehicle is, whether it lies on its side.
+"""What the commander keeps an eye on: the ground station, and where the vehicle is.
 
-Sources: PX4's Commander::dataLinkCheck and MavlinkReceiver::CheckHeartbeats; EKF2 (EKF2_NOAID_TOUT); and
-commander/failure_detector/FailureDetector.cpp (updateAttitudeStatus).
+Sources: PX4's Commander::dataLinkCheck and MavlinkReceiver::CheckHeartbeats; EKF2 (EKF2_NOAID_TOUT).
 """
 
-import math
-
 from sim_vehicle.autopilot.messages import Severity, StatusText
-from sim_vehicle.estimator.estimate import roll_pitch_of
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Quaternion
 
 # A link calls the ground station present until this long after its last heartbeat: two lost ones and a half.
 HEARTBEAT_TIMEOUT_US = 2_500_000
@@ -72,29 +67,3 @@ class Positioning:
             self._lost_us = now_us
         self.has_global = now_us - self._lost_us < self._parameters["EKF2_NOAID_TOUT"]
         self.has_local = self.has_global or self.sees_ground
-
-
-# The greatest tilt and how long it has to last; a tilt of 0 or less switches the axis off.
-_NAMES = (("FD_FAIL_R", "FD_FAIL_R_TTRI"), ("FD_FAIL_P", "FD_FAIL_P_TTRI"))
-
-
-class TippingDetector:
-    """Roll and pitch, each with a clock of its own: tipped over further and longer than its parameters allow."""
-
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
-        self._since_us: list[int | None] = [None, None]
-        self.tipped_over = False
-
-    def update(self, now_us: int, attitude_wxyz: Quaternion) -> None:
-        """Judge the attitude; call it at every cycle of the failsafes."""
-        tipped = False
-        for axis, (angle_rad, (most, lasting)) in enumerate(zip(roll_pitch_of(attitude_wxyz), _NAMES, strict=True)):
-            if not 0.0 < self._parameters[most] < abs(math.degrees(angle_rad)):
-                self._since_us[axis] = None
-                continue
-            since_us = self._since_us[axis]
-            if since_us is None:
-                since_us = self._since_us[axis] = now_us
-            tipped = tipped or now_us - since_us > 1e6 * self._parameters[lasting]
-        self.tipped_over = tipped

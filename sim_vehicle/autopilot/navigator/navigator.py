@@ -124,7 +124,7 @@ class Navigator:
         elif mode is Mode.TAKEOFF:
             self._begin_takeoff()
         elif mode is Mode.RETURN:
-            self._return.begin(self.view, self._missions)
+            self._return.begin(self.view)
         elif mode in LANDING_MODES or mode is Mode.DESCEND:
             self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
         elif mode is Mode.MISSION:

@@ -1,6 +1,7 @@
-"""RETURN: climb, fly to home or to a rally point that is nearer, and land there.
+"""RETURN: climb, fly home, and land there.
 
-Sources: PX4's navigator rtl.cpp and rtl_direct.cpp for multicopters, with RTL_TYPE 0 and no landing in the mission.
+Sources: PX4's navigator rtl.cpp and rtl_direct.cpp for multicopters, with RTL_TYPE 0, no landing in the mission and no
+rally points: they are stored, and nothing leads there.
 """
 
 import math
@@ -8,16 +9,8 @@ from enum import Enum, auto
 
 from sim_vehicle.autopilot.flight_tasks.target import Acceptance, Arrival, Kind, NavigatorTarget, View
 from sim_vehicle.autopilot.messages import Severity, StatusText
-from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Vector3
-
-# RTL::findClosestSafePoint: rally points this near to home are home, and one must be nearer by this much.
-_SAME_AS_HOME_M = 10.0
-_NEARER_BY_M = 2.0
 
 
 class ReturnLeg(Enum):
@@ -25,9 +18,6 @@ class ReturnLeg(Enum):
 
     CLIMB = auto()
     GO = auto()
-    SINK = auto()
-    WAIT = auto()
-    GO_OVER = auto()
     LAND = auto()
     DONE = auto()
 
@@ -40,25 +30,20 @@ class Return:
         self._origin = origin
         self._arrival = Arrival()
         self._leg = ReturnLeg.DONE
-        self._place_ned_m: Vector3 = (0.0, 0.0, 0.0)
-        self._place_yaw_rad: float | None = None
         self._down_m = 0.0
-        self.target = NavigatorTarget(Kind.IDLE, self._place_ned_m)
+        self.target = NavigatorTarget(Kind.IDLE, (0.0, 0.0, 0.0))
         self.texts: list[StatusText] = []
 
-    def begin(self, view: View, missions: MissionStore) -> None:
-        """Choose where to and how high, and start."""
-        self._choose_place(view, missions)
-        place_down_m = self._place_ned_m[2]
-        height_m = place_down_m - view.position_ned_m[2]
-        return_height_m = return_height_over(height_m, view.distance_m(self._place_ned_m), self._parameters)
-        self._down_m = place_down_m - return_height_m
+    def begin(self, view: View) -> None:
+        """Choose how high, and start."""
+        return_height_m = return_height_over(view.height_m, view.distance_m(view.home_ned_m), self._parameters)
+        self._down_m = view.home_ned_m[2] - return_height_m
         if view.landed:
             self._leg = ReturnLeg.DONE
         else:
-            self._leg = ReturnLeg.CLIMB if height_m < return_height_m else ReturnLeg.GO
+            self._leg = ReturnLeg.CLIMB if view.height_m < return_height_m else ReturnLeg.GO
         altitude_m = self._origin.place.altitude_m - self._down_m
-        self._say(f"RTL: start return at {_metres(altitude_m)} m ({_metres(return_height_m)} m above destination)")
+        self._say(f"RTL: start return at {math.ceil(altitude_m)} m ({math.ceil(return_height_m)} m above destination)")
         self._enter(view)
 
     def update(self, view: View) -> None:
@@ -66,70 +51,31 @@ class Return:
         if self._leg in (ReturnLeg.DONE, ReturnLeg.LAND):
             return
         if self._arrival.is_reached(self.target, self._acceptance(), view, self._parameters):
-            self._leg = self._next()
+            self._leg = ReturnLeg.GO if self._leg is ReturnLeg.CLIMB else ReturnLeg.LAND
             self._enter(view)
-
-    def _choose_place(self, view: View, missions: MissionStore) -> None:
-        """RTL::findRtlDestination."""
-        home = view.home_ned_m
-        self._place_ned_m, self._place_yaw_rad = home, view.home_yaw_rad
-        nearest_m = view.distance_m(home)
-        for item in missions.rally.items:
-            if item.command != kinds.RALLY_POINT:
-                continue
-            place = place_of(item, self._origin, home)
-            is_another = math.hypot(place[0] - home[0], place[1] - home[1]) > _SAME_AS_HOME_M
-            if is_another and view.distance_m(place) + _NEARER_BY_M < nearest_m:
-                nearest_m = view.distance_m(place)
-                self._place_ned_m, self._place_yaw_rad = place, None
-
-    def _next(self) -> ReturnLeg:
-        if self._leg is ReturnLeg.CLIMB:
-            return ReturnLeg.GO
-        if self._leg is ReturnLeg.GO:
-            return ReturnLeg.LAND if self._parameters["RTL_LAND_DELAY"] == 0.0 else ReturnLeg.SINK
-        return {ReturnLeg.SINK: ReturnLeg.WAIT, ReturnLeg.WAIT: ReturnLeg.GO_OVER}.get(self._leg, ReturnLeg.LAND)
 
     def _enter(self, view: View) -> None:
         self._arrival.begin()
-        north, east, down = self._place_ned_m
-        over = (north, east, max(down - self._parameters["RTL_DESCEND_ALT"], self._down_m))
+        north, east, _ = home = view.home_ned_m
         if self._leg is ReturnLeg.CLIMB:
             here = (view.position_ned_m[0], view.position_ned_m[1], self._down_m)
             self.target = NavigatorTarget(Kind.HOLD, here, view.yaw_rad)
         elif self._leg is ReturnLeg.GO:
-            is_near = view.distance_m(self._place_ned_m) < self._parameters["RTL_MIN_DIST"]
-            yaw_rad = self._place_yaw_rad if is_near else None
+            is_near = view.distance_m(home) < self._parameters["RTL_MIN_DIST"]
+            yaw_rad = view.home_yaw_rad if is_near else None
             self.target = NavigatorTarget(Kind.POSITION, (north, east, self._down_m), yaw_rad)
-        elif self._leg in (ReturnLeg.SINK, ReturnLeg.WAIT):
-            self.target = NavigatorTarget(Kind.HOLD, over, self._place_yaw_rad)
-            if self._leg is ReturnLeg.WAIT and self._parameters["RTL_LAND_DELAY"] < 0.0:
-                self._say("RTL: completed, loitering")
-        elif self._leg is ReturnLeg.GO_OVER:
-            self.target = NavigatorTarget(Kind.POSITION, over, self._place_yaw_rad)
         elif self._leg is ReturnLeg.LAND:
-            self.target = NavigatorTarget(Kind.LAND, self._place_ned_m, self._place_yaw_rad)
+            self.target = NavigatorTarget(Kind.LAND, home, view.home_yaw_rad)
             self._say("RTL: land at destination")
         else:
             self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
 
     def _acceptance(self) -> Acceptance:
-        parameters = self._parameters
-        horizontal_m, vertical_m = parameters["NAV_ACC_RAD"], parameters["NAV_MC_ALT_RAD"]
-        if self._leg is ReturnLeg.WAIT:
-            wait_s = parameters["RTL_LAND_DELAY"]
-            return Acceptance(math.inf, math.inf, inside_s=wait_s if wait_s >= 0.0 else math.inf)
-        vertical_m = math.inf if self._leg is ReturnLeg.GO_OVER else vertical_m
         yaw_rad = None if self._leg is ReturnLeg.CLIMB else self.target.yaw_rad
-        return Acceptance(horizontal_m, vertical_m, yaw_rad=yaw_rad)
+        return Acceptance(self._parameters["NAV_ACC_RAD"], self._parameters["NAV_MC_ALT_RAD"], yaw_rad=yaw_rad)
 
     def _say(self, text: str) -> None:
         self.texts.append(StatusText(Severity.INFO, text))
-
-
-def _metres(length_m: float) -> int:
-    """As it is told: whole and rounded up; 0 for a height that is none, which a rally point may come with."""
-    return math.ceil(length_m) if math.isfinite(length_m) else 0
 
 
 def return_height_over(height_m: float, distance_m: float, parameters: Parameters) -> float:

@@ -29,10 +29,8 @@ _DOWNLOAD_RUNS = "Mission download request ignored, already active"
 Packet: TypeAlias = dialect.MAVLink_message
 
 
-# Message ids. Items and requests for them are of the new kind or the old.
-SET_CURRENT, REQUEST_LIST, COUNT, CLEAR_ALL, ACK, REQUEST_INT, ITEM_INT = 41, 43, 44, 45, 47, 51, wire.ITEM_INT_ID
-_NEW_KIND = {wire.ITEM_ID: ITEM_INT, 40: REQUEST_INT}
-MESSAGES = (SET_CURRENT, REQUEST_LIST, COUNT, CLEAR_ALL, ACK, REQUEST_INT, ITEM_INT, *_NEW_KIND)
+# Message ids. Items and requests for them are those with whole numbers; the older kind is not answered.
+SET_CURRENT, REQUEST_LIST, COUNT, CLEAR_ALL, ACK, REQUEST_INT, ITEM_INT = MESSAGES = (41, 43, 44, 45, 47, 51, 73)
 
 
 class TransferState(Enum):
@@ -57,7 +55,6 @@ class MissionTransfer:
         self._now_us = 0
         self._peer = _NOBODY
         self._type: int = MissionType.MISSION
-        self._is_int = True
         self._next = 0
         self._count = 0
         self._items: list[StoredItem] = []
@@ -69,7 +66,7 @@ class MissionTransfer:
     def receive(self, message: Packet, now_us: int) -> None:
         """Take a message that is addressed to this vehicle."""
         self._now_us = now_us
-        _HANDLERS[_NEW_KIND.get(message.id, message.id), self.state](self, message)
+        _HANDLERS[message.id, self.state](self, message)
 
     def update(self, now_us: int) -> None:
         """Let time pass: repeats and time-outs."""
@@ -112,7 +109,6 @@ class MissionTransfer:
         if _peer(message) != self._peer:
             self._say("WPM: REJ. CMD: partner id mismatch")
             return
-        self._is_int = message.id not in _NEW_KIND
         if message.mission_type != self._type:
             return
         self._heard_us = self._now_us
@@ -122,7 +118,7 @@ class MissionTransfer:
             self._next += 1
         if (is_next or number == self._next - 1) and number < len(items):
             self._sent_us = self._now_us
-            around = (self._peer, number, self._store.current == number, self._type, self._is_int)
+            around = (self._peer, number, self._store.current == number, self._type)
             self._send(wire.item_message(items[number], *around))
             return
         self.state = TransferState.IDLE
@@ -130,12 +126,10 @@ class MissionTransfer:
         self._say("WPM: REJ. CMD: Req. WP was unexpected")
 
     def _ignore_request(self, message: Packet) -> None:
-        self._is_int = message.id not in _NEW_KIND
         if _peer(message) != self._peer:
             self._say("WPM: REJ. CMD: partner id mismatch")
 
     def _refuse_request(self, message: Packet) -> None:
-        self._is_int = message.id not in _NEW_KIND
         self._say("WPM: REJ. CMD: " + ("Busy" if _peer(message) == self._peer else "partner id mismatch"))
 
     def _end_download(self, message: Packet) -> None:
@@ -183,10 +177,7 @@ class MissionTransfer:
 
     def _ask_for_next(self) -> None:
         self._sent_us = self._now_us
-        request = dialect.MAVLink_mission_request_int_message
-        if not self._is_int:
-            request = dialect.MAVLink_mission_request_message
-        self._send(request(*self._peer, self._next, self._type))
+        self._send(dialect.MAVLink_mission_request_int_message(*self._peer, self._next, self._type))
 
     def _take_item(self, message: Packet) -> None:
         if not self._is_from_partner(message):
@@ -235,7 +226,6 @@ class MissionTransfer:
             self._acknowledge(MissionResult.ERROR)
 
     def _is_from_partner(self, message: Packet) -> bool:
-        self._is_int = message.id not in _NEW_KIND
         if _peer(message) != self._peer:
             self._say("REJ. MIS ITEM: partner id mismatch")
             return False
@@ -253,12 +243,9 @@ class MissionTransfer:
         self.state = TransferState.IDLE
 
     def _answer_upload(self, message: Packet) -> None:
-        """The peer cannot send items of the other kind, or gives up."""
+        """The peer gives up."""
         if _peer(message) != self._peer:
             self._say("REJ. WP CMD: partner id mismatch")
-        elif message.type == MissionResult.UNSUPPORTED:
-            self._is_int = not self._is_int
-            self._ask_for_next()
         elif message.type == MissionResult.CANCELLED:
             self._end_upload()
 

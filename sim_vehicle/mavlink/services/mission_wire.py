@@ -16,14 +16,11 @@ from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.mavlink.encode import Message
 
-ItemPacket: TypeAlias = dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message
-"""The two differ in the fifth and sixth parameter: degrees or units themselves, or 1e-7 degrees or whole units."""
+ItemPacket: TypeAlias = dialect.MAVLink_mission_item_int_message
 
-ITEM_ID, ITEM_INT_ID = 39, 73
 _GLOBAL_FRAMES = (kinds.FRAME_GLOBAL, kinds.FRAME_GLOBAL_RELATIVE)
 _GLOBAL_INT_FRAMES = (kinds.FRAME_GLOBAL_INT, kinds.FRAME_GLOBAL_RELATIVE_INT)
 _INT_FRAME = dict(zip(_GLOBAL_FRAMES, _GLOBAL_INT_FRAMES, strict=True))
-_FLOAT_FRAME = dict(zip(_GLOBAL_INT_FRAMES, _GLOBAL_FRAMES, strict=True))
 # Of the first four parameters of a global item: kept as they are (k), as whether they are positive (b), as a
 # heading within 0 to 360 degrees (h), as a whole number (n), or not at all (-).
 _KEPT: dict[int, str] = {
@@ -58,28 +55,26 @@ class MissionResult(IntEnum):
 
 def checksum(packet: ItemPacket, before: int) -> int:
     """PX4's CRC-32 over the items, continued from ``before`` (mavlink_mission.cpp, crc32part)."""
-    place = "ii" if packet.id == ITEM_INT_ID else "ff"
     params = (packet.param1, packet.param2, packet.param3, packet.param4, packet.x, packet.y, packet.z)
-    raw = struct.pack(f"<BHB4f{place}f", packet.frame, packet.command, packet.autocontinue & 0xFF, *params)
+    raw = struct.pack("<BHB4f2if", packet.frame, packet.command, packet.autocontinue & 0xFF, *params)
     return zlib.crc32(raw, before ^ 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def parse(packet: ItemPacket) -> StoredItem | MissionResult:
     """The item as it is stored, or why it is refused."""
-    is_int = packet.id == ITEM_INT_ID
-    if packet.frame in _GLOBAL_FRAMES or (is_int and packet.frame in _GLOBAL_INT_FRAMES):
-        return _with_place(packet, _DEGREES_PER_UNIT if is_int else 1.0)
+    if packet.frame in (*_GLOBAL_FRAMES, *_GLOBAL_INT_FRAMES):
+        return _with_place(packet)
     if packet.frame == kinds.FRAME_MISSION:
         return _without_place(packet)
     return MissionResult.UNSUPPORTED_FRAME
 
 
-def _with_place(packet: ItemPacket, scale: float) -> StoredItem | MissionResult:
+def _with_place(packet: ItemPacket) -> StoredItem | MissionResult:
     kept = _KEPT.get(packet.command)
     if kept is None:
         return MissionResult.UNSUPPORTED
     params = tuple(_kept(rule, value) for rule, value in zip(kept, _params(packet), strict=True))
-    return _item(packet, params, packet.x * scale, packet.y * scale)
+    return _item(packet, params, packet.x * _DEGREES_PER_UNIT, packet.y * _DEGREES_PER_UNIT)
 
 
 def _without_place(packet: ItemPacket) -> StoredItem | MissionResult:
@@ -119,15 +114,10 @@ def fits(item: StoredItem, kind: int) -> bool:
     return kind != MissionType.FENCE or not has_too_few_corners
 
 
-def item_message(
-    item: StoredItem, peer: tuple[int, int], number: int, is_current: bool, kind: int, is_int: bool
-) -> Message:
-    """MISSION_ITEM_INT, or MISSION_ITEM for a peer that knows no other."""
+def item_message(item: StoredItem, peer: tuple[int, int], number: int, is_current: bool, kind: int) -> Message:
+    """MISSION_ITEM_INT."""
     *params, x, y, z = item.params
     around = (item.command, int(is_current), item.autocontinue)
-    if not is_int:
-        frame = _FLOAT_FRAME.get(item.frame, item.frame)
-        return dialect.MAVLink_mission_item_message(*peer, number, frame, *around, *params, x, y, z, kind)
     scale = 1 if item.frame == kinds.FRAME_MISSION else 1e7
     frame = _INT_FRAME.get(item.frame, item.frame)
     place = (round(x * scale), round(y * scale))

@@ -20,10 +20,8 @@ _MARKER_V2, _HEADER_V2, _HEADER_V1 = 0xFD, 10, 6
 
 _IS_WHOLE = {dialect.MAV_PARAM_TYPE_INT32: True, dialect.MAV_PARAM_TYPE_REAL32: False}
 
-# PX4 sends so many of a list at a time where the link is fast, and so many on a serial line.
-BURST, BURST_SERIAL = 20, 3
-# A whole PARAM_VALUE with header and checksum.
-PACKET_BYTES = 25 + 12
+# PX4 sends so many of a list at a time where the link is fast.
+BURST = 20
 # A changed value is told to everybody this long after it was set, whoever set it.
 ANNOUNCE_AFTER_US = 5_000
 
@@ -77,7 +75,7 @@ class ParameterService:
         self._send(packet.param_id)
 
     def _send_burst(self) -> None:
-        for _ in range(self._link.burst(BURST, BURST_SERIAL, PACKET_BYTES)):
+        for _ in range(BURST):
             if self._next is None:
                 return
             self._send(self._names[self._next])

@@ -21,9 +21,6 @@ class Channel(Protocol):
     def send(self, message: Message) -> None:
         """Send something that is no stream."""
 
-    def burst(self, fast: int, serial: int, size: int) -> int:
-        """How many packets of ``size`` bytes may be sent now: at most ``serial`` on a serial line, else ``fast``."""
-
 
 class Service(Protocol):
     """One protocol on one link, each message answered at once. What all links share is the autopilot's."""

@@ -24,7 +24,7 @@ CUSTOM_VERSION = tuple(b"rebound\0")
 # MAV_SYS_STATUS_SENSOR as a PX4 SITL at rest has them: gyro, accelerometer, magnetometer, pressure, GPS, position
 # control and battery are there; sticks are wanted, too; and this is well beside them.
 _PRESENT = 0x1 | 0x2 | 0x4 | 0x8 | 0x20 | 0x4000 | 0x2000000
-_RC_RECEIVER, _GPS, _BATTERY, _PREARM_CHECK = 0x10000, 0x20, 0x2000000, 0x10000000
+_RC_RECEIVER, _GPS, _PREARM_CHECK = 0x10000, 0x20, 0x10000000
 _WELL = _PRESENT | 0x10 | 0x800 | 0x8000 | 0x200000 | 0x1000000
 _EXTENDED_WELL = 0x1
 # Packets dropped and errors, and the upper halves of the three bit masks.
@@ -48,8 +48,6 @@ def sys_status(state: Telemetry) -> Message:
     health = _WELL | (_PREARM_CHECK if autopilot.commander.checks_pass else 0)
     if state.gps is None:
         health &= ~_GPS
-    if battery.warning:
-        health &= ~_BATTERY
     return dialect.MAVLink_sys_status_message(
         _PRESENT,
         enabled,
@@ -78,7 +76,7 @@ def battery_status(state: Telemetry) -> Message:
         -1,
         round(100 * battery.remaining),
         0,
-        battery.warning + 1,
+        dialect.MAV_BATTERY_CHARGE_STATE_OK,
     )
 
 

@@ -9,17 +9,16 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from operator import ne
-from typing import NamedTuple
 
 import numpy as np
 
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.encode import Message
-from sim_vehicle.mavlink.line import FAST_LINE, Line, Outbox
+from sim_vehicle.mavlink.outbox import Outbox
 from sim_vehicle.mavlink.streams import aiding, condition, navigation
 from sim_vehicle.mavlink.streams.on_request import ANSWERS
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
-from sim_vehicle.mavlink.streams.topics import NEVER_SENT, OPTIONAL, Topic, Topics
+from sim_vehicle.mavlink.streams.topics import NEVER_SENT, Topic, Topics
 from sim_vehicle.mavlink.telemetry import Telemetry
 
 NOT_STREAMED_US = -1
@@ -37,16 +36,10 @@ class StreamKind:
     notes: tuple[Topic, ...] = ()
     """Slower topics whose news the message marks as such: `Telemetry.renewed`, in this order."""
 
-    @property
-    def is_constant(self) -> bool:
-        """Whether a slow line leaves its rate alone."""
-        return self.message_id in CONSTANT_IDS
-
 
 HEARTBEAT_ID = 0
-# Streams that PX4 never slows: HEARTBEAT and PING.
-CONSTANT_IDS = (HEARTBEAT_ID, 4)
-_AROUND_PAYLOAD = 12
+# A message is sent up to 0.3 of the loop's sleep of 1.5 ms before it is due, as on SITL's fast links.
+EARLY_US = 450
 # Topics whose messages are sent on request even if they were sent already.
 SENT_AGAIN = (Topic.ALWAYS_NEW, Topic.ORIGIN)
 # On every link, whatever its set.
@@ -108,37 +101,22 @@ def interval_from_request(interval_us: float) -> int:
     return max(int(np.float32(1_000_000) / rate_hz), 1)
 
 
-class StreamPace(NamedTuple):
-    """How a link slows its streams: see `line.py`."""
-
-    early_us: int
-    share: float = 1.0
-
-
-FAST_PACE = StreamPace(Line().early_us)
-
-
 class Stream:
     """One running or stopped stream: due when `now_us > due_after_us`; then tell it that it was `sent`."""
 
     __slots__ = (
         "_last_us",
-        "_paced_us",
         "default_interval_us",
         "due_after_us",
         "interval_us",
         "kind",
         "noted",
-        "pace",
         "seen",
         "topic",
     )
 
-    def __init__(
-        self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US, pace: StreamPace = FAST_PACE
-    ) -> None:
+    def __init__(self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US) -> None:
         self.kind, self.topic = kind, int(kind.topic)
-        self.pace = pace
         self.seen = NEVER_SENT
         self.noted = [NEVER_SENT for _ in kind.notes]
         self.default_interval_us = default_interval_us
@@ -152,16 +130,7 @@ class Stream:
     def set_interval(self, interval_us: int) -> None:
         """Go on with another interval."""
         self.interval_us = interval_us
-        self._plan()
-
-    def set_pace(self, pace: StreamPace) -> None:
-        """Go on with what the link can carry."""
-        self.pace = pace
-        self._plan()
-
-    def _plan(self) -> None:
-        self._paced_us = int(self.interval_us / self.pace.share)
-        self.due_after_us = self._last_us + self._paced_us - self.pace.early_us
+        self.due_after_us = self._last_us + interval_us - EARLY_US
 
     def renewed(self, versions: list[int]) -> tuple[bool, ...]:
         """Which of the noted topics have news since the last message."""
@@ -170,10 +139,10 @@ class Stream:
 
     def sent(self, now_us: int) -> None:
         """Keep the mean rate by counting from when it was due, unless that is long ago."""
-        interval_us = self._paced_us
+        interval_us = self.interval_us
         late = now_us - self._last_us >= 1.5 * interval_us
         self._last_us = now_us if late else self._last_us + interval_us
-        self.due_after_us = self._last_us + interval_us - self.pace.early_us
+        self.due_after_us = self._last_us + interval_us - EARLY_US
 
 
 # Now and then the link's loop comes too late and misses one sample: PX4 asked for 250 Hz sends 246.
@@ -197,12 +166,9 @@ class LateLoops:
 class Streams:
     """All streams of one link; their messages go to its ``outbox``."""
 
-    def __init__(
-        self, state: Telemetry, topics: Topics, outbox: Outbox, link: LinkKind, seed: int, line: Line = FAST_LINE
-    ) -> None:
+    def __init__(self, state: Telemetry, topics: Topics, outbox: Outbox, link: LinkKind, seed: int) -> None:
         self._state = state
         self._outbox = outbox
-        self._line = line
         self._now_us = state.sample.time_boot_us
         rates_hz = {HEARTBEAT_ID: HEARTBEAT_HZ, **link.rates_hz}
         self._streams = [
@@ -214,19 +180,8 @@ class Streams:
         self._run()
 
     def _run(self) -> None:
-        """Find the streams that run, and at what pace the line lets them."""
+        """Find the streams that run."""
         self._running = [stream for stream in self._streams if stream.interval_us >= 0]
-        if self._line.baud is None:
-            return
-        planned = [(stream, _size(stream.kind), stream.interval_us) for stream in self._running if self._exists(stream)]
-        varying = [(size, interval_us) for stream, size, interval_us in planned if not stream.kind.is_constant]
-        constant = [(size, interval_us) for stream, size, interval_us in planned if stream.kind.is_constant]
-        share, early_us = self._line.share(varying, constant), self._line.early_us
-        for stream in self._streams:
-            stream.set_pace(StreamPace(early_us, 1.0 if stream.kind.is_constant else share))
-
-    def _exists(self, stream: Stream) -> bool:
-        return stream.kind.topic not in OPTIONAL or self._versions[stream.kind.topic] != NEVER_SENT
 
     def update(self) -> None:
         """Send what is due at the newest sample."""
@@ -293,8 +248,3 @@ class Streams:
             return False
         self._outbox.send(message)
         return True
-
-
-def _size(kind: StreamKind) -> int:
-    """As PX4 reckons: the whole payload, header and checksum."""
-    return encode.payload_bytes(kind.message_id) + _AROUND_PAYLOAD

@@ -7,11 +7,9 @@ import pytest
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
 from sim_vehicle.autopilot.flight_commands import DO_CHANGE_ALTITUDE, DO_ORBIT, DO_REPOSITION
 from sim_vehicle.autopilot.messages import FollowTarget, Result
-from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
-from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, item, place, set_mode, upload
+from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, place, set_mode
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target
 
 NAN = math.nan
@@ -30,16 +28,6 @@ def test_takeoff_goes_to_the_height_and_over_the_place_that_the_command_names():
     flight.fly(5.0)
     assert flight.height_m == pytest.approx(7.0, abs=0.05)
     assert "Using default takeoff altitude: 2.5 m" not in flight.texts()
-
-
-def test_a_takeoff_to_below_the_ground_stays_there():
-    # As PX4: a height of 0 is that of the sea
-    flight = Flight()
-    flight.ask(NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 0)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    flight.fly(8.0)
-    assert "Already higher than takeoff altitude" in flight.texts()
-    assert flight.height_m == 0.0
 
 
 def test_a_takeoff_to_latitude_and_longitude_0_stays_on_the_ground_until_it_disarms():
@@ -158,27 +146,3 @@ def test_return_climbs_to_its_height_and_lands_at_home(height_m):
     assert math.hypot(*north_east(flight)) < 0.2
     assert any(text.endswith(f"({math.ceil(height_m)} m above destination)") for text in flight.texts())
     assert "RTL: land at destination" in flight.texts()
-
-
-def test_return_waits_above_home_where_it_is_to_or_for_good():
-    for delay_s, lands in ((3.0, True), (-1.0, False)):
-        flight = away(RTL_RETURN_ALT=15.0, RTL_DESCEND_ALT=6.0, RTL_LAND_DELAY=delay_s)
-        flight.ask(NAV_RETURN_TO_LAUNCH)
-        flight.fly_until(lambda flight=flight: math.hypot(*north_east(flight)) < 0.5, 60.0)
-        flight.fly(11.0)
-        assert flight.height_m == pytest.approx(6.0, abs=0.9) or lands
-        flight.fly(25.0)
-        assert flight.autopilot.arming.armed is not lands
-
-
-def test_return_leads_to_the_rally_point_that_is_nearer():
-    flight = away(RTL_RETURN_ALT=10.0)
-    upload(
-        flight,
-        item(kinds.RALLY_POINT, 45.0, 10.0, 0.0),
-        item(kinds.RALLY_POINT, -60.0, 0.0, 0.0),
-        kind=MissionType.RALLY,
-    )
-    flight.ask(NAV_RETURN_TO_LAUNCH)
-    flight.fly_until(lambda: not flight.autopilot.arming.armed, 90.0)
-    assert math.dist(north_east(flight), (45.0, 10.0)) < 0.3

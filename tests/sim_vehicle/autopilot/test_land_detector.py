@@ -70,13 +70,6 @@ def test_turning_about_the_vertical_does_not_count_as_moving():
     assert detection.detector.landed
 
 
-def test_a_descent_stalled_on_an_obstacle_looks_like_a_landing():
-    # Given a setpoint that keeps descending while the vehicle rests on something in the air
-    detection = Detection()
-    detection.feed(1.2, thrust=NONE, asked_down=1.0)
-    assert detection.detector.landed
-
-
 def test_landed_lasts_without_a_demand_and_ends_with_thrust():
     detection = Detection()
     detection.feed(1.2, thrust=NONE)
@@ -84,9 +77,3 @@ def test_landed_lasts_without_a_demand_and_ends_with_thrust():
     assert detection.detector.landed
     detection.feed(0.008, thrust=0.2, asked_down=None)
     assert not detection.detector.landed
-
-
-def test_disarmed_is_landed_at_once():
-    detection = Detection()
-    detection.feed(0.008, thrust=0.0, armed=False, velocity=(0.0, 0.0, 5.0))
-    assert detection.detector.landed

@@ -70,13 +70,6 @@ def test_only_a_stick_that_is_moved_fast_enough_counts_as_moved():
 # --- flown -------------------------------------------------------------------------------------------------------
 
 
-def test_centred_sticks_hold_the_place():
-    flight = flying(Mode.POSCTL)
-    there = flight.state.position_ned_m
-    sticks(flight, 5.0)
-    assert math.dist(flight.state.position_ned_m, there) < 0.1
-
-
 @pytest.mark.parametrize(
     ("held", "north", "east"),
     [({"pitch": 1.0}, 1, 0), ({"pitch": -1.0}, -1, 0), ({"roll": 1.0}, 0, 1), ({"roll": -1.0}, 0, -1)],
@@ -111,13 +104,6 @@ def test_the_throttle_is_a_climb_and_centred_it_holds_the_height(mode):
     assert held_m > before_m + 5.0
     sticks(flight, 5.0)
     assert flight.height_m == pytest.approx(held_m, abs=0.05)
-
-
-def test_a_stick_within_the_dead_zone_is_centred():
-    flight = flying(Mode.POSCTL)
-    there = flight.state.position_ned_m
-    sticks(flight, 5.0, pitch=0.09, roll=-0.09, throttle=0.09)
-    assert math.dist(flight.state.position_ned_m, there) < 0.1
 
 
 def test_pulled_down_it_lands_and_disarms():

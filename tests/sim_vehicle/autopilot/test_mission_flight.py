@@ -29,8 +29,8 @@ def begun(*items: StoredItem) -> Flight:
     return flight
 
 
-def reached(flight: Flight, number: int, at_most_s: float = 60.0) -> float:
-    return flight.fly_until(lambda: flight.autopilot.missions.progress.reached >= number, at_most_s)
+def reached(flight: Flight, number: int) -> float:
+    return flight.fly_until(lambda: flight.autopilot.missions.progress.reached >= number, 60.0)
 
 
 def north_east(flight: Flight) -> tuple[float, float]:
@@ -62,15 +62,6 @@ def test_a_mission_from_the_ground_and_back_disarms_and_says_so():
     assert said.index("Mission finished, landed") < said.index("Disarmed by landing")
 
 
-def test_without_a_landing_it_holds_at_the_last_place():
-    flight = begun(TAKEOFF, NORTH)
-    flight.fly_until(lambda: flight.autopilot.missions.progress.finished, 60.0)
-    assert "Mission finished, loitering" in flight.texts()
-    flight.fly(10.0)
-    assert math.dist(north_east(flight), (20.0, 0.0)) < 0.1
-    assert flight.autopilot.modes.flown is Mode.LOITER
-
-
 def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
     # Given a hover at 5 m and a first place at 15 m
     flight = hovering(5.0)
@@ -84,36 +75,15 @@ def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
     assert north_east(flight)[0] > 27.0
 
 
-def test_time_to_stay_is_stayed():
-    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, params=(4.0, 0.0, 0.0, math.nan)), LAND_AT_HOME)
-    flight.fly_until(lambda: math.dist(north_east(flight), (10.0, 0.0)) < 2.0, 60.0)
-    assert reached(flight, 1) == pytest.approx(4.0, abs=0.15)
-
-
-def test_loiter_time_and_delay_take_their_time():
-    flight = begun(TAKEOFF, item(kinds.LOITER_TIME, params=(3.0, 0.0, 0.0, math.nan)), action(kinds.DELAY, 2.0), NORTH)
-    reached(flight, 0)
-    assert reached(flight, 1) == pytest.approx(3.0, abs=0.15)
-    assert reached(flight, 2) == pytest.approx(2.0, abs=0.15)
-
-
-def test_a_heading_is_reached_before_the_item_is_over():
-    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, params=(0.0, 0.0, 0.0, 90.0)), NORTH)
-    reached(flight, 1)
+def test_times_radius_and_heading_are_kept_before_an_item_is_over():
+    stays = item(kinds.WAYPOINT, 10.0, params=(4.0, 0.3, 0.0, 90.0))
+    waits = item(kinds.LOITER_TIME, 10.0, params=(3.0, 0.0, 0.0, math.nan))
+    flight = begun(TAKEOFF, stays, waits, action(kinds.DELAY, 2.0), NORTH)
+    flight.fly_until(lambda: math.dist(north_east(flight), (10.0, 0.0)) < 0.3, 60.0)
+    assert 4.0 < reached(flight, 1) < 6.0
     assert math.degrees(yaw_of(flight.state.attitude_wxyz)) == pytest.approx(90.0, abs=12.0)
-
-
-def test_without_a_heading_the_nose_points_to_where_it_flies():
-    flight = begun(TAKEOFF, NORTH, EAST)
-    reached(flight, 1)
-    flight.fly(3.0)
-    assert math.degrees(yaw_of(flight.state.attitude_wxyz)) == pytest.approx(90.0, abs=12.0)
-
-
-def test_a_tighter_acceptance_radius_counts():
-    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, params=(0.0, 0.3, 0.0, math.nan)), NORTH)
-    reached(flight, 1)
-    assert math.dist(north_east(flight), (10.0, 0.0)) < 0.35
+    assert reached(flight, 2) == pytest.approx(3.0, abs=0.15)
+    assert reached(flight, 3) == pytest.approx(2.0, abs=0.15)
 
 
 def test_speed_is_changed_for_what_follows():
@@ -172,23 +142,6 @@ def test_pause_holds_and_resume_goes_on_with_the_same_item():
     assert set_mode(flight, Mode.MISSION) is Result.ACCEPTED
     reached(flight, 2)
     assert math.dist(north_east(flight), (20.0, 20.0)) < 2.1
-
-
-def test_another_current_item_is_flown_at_once():
-    flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
-    reached(flight, 0)
-    assert flight.autopilot.missions.choose(2)
-    reached(flight, 2)
-    assert math.dist(north_east(flight), (20.0, 20.0)) < 2.1
-
-
-def test_another_mission_in_flight_is_flown_instead():
-    flight = begun(TAKEOFF, NORTH, EAST)
-    reached(flight, 1)
-    upload(flight, item(kinds.WAYPOINT, -10.0), item(kinds.WAYPOINT, -10.0, -10.0))
-    flight.autopilot.missions.choose(0)
-    reached(flight, 1)
-    assert math.dist(north_east(flight), (-10.0, -10.0)) < 2.1
 
 
 def test_a_mission_cleared_in_flight_is_a_failsafe():

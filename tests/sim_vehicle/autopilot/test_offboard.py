@@ -1,7 +1,6 @@
 """Which offboard setpoints count, and how the vehicle flies when they stop and come back."""
 
 import math
-from itertools import pairwise
 
 import pytest
 
@@ -91,15 +90,6 @@ def test_without_setpoints_offboard_can_be_chosen_but_not_armed():
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
 
 
-def test_one_setpoint_is_enough_to_choose_offboard_in_the_air():
-    # Given a client that sends its first setpoint and the mode at once, as MAVSDK does
-    flight = hovering()
-    flight.ask(DO_SET_MODE, 1, 4, 3)
-    flight.fly(2.0)
-    flight.autopilot.setpoint(UP_THERE)
-    assert flight.ask(DO_SET_MODE, 1, 6) is Result.ACCEPTED
-
-
 def test_in_the_air_offboard_without_setpoints_is_refused():
     flight = hovering()
     assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
@@ -130,18 +120,6 @@ def test_setpoints_that_come_back_put_it_into_offboard_again():
     assert flight.autopilot.commander.system_status == 4
 
 
-def test_too_slow_a_stream_flips_to_and_fro():
-    flight = hovering()
-    shown = []
-    for _ in range(5):
-        flight.autopilot.setpoint(UP_THERE)
-        for _ in range(round(250 / 0.8)):
-            flight.step()
-            shown.append(flight.autopilot.modes.flown)
-    changes = sum(a is not b for a, b in pairwise(shown))
-    assert changes >= 8
-
-
 def test_a_refused_frame_and_an_empty_mask_do_not_keep_it_alive():
     for useless in (target((0, 0, -3.0), frame=9), target()):
         flight = hovering()
@@ -159,12 +137,3 @@ def test_only_setpoints_received_in_offboard_are_flown():
     # Then the vehicle stays
     assert flight.autopilot.modes.flown is Mode.OFFBOARD
     assert abs(flight.state.position_ned_m[0]) < 0.1
-
-
-def test_a_pilots_change_is_not_undone_by_setpoints():
-    flight = hovering()
-    assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
-    flight.fly(3.0, target(position=(50.0, 0.0, -3.0)))
-    assert flight.autopilot.modes.flown is flight.autopilot.modes.intended is Mode.LOITER
-    assert abs(flight.state.position_ned_m[0]) < 0.1
-    assert flight.autopilot.commander.system_status == 4

@@ -109,19 +109,6 @@ def test_an_attitude_alone_arms_and_takes_off_without_the_ramp():
     assert not flight.autopilot.detector.landed
 
 
-def test_from_an_attitude_to_a_position_no_ramp_holds_it_back():
-    flight = Flight()
-    up = AttitudeTarget(LEVEL, NO_RATES, 1.1 * HOVER)
-    stream(flight, up, 0.2)
-    set_mode(flight, Mode.OFFBOARD)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    stream(flight, up, 2.0)
-    lowest = flight.height_m
-    set_mode(flight, Mode.LOITER)
-    flight.fly(3.0)
-    assert flight.height_m > lowest - 0.3
-
-
 @pytest.mark.parametrize("command", [None, RUN_PREARM_CHECKS])
 def test_from_an_attitude_to_a_position_it_changes_with_the_commanders_status(command):
     # Given a vehicle that is flown by attitude
@@ -139,16 +126,6 @@ def test_from_an_attitude_to_a_position_it_changes_with_the_commanders_status(co
         steps += 1
     # Then it is flown with the commander's status, which comes twice a second, or at once
     assert (steps * 0.004 <= 0.012) if command is not None else (0.1 < steps * 0.004 <= 0.51)
-
-
-def test_low_thrust_by_attitude_is_a_landing_without_a_commanded_descent():
-    flight = hovering(2.5)
-    stream(flight, AttitudeTarget(LEVEL, NO_RATES, HOVER), 0.2)
-    set_mode(flight, Mode.OFFBOARD)
-    stream(flight, AttitudeTarget(LEVEL, NO_RATES, 0.9 * HOVER), 4.0)
-    assert flight.height_m == 0.0
-    stream(flight, AttitudeTarget(LEVEL, NO_RATES, 0.0), 4.0)
-    assert "Disarmed by landing" in flight.texts()
 
 
 # --- by the real loops ---------------------------------------------------------------------------------------------

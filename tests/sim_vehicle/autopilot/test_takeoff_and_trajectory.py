@@ -6,31 +6,27 @@ import pytest
 
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
 from sim_vehicle.autopilot.flight_tasks.auto_flight import land_speed_m_s
-from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, stop_point
+from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
-from sim_vehicle.estimator.estimate import Estimate, yaw_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
-from tests.sim_vehicle.autopilot.kinematic_plant import STANDING, Flight, attitude_of_yaw, target
+from tests.sim_vehicle.autopilot.flying import hovering
+from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
 SECOND = 1_000_000
 DEFAULTS = Parameters()
 
 
-def taken_off(start: Estimate | None = None) -> Flight:
-    flight = Flight(start)
-    flight.ask(NAV_TAKEOFF)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.LOITER, 12.0)
-    return flight
-
-
-def test_takeoff_climbs_to_two_and_a_half_metres_and_holds():
+def test_takeoff_waits_for_the_motors_climbs_to_two_and_a_half_metres_and_holds():
     flight = Flight()
     flight.ask(NAV_TAKEOFF)
     flight.ask(COMPONENT_ARM_DISARM, 1)
+    left_after_s = flight.fly_until(lambda: flight.height_m > 0.01, 5.0)
+    # One second of spooling up, then the ramp from -2.45 m/s, which passes zero after 45 % of its 3 s;
+    # the first centimetre takes another 0.2 s at the speed that is allowed then
+    assert left_after_s == pytest.approx(1.0 + 1.35 + 0.2, abs=0.03)
     fastest = 0.0
     while flight.autopilot.modes.flown is Mode.TAKEOFF:
         flight.step()
@@ -41,16 +37,6 @@ def test_takeoff_climbs_to_two_and_a_half_metres_and_holds():
     assert 1.0 < fastest <= 1.55
     flight.fly(5.0)
     assert flight.height_m == pytest.approx(2.5, abs=0.02)
-
-
-def test_nothing_leaves_the_ground_before_the_motors_are_up_to_speed():
-    flight = Flight()
-    flight.ask(NAV_TAKEOFF)
-    flight.ask(COMPONENT_ARM_DISARM, 1)
-    left_after_s = flight.fly_until(lambda: flight.height_m > 0.01, 5.0)
-    # One second of spooling up, then the ramp from -2.45 m/s, which passes zero after 45 % of its 3 s;
-    # the first centimetre takes another 0.2 s at the speed that is allowed then
-    assert left_after_s == pytest.approx(1.0 + 1.35 + 0.2, abs=0.03)
 
 
 def test_armed_and_left_alone_it_stays_on_the_ground_and_disarms():
@@ -96,8 +82,7 @@ def test_after_a_landing_the_ramp_begins_again():
 
 
 def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground():
-    flight = taken_off()
-    flight.fly(3.0)
+    flight = hovering(2.5)
     flight.ask(NAV_LAND)
     flight.fly(1.5)
     assert flight.state.velocity_ned_m_s[2] == pytest.approx(0.7, abs=0.01)
@@ -129,45 +114,6 @@ def test_landing_is_faster_high_up():
 )
 def test_return_flies_at_px4s_height(height_m, distance_m, expected_m):
     assert return_height_over(height_m, distance_m, DEFAULTS) == pytest.approx(expected_m)
-
-
-def test_return_climbs_comes_home_and_lands_facing_as_it_stood():
-    # Given a takeoff facing east, and a flight 12 m to the north
-    flight = taken_off(STANDING._replace(attitude_wxyz=attitude_of_yaw(math.pi / 2)))
-    away = target(position=(12.0, 0.0, -2.5))
-    flight.fly(0.5, away)
-    flight.ask(176, 1, 6)
-    flight.fly(12.0, away)
-    assert flight.state.position_ned_m[0] == pytest.approx(12.0, abs=0.1)
-    # When it returns
-    flight.ask(NAV_RETURN_TO_LAUNCH)
-    highest, yaws = 0.0, set()
-    while flight.autopilot.arming.armed:
-        flight.step()
-        highest = max(highest, flight.height_m)
-        yaws.add(round(math.degrees(yaw_of(flight.state.attitude_wxyz))))
-        assert flight.time_s < 120.0
-    # Then it went to 30 m, looked home (south), and landed at home facing east
-    assert highest == pytest.approx(30.0, abs=0.3)
-    assert yaws & {180, -180}
-    assert math.hypot(*flight.state.position_ned_m[:2]) < 0.1
-    assert yaw_of(flight.state.attitude_wxyz) == pytest.approx(math.pi / 2, abs=0.01)
-
-
-def test_hold_stops_where_braking_ends_and_stays():
-    flight = taken_off()
-    flight.fly(3.0)
-    moving = target(velocity=(2.0, 0.0, 0.0))
-    flight.fly(0.5, moving)
-    flight.ask(176, 1, 6)
-    flight.fly(3.0, moving)
-    place = flight.state.position_ned_m[0]
-    expected = stop_point(flight.state.position_ned_m, flight.state.velocity_ned_m_s, DEFAULTS)[0]
-    flight.ask(176, 1, 4, 3)
-    flight.fly(6.0)
-    assert flight.state.position_ned_m[0] == pytest.approx(expected, abs=0.1)
-    assert 1.0 < flight.state.position_ned_m[0] - place < 2.5
-    assert math.hypot(*flight.state.velocity_ned_m_s) < 0.02
 
 
 def test_a_smoothed_setpoint_keeps_its_limits_and_does_not_run_past():

@@ -1,5 +1,7 @@
 """Flies a vehicle in lockstep over its bytes, as a companion would."""
 
+from typing import Any
+
 from sim_vehicle.testing import LockstepVehicle
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, End
 
@@ -24,3 +26,10 @@ class Pilot(End):
         self.vehicle.advance_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, 20)
         self.fly(1.0)
         self.forget()
+
+
+def hovering(**setup: Any) -> Pilot:
+    """Taken off in a vehicle of its own."""
+    pilot = Pilot(LockstepVehicle(**setup))
+    pilot.take_off()
+    return pilot

@@ -9,7 +9,6 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.errors import ConditionNotMet, SceneError, SimulationError, VehicleEnded
-from sim_vehicle.shell.truth_file import load_faults, load_truth
 from sim_vehicle.testing import RunningVehicle, Truth, Wall, faults, start_vehicle
 
 TIMEOUT_S = 10.0
@@ -37,7 +36,7 @@ def command(number: int, *params: float) -> bytes:
 
 
 def vehicle_threads() -> int:
-    return sum(thread.name == "simulated vehicle" for thread in threading.enumerate())
+    return sum(thread.name.startswith("simulated vehicle") for thread in threading.enumerate())
 
 
 def is_free(kind: int, port: int) -> bool:
@@ -64,12 +63,6 @@ def test_it_is_there_at_its_addresses_and_gone_afterwards() -> None:
         vehicle.hit(1.0)
     # What happened may be read afterwards, too
     assert vehicle.truth.time_boot_s > 0
-
-
-def test_it_ends_with_an_error_in_the_test() -> None:
-    with pytest.raises(ZeroDivisionError), start_vehicle():
-        _ = 1 / 0
-    assert vehicle_threads() == 0
 
 
 def test_a_setup_that_cannot_be_leaves_nothing_behind() -> None:
@@ -194,13 +187,3 @@ def test_a_vehicle_that_comes_to_grief_says_so(monkeypatch: pytest.MonkeyPatch) 
         vehicle.stop()
     vehicle.stop()
     assert vehicle_threads() == 0
-
-
-def test_the_truth_in_a_file(tmp_path) -> None:
-    with start_vehicle(speed=0.0) as vehicle:
-        vehicle.inject(faults.gps_loss(), for_s=0.1)
-        passes(vehicle, 0.5)
-        vehicle.save_truth(tmp_path / "truth.npz")
-    hits, series, _ = load_truth(tmp_path / "truth.npz")
-    assert hits == [] and series["time_boot_us"][-1] > 400_000
-    assert [span.kind for span in load_faults(tmp_path / "truth.npz")] == ["aiding_loss"]

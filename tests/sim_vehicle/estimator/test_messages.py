@@ -1,42 +1,9 @@
 """What of the filter and its sensors is on the wire."""
 
-import math
-
 import pytest
 
-from sim_vehicle.geography import Origin
-from sim_vehicle.scene import Scene
 from tests.sim_vehicle.estimator.flying import filtered
-from tests.sim_vehicle.vehicle_client import SET_INTERVAL, Client
-
-TRUTH = 115  # HIL_STATE_QUATERNION
-
-
-def test_flow_and_range_are_sent_at_ten_hertz_where_they_are_simulated():
-    wire = Client(airframe=filtered())
-    assert wire.rate_hz("OPTICAL_FLOW_RAD", 10.0) == pytest.approx(10, rel=0.03)
-    assert len(wire.all("DISTANCE_SENSOR")) == pytest.approx(100, rel=0.03)
-    distance = wire.last("DISTANCE_SENSOR")
-    assert distance.current_distance == pytest.approx(8, abs=4)
-    assert (distance.min_distance, distance.max_distance, distance.orientation) == (1, 4000, 25)
-    assert distance.signal_quality == 100
-    flow = wire.last("OPTICAL_FLOW_RAD")
-    # On its feet the camera is too near to see anything.
-    assert (flow.integration_time_us, flow.quality, flow.distance) == (100_000, 0, -1.0)
-
-
-def test_the_truth_is_sent_on_request_alone():
-    scene = Scene.model_validate({"start": {"position_ned_m": [30.0, -20.0, 0.0], "yaw_deg": 90}})
-    wire = Client(airframe=filtered(), scene=scene)
-    wire.run(1.0)
-    assert not wire.all("HIL_STATE_QUATERNION")
-    wire.command(SET_INTERVAL, TRUTH, 20_000)
-    assert wire.rate_hz("HIL_STATE_QUATERNION", 2.0) == pytest.approx(50, rel=0.05)
-    truth = wire.last("HIL_STATE_QUATERNION")
-    place = Origin().place_at((30.0, -20.0, -0.08))
-    assert (truth.lat, truth.lon) == (round(1e7 * place.latitude_deg), round(1e7 * place.longitude_deg))
-    assert truth.alt == pytest.approx(1e3 * place.altitude_m, abs=20)
-    assert truth.attitude_quaternion == pytest.approx([math.sqrt(0.5), 0, 0, math.sqrt(0.5)], abs=0.01)
+from tests.sim_vehicle.vehicle_client import Client
 
 
 def test_odometry_counts_the_filters_resets_and_states_its_variances():

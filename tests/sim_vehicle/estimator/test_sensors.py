@@ -45,12 +45,6 @@ def test_flow_is_speed_over_distance_and_turns_are_in_both_flow_and_gyroscope():
     assert flow.std(axis=0) == pytest.approx(SPECS.optical_flow.noise_rad_s, rel=0.15)
 
 
-def test_flow_comes_at_its_rate_with_its_integration_time():
-    samples = flow_samples(body(), 2.0)
-    assert [sample.time_us for sample in samples] == list(range(100_000, 2_000_001, 100_000))
-    assert {sample.integration_us for sample in samples} == {100_000}
-
-
 @pytest.mark.parametrize(
     "state",
     [
@@ -136,8 +130,3 @@ def test_a_filter_without_the_sensors_it_needs_is_refused(missing):
     with pytest.raises(ValidationError, match="needs fitted sensors"):
         filtered(changes={"sensors": {missing: {"fitted": False}}})
     filtered(changes={"sensors": {missing: {"fitted": False}, "motion_capture": {"fitted": True}}})
-
-
-def test_a_loss_that_ends_before_it_begins_is_refused():
-    with pytest.raises(ValidationError, match="ends before it begins"):
-        filtered(changes={"sensors": {"compass": {"lost_between_s": [[3.0, 2.0]]}}})

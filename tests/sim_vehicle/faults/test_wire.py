@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.airframe import load_built_in
 from sim_vehicle.faults.spec import WireFault
 from sim_vehicle.faults.wire import Wire, message_number, split
 from sim_vehicle.mavlink.restamp import Restamper
 from sim_vehicle.scene import Scene
-from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.vehicle_client import Client
 
 STEP_US = 4000
@@ -26,12 +24,12 @@ def number_in(raw: bytes) -> int:
     return int.from_bytes(raw[10:12], "little")
 
 
-def carried(seed: int = 1, count: int = 20_000, **fault: Any) -> tuple[list[tuple[int, bytes]], Wire]:
+def carried(**fault: Any) -> tuple[list[tuple[int, bytes]], Wire]:
     """One frame every 4 ms; (time, frame) as they arrive."""
-    wire = Wire([WireFault.model_validate({"kind": "wire", "at_s": 0, **fault})], seed)
+    wire = Wire([WireFault.model_validate({"kind": "wire", "at_s": 0, **fault})], 1)
     arrived = []
-    for step in range(count + 500):
-        frames = [frame(step)] if step < count else []
+    for step in range(20_500):
+        frames = [frame(step)] if step < 20_000 else []
         arrived += [(step * STEP_US, raw) for raw in wire.carry(frames, step * STEP_US)]
     return arrived, wire
 
@@ -52,21 +50,6 @@ def test_as_many_are_lost_as_asked_in_runs_as_long_as_asked(burst_packets: float
     assert (~there).sum() / starts == pytest.approx(max(burst_packets, 1.25), rel=0.1)
 
 
-def test_a_cut_lets_nothing_through_and_ends() -> None:
-    wire = Wire([WireFault(kind="wire", between_s=(1.0, 2.0), loss=1.0)], 1)
-    arrived = [number_in(raw) for step in range(750) for raw in wire.carry([frame(step)], step * STEP_US)]
-    assert arrived == [*range(250), *range(500, 750)]
-
-
-def test_delay_and_jitter_are_those_asked_and_keep_the_order() -> None:
-    arrived, _ = carried(delay_s=0.03, jitter_s=0.05)
-    delays, numbers = delays_s(arrived), [number_in(raw) for _, raw in arrived]
-    assert numbers == sorted(numbers) and len(numbers) == 20_000
-    assert delays.min() >= 0.03
-    # What is overtaken waits for the one before it: never more than the longest, and one step to be noticed.
-    assert delays.max() <= 0.08 + 0.004 and delays.mean() > 0.055
-
-
 def test_the_share_that_is_overtaken_is_the_one_asked() -> None:
     arrived, _ = carried(reorder=0.1, reorder_by_s=0.02)
     assert (delays_s(arrived) > 0).mean() == pytest.approx(0.1, abs=0.01)
@@ -74,30 +57,10 @@ def test_the_share_that_is_overtaken_is_the_one_asked() -> None:
     assert sorted(numbers) == list(range(20_000)) and numbers != sorted(numbers)
 
 
-def test_doubles_and_damage_come_as_often_as_asked() -> None:
-    arrived, _ = carried(duplicate=0.05, corrupt=0.1)
-    assert len(arrived) == pytest.approx(21_000, abs=150)
-    good = {frame(number) for number in range(20_000)}
-    assert sum(raw not in good for _, raw in arrived) / len(arrived) == pytest.approx(0.1, abs=0.015)
-    assert all(len(raw) == 14 for _, raw in arrived)
-
-
 def test_only_the_named_messages_are_hit() -> None:
     wire = Wire([WireFault(kind="wire", at_s=0, loss=1.0, messages=("HIGHRES_IMU", 30))], 1, {"HIGHRES_IMU": 105}.get)
     kept = wire.carry([frame(1, 105), frame(2, 30), frame(3, 32)], 0)
     assert [message_number(raw) for raw in kept] == [32]
-
-
-def test_the_same_seed_means_the_same_fate() -> None:
-    fault = {"loss": 0.1, "jitter_s": 0.02, "reorder": 0.1, "corrupt": 0.1, "duplicate": 0.1}
-    assert carried(seed=4, count=500, **fault)[0] == carried(seed=4, count=500, **fault)[0]
-    assert carried(seed=4, count=500, **fault)[0] != carried(seed=5, count=500, **fault)[0]
-
-
-def test_without_faults_at_the_moment_frames_go_straight_through() -> None:
-    wire = Wire([WireFault(kind="wire", at_s=9, loss=1.0)], 1)
-    frames = [frame(1), frame(2)]
-    assert wire.carry(frames, 0) == tuple(frames)
 
 
 def test_bytes_are_split_where_frames_begin() -> None:
@@ -136,20 +99,6 @@ def test_a_battery_that_sags_shows_its_voltage() -> None:
     heard = flown({"kind": "battery_sag", "between_s": [0.5, 1.0], "voltage_share": 0.8}, seconds=4.0)
     millivolts = stamps(heard, "SYS_STATUS", "voltage_battery")
     assert millivolts[-1] / millivolts[0] == pytest.approx(0.8, abs=0.01)
-
-
-def test_commands_to_the_vehicle_are_lost_too() -> None:
-    link = dialect.MAVLink(None, 255, 190)
-    request = dialect.MAVLink_timesync_message(0, 12345).pack(link)
-
-    def answers(*faults: dict[str, Any]) -> int:
-        vehicle = SimulatedVehicle(load_built_in("foldable"), Scene.model_validate({"faults": faults}), seed=1)
-        parser = dialect.MAVLink(None)
-        got = [parser.decode(bytearray(raw)) for _ in range(200) for raw in vehicle.step(request)]
-        return sum(message.get_type() == "TIMESYNC" and message.ts1 == 12345 for message in got)
-
-    assert answers() == 200
-    assert answers({"kind": "wire", "direction": "to_vehicle", "at_s": 0, "loss": 0.5}) == pytest.approx(100, abs=25)
 
 
 def test_what_has_no_stamp_of_the_vehicles_is_left_alone() -> None:

@@ -34,10 +34,9 @@ class Px4Client:
                 raise EOFError
             self._waiting += self._link.parse_buffer(data) or []
 
-    def answer(self, controls: list[float], armed: bool = True, flags: int = 1, time_us: int | None = None) -> None:
-        stamp = self.times_us[-1] if time_us is None else time_us
+    def answer(self, controls: list[float], armed: bool = True) -> None:
         mode = 0x81 if armed else 0x01
-        message = dialect.MAVLink_hil_actuator_controls_message(stamp, controls + [0.0] * 12, mode, flags)
+        message = dialect.MAVLink_hil_actuator_controls_message(self.times_us[-1], controls + [0.0] * 12, mode, 1)
         self._socket.sendall(message.pack(self._link))
 
     def fly(self, steps: int, controls: list[float]) -> Iterator[list]:

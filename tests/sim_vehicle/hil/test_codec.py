@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Place
-from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, HilState, MotionCapture
+from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, MotionCapture
 from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
 
 ZURICH = Place(47.397742, 8.545594, 488.123)
@@ -56,14 +56,6 @@ def test_motion_capture_is_an_odometry_in_local_ned_that_ekf2_reads():
     assert [covariance[i] for i in (0, 6, 11)] == pytest.approx([4e-6] * 3)
     assert [covariance[i] for i in (15, 18, 20)] == pytest.approx([2.5e-5] * 3)
     assert sum(value != 0 for value in covariance) == 6
-
-
-def test_the_truth_for_px4s_log():
-    sent = on_the_wire(HilState(8_000, ZURICH, (1.0, -2.0, 0.5), (0.8, 0.0, 0.6, 0.0), (0.1, 0.2, 0.3)))
-    assert (sent.lat, sent.lon, sent.alt) == (473977420, 85455940, 488123)
-    assert (sent.vx, sent.vy, sent.vz) == (100, -200, 50)
-    assert tuple(sent.attitude_quaternion) == pytest.approx((0.8, 0.0, 0.6, 0.0))
-    assert (sent.rollspeed, sent.pitchspeed, sent.yawspeed) == pytest.approx((0.1, 0.2, 0.3))
 
 
 @pytest.mark.parametrize(

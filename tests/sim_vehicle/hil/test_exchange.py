@@ -7,7 +7,6 @@ from sim_vehicle.hil.exchange import (
     ANSWER_TIMEOUT_US,
     FIRST_ANSWER_WORDS,
     MOVES,
-    STARTING_PERIOD_US,
     STARTING_TIMEOUT_US,
     Exchange,
     ExchangeEvent,
@@ -22,9 +21,9 @@ def answer(time_us: int, armed: bool = True, is_lockstep: bool = True) -> Actuat
     return ActuatorControls(time_us, armed, is_lockstep, HALF_THRUST)
 
 
-def starting(now_us: int = 0) -> Exchange:
+def starting() -> Exchange:
     exchange = Exchange()
-    exchange.connected(now_us)
+    exchange.connected(0)
     return exchange
 
 
@@ -34,15 +33,6 @@ def in_lockstep() -> Exchange:
     exchange.sent(4_000, 1_000)
     exchange.received(answer(4_000))
     return exchange
-
-
-def test_while_px4_boots_samples_go_out_at_a_pace_of_their_own():
-    exchange = starting(now_us=50)
-    assert exchange.next_sample_at_us() == 50
-    exchange.sent(4_000, 60)
-    assert exchange.next_sample_at_us() == 60 + STARTING_PERIOD_US
-    exchange.sent(8_000, 5_000)
-    assert exchange.phase is ExchangePhase.STARTING
 
 
 def test_the_first_answer_begins_lockstep_even_to_an_older_sample():
@@ -98,17 +88,6 @@ def test_an_answer_that_does_not_come_is_given_up_after_the_timeout_and_told_onc
     assert len(exchange.notices) == 1
 
 
-def test_a_px4_that_comes_back_late_is_in_lockstep_again():
-    exchange = in_lockstep()
-    exchange.sent(8_000, 0)
-    exchange.look_at_clock(ANSWER_TIMEOUT_US)
-    exchange.sent(12_000, ANSWER_TIMEOUT_US)
-    exchange.received(answer(8_000))
-    assert exchange.phase is ExchangePhase.AWAITING
-    exchange.received(answer(12_000))
-    assert exchange.phase is ExchangePhase.READY
-
-
 def test_a_px4_that_never_answers_is_told_of_once():
     exchange = starting()
     for now_us in range(0, STARTING_TIMEOUT_US + 3_000_000, 1_000_000):
@@ -123,18 +102,6 @@ def test_a_px4_with_a_clock_of_its_own_is_refused(wrong):
     exchange.sent(4_000, 0)
     with pytest.raises(NotInLockstep, match="lockstep"):
         exchange.received(wrong)
-
-
-def test_the_next_px4_begins_with_stopped_motors_and_from_the_start():
-    exchange = in_lockstep()
-    exchange.closed()
-    assert exchange.next_sample_at_us() is None
-    assert exchange.motor_fractions == MOTORS_STOPPED
-    exchange.connected(70)
-    assert exchange.phase is ExchangePhase.STARTING
-    exchange.sent(4_000, 80)
-    exchange.received(answer(4_000))
-    assert exchange.phase is ExchangePhase.READY
 
 
 REACHED = {

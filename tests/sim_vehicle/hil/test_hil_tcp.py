@@ -3,13 +3,13 @@
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
 
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.errors import NotInLockstep, PortInUse
+from sim_vehicle.errors import PortInUse
 from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
@@ -34,53 +34,29 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Served:
-    """The server in a thread, and what it said."""
-
-    def __init__(self, speed: float, truth_path: Path | None) -> None:
-        self.port = free_port()
-        self.said: list[str] = []
-        self.problem: Exception | None = None
-        self._stop, self._listening = threading.Event(), threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(speed, truth_path))
-        self._thread.start()
-        assert self._listening.wait(TIMEOUT_S)
-
-    def _run(self, speed: float, truth_path: Path | None) -> None:
-        try:
-            serve_px4(new_vehicle, self.port, speed, truth_path, self._stop.is_set, self._tell)
-        except NotInLockstep as problem:
-            self.problem = problem
-
-    def _tell(self, text: str) -> None:
-        self.said.append(text)
-        self._listening.set()
-
-    def end(self) -> None:
-        self._stop.set()
-        self.join()
-
-    def join(self) -> None:
-        self._thread.join(TIMEOUT_S)
-        assert not self._thread.is_alive()
-
-
 @contextmanager
-def served(speed: float = 0.0, truth_path: Path | None = None) -> Iterator[Served]:
-    server = Served(speed, truth_path)
+def served(speed: float = 0.0, truth_path: Path | None = None) -> Iterator[tuple[int, list[str]]]:
+    """The server in a thread: its port, and what it says."""
+    port, said, stop, listening = free_port(), [], threading.Event(), threading.Event()
+
+    def tell(text: str) -> None:
+        said.append(text)
+        listening.set()
+
+    arguments = (new_vehicle, port, speed, truth_path, stop.is_set, tell)
+    thread = threading.Thread(target=serve_px4, args=arguments)
+    thread.start()
+    assert listening.wait(TIMEOUT_S)
     try:
-        yield server
+        yield port, said
     finally:
-        server.end()
+        stop.set()
+        thread.join(TIMEOUT_S)
+        assert not thread.is_alive()
 
 
-@contextmanager
-def connected(server: Served) -> Iterator[Px4Client]:
-    px4 = Px4Client(server.port)
-    try:
-        yield px4
-    finally:
-        px4.close()
+def connected(port: int) -> closing[Px4Client]:
+    return closing(Px4Client(port))
 
 
 DUE_IN_A_SECOND = {
@@ -88,15 +64,15 @@ DUE_IN_A_SECOND = {
 }  # fmt: skip
 
 
-def boot(px4: Px4Client, unanswered: int = 12) -> None:
+def boot(px4: Px4Client) -> None:
     """PX4's modules need some samples before the first motor command."""
-    for _ in range(unanswered):
+    for _ in range(12):
         px4.next_step()
     px4.answer([0.0] * 4, armed=False)
 
 
 def test_px4_boots_on_samples_that_it_does_not_answer_and_then_gets_one_an_answer():
-    with served() as server, connected(server) as px4:
+    with served() as (port, _), connected(port) as px4:
         boot(px4)
         steps = list(px4.fly(200, HOVER))
         assert px4.times_us == [4_000 * i for i in range(1, len(px4.times_us) + 1)]
@@ -107,7 +83,7 @@ def test_px4_boots_on_samples_that_it_does_not_answer_and_then_gets_one_an_answe
 
 def test_a_lost_answer_costs_a_second_and_not_the_flight(tmp_path):
     path = tmp_path / "truth.npz"
-    with served(1.0, path) as server, connected(server) as px4:
+    with served(1.0, path) as (port, _), connected(port) as px4:
         boot(px4)
         list(px4.fly(20, HOVER))
         px4.next_step()
@@ -121,21 +97,13 @@ def test_a_lost_answer_costs_a_second_and_not_the_flight(tmp_path):
     assert not others and at_us == 4_000 * 34 and stood_us >= 900_000
 
 
-def test_motor_commands_move_the_vehicle():
-    with served() as server, connected(server) as px4:
-        boot(px4)
-        steps = list(px4.fly(300, [0.9] * 4))
-        heights = [message.alt for step in steps for message in step if message.get_type() == "HIL_STATE_QUATERNION"]
-        assert heights[-1] - heights[0] > 300  # mm
-
-
 def test_the_next_px4_gets_a_new_vehicle_and_the_truth_of_each_is_written(tmp_path):
     path = tmp_path / "truth.npz"
-    with served(truth_path=path) as server:
-        with connected(server) as px4:
+    with served(truth_path=path) as (port, said):
+        with connected(port) as px4:
             boot(px4)
             list(px4.fly(300, [0.9] * 4))
-        with connected(server) as px4:
+        with connected(port) as px4:
             first = px4.next_step()
             _, series, _ = load_truth(path)
             assert series["position_ned_m"][-1, 2] < -0.3
@@ -144,26 +112,7 @@ def test_the_next_px4_gets_a_new_vehicle_and_the_truth_of_each_is_written(tmp_pa
             list(px4.fly(10, [0.0] * 4))
     _, series, _ = load_truth(path)
     assert series["position_ned_m"][-1, 2] > -0.1
-    assert sum("has connected" in text for text in server.said) == 2
-
-
-def test_a_px4_that_goes_while_it_boots_does_no_harm():
-    with served() as server:
-        with connected(server) as px4:
-            px4.next_step()
-        with connected(server) as px4:
-            boot(px4)
-            assert len(list(px4.fly(5, HOVER))) == 5
-    assert any("before it answered" in text for text in server.said)
-
-
-def test_a_px4_without_lockstep_ends_the_simulation_with_a_reason():
-    server = Served(0.0, None)
-    with connected(server) as px4:
-        px4.next_step()
-        px4.answer(HOVER, flags=0)
-        server.join()
-    assert isinstance(server.problem, NotInLockstep)
+    assert sum("has connected" in text for text in said) == 2
 
 
 def test_only_this_machine_is_listened_to(monkeypatch):

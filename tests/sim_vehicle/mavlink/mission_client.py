@@ -19,9 +19,8 @@ STEP_US = 4_000
 CLIENT_RETRY_US = 500_000
 
 
-def wire_item(number, command=commands.WAYPOINT, is_int=True, kind=MissionType.MISSION, **fields):
+def wire_item(number, command=commands.WAYPOINT, kind=MissionType.MISSION, **fields):
     """A waypoint north of home, 10 m up, in MISSION_ITEM_INT."""
-    build = dialect.MAVLink_mission_item_int_message if is_int else dialect.MAVLink_mission_item_message
     params = fields.pop("params", (0.0, 0.0, 0.0, 0.0))
     values = {
         "frame": commands.FRAME_GLOBAL_RELATIVE_INT,
@@ -33,7 +32,11 @@ def wire_item(number, command=commands.WAYPOINT, is_int=True, kind=MissionType.M
         **fields,
     }
     frame, current, autocontinue, *place = values.values()
-    return sent(build(1, 1, number, frame, command, current, autocontinue, *params, *place, kind))
+    return sent(
+        dialect.MAVLink_mission_item_int_message(
+            1, 1, number, frame, command, current, autocontinue, *params, *place, kind
+        )
+    )
 
 
 def sent(message, peer=CLIENT):
@@ -58,8 +61,8 @@ def ack(result, kind, peer=CLIENT):
     return sent(dialect.MAVLink_mission_ack_message(1, 1, result, kind), peer)
 
 
-def clear_all(kind, peer=CLIENT):
-    return sent(dialect.MAVLink_mission_clear_all_message(1, 1, kind), peer)
+def clear_all(kind):
+    return sent(dialect.MAVLink_mission_clear_all_message(1, 1, kind))
 
 
 def set_current(number, peer=CLIENT):
@@ -126,27 +129,11 @@ class Exchange:
                 self.asked.append(said)
         raise AssertionError("no acknowledgement came")
 
-    def download(self, kind=MissionType.MISSION, within_s: float = 60.0):
-        """The items that the client has in the end, in their order."""
-        said = request_list(kind)
-        self.asked.append(said)
-        said_us, total, items = self.now_us, None, {}
-        end_us = self.now_us + round(1e6 * within_s)
-        while self.now_us < end_us:
-            for answer in self.step():
-                assert answer.get_type() != "MISSION_ACK", f"refused: {answer}"
-                if answer.get_type() == "MISSION_COUNT":
-                    total = answer.count if total is None else total
-                elif answer.get_type() == "MISSION_ITEM_INT" and answer.seq == len(items):
-                    items[answer.seq] = answer
-                else:
-                    continue
-                if len(items) == total:
-                    self.asked.append(ack(MissionResult.ACCEPTED, kind))
-                    return [items[number] for number in range(total)]
-                said, said_us = request_item(len(items), kind), self.now_us
-                self.asked.append(said)
-            if self.now_us - said_us > CLIENT_RETRY_US:
-                said_us = self.now_us
-                self.asked.append(said)
-        raise AssertionError("the download did not end")
+    def download(self):
+        """The items that the client gets, in their order."""
+        (said,) = of_type(self.ask(request_list(MissionType.MISSION)), "MISSION_COUNT")
+        items = [
+            of_type(self.ask(request_item(n, MissionType.MISSION)), "MISSION_ITEM_INT")[0] for n in range(said.count)
+        ]
+        self.ask(ack(MissionResult.ACCEPTED, MissionType.MISSION))
+        return items

@@ -9,14 +9,13 @@ from pymavlink.dialects.v20 import development as dialect
 from pymavlink.generator.mavcrc import x25crc
 
 from sim_vehicle.geography import Origin, Place
-from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import KINDS
 from sim_vehicle.mavlink.streams.topics import OPTIONAL, Topic
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
-from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_MODE, TAKEOFF, Client
+from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, TAKEOFF, Client
 
 NAN = math.nan
 MISSION_CURRENT = 42
@@ -26,7 +25,7 @@ MISSION_CURRENT = 42
 def test_each_links_set_is_sent_at_its_rates(kind):
     # Without a flow sensor and a range finder
     vehicle = SimulatedVehicle(filtered(changes={"estimate": {"kind": "markov"}}), Scene(), 1)
-    link, parser, seconds = vehicle.add_link(LinkOptions(kind)), dialect.MAVLink(None), 20.0
+    link, parser, seconds = vehicle.add_link(kind), dialect.MAVLink(None), 20.0
     counts: Counter[int] = Counter()
     for _ in range(round(seconds * 250)):
         vehicle.advance()
@@ -129,23 +128,6 @@ def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_
     assert client.last("SYS_STATUS").battery_remaining == 50
 
 
-def test_a_low_battery_shows():
-    client = Client()
-    for name, value in (("SIM_BAT_DRAIN", 5.0), ("SIM_BAT_MIN_PCT", 0.0)):
-        client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(5.0)
-    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x2000000
-
-
-def test_a_hundred_metres_east_is_as_many_degrees_as_the_parallel_says():
-    place = Origin().place_at((0.0, 100.0, -12.0))
-    degrees = 100.0 / (111_194.93 * math.cos(math.radians(47.397742)))
-    assert place.longitude_deg - 8.545594 == pytest.approx(degrees, rel=1e-5)
-    assert place.altitude_m == 500.0
-
-
 def test_the_world_lies_where_the_parameters_say():
     there = {"SIH_LOC_LAT0": -33.9, "SIH_LOC_LON0": 151.2, "SIH_LOC_H0": 20.0}
     client = Client(parameters=there)
@@ -191,27 +173,6 @@ def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiti
     assert math.hypot(vx, vy) == pytest.approx(2.0, abs=0.2) and r == pytest.approx(-1 / 3, abs=0.1)
     for stamp_us in (felt.time_usec, orbiting.last("ODOMETRY").time_usec, 1000 * told.time_boot_ms):
         assert orbiting.time_s - 1e-6 * stamp_us < 0.05
-
-
-def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
-    client = Client(system=255, component=190)
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(8.0)
-    assert client.all("ORBIT_EXECUTION_STATUS") == []
-    client.command(34, -6.0, 2.0, 0, 0, NAN, NAN, NAN)
-    client.run(2.0)
-    shown = client.all("ORBIT_EXECUTION_STATUS")
-    assert len(shown) == pytest.approx(10, abs=1)
-    assert (shown[-1].radius, shown[-1].frame) == (-6.0, 0)
-    heartbeat = client.last("HEARTBEAT")
-    assert (heartbeat.custom_mode, heartbeat.system_status) == (0x01030000, dialect.MAV_STATE_ACTIVE)
-    assert (shown[-1].x, shown[-1].y) == pytest.approx((473_977_420, 85_455_940), abs=30)
-    client.command(SET_MODE, 1, 4, 3)
-    client.run(0.3)
-    client.forget()
-    client.run(1.0)
-    assert client.all("ORBIT_EXECUTION_STATUS") == []
 
 
 def requested(client: Client, *params: float) -> None:

@@ -83,29 +83,6 @@ def test_vibration_is_the_slow_mean_of_the_jumps():
 ARMED = StatusText(Severity.INFO, "Armed by external command")
 
 
-def test_with_one_the_text_comes_and_ends_in_a_tab():
-    link = TextLink()
-    link.heard_us = 0
-    link.add(ARMED, 0)
-    (message,) = link.due(0)
-    message = read_back(message)
-    assert message.text.rstrip("\0") == "Armed by external command\t"
-    assert (message.severity, message.id, message.chunk_seq) == (6, 0, 0)
-
-
-def test_a_ground_station_that_has_gone_silent_hears_nothing():
-    link = TextLink()
-    link.heard_us = 0
-    link.add(ARMED, 3 * SECOND)
-    assert list(link.due(3 * SECOND)) == []
-    # One that comes within five seconds still gets it, a later one does not
-    link.heard_us = 4 * SECOND
-    assert len(list(link.due(4 * SECOND))) == 1
-    link.add(ARMED, 5 * SECOND)
-    link.heard_us = 11 * SECOND
-    assert list(link.due(11 * SECOND)) == []
-
-
 def test_a_long_text_comes_in_pieces():
     link = TextLink()
     link.heard_us = 0

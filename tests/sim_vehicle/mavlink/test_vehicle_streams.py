@@ -6,7 +6,6 @@ from itertools import pairwise
 import pytest
 
 from sim_vehicle.mavlink.streams import streams as module
-from sim_vehicle.mavlink.streams.streams import interval_from_request
 from tests.sim_vehicle.vehicle_client import SET_INTERVAL, SET_MODE, Client
 
 GET_INTERVAL = 510
@@ -90,11 +89,6 @@ def test_the_announced_interval_is_the_one_asked_for(asked_us, announced_us):
     client.run(0.1)
     announced = client.last("MESSAGE_INTERVAL")
     assert (announced.message_id, announced.interval_us) == (105, announced_us)
-
-
-@pytest.mark.parametrize(("asked_us", "kept_us"), [(4_000.0, 4_000), (33_333.0, 33_333), (0.5, 1), (1e30, -1)])
-def test_an_interval_goes_through_a_rate_and_back(asked_us, kept_us):
-    assert interval_from_request(asked_us) == pytest.approx(kept_us, abs=1)
 
 
 def test_current_mode_comes_on_a_change_and_twice_a_second_at_most_otherwise():

@@ -20,15 +20,6 @@ def test_names_are_px4s_and_their_defaults_lie_within_their_ranges():
         assert row.limited(row.default) == row.default, row.name
 
 
-def test_a_set_value_counts_at_once_and_is_counted_as_a_change():
-    parameters = Parameters()
-    parameters.set("MIS_TAKEOFF_ALT", 4.0)
-    assert parameters["MIS_TAKEOFF_ALT"] == 4.0
-    assert parameters.changes == 1
-    parameters.set("MIS_TAKEOFF_ALT", 4.0)
-    assert parameters.changes == 1
-
-
 def test_some_count_only_after_a_reboot():
     parameters = Parameters()
     parameters.set("MAV_SYS_ID", 7)

@@ -69,18 +69,6 @@ def test_a_poles_normal_is_radial_where_the_guard_touches_it(offset_m: float) ->
     assert np.abs(guard - centre) == pytest.approx(np.array([arm_m, arm_m]), abs=2e-4)
 
 
-@pytest.mark.parametrize("name", ["foldable", "rigid"])
-@pytest.mark.parametrize("offset_m", [0.04, 0.15])
-def test_hits_mirrored_at_a_pole_are_mirrored(name: str, offset_m: float) -> None:
-    left, right = (
-        thrown(smooth(name), POLE, (1.5, side * offset_m, -HEIGHT_M), duration_s=0.24).state.body for side in (1, -1)
-    )
-    assert left[3] == pytest.approx(right[3], rel=1e-6)
-    assert left[4] == pytest.approx(-right[4], rel=1e-6)
-    assert left[12] == pytest.approx(-right[12], rel=1e-6)
-    assert abs(left[4]) > 0.1
-
-
 def test_a_pole_hit_through_the_hub_rebounds_as_the_hub_does() -> None:
     """A pole that fits between the front guards meets the hub, a ball: straight back at its restitution."""
     thin = {"poles": [{"point_ned_m": [2, 0, 0], "radius_m": 0.02, "height_m": 30}]}
@@ -89,16 +77,6 @@ def test_a_pole_hit_through_the_hub_rebounds_as_the_hub_does() -> None:
     assert hit.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
     assert hit.contact_position_ned_m[0] == pytest.approx(2.0 - 0.02 - 0.05, abs=1e-3)
     assert hit.rebound_speed_m_s / 2.0 == pytest.approx(0.9, abs=0.01)
-
-
-def test_a_thick_pole_is_a_wall() -> None:
-    thick = {
-        "poles": [{"point_ned_m": [52, 0, -HEIGHT_M - 500], "axis_ned": [0, 0, 1], "radius_m": 50, "height_m": 1000}]
-    }
-    wall = {"walls": [{"point_ned_m": [2, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]}]}
-    (at_pole,), (at_wall,) = (thrown(smooth("foldable"), scene).truth.hits for scene in (thick, wall))
-    assert at_pole.rebound_speed_m_s == pytest.approx(at_wall.rebound_speed_m_s, rel=0.01)
-    assert at_pole.contact_duration_s == pytest.approx(at_wall.contact_duration_s, rel=0.01)
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -184,15 +162,6 @@ def test_a_moving_obstacle_hits_as_a_standing_one_is_hit(name: str, kind: str) -
     assert run_over.energy_after_j / run_over.energy_before_j == pytest.approx(
         at_rest.energy_after_j / at_rest.energy_before_j, rel=0.01
     )
-
-
-def test_a_path_is_followed() -> None:
-    path = [{"at_s": 0.1, "offset_ned_m": [0, 0, 0]}, {"at_s": 0.2, "offset_ned_m": [-1, 0, 0]}]
-    scene = {"walls": [{"point_ned_m": [2, 0, -1], "normal_ned": [-1, 0, 0], "motion": {"path": path}}]}
-    motion = Scene.model_validate(scene).walls_built()[0].motion
-    assert motion.offset_ned_m(0.0) == (0, 0, 0)
-    assert motion.offset_ned_m(0.15) == pytest.approx((-0.5, 0, 0))
-    assert motion.offset_ned_m(9.0) == (-1, 0, 0)
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,6 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import (
-    ARM_DIRECTIONS_FRD,
-    ROTOR_YAW_SIGNS,
     constants_from,
     initial_state,
 )
@@ -36,13 +34,6 @@ def hovering(airframe: Airframe, seed: int = 1, **scene: object) -> Plant:
     plant = Plant(airframe, Scene.model_validate(scene), seed)
     flown(plant, at(0, 0, -2), 8)
     return plant
-
-
-def test_at_rest_on_the_ground_it_feels_one_g_up() -> None:
-    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
-    last = flown(plant, None, 1.0)[-1]
-    assert last.specific_force_frd_m_s2 == pytest.approx((0, 0, -9.81), abs=0.01)
-    assert plant.state.body[2] == pytest.approx(-0.08, abs=0.005)
 
 
 @pytest.mark.parametrize("yaw_deg", [0, 90, -135])
@@ -73,12 +64,6 @@ def test_thrust_ends_where_px4s_does(down_m_s2: float, leant_m_s2: float, thrust
     assert plant.state.collective_n == pytest.approx(thrust_n, rel=0.01)
     lean = plant.state.attitude_setpoint[0, 2] / plant.state.attitude_setpoint[2, 2]
     assert (lean < -0.05) == (leant_m_s2 > 0.0)
-
-
-def test_a_step_of_the_setpoint_does_not_overshoot() -> None:
-    plant = hovering(quiet(load_built_in("foldable")))
-    flown(plant, at(1.0, 0, -2), 6)
-    assert plant.truth.series()["position_ned_m"][:, 0].max() < 1.02
 
 
 @pytest.mark.parametrize(("yaw_deg", "rate_rad_s"), [(0, 7.0), (160, 0.0), (180, 0.0), (180, 7.0)])
@@ -114,26 +99,6 @@ def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
 
     expected = np.cross(rates, full(state.inertia) @ rates) + full(state.inertia_rate) @ rates
     assert state.moment_frd_n_m == pytest.approx(expected)
-
-
-def test_hover_thrust_is_the_stated_share() -> None:
-    airframe = quiet(load_built_in("foldable"))
-    output = flown(hovering(airframe), at(0, 0, -2), 1)[-1]
-    assert output.thrust_fraction == pytest.approx(airframe.hover_fraction, abs=0.005)
-    assert load_built_in("foldable").model_copy(update={"mass_kg": 1.0}).hover_fraction == pytest.approx(
-        0.70, abs=0.001
-    )
-
-
-def test_front_motors_pitch_the_nose_up_and_right_motors_roll_left() -> None:
-    """PX4's quad-x: front right, rear left, front left, rear right; the first two turn counter-clockwise."""
-    assert ARM_DIRECTIONS_FRD[0] == pytest.approx([math.sqrt(0.5), math.sqrt(0.5), 0])
-    for motors, axis, sign in (((0, 2), 1, 1), ((0, 3), 0, -1), ((0, 1), 2, 1)):
-        plant = hovering(quiet(load_built_in("foldable")))
-        plant.state.motor_thrust_n[list(motors)] += 0.5
-        plant.step(None, armed=True)
-        assert sign * plant.state.body[10 + axis] > 0.005
-    assert ROTOR_YAW_SIGNS.sum() == 0
 
 
 def test_driven_motors_do_as_they_are_told() -> None:
@@ -183,29 +148,3 @@ def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
     assert np.sqrt((error**2).mean()) >= 0.03 * 0.9
     position_error = np.array([output.position_ned_m for output in outputs]) - truth["position_ned_m"][start - 5 : -5]
     assert 0.005 < np.sqrt((position_error**2).mean()) < 0.02
-
-
-def test_a_tumble_in_free_fall_keeps_its_angular_momentum() -> None:
-    airframe = quiet(load_built_in("foldable"))
-    plant = Plant(airframe, Scene(), seed=1)
-    plant.state.body[2] = -80.0
-    plant.state.body[10:13] = [15.0, -9.0, 20.0]
-
-    def momentum() -> float:
-        return float(np.linalg.norm(np.array(airframe.inertia_kg_m2) * plant.state.body[10:13]))
-
-    before = momentum()
-    flown(plant, None, 2.0)
-    assert momentum() == pytest.approx(before, rel=1e-6)
-
-
-def test_a_body_driven_from_outside_still_knows_where_it_is() -> None:
-    plant = hovering(load_built_in("foldable"))
-    start_m = plant.state.body[2]
-    for _ in range(125):
-        output = plant.drive((0.0, 0.0, 0.0, 0.0))
-    fallen_m = plant.state.body[2] - start_m
-    assert fallen_m > 0.5
-    # as badly as stated: noise of centimetres and 20 ms of delay at 5 m/s
-    assert output.position_ned_m[2] == pytest.approx(plant.state.body[2], abs=0.2)
-    assert output.velocity_ned_m_s[2] == pytest.approx(plant.state.body[5], abs=0.4)

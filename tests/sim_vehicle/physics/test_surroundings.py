@@ -4,7 +4,7 @@ import numpy as np
 
 from sim_vehicle.physics.touching.proximity import IN_FRONT, INSIDE, PASSED
 from sim_vehicle.physics.touching.surroundings import Surroundings
-from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Motion, Obstacle, Pole, Wall, build_world
+from sim_vehicle.world import Motion, Obstacle, Pole, Wall, build_world
 
 STEP_US = 4000
 HERE = (0.0, 0.0, -2.0)
@@ -29,18 +29,3 @@ def test_what_a_part_has_passed_it_has_still_passed_when_other_obstacles_come_an
     assert np.all(around.behind[:, rows_of(around, MAST)] == INSIDE)
     front = rows_of(around, first)[0]
     assert around.behind[2, front] == PASSED and around.behind[1, front] == IN_FRONT
-
-
-def test_an_obstacle_that_comes_is_taken_as_it_stands_around_the_vehicle() -> None:
-    around = Surroundings(build_world(()), HERE, 0, STEP_US).changed(build_world((wall(-1.0),)), HERE, 0)
-    towards, away = rows_of(around, around.world.obstacles[0])[:2]
-    # The vehicle is behind its front and before its back
-    assert np.all(around.behind[:, towards] == PASSED) and np.all(around.behind[:, away] == IN_FRONT)
-
-
-def test_one_that_moves_is_where_its_motion_has_brought_it() -> None:
-    moving = wall(5.0, Motion((0.0, 10.0), ((0.0, 0.0, 0.0), (-10.0, 0.0, 0.0))))
-    around = Surroundings(build_world(()), HERE, 0, STEP_US).changed(build_world((moving,)), HERE, 2_000_000)
-    front = rows_of(around, moving)[0]
-    assert around.faces[front, FACE_POINT] == 3.0
-    assert np.allclose(around.faces[front, FACE_VELOCITY : FACE_VELOCITY + 3], (-1.0, 0.0, 0.0))

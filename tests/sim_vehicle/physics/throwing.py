@@ -49,7 +49,6 @@ def throw(
     speed_m_s: float,
     heading_rad: float = 0.0,
     yaw_rad: float | None = None,
-    offset_m: float = 0.0,
     fine_steps: int = FINE_STEPS,
     gap_m: float = 0.05,
     rates_frd_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -73,7 +72,7 @@ def throw(
     )  # fmt: skip
     plant = Plant(free, scene, seed=1, fine_steps=fine_steps)
     body = plant.state.body
-    body[0:3] = [(10 - distance) * north - offset_m * east, (10 - distance) * east + offset_m * north, -HEIGHT_M]
+    body[0:3] = [(10 - distance) * north, (10 - distance) * east, -HEIGHT_M]
     body[3:6] = [speed_m_s * north, speed_m_s * east, 0.0]
     body[10:13] = rates_frd_rad_s
     for _ in range(round(duration_s / (1e-6 * plant.interval_us))):
