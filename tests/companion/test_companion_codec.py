@@ -406,3 +406,8 @@ def test_a_parameter_is_set_with_its_type_and_bytes(value, kind):
     m = sent(SetParameter("COM_OBL_RC_ACT", value))
     assert (m.target_system, m.param_id, m.param_type) == (7, "COM_OBL_RC_ACT", kind)
     assert struct.pack("<f", m.param_value) == struct.pack("<f" if kind == 9 else "<i", value)
+
+
+def test_mavlink_1_packets_are_understood():
+    message, expected = CASES[2]
+    assert listening_decoder().feed(packed(message, v1=True)) == [(packed(message, v1=True), expected)]

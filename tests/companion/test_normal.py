@@ -27,4 +27,8 @@ def turned(angle_deg, size=1.0):
 )
 def test_force_and_approach_show_the_normal_each_by_its_error(force, speed_m_s, normal_deg):
     n, e, _ = normal_of(force, (speed_m_s, 0.0, 0.0)).direction_ned
-    assert math.degrees(math.atan2(-e, -n)) == pytest.approx(normal_deg, abs=1.5)
+    assert math.degrees(math.atan2(-e, -n)) == pytest.approx(normal_deg, abs=0.5)
+
+
+def test_two_directions_leave_less_error_than_either():
+    assert math.degrees(normal_of(turned(30.0), (2.0, 0.0, 0.0)).error_rad) == pytest.approx(17.3, abs=0.2)
