@@ -93,6 +93,13 @@ def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():
     assert pressing < 0.75 * lifting
 
 
+def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
+    # Given one that accelerates by 1 m/s^2 to the north where it takes itself for level
+    belief = Belief(HERE, ZERO, level_m_s2=(1.0, 0.0, 0.0))
+    attitude, _ = attitude_and_thrust((1.0, 0.0, 0.0), lean(belief))
+    assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0)), "level by its own attitude"
+
+
 @given(
     acceleration=st.tuples(*[st.floats(-50.0, 50.0)] * 3),
     turned=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 0.1),
@@ -108,10 +115,3 @@ def test_whatever_is_asked_for_the_attitude_is_upright_and_the_thrust_one_that_t
     assert math.hypot(*attitude) == pytest.approx(1.0)
     assert -up_of(attitude)[2] >= math.cos(MOST_TILT_RAD) - 1e-9
     assert LEAST_THRUST <= thrust <= 1.0
-
-
-def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
-    # Given one that accelerates by 1 m/s^2 to the north where it takes itself for level
-    belief = Belief(HERE, ZERO, level_m_s2=(1.0, 0.0, 0.0))
-    attitude, _ = attitude_and_thrust((1.0, 0.0, 0.0), lean(belief))
-    assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0)), "level by its own attitude"

@@ -176,6 +176,11 @@ def test_every_sample_is_decoded_in_any_chunking(chunk):
     assert b"".join(frame for frame, _ in frames) == stream
 
 
+def test_mavlink_1_packets_are_understood():
+    message, expected = CASES[2]
+    assert listening_decoder().feed(packed(message, v1=True)) == [(packed(message, v1=True), expected)]
+
+
 @pytest.mark.parametrize(
     "junk", [b"\x00\x01\x02", b"\xfd", b"\xfe\x09\x00", b"\xfd\x09\x00\x00\x00\x01", b"\xfd\xff\x02"]
 )
@@ -406,8 +411,3 @@ def test_a_parameter_is_set_with_its_type_and_bytes(value, kind):
     m = sent(SetParameter("COM_OBL_RC_ACT", value))
     assert (m.target_system, m.param_id, m.param_type) == (7, "COM_OBL_RC_ACT", kind)
     assert struct.pack("<f", m.param_value) == struct.pack("<f" if kind == 9 else "<i", value)
-
-
-def test_mavlink_1_packets_are_understood():
-    message, expected = CASES[2]
-    assert listening_decoder().feed(packed(message, v1=True)) == [(packed(message, v1=True), expected)]

@@ -5,8 +5,9 @@ import random
 
 import pytest
 
-from companion.messages import LocalPosition, Odometry
+from companion.messages import ImuSample, LocalPosition, Odometry
 from companion.reflex.config import EstimateConfig
+from companion.reflex.contact_force import ContactForce
 from companion.reflex.detector import Impact, ImpactKind
 from companion.reflex.impact import ImpactEstimator
 from tests.companion.watching import Watch
@@ -59,6 +60,36 @@ def test_what_is_told_after_the_contact_or_in_its_millisecond_changes_nothing(la
     for t_us in range(CONTACT_US - 500, CONTACT_US + late_us, 20_000):
         told(estimator, t_us, (-1.0, 0.0, 0.0))
     assert begun(estimator).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0))
+
+
+def imu(t_us, contact, yaw_rate=0.0):
+    return ImuSample(t_us, (contact, 0.0, -9.81), (0.0, 0.0, yaw_rate))
+
+
+def pushed(pushes, every_us=4_000, yaw_rate=0.0):
+    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
+    for number, (force, loud) in enumerate(pushes, start=1):
+        turned_rad = 0.5e-6 * (number - 1) * every_us * yaw_rate
+        attitude = (math.cos(turned_rad), 0.0, 0.0, math.sin(turned_rad))
+        if loud:
+            contact.add(imu(1_000_000 + number * every_us, force, yaw_rate), every_us, attitude)
+    return contact
+
+
+@pytest.mark.parametrize(
+    ("pushes", "every_us"),
+    [
+        ([(-60.0, True)] * 5, 4_000),
+        ([(-20.0, True)] * 2, 4_000),
+        ([(-20.0, True)] * 5, 20_000),
+        ([(-3.0, True), (-30.0, True), (-4.0, True), (-3.0, True)], 4_000),
+        ([(-19.0, True), (23.6, True), (-13.1, True), (-4.7, True)], 4_000),
+    ],
+    ids=["may have clipped", "too short to tell", "gaps", "over in one window", "guards that clatter"],
+)
+def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
+    contact = pushed(pushes, every_us)
+    assert contact.has_gap or not contact.is_fully_measured
 
 
 def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():

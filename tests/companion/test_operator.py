@@ -102,6 +102,15 @@ def test_of_each_subject_one_text_a_second_is_sent_and_none_twice(told, sent):
     assert spoken(told) == sent
 
 
+@pytest.mark.parametrize(
+    ("kind", "severity"),
+    [("link", 4), ("take_over", 4), ("let_go", 4), ("given_back", 5), ("policy", 5), ("envelope", 5), ("mode", None)],
+)
+def test_what_a_pilot_may_have_to_act_on_warns_and_what_goes_as_planned_does_not(kind, severity):
+    text = status_text(Event(EPOCH_US, kind, "something is so", {}), "test", 0)
+    assert text == (None if severity is None else StatusText(Severity(severity), "Something is so"))
+
+
 def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_end_at_once():
     f = flight(items=[TAKEOFF, {"hold": {"duration_s": 9}}, LANDING])
     f.run_to("mission")
@@ -117,12 +126,3 @@ def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_e
     f.companion.stop("Ctrl-C")
     f.run_to_end(0.5)
     assert "Fourth" in [message.text for _, message in sent(f, "STATUSTEXT")]
-
-
-@pytest.mark.parametrize(
-    ("kind", "severity"),
-    [("link", 4), ("take_over", 4), ("let_go", 4), ("given_back", 5), ("policy", 5), ("envelope", 5), ("mode", None)],
-)
-def test_what_a_pilot_may_have_to_act_on_warns_and_what_goes_as_planned_does_not(kind, severity):
-    text = status_text(Event(EPOCH_US, kind, "something is so", {}), "test", 0)
-    assert text == (None if severity is None else StatusText(Severity(severity), "Something is so"))

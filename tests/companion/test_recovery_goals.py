@@ -56,6 +56,14 @@ def test_the_papers_own_numbers():
     assert goal_of("paper", Contact(0, AT, ZERO, SOUTH)) == AT, "hit while hovering: stay"
 
 
+def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
+    # 2 m/s at 60 degrees from the normal: 1 m/s into the wall, 1.73 along it
+    touched = hit(2.0, math.radians(60))
+    goal, on = (goal_of("normal", touched, tangential=how) for how in ("damped", "kept"))
+    assert off_m(touched, goal) == pytest.approx(0.5) and math.dist(goal, AT) == pytest.approx(0.5)
+    assert off_m(touched, on) == pytest.approx(0.5) and math.dist(on, goal) == pytest.approx(0.5 * math.sqrt(3))
+
+
 @pytest.mark.parametrize("speed", ALL_SPEEDS)
 def test_adaptive_keeps_the_guards_clear_by_the_distance_asked_for(speed):
     touched = hit(speed)
@@ -120,11 +128,3 @@ def test_out_of_a_corner_the_goal_is_clear_of_both_walls():
     assert goal == pytest.approx((2.5, alone[1], -1.5))
     further = (1.0, 2.0, -1.5)
     assert in_room((NORTH_WALL,), east_wall.position_ned_m, further) == further
-
-
-def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
-    # 2 m/s at 60 degrees from the normal: 1 m/s into the wall, 1.73 along it
-    touched = hit(2.0, math.radians(60))
-    goal, on = (goal_of("normal", touched, tangential=how) for how in ("damped", "kept"))
-    assert off_m(touched, goal) == pytest.approx(0.5) and math.dist(goal, AT) == pytest.approx(0.5)
-    assert off_m(touched, on) == pytest.approx(0.5) and math.dist(on, goal) == pytest.approx(0.5 * math.sqrt(3))

@@ -70,6 +70,12 @@ def test_a_hit_that_only_the_velocity_shows_is_found_while_another_is_corrected(
     assert len(impacts) == hits
 
 
+def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
+    impacts, told, trusted = after_a_hit(3.0, 20.0, 8, lambda since_s: 0.0)
+    assert len(impacts) == 1 and not told
+    assert trusted.count(False) <= 2
+
+
 @pytest.mark.parametrize(("turns", "leans_m_s2"), [(False, 9.80665 * math.tan(math.radians(4.0))), (True, 0.0)])
 def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2):
     """Told to be level, a vehicle whose filter says nose up by 4 degrees too much leans forward by as much."""
@@ -94,9 +100,3 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
     # Then it is the filter's in the one case and the vehicle's in the other
     assert not watch.monitor.estimator.validity.is_valid
     assert strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
-
-
-def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
-    impacts, told, trusted = after_a_hit(3.0, 20.0, 8, lambda since_s: 0.0)
-    assert len(impacts) == 1 and not told
-    assert trusted.count(False) <= 2

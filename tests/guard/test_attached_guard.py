@@ -7,12 +7,13 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.core import POLL_INTERVAL_US
+from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
 from companion.guard.holding import is_foreign
 from companion.guard.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.readers import GUARD_READERS, sample_from
-from companion.messages import PositionTarget
+from companion.messages import PositionTarget, Refused
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
@@ -103,6 +104,16 @@ def test_the_guard_makes_way_for_a_programs_setpoints_before_its_offboard_and_af
 # --- the gate
 
 
+def test_the_gate_knows_its_own_by_content_and_each_but_once():
+    gate = Gate()
+    own = {"time_boot_ms": 7, "type_mask": 0xDF8, "x": 1.0, "y": 2.0, "z": -3.0}
+    gate.sends(own)
+    assert not gate.is_own({**own, "x": 1.1})
+    assert not gate.is_own({**own, "time_boot_ms": 8})
+    assert gate.is_own({**own, "x": 1.0000000298})
+    assert not gate.is_own(own)
+
+
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
     guard = AttachedFlight().guard.core.flight
     there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
@@ -128,6 +139,14 @@ def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
             assert by_fields == sample, message.get_type()
             kinds.add(type(sample).__name__)
     assert kinds >= {"ImuSample", "LocalPosition", "Attitude", "AttitudeTarget", "Heartbeat", "PositionTarget"}
+
+
+def test_fields_of_another_dialect_make_no_sample_and_no_error():
+    assert sample_from("HIGHRES_IMU", (1, 1), {"message_id": 105}) is None
+    assert sample_from("HEARTBEAT", (1, 1), {"type": None, "custom_mode": None}) is None
+    assert sample_from("NO_SUCH_MESSAGE", (1, 1), {}) is None
+    imu = {"time_usec": 1, "xacc": None, "yacc": 0.0, "zacc": 0.0, "xgyro": 0.0, "ygyro": 0.0, "zgyro": 0.0}
+    assert isinstance(sample_from("HIGHRES_IMU", (1, 1), {**imu, "fields_updated": 63}), Refused)
 
 
 # --- when the process stalls, or something around the guard fails

@@ -7,14 +7,22 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
+from companion.guard.watching import observe
 from companion.link.streams import StreamMonitor
+from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
+from companion.px4_mode import AUTO_LAND
 from companion.reflex.detector import Phase
-from tests.guard.flying import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, AttachedFlight
+from tests.guard.flying import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, AttachedFlight, fly_a_mission
 from tests.guard.flying import GuardedFlight as Air
 
 CLEAR_M = 0.3
 REBOOT = 246
+
+
+def mission_into_the_wall(air: Air) -> None:
+    air.take_off()
+    fly_a_mission(air)
 
 
 def recovering(**changes) -> Air:
@@ -75,6 +83,16 @@ def test_offboard_is_confirmed_at_once_because_setpoints_lead(hit_in_posctl):
     assert len(hit_in_posctl.setpoints("guard", hit_s - 2.0, hit_s - 0.001)) == pytest.approx(20, abs=2)
 
 
+def test_a_mission_is_not_given_back_to_that_would_go_on_into_what_was_hit():
+    air = Air(GuardConfig(then="previous"))
+    mission_into_the_wall(air)
+    air.run_to(State.RECOVERING, 30.0)
+    air.run_to(State.WATCHING, 10.0)
+    air.run_for(2.0)
+    assert air.mode == "AUTO.LOITER" and len(air.told("detection")) == 1
+    assert "not given back: AUTO.MISSION goes on into what was hit" in air.told("not_back")[0]
+
+
 def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
     # Given a pilot who does not open the hand after a hit
     air = Air(GuardConfig(then="previous"))
@@ -90,6 +108,16 @@ def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
     air.run_to(State.WATCHING, 1.0)
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
     assert len(air.told("detection")) == 1
+
+
+def test_sticks_that_are_heard_no_more_are_not_waited_for():
+    air = Air(GuardConfig(then="previous"))
+    stick = air.pushed_into_the_wall(recovers=False)
+    stick[0] = 0.3
+    air.run_to(State.GIVING_BACK, 10.0)
+    air.stop_all()
+    air.run_until(lambda: air.state is not State.GIVING_BACK, 3.0)
+    assert air.mode == "AUTO.LOITER" and air.told("given_back")
 
 
 # --- whoever takes the vehicle has it
@@ -260,6 +288,23 @@ def test_a_second_stream_that_appears_while_the_guard_holds_is_noticed_and_not_f
     air.run_until(lambda: air.mode == "AUTO.LOITER", 1.0)
 
 
+def test_a_pilot_whose_setpoints_are_told_before_his_mode_is_no_second_stream():
+    """The vehicle tells its own setpoints fifty times a second, and its mode with the next report."""
+    # Given a guard that holds, and a pilot's mode that flies elsewhere
+    air, vehicle = recovering(), dialect.MAVLink(None, 1, 1)
+    air.run_for(0.3)
+    elsewhere = dialect.MAVLink_position_target_local_ned_message(0, 1, 0xDF8, 9.0, 9.0, -2.0, *[0.0] * 8)
+    for _ in range(6):
+        air.guard_hears(elsewhere.pack(vehicle))
+    assert air.state is State.RECOVERING
+    # When the reports say so
+    for _ in range(2):
+        air.guard_hears(dialect.MAVLink_current_mode_message(0, AUTO_LAND, AUTO_LAND).pack(vehicle))
+    # Then it is his, and no program's; where they say that OFFBOARD goes on it is a program's
+    assert air.state is State.STOOD_DOWN and air.told("crossed") == []
+    assert not air.guard.core.flight.program_elsewhere
+
+
 # --- when it is not to act
 
 
@@ -273,6 +318,34 @@ def test_a_failsafe_that_flies_is_not_taken_over_from():
     assert air.state is State.STANDING_BY and "standing by: a failsafe flies" in air.told("standing_by")
 
 
+def test_below_the_height_of_the_ground_nothing_is_a_hit():
+    air = Air(GuardConfig(companion=CompanionConfig(min_detection_height_m=4.0)))
+    stick = air.flown_by_sticks()
+    stick[0] = 0.3
+    air.run_until(lambda: air.position[0] > 3.6, 20.0)
+    air.run_for(1.0)
+    assert air.state is State.WATCHING and air.told("detection") == []
+
+
+def test_a_report_of_the_ground_moves_heights_and_fence_only_while_somebody_else_flies():
+    air = Air()
+    air.take_off()
+    guard = air.guard.core.flight
+    origin, here = guard.origin_ned_m, guard.vehicle.history.latest().position_ned_m
+    guard.vehicle.landed, guard.expected_mode = LandedState.ON_GROUND, 1
+    observe(guard, (), air.guard.core.now_us)
+    assert guard.origin_ned_m == origin
+    guard.expected_mode = None
+    observe(guard, (), air.guard.core.now_us)
+    assert guard.origin_ned_m == here
+
+
+def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told():
+    air = Air(parameters={"COM_OF_LOSS_T": 3.0})
+    air.run_for(5.0)
+    assert any("COM_OF_LOSS_T is 3 s" in text for text in air.told("unattended"))
+
+
 # --- a slow link: 200 ms each way
 
 
@@ -284,6 +357,17 @@ def test_a_guard_does_not_begin_at_the_end_of_a_slow_link():
     air = Air(faults=[far(at_s=0)])
     air.run_until(lambda: air.guard.finished, 30.0)
     assert air.guard.outcome.startswith("the round trip to the vehicle takes 404 ms and at most 100 ms are allowed")
+
+
+def test_a_guard_tells_of_a_link_that_became_slow_and_watches_on():
+    air = Air(faults=[far(at_s=18)])
+    air.take_off()
+    assert air.time_s < 18.0 and air.told("round_trip") == []
+    air.run_until(lambda: air.told("round_trip") != [], 25.0)
+    air.run_for(3.0)
+    assert air.state is State.WATCHING
+    assert air.told("round_trip") == ["round trip 404 ms: hits are answered late"]
+    assert air.guard.round_trip().summary()["worst"] == pytest.approx(404.0)
 
 
 def test_a_guard_on_the_ground_does_not_go_in_while_the_link_is_slow():
