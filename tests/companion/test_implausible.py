@@ -93,9 +93,6 @@ def test_a_reset_moves_no_vehicle_and_is_told():
     assert f.companion.status().position_ned_m == pytest.approx(before_m, abs=0.02) and f.state == "mission"
 
 
-# --- the attitude
-
-
 # --- hits that nothing else shows
 
 

@@ -1,4 +1,4 @@
-"""What a hit that was not measured whole leaves in doubt: the push's direction, the vehicle's velocity."""
+"""What a hit that was not measured whole leaves in doubt: the velocity of the vehicle, and its tilt."""
 
 import math
 
