@@ -47,16 +47,3 @@ def test_takeoff_offboard_and_land(vehicle):
 
     with vehicle() as simulated:
         asyncio.run(scenario(simulated.companion_port))
-
-
-def test_parameters_and_version():
-    async def scenario(port: int) -> None:
-        drone = await connected(port)
-        everything = await drone.param.get_all_params()
-        assert len(everything.int_params) + len(everything.float_params) > 100
-        await drone.param.set_param_float("MIS_TAKEOFF_ALT", 4.0)
-        assert await drone.action.get_takeoff_altitude() == 4.0
-        assert (await drone.info.get_version()).flight_sw_major == 1
-
-    with simulator() as simulated:
-        asyncio.run(scenario(simulated.companion_port))

@@ -5,7 +5,6 @@
 
 import os
 import re
-import resource
 import signal
 import subprocess
 from pathlib import Path
@@ -91,14 +90,6 @@ def test_a_command_works_or_says_in_one_sentence_why_not(arguments, exit_code, w
     assert code == exit_code, stderr
     assert words in (stderr if exit_code else stdout) and "Traceback" not in stderr
     assert stderr.count("rebound: ") == exit_code
-
-
-def test_help_takes_no_time(nowhere):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert finished(start("drone", nowhere, WHEEL / "drone/bin/rebound", "--help"), 30)[0] == 0
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    # What a person does not notice.
-    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.2
 
 
 def test_a_mission_is_flown_guarded_and_looked_over_on_a_connection(nowhere, tmp_path):

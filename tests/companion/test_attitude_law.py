@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.flight.context import Target
 from companion.motion.config import GRAVITY_M_S2
-from companion.motion.rotation import body_to_ned, yaw_rad
+from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO
 from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, tilted, wanted
 from companion.reflex.config import LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S
@@ -67,14 +66,6 @@ def test_a_thrust_gain_that_is_wrong_by_a_tenth_costs_a_quarter_of_a_metre_of_he
     assert math.hypot(*path[-1][1]) < 0.1
 
 
-def test_at_rest_and_clear_a_vehicle_hovers_level_with_its_heading():
-    belief = Belief(HERE, ZERO)
-    attitude, thrust = attitude_and_thrust(wanted(belief, [FAR], HERE[2]), lean(belief, [FAR], 1.2))
-    assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0))
-    assert yaw_rad(attitude) == pytest.approx(1.2)
-    assert thrust == pytest.approx(GRAVITY_M_S2 / FULL_M_S2)
-
-
 def test_near_a_surface_only_what_is_certain_of_the_speed_away_from_it_is_braked():
     off = Belief(HERE, (-2.0, 0.0, 0.0))
     certain, doubtful, unknown = (wanted(replace(off, spread_m_s=s), [WALL], HERE[2])[0] for s in (0.0, 0.6, 5.0))
@@ -86,30 +77,6 @@ def test_near_a_surface_only_what_is_certain_of_the_speed_away_from_it_is_braked
     beside = Belief(HERE, (0.0, 1.0, 0.0))
     doubtful = wanted(replace(beside, spread_m_s=0.6), [WALL], HERE[2])
     assert doubtful == wanted(beside, [WALL], HERE[2])
-
-
-def test_what_an_obstacle_pushes_with_is_not_leant_against():
-    pushed = Belief(HERE, ZERO, external_m_s2=(-3.0, 0.0, 0.0))
-    assert wanted(pushed, [WALL], HERE[2])[0] < 0.0
-    assert wanted(pushed, [FAR], HERE[2])[0] > 0.0, "a wind is"
-
-
-def test_a_vehicle_with_little_thrust_to_spare_leans_less():
-    belief = Belief(HERE, (-4.0, 0.0, 0.0))
-    weak, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=1.25 * GRAVITY_M_S2))
-    strong, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=3.0 * GRAVITY_M_S2))
-    assert math.acos(-up_of(strong)[2]) == pytest.approx(MOST_TILT_RAD)
-    assert -up_of(weak)[2] == pytest.approx(1.1 / 1.25), "hover's share of the thrust, and a tenth to spare"
-
-
-def test_a_vehicle_that_spins_leans_less_and_brakes_the_turn_little_by_little():
-    still = Belief(HERE, (-4.0, 0.0, 0.0))
-    spinning = lean(replace(still, yaw_rate_rad_s=-12.0))
-    slow, _ = attitude_and_thrust((9.0, 0.0, -4.0), lean(still))
-    spun, _ = attitude_and_thrust((9.0, 0.0, -4.0), spinning)
-    assert up_of(spun)[0] < 0.5 * up_of(slow)[0]
-    sent = Target(HERE, 0.0, None, (9.0, 0.0, -4.0), spinning).setpoint(0)
-    assert -12.0 < sent.yaw_rate_rad_s < -10.0
 
 
 def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():

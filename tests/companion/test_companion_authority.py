@@ -106,12 +106,6 @@ def test_ctrl_c_hands_the_vehicle_over_as_the_mission_says(state, on_interrupt, 
     assert_silent_from_now(f)
 
 
-def test_the_stop_is_due_at_once():
-    f = flying_in("mission")
-    f.companion.stop("Ctrl-C")
-    assert f.companion.next_deadline_us() <= f.now_us
-
-
 def test_a_vehicle_that_does_not_answer_the_hand_over_is_left_to_its_own_failsafe():
     f = flying_in("mission")
     f.vehicle.deaf = True
@@ -162,14 +156,6 @@ def test_ctrl_c_while_arming_on_the_ground_disarms():
     assert f.report.outcome == "aborted"
 
 
-def test_a_vehicle_that_flies_already_is_not_kept_from_the_hand_over_by_a_refused_disarm():
-    f = flight(FakeVehicle(ack=lambda c, n: [1] if c == 400 and n > 1 else [0], obey=lambda c, n: c != 400 or n == 1))
-    f.run_until(lambda: f.vehicle.armed)
-    f.companion.stop("Ctrl-C")
-    f.run_to_end(1.0)
-    assert f.vehicle.mode == LOITER
-
-
 @pytest.mark.parametrize("state", ["connect", "ready"])
 def test_ctrl_c_before_the_flight_asks_nothing_of_the_vehicle(state):
     f = flight(confirmed=False)
@@ -177,12 +163,3 @@ def test_ctrl_c_before_the_flight_asks_nothing_of_the_vehicle(state):
     f.companion.stop("Ctrl-C")
     assert f.run_to_end(0.1).outcome == "aborted"
     assert not [m for _, m in f.vehicle.commands if m.command in (176, 400)]
-
-
-def test_a_second_ctrl_c_changes_nothing():
-    f = flying_in("mission")
-    f.companion.stop("Ctrl-C")
-    f.step()
-    f.companion.stop("Ctrl-C again")
-    f.run_to_end(2.0)
-    assert f.report.reason == "Ctrl-C"

@@ -113,7 +113,6 @@ CASES = [
     ),
     (mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 42, 0, 0, 0, 0, 0, 0), Battery(42)),
 ]
-UNUSED = mav.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0, 0, 0)
 
 
 # Nothing is made of these: body velocity without its attitude, a thrust that is not given, answers to others, values
@@ -204,12 +203,6 @@ def test_a_flipped_bit_anywhere_in_a_packet_never_yields_a_sample_or_an_error():
         samples = [s for _, s in listening_decoder().feed(bytes(damaged) + follower * 8) if s is not None]
         assert not [s for s in samples if isinstance(s, ImuSample)], position
         assert samples[-1] == CASES[2][1]
-
-
-def test_packets_without_use_and_unknown_ids_pass_as_frames():
-    unknown = bytes([0xFD, 1, 0, 0, 0, 1, 1, 0xFF, 0xFF, 0xF0, 7, 0, 0])
-    frames = listening_decoder().feed(packed(UNUSED) + unknown + packed(UNUSED))
-    assert frames == [(packed(UNUSED), None), (unknown, None), (packed(UNUSED), None)]
 
 
 def test_only_heartbeats_are_heard_before_the_vehicle_is_known_and_only_the_vehicle_afterwards():
@@ -418,9 +411,3 @@ def test_a_parameter_is_set_with_its_type_and_bytes(value, kind):
     m = sent(SetParameter("COM_OBL_RC_ACT", value))
     assert (m.target_system, m.param_id, m.param_type) == (7, "COM_OBL_RC_ACT", kind)
     assert struct.pack("<f", m.param_value) == struct.pack("<f" if kind == 9 else "<i", value)
-
-
-def test_sequence_numbers_count_up_and_wrap():
-    encoder = Encoder()
-    numbers = [encoder.packets(OnboardHeartbeat(False))[0][4] for _ in range(258)]
-    assert numbers == [*range(256), 0, 1]

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from tests.companion import fake_vehicle
-from tests.companion.fake_vehicle import INTO_WALL, LANDING, LOITER, TAKEOFF, FakeVehicle, flight, strike
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, FakeVehicle, flight, strike
 from tests.flying import Flight
 
 AND_BACK = {"go_to": {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}}
@@ -120,44 +120,6 @@ def test_the_collision_report_tells_what_happened():
     assert 0.0 <= hit.overshoot_m < 0.1
 
 
-@pytest.mark.parametrize("state", ["recovering", "holding"])
-def test_a_second_hit_is_a_new_collision_with_a_new_setpoint(state):
-    f = at_wall()
-    f.run_to(state)
-    f.run_for(0.3)
-
-    strike(f, 0.0, 12.0)
-
-    first, second = f.report.collisions
-    assert f.state == "recovering"
-    assert second.normal_ned == pytest.approx((0.0, 1.0, 0.0), abs=0.1)
-    assert second.sample_time_boot_us > first.sample_time_boot_us
-    m = f.vehicle.setpoints[-1][1]
-    f.step()
-    m = f.vehicle.setpoints[-1][1]
-    assert (m.x, m.y) == pytest.approx(second.recovery_setpoint_ned_m[:2], abs=1e-4)
-    assert f.run_to_end().outcome == "completed"
-
-
-@pytest.mark.parametrize(("state", "keeps_clear"), [("recovering", True), ("holding", False)])
-def test_a_second_hit_while_recovering_does_not_lead_back_to_the_first_wall(state, keeps_clear):
-    """Flying back from the north wall when something strikes from the west: eq. 3 alone leads north again."""
-    f = at_wall()
-    f.run_to(state)
-    f.run_for(0.2)
-
-    strike(f, 0.0, 12.0)
-
-    first, second = f.report.collisions
-    alone_m = second.position_ned_m[0] - 0.5 * second.impact_velocity_ned_m_s[0]
-    if keeps_clear:
-        clear_m = first.position_ned_m[0] - 0.35
-        assert alone_m > clear_m + 0.01
-        assert second.recovery_setpoint_ned_m[0] == pytest.approx(clear_m, abs=0.02)
-    else:
-        assert second.recovery_setpoint_ned_m[0] == pytest.approx(alone_m, abs=1e-6)
-
-
 def test_a_takeoff_shakes_without_a_detection():
     f = flight()
     f.run_to("takeoff")
@@ -192,47 +154,6 @@ def test_a_fall_to_the_ground_is_told_as_a_crash():
     assert crash.data["down_m_s"] > 3.5 and "tilted by 0 degrees" in crash.text
 
 
-@pytest.mark.parametrize(("then", "first_item"), [("hold", 2), ("retry", 1)])
-def test_a_hit_in_the_climb_is_recovered_from(then, first_item):
-    items = [{"takeoff": {"height_m": 4}}, {"go_to": {"position_ned_m": [2, 0, -4]}}, LANDING]
-    f = flight(items=items, on_collision={"then": then, "hold_s": 0.5})
-    f.run_until(lambda: f.vehicle.position[2] < -1.5)
-    assert f.state == "takeoff"
-    strike(f)
-    assert f.state == "recovering"
-    (hit,) = f.report.collisions
-    assert hit.recovery_setpoint_ned_m[2] == pytest.approx(f.vehicle.position[2], abs=0.2)
-    assert f.run_to_end().outcome == "completed"
-    assert [e.data["number"] for e in f.events if e.kind == "item"] == list(range(first_item, 4))
-
-
-@pytest.mark.parametrize("after_s", [0.05, 0.2])
-def test_a_second_hit_in_the_descent_does_not_forget_what_the_first_has_asked_for(after_s):
-    """Given the order out of the land mode on its way, when it is hit again: the mode that comes is no pilot's."""
-    f = flight(items=[{"takeoff": {"height_m": 4}}, LANDING])
-    f.run_to("landing")
-    f.run_until(lambda: f.vehicle.position[2] > -3.0)
-    strike(f)
-    f.run_for(after_s)
-    strike(f, 25.0, 0.0)
-    assert len(f.report.collisions) == 2
-    assert f.run_to_end().outcome == "completed"
-
-
-def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
-    """A hit that threw the vehicle down, or an item that leads low, takes no hit that follows."""
-    down = {"go_to": {"position_ned_m": [0, 0, -0.35]}}
-    low = [TAKEOFF, down, {"hold": {"duration_s": 3}}, LANDING]
-    f = flight(items=low)
-    f.run_to("mission")
-    f.run_until(lambda: f.vehicle.position[2] > -0.4)
-    assert f.state in ("mission", "holding")
-    strike(f)
-    (hit,) = f.report.collisions
-    assert hit.position_ned_m[2] > -0.5
-    assert f.run_to_end().outcome == "completed"
-
-
 def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
     f = at_wall(companion={"settled": {"speed_m_s": 1e-6, "timeout_s": 2.0}})
     f.run_to("recovering")
@@ -242,21 +163,6 @@ def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
     report = f.report
     assert report.outcome == "completed"
     assert report.collisions[0].settled_after_s is None
-
-
-def test_the_recovery_stays_inside_the_fence():
-    f = at_wall(recovery={"law": "paper", "gamma": [5.0, 0.5]}, fence={"radius_m": 6, "max_height_m": 3})
-    f.run_to("recovering")
-    assert f.report.collisions[0].recovery_setpoint_ned_m[0] == pytest.approx(-6.0, abs=0.01)
-
-
-def test_an_item_that_cannot_be_reached_ends_in_the_vehicles_own_hold():
-    f = at_wall(companion={"min_detection_height_m": 100.0, "flight": {"arrival_timeout_s": 3.0}})
-    f.run_to_end()
-    report = f.report
-    assert report.outcome == "aborted"
-    assert "not arrived" in report.reason
-    assert f.vehicle.mode == LOITER
 
 
 def test_the_same_flight_twice_is_the_same_byte_for_byte_and_so_is_a_copy_that_goes_on():
@@ -281,14 +187,3 @@ def test_headings_turn_the_shorter_way_at_a_limited_rate():
     assert all(abs(math.remainder(yaw - math.pi, math.tau)) < math.radians(10.5) for yaw in yaws)
     steps = [abs(math.remainder(b - a, math.tau)) for a, b in itertools.pairwise(yaws)]
     assert max(steps) <= math.radians(45) * 0.021
-
-
-def test_a_hit_in_the_middle_of_a_turn_stops_the_turn():
-    turn = {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0, "yaw_deg": 90}
-    f = flight(items=[TAKEOFF, {"go_to": turn}, LANDING])
-    f.run_to("mission")
-    f.run_for(1.0)
-    f.vehicle.yaw_rad = math.radians(45)
-    strike(f)
-    f.run_for(0.1)
-    assert f.vehicle.setpoints[-1][1].yaw == pytest.approx(math.radians(45), abs=0.05)

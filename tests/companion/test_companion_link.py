@@ -26,16 +26,6 @@ def test_no_heartbeat_for_ten_seconds():
     assert f.now_us - EPOCH_US == pytest.approx(10_000_000, abs=50_000)
 
 
-def test_heartbeats_of_other_components_are_not_a_vehicle():
-    f = flight(FakeVehicle(silent=True))
-    camera = bytes(mav.MAVLink_heartbeat_message(30, 8, 0, 0, 4, 3).pack(mav.MAVLink(None, 1, 100)))
-    for _ in range(100):
-        f.now_us += 4000
-        f.companion.step(camera, f.now_us)
-    assert f.state == "connect"
-    assert f.companion.status().vehicle_mode == ""
-
-
 @pytest.mark.parametrize(
     ("vehicle", "word"),
     [
@@ -183,22 +173,6 @@ def test_a_silent_link_hands_over_all_the_same_and_is_reported(on_interrupt, mod
     assert f.setpoints_since(since) == []
 
 
-def test_silence_while_the_vehicle_lands_does_not_stop_its_landing():
-    f = flight()
-    f.run_until(lambda: "landing" in f.kinds())
-    f.vehicle.silent = True
-    assert f.run_to_end(3.0).outcome == "aborted"
-    assert f.vehicle.mode == LAND
-
-
-def test_silence_before_the_flight_fails():
-    f = flight(confirmed=False)
-    f.run_to("ready")
-    f.vehicle.silent = True
-    assert f.run_to_end(11.0).outcome == "failed"
-    assert "silent" in f.report.reason
-
-
 def requests(f):
     return [m.param1 for _, m in f.vehicle.commands if m.command == SET_MESSAGE_INTERVAL]
 
@@ -230,31 +204,6 @@ def test_a_vehicle_that_restarts_while_the_plan_is_read_has_it_made_and_agreed_t
     assert f.run_to_end().outcome == "completed"
 
 
-def test_a_vehicle_that_restarts_while_its_streams_are_measured_is_measured_again():
-    f = flight(companion={"streams": {"window_s": 2.0}})
-    f.run_until(lambda: "connected" in f.kinds())
-    f.run_for(0.5)
-    f.vehicle.silent = True
-    f.run_for(4.0)
-    assert f.state == "connect"
-    f.vehicle.time_us, f.vehicle.silent = 0, False
-    f.run_to_end()
-    assert f.report.outcome == "completed" and f.kinds().count("streams") == 1
-
-
-def test_a_blind_detector_says_so_and_so_does_one_that_sees_again():
-    f = flight()
-    f.run_to("mission")
-    f.vehicle.no_imu = True
-    f.run_for(0.5)
-    assert "blind" in f.companion.status().detector
-    assert "blind" in f.event("link").text
-    f.vehicle.no_imu = False
-    f.run_for(0.2)
-    assert "sees again" in f.event("link", 1).text
-    assert f.run_to_end().outcome == "completed"
-
-
 def test_our_heartbeat_goes_out_every_second_from_the_first_step_to_the_last():
     f = flight()
     f.run_to_end()
@@ -273,16 +222,6 @@ def test_the_vehicles_time_requests_are_answered():
     answer = f.vehicle.timesyncs[-1]
     assert answer.tc1 // 1000 == pytest.approx(f.now_us, abs=200_000)
     assert answer.ts1 // 1000 == pytest.approx(f.vehicle.time_us, abs=200_000)
-
-
-@pytest.mark.slow
-def test_a_vehicle_that_never_disarms_is_reported_and_left_alone():
-    f = flight()
-    f.run_until(lambda: "landing" in f.kinds())
-    f.vehicle.meet_ground = lambda: None
-    f.run_to_end(130.0)
-    assert "not disarmed" in f.report.reason
-    assert f.vehicle.mode == LAND
 
 
 @pytest.mark.parametrize(("loss_s", "said"), [(1.0, []), (3.0, [3.0])])

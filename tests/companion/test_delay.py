@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from companion.motion.config import DELAY_S, LATEST_S
+from companion.motion.config import LATEST_S
 from companion.motion.delay import Delay
 
 NOISE_M_S = 0.05
@@ -28,11 +28,6 @@ def manoeuvres(count, size_m_s2, seed=2):
 def test_a_flight_with_manoeuvres_shows_how_late_the_velocity_is(late_s):
     # Given half a minute at 30 Hz in which the acceleration changes by 0.5 m/s^2
     assert learnt(late_s, manoeuvres(1_000, 0.5)) == pytest.approx(late_s, abs=0.005)
-
-
-def test_before_anything_has_changed_it_is_what_is_common():
-    assert Delay().delay_s(NOISE_M_S**2) == Delay().delay_s(0.0) == DELAY_S
-    assert learnt(0.05, [(0.0, 0.0, 0.0)] * 1_000) == pytest.approx(DELAY_S)
 
 
 def test_one_step_that_was_a_hit_moves_it_little_and_never_beyond_what_can_be_flown():

@@ -1,14 +1,11 @@
 """The geofence: what is inside, where a way leaves it, and which fences make no sense."""
 
-import math
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from companion.fence import Fence
-from companion.reflex.halfspace import inside_fence
 
 # An L: the room to the north-east is not ours.
 ROOM = Fence(polygon_ne_m=[[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]], max_height_m=3)
@@ -37,11 +34,6 @@ def test_fences_that_make_no_sense(polygon, words):
         Fence(polygon_ne_m=polygon)
 
 
-def test_the_floor_lies_below_the_top():
-    with pytest.raises(ValidationError, match="not below"):
-        Fence(min_height_m=3, max_height_m=2)
-
-
 @given(COORDINATE, COORDINATE, st.sampled_from([ROOM, ROUND, Fence(radius_m=4, polygon_ne_m=ROOM.polygon_ne_m)]))
 def test_ways_from_home_end_inside(north_m, east_m, fence):
     """And what was inside already is left alone."""
@@ -52,17 +44,3 @@ def test_ways_from_home_end_inside(north_m, east_m, fence):
     nearest = fence.nearest_inside(north_m, east_m)
     towards = tuple(0.999999 * value for value in nearest)
     assert fence.contains(*towards) or fence.outside_by_m((*nearest, -1.0)) < 1e-6
-
-
-def test_outside_by_how_much():
-    assert ROUND.outside_by_m((3.0, 4.0, -2.0)) == 0.0
-    assert ROUND.outside_by_m((6.0, 8.0, -2.0)) == pytest.approx(5.0)
-    assert ROUND.outside_by_m((0.0, 0.0, -7.5)) == pytest.approx(1.5)
-    assert ROOM.outside_by_m((5.0, 3.0, -1.0)) == pytest.approx(2.0)
-
-
-def test_a_recovery_stays_in_the_room():
-    """From the inner corner of the L straight towards the other room."""
-    setpoint = inside_fence(ROOM, (10.0, 0.0, 0.0), (10.0, 0.0, -1.0), (14.0, 4.0, -9.0))
-    assert setpoint[2] == -3.0
-    assert math.isclose(setpoint[0] - 10.0, setpoint[1]) and setpoint[0] == pytest.approx(12.0)

@@ -19,7 +19,6 @@ from companion.flight.envelope import (
 )
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.plan import mission_lines
-from companion.memory.patch import Patch
 from companion.mission.model import Mission
 from companion.mission.policy import SetpointLimits
 from companion.reflex.attitude_law import Belief, Lean
@@ -87,67 +86,6 @@ def test_a_lean_that_is_held_leads_no_nearer_to_the_wall_than_can_be_braked(off_
     assert sent.acceleration_ned_m_s2[1] == 1.0 and sent.acceleration_ned_m_s2[0] <= 6.0
     # and what leaves fast enough may brake as hard as it likes
     assert (sent.acceleration_ned_m_s2[0] == 6.0) is (off_m_s == 2.5)
-
-
-def test_a_lean_that_is_held_stays_inside_the_fence_above_the_floor_and_below_the_top():
-    edge, low = (11.5, 0.0, -0.5), (0.0, 0.0, -0.4)
-    outwards, _ = bounded(lean((5.0, 0.0, 0.0), (1.0, 0.0, 0.0), edge), around(), FENCE, LIMITS)
-    assert 1.0 + HELD_BY_ATTITUDE_S * outwards.acceleration_ned_m_s2[0] < 0.9
-    down, _ = bounded(lean((0.0, 0.0, 4.0), REST, low), around(), FENCE, LIMITS)
-    assert down.acceleration_ned_m_s2[2] < 1.0
-    up, _ = bounded(lean((0.0, 0.0, -4.0), (0.0, 0.0, -1.0), (0.0, 0.0, -4.9)), around(), FENCE, LIMITS)
-    assert up.acceleration_ned_m_s2[2] > 0.0
-
-
-def test_what_leads_away_from_the_wall_or_along_it_passes():
-    asked = lean((-3.0, 2.0, 0.0))
-    assert bounded(asked, around([KnownSurface(WALL)]), FENCE, LIMITS)[0] == asked
-
-
-def test_a_place_with_a_velocity_into_the_wall_loses_that_and_says_so():
-    asked = Target((0.2, 0.0, -1.5), 0.0, (1.5, 0.5, 0.0), (1.0, 0.0, 0.0))
-    sent, said = bounded(asked, around([KnownSurface(WALL)]), FENCE, LIMITS)
-    assert said == "leads too near to what is known, or out of the fence"
-    place, _ = flown(sent, MotionState(HERE, (0.5, 0.5, 0.0)), HELD_S + NOTICED_S)
-    assert WALL.off_m(place) > 0.1
-    assert sent.velocity_ned_m_s[1] == 0.5
-    assert sent.position_ned_m == asked.position_ned_m
-
-
-def test_a_place_that_is_asked_for_beside_the_wall_may_be_flown_to():
-    """Whoever plans a goal nearer than the clearance has decided on it."""
-    asked = Target((0.42, 0.0, -1.5), 0.0)
-    assert bounded(asked, around([KnownSurface(WALL)]), FENCE, LIMITS) == (asked, "")
-
-
-def test_a_velocity_that_leads_out_of_the_fence_is_held_back():
-    vehicle, velocity = (11.0, 0.0, -1.5), (2.0, 0.0, 0.0)
-    asked = Target((11.2, 0.0, -1.5), 0.0, velocity, REST)
-    sent, said = bounded(asked, around(vehicle=vehicle), FENCE, LIMITS)
-    assert "out of the fence" in said
-    assert flown(sent, MotionState(vehicle, velocity), HELD_S + NOTICED_S)[0][0] < 12.2
-    # in its middle it passes
-    asked = Target((0.2, 0.0, -1.5), 0.0, velocity, REST)
-    assert bounded(asked, around(), FENCE, LIMITS) == (asked, "")
-
-
-def test_a_surface_that_the_vehicle_is_behind_is_in_nobodys_way():
-    """It is not where it was thought to be: a pole that was slid past, or an estimate that has jumped."""
-    vehicle, velocity = (0.8, 0.0, -1.5), (1.0, 0.0, 0.0)
-    asked = Target((0.9, 0.0, -1.5), 0.0, velocity, REST)
-    assert bounded(asked, around([KnownSurface(WALL)], vehicle), FENCE, LIMITS) == (asked, "")
-
-
-@pytest.mark.parametrize(("east_m", "is_held_back"), [(0.0, True), (4.0, False)])
-def test_a_patch_counts_as_far_as_it_is_believed_to_go(east_m, is_held_back):
-    # Given one touch of a wall, 0.7 m north of the origin, by a vehicle with a reach of 0.2 m
-    patch = Patch(((0.7, 0.0, -1.5),), (-1.0, 0.0, 0.0), 0.2, 0.5, 0)
-    known = KnownSurface(touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0)), patch, ORIGIN, 0.2)
-    vehicle, velocity = (0.0, east_m, -1.5), (1.5, 0.0, 0.0)
-    # When a velocity leads through its plane
-    _, said = bounded(Target(vehicle, 0.0, velocity, REST), around([known], vehicle), FENCE, LIMITS)
-    # Then it is held back where the wall is, and not beside it
-    assert bool(said) is is_held_back
 
 
 def test_a_flights_setpoints_keep_off_what_it_has_just_hit_and_off_what_it_remembers():

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry
+from companion.messages import ImuSample, LocalPosition, Odometry
 from companion.reflex.config import EstimateConfig
 from companion.reflex.contact_force import ContactForce
 from companion.reflex.detector import Impact, ImpactKind
@@ -62,30 +62,6 @@ def test_what_is_told_after_the_contact_or_in_its_millisecond_changes_nothing(la
     assert begun(estimator).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0))
 
 
-def test_a_vehicle_that_has_told_no_velocity_has_none():
-    estimate = begun(ImpactEstimator(CONFIG))
-    assert estimate.velocity_ned_m_s == STILL and estimate.velocity_error_m_s == math.inf
-
-
-@pytest.mark.parametrize(("is_second", "normal_deg"), [(False, 19.0), (True, 0.0)])
-def test_a_vehicle_that_slides_along_a_wall_is_not_sent_along_it_by_the_second_hit(is_second, normal_deg):
-    # Given a vehicle that flies west, after a hit that clipping hid a part of or without one
-    estimator = ImpactEstimator(CONFIG)
-    for t_us in range(CONTACT_US - 1_000_000, CONTACT_US, 4_000):
-        estimator.update(ImuSample(t_us, (0.0, 0.0, -9.80665), (0.0, 0.0, 0.0)))
-        estimator.update(Attitude(t_us, LEVEL, (0.0, 0.0, 0.0)))
-        if t_us % 20_000 == 0:
-            estimator.update(Odometry(t_us, (0.0, 0.0, 0.0), (0.0, -1.5, 0.0), 0))
-            estimator.update(LocalPosition(t_us, (0.0, 0.0, 0.0), (0.0, -1.5, 0.0)))
-    if is_second:
-        estimator.validity.invalidate(CONTACT_US - 300_000, 2.0)
-    # When something pushes it south
-    estimate = estimator.begin(Impact(CONTACT_US, CONTACT_US - 4_000, (-20.0, 0.0, 0.0)))
-    # Then the way that it came from says where off is in a first hit alone
-    n, e, _ = estimate.normal.direction_ned
-    assert math.degrees(math.atan2(e, -n)) == pytest.approx(normal_deg, abs=2.0)
-
-
 def imu(t_us, contact, yaw_rate=0.0):
     return ImuSample(t_us, (contact, 0.0, -9.81), (0.0, 0.0, yaw_rate))
 
@@ -98,18 +74,6 @@ def pushed(pushes, every_us=4_000, yaw_rate=0.0):
         if loud:
             contact.add(imu(1_000_000 + number * every_us, force, yaw_rate), every_us, attitude)
     return contact
-
-
-def test_the_first_window_tells_when_the_contact_began():
-    """A quarter of the second window's mean: three quarters of it (5 ms) were still free."""
-    contact = pushed([(-10.0, True), (-40.0, True)])
-    assert contact.begun_boot_us == 1_004_000 - 1_250
-
-
-def test_a_vehicle_that_turns_in_the_contact_is_followed():
-    contact = pushed([(-20.0, True)] * 25, yaw_rate=math.radians(90.0) / 0.096)
-    north, east, _ = contact.impulse_ned_m_s
-    assert math.degrees(math.atan2(-east, -north)) == pytest.approx(45.0, abs=2.0)
 
 
 @pytest.mark.parametrize(

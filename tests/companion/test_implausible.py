@@ -7,7 +7,6 @@ from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.packets import made
 from companion.messages import (
-    Attitude,
     ImuSample,
     LocalPosition,
     Odometry,
@@ -17,9 +16,8 @@ from companion.messages import (
 )
 from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
-from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.motion.strapdown import VelocityFix
 from companion.reflex.confirmation import Hypothesis
-from companion.reflex.stream_health import SampleGate
 from tests.companion.fake_vehicle import LOITER, flight
 from tests.companion.hostile import attacked, flight_in
 
@@ -55,17 +53,6 @@ def test_a_reset_moves_what_is_heard_and_what_is_sent_and_the_vehicle_stays_wher
     assert resets.sent(PositionSetpoint(0, (1.0, 0.0, -1.0), None)).position_ned_m == pytest.approx((4.0, 0.0, -1.0))
     (echo,) = followed(resets, [PositionTarget((4.0, 0.0, -1.0))])
     assert echo.position_ned_m == pytest.approx((1.0, 0.0, -1.0)), "a setpoint comes back as it was meant"
-
-
-def test_one_forged_reset_moves_nothing_and_two_only_until_the_vehicle_speaks_again():
-    resets = Resets()
-    followed(resets, [told(0, 0.0)])
-    followed(resets, [told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9, 50.0)])
-    assert resets.shift_ned_m == pytest.approx((4.0, 0.0, 0.0))
-    followed(resets, [told(40, 0.0), told(50, 0.0)])
-    assert resets.shift_ned_m == STILL
-    followed(resets, [told(60, 40.0, 7), told(70, 40.0, 7)])
-    assert resets.shift_ned_m == STILL, "so far no setpoint goes"
 
 
 def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_reset():
@@ -106,36 +93,6 @@ def test_a_reset_moves_no_vehicle_and_is_told():
     assert f.companion.status().position_ned_m == pytest.approx(before_m, abs=0.02) and f.state == "mission"
 
 
-# --- the attitude
-
-
-def test_an_attitude_that_no_rate_leads_to_counts_from_the_second_on():
-    turning = SampleGate()
-    level, upside_down = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
-    assert turning.attitude(Attitude(0, level))
-    assert not turning.attitude(Attitude(20_000, upside_down))
-    assert turning.attitude(Attitude(40_000, level)), "it was one message"
-    assert not turning.attitude(Attitude(60_000, upside_down))
-    assert turning.attitude(Attitude(80_000, upside_down)), "the estimator has been reset"
-
-
-def test_a_vehicle_that_is_struck_turns_as_its_rates_say():
-    turning = SampleGate()
-    assert turning.attitude(Attitude(0, (1.0, 0.0, 0.0, 0.0)))
-    turning.imu(ImuSample(4_000, (0.0, 0.0, -9.8), (15.0, 0.0, 0.0)))
-    half_rad = 0.5 * 15.0 * 0.02
-    assert turning.attitude(Attitude(20_000, (math.cos(half_rad), math.sin(half_rad), 0.0, 0.0)))
-
-
-def test_a_sample_that_is_sent_twice_is_no_stuck_sensor():
-    gate, sample = SampleGate(), ImuSample(4_000, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0))
-    # Given a vehicle that turns, whose attitudes come between the two
-    assert gate.attitude(Attitude(0, (1.0, 0.0, 0.0, 0.0))) and gate.imu(sample)
-    assert gate.attitude(Attitude(20_000, (1.0, 1e-4, 0.0, 0.0))) and gate.imu(sample)
-    # When the attitude changes while the sample stays, it is stuck
-    assert gate.attitude(Attitude(40_000, (1.0, 2e-4, 0.0, 0.0))) and not gate.imu(sample)
-
-
 # --- hits that nothing else shows
 
 
@@ -155,22 +112,6 @@ def test_a_weak_force_of_one_sample_is_a_hit_only_where_the_velocity_shows_what_
     assert hypothesis.is_rejected(fixes(changed_m_s), MotionHistory(), 0.03) is is_none
 
 
-def test_a_push_along_an_axis_that_is_stuck_is_not_taken_back_for_what_the_others_show_of_it():
-    # Given a sensor that shows the east of a push alone, which took 1.3 m/s off the way north
-    earlier = ImuSample(996_000, (0.0, 0.0, -9.8), STILL)
-    hypothesis = Hypothesis(1_000_000, 996_000, 0.035, (0.0, 1.0, 0.0), 7.0, earlier, later_boot_us=1_004_000)
-    assert not hypothesis.is_rejected(fixes(-1.3), MotionHistory(), 0.03)
-    # Then without it the one sample stands alone
-    assert hypothesis.is_rejected(fixes(0.0), MotionHistory(), 0.03)
-
-
-def test_one_forged_velocity_among_those_before_does_not_make_the_next_true_one_a_hit():
-    true = [VelocityFix(at_ms * 1000, STILL, STILL) for at_ms in range(800, 1160, 30)]
-    forged = VelocityFix(910_000, (0.0, -2.0, 0.0), STILL)
-    leap = Hypothesis(1_000_000, 930_000, 0.64, (0.0, 1.0, 0.0))
-    assert leap.is_rejected(sorted([*true, forged], key=lambda fix: fix.time_boot_us), MotionHistory(), 0.03)
-
-
 @pytest.mark.parametrize(("shown_m_s", "is_none"), [(0.3, False), (0.2, True)])
 def test_a_jump_of_the_velocity_that_fades_is_a_hit_where_one_velocity_shows_half_of_it(shown_m_s, is_none):
     """A ceiling met at 2 m/s between the samples at 50 Hz: the sum drifts while the vehicle turns."""
@@ -181,14 +122,6 @@ def test_a_jump_of_the_velocity_that_fades_is_a_hit_where_one_velocity_shows_hal
     ]
     hit = Hypothesis(1_000_000, 930_000, 0.51, (0.0, 0.0, 1.0))
     assert hit.is_rejected([*was, *came], MotionHistory(), 0.03) is is_none
-
-
-@pytest.mark.parametrize(("speed_m_s", "stays"), [(0.0, True), (3.0, False)])
-def test_a_velocity_that_jumps_is_no_hit_where_the_places_do_not_follow(speed_m_s, stays):
-    history = MotionHistory()
-    for at_ms in range(800, 1160, 20):
-        history.add(LocalPosition(at_ms * 1000, (max(0.0, speed_m_s * (at_ms - 1000) * 1e-3), 0.0, 0.0), STILL))
-    assert Hypothesis(1_000_000, 950_000, 3.0, (1.0, 0.0, 0.0)).is_rejected((), history, 0.03) is stays
 
 
 @pytest.mark.parametrize(("height_m", "state"), [(1.5, "recovering"), (0.3, "mission")])
@@ -231,19 +164,6 @@ def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_
     assert math.dist(place_in(sent), places.pop()) < 2.0 * 0.1 + 0.01
 
 
-def test_a_step_that_comes_late_catches_up_with_nothing():
-    f = flight_in("mission")
-    f.run_for(0.7)
-    # Given a position in the step that comes, half a second late
-    f.run_until(lambda: f.vehicle.ticks % 5 == 4)
-    _, before = f.setpoints_since(f.now_us - 30_000)[-1]
-    f.now_us += 500_000
-    f.step()
-    # Then the setpoint goes on from where it was
-    _, after = f.setpoints_since(f.now_us - 1)[-1]
-    assert after.x - before.x < 2.0 * 0.05
-
-
 def test_a_clock_that_jumps_is_no_silence_of_the_positions():
     f = flight_in("mission")
     f.run_for(0.7)
@@ -284,16 +204,3 @@ def test_a_position_that_comes_late_or_from_before_a_reboot_is_no_fault(late_ms)
         late = mav.MAVLink_local_position_ned_message(stamp_ms - late_ms, *f.vehicle.position, *f.vehicle.velocity)
         attacked(f, [bytes(late.pack(mav.MAVLink(None, 1, 1)))])
     assert "fault" not in f.kinds(), f.texts()
-
-
-def test_an_attitude_after_a_silence_makes_no_lean_of_what_the_rates_were_in_one_moment():
-    # Given a level vehicle that has told no attitude for half a second, and turns fast for a moment after a hit
-    strapdown = Strapdown()
-    strapdown.attitude(0, (1.0, 0.0, 0.0, 0.0))
-    for at_ms in range(0, 501, IMU_MS):
-        turning_rad_s = 5.0 if at_ms > 490 else 0.0
-        strapdown.imu(at_ms * 1000, (0.0, 0.0, -9.8), (0.0, turning_rad_s, 0.0))
-    # When it tells one again, which is not to be believed
-    strapdown.attitude(500_000, (1.0, 0.0, 0.0, 0.0), most_wrong_rad=0.4)
-    # Then the lean is that of the moment, not of half a second of such rates
-    assert math.hypot(*strapdown.level_acceleration_m_s2) < 9.80665 * math.tan(5.0 * 0.015)

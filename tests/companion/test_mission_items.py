@@ -6,7 +6,6 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from companion.mission.items import program
 from companion.mission.model import Mission
 from tests.companion.fake_vehicle import LANDING, LOITER, TAKEOFF, flight
 from tests.flying import Flight
@@ -93,24 +92,6 @@ def test_what_is_repeated_is_flown_as_often_as_asked_and_told_by_lap():
     ]
 
 
-def test_repeats_may_stand_in_repeats_and_too_many_steps_are_refused():
-    inner = {"repeat": {"times": 3, "items": [{"hold": {"duration_s": 1}}]}}
-    mission = Mission.model_validate(
-        {"name": "t", "items": [TAKEOFF, {"repeat": {"times": 2, "items": [inner]}}, LANDING]}
-    )
-    steps = program(mission.items)
-    assert len(steps) == 8 and steps[4].label == "2.1.1 (2 of 2) (1 of 3)"
-    with pytest.raises(ValidationError, match="more than 10000 steps"):
-        items = [inner | {"repeat": inner["repeat"] | {"times": 1000}}]
-        Mission.model_validate({"name": "t", "items": [TAKEOFF, {"repeat": {"times": 1000, "items": items}}, LANDING]})
-
-
-def test_waiting_until_a_time_after_arming():
-    f = flown({"wait_for": {"flight_time_s": 9.0}})
-    waited_until = next(event.time_us for event in f.events if event.kind == "item" and event.data["name"] == "land")
-    assert (waited_until - f.report.armed_at_us) / 1e6 == pytest.approx(9.0, abs=0.01)
-
-
 def test_waiting_for_a_file():
     f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LANDING])
     f.run_to("mission")
@@ -119,13 +100,6 @@ def test_waiting_for_a_file():
     f.companion.file_is_there()
     f.run_to("landing", 0.1)
     assert f.companion.file_awaited is None
-
-
-def test_waiting_until_steady():
-    settle = {"wait_for": {"steady": {"within_m": 0.05, "speed_m_s": 0.02, "for_s": 0.5}}}
-    f = flown({"go_to": {"position_ned_m": [2, 0, -1.5], "speed_m_s": 2.0}}, settle)
-    assert item_times_s(f)[1] > 0.6
-    assert f.vehicle.position[0] == pytest.approx(2.0, abs=0.05)
 
 
 def test_whoever_is_pushed_is_not_steady():

@@ -7,8 +7,6 @@ import pytest
 from companion.messages import LocalPosition
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, yaw_rad
-from companion.motion.strapdown import Strapdown
-from companion.reflex.validity import VelocityValidity
 
 CONTACT_US = 10_000_000
 
@@ -48,22 +46,3 @@ def test_rotation_on_attitudes_everyone_knows(attitude, nose_ned, right_ned, yaw
     assert body_to_ned(attitude, (0.0, 1.0, 0.0)) == pytest.approx(right_ned, abs=1e-12)
     if yaw is not None:
         assert yaw_rad(attitude) == pytest.approx(yaw)
-
-
-@pytest.mark.parametrize(
-    ("speed_m_s", "told_deg", "kept_deg"), [(4.2, 24.0, 0.0), (4.2, 36.0, 36.0), (1.0, 14.0, 14.0)]
-)
-def test_after_a_clipped_hit_the_reported_tilt_counts_where_it_is_further_off_than_that_hit_spoils_it(
-    speed_m_s, told_deg, kept_deg
-):
-    # Given gyroscopes that show no turn since the hit
-    strapdown, validity = Strapdown(), VelocityValidity()
-    strapdown.imu(1_000_000, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))
-    validity.invalidate(800_000, speed_m_s)
-    # When the estimator, which corrects itself, tells a tilt
-    half_rad = 0.5 * math.radians(told_deg)
-    tilted = (math.cos(half_rad), math.sin(half_rad), 0.0, 0.0)
-    strapdown.attitude(1_000_000, tilted, validity.tilt_error_rad(1_000_000))
-    # Then an error that clipping makes of it (23 degrees on a real PX4 at 4.2 m/s) is left out, and a larger one is not
-    _, _, down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
-    assert math.degrees(math.acos(min(1.0, down))) == pytest.approx(kept_deg, abs=0.01)

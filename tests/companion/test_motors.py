@@ -69,28 +69,11 @@ def test_what_is_no_motors_own_is_not_told(change, hover):
     assert flown.fly(30.0, True, change, hover) == []
 
 
-def test_nothing_is_told_that_the_healthy_flight_has_shown_too_or_that_too_few_moments_show():
-    agile = Flown()
-    agile.fly(20.0, False, manoeuvre=0.25)
-    assert agile.fly(20.0, True, HURT) == []
-    short = Flown()
-    short.fly(1.5, False)
-    assert short.fly(2.0, True, HURT) == []
-
-
 def test_a_motor_that_gives_all_it_has_is_named_although_another_is_spared_for_it():
     flown = Flown(most=1550.0)
     flown.fly(5.0, False)
     (damage,) = flown.fly(20.0, True, (0.0, -0.3, 0.3, 0.0))
     assert damage.motor == 3 and damage.is_at_limit and ", all it has" in damage.text
-
-
-def test_outputs_that_begin_at_zero_are_shares_of_what_they_are():
-    flown = Flown(zero=0.0)
-    flown.monitor.take((100.0,) * 4, None, 0)  # idling, as DShot has it
-    flown.fly(5.0, False)
-    (damage,) = flown.fly(20.0, True, HURT)
-    assert damage.harder == pytest.approx(0.16, abs=0.01)
 
 
 def test_a_recovery_says_nothing_and_what_came_before_it_counts_anew():

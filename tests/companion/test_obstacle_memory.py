@@ -5,8 +5,6 @@ import math
 import pytest
 
 from companion.memory.patch import (
-    GOES_ON_MOST_M,
-    LEAST_SPEED_M_S,
     REACHES_M,
     Patch,
     is_same,
@@ -53,36 +51,13 @@ def test_what_pushes_a_vehicle_on_came_after_it_and_is_no_wall():
     assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
 
 
-def test_what_came_to_a_hovering_vehicle_is_not_believed_to_be_a_wall():
-    touch = touch_of((0, 0, -1.5), (0.5 * LEAST_SPEED_M_S, 0.0, 0.0), Normal(SOUTH, ERROR_RAD), 0.2, 0)
-    assert touch.reaches_m == 0.0
-
-
-def test_a_hit_of_which_nothing_is_known_leaves_nothing():
-    assert touch_of((0, 0, -1.5), (0.0, 0.0, 0.0), Normal(), 0.2, 0) is None
-
-
 # --- patches of the same surface
-
-
-def test_one_touch_is_believed_to_reach_a_little_to_all_sides():
-    (patch,) = remembered((), [wall_touch(1.0)], CLEARANCE_M)
-    # someone who looks south has the west on the right
-    assert patch.assumed_along_m() == pytest.approx((-REACHES_M, REACHES_M))
-    assert patch.assumed_heights_m() == pytest.approx((1.0, 2.0))
-    assert patch.hits == 1
 
 
 def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
     (patch,) = remembered((), [wall_touch(0.0), wall_touch(1.05)], CLEARANCE_M)
     low_m, high_m = patch.assumed_along_m()
     assert patch.hits == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
-
-
-def test_the_longer_a_wall_is_known_to_be_the_further_it_is_believed_to_go_on():
-    known = remembered((), [wall_touch(east_m) for east_m in (0, 1, 2, 3, 4, 5, 6)], CLEARANCE_M)
-    (low_m, high_m), (touched_low_m, touched_high_m) = known[0].assumed_along_m(), known[0].touched_along_m()
-    assert high_m - touched_high_m == touched_low_m - low_m == GOES_ON_MOST_M
 
 
 def test_the_places_give_a_better_normal_than_the_pushes():
@@ -107,25 +82,6 @@ def test_the_places_give_a_better_normal_than_the_pushes():
 def test_another_surface_is_another_patch(other):
     assert len(remembered((), [wall_touch(0.0), other], CLEARANCE_M)) == 2
     assert not is_same(wall_touch(0.0), other, CLEARANCE_M)
-
-
-def test_a_touch_between_two_patches_joins_them():
-    apart = remembered((), [wall_touch(0.0), wall_touch(2.4)], CLEARANCE_M)
-    joined = remembered(apart, [wall_touch(1.2)], CLEARANCE_M)
-    assert len(apart) == 2 and len(joined) == 1 and joined[0].hits == 3
-
-
-def test_an_uncertain_normal_does_not_split_a_wall():
-    """Rigid hits have been 50 degrees off: sure normals so far apart are two surfaces, unsure ones may be one."""
-    for error_deg, patches in ((10.0, 2), (30.0, 1)):
-        touches = [wall_touch(0.0, error_deg=error_deg), wall_touch(0.9, normal=turned(45.0), error_deg=error_deg)]
-        assert len(remembered((), touches, CLEARANCE_M)) == patches
-
-
-def test_a_ceiling_is_believed_upwards_without_an_end():
-    lid = Patch(((1.0, 1.0, -2.5),), (0.0, 0.0, 1.0), math.radians(15.0), REACHES_M, 0)
-    (patch,) = remembered((), [lid], CLEARANCE_M)
-    assert patch.is_steep and patch.assumed_heights_m() == (2.5, math.inf)
 
 
 # --- files

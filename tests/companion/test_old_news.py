@@ -80,14 +80,6 @@ def test_a_cut_link_that_comes_back_in_the_companions_mode_is_handed_over():
     assert f.vehicle.mode == LOITER
 
 
-def test_into_a_silence_the_mode_is_asked_for_once():
-    f = flying_in("mission")
-    asked = modes_asked(f)
-    f.vehicle.silent, f.vehicle.obey = True, lambda command, count: False
-    f.run_to_end(6.0)
-    assert modes_asked(f) == asked + 1
-
-
 @pytest.mark.parametrize("state", ON_SETPOINTS)
 def test_a_takeover_at_any_instant_stops_the_setpoints_with_the_report_that_shows_it(state):
     """All of a recovery, half a second of the others: ahead of, with and behind every stream and setpoint."""
@@ -129,16 +121,6 @@ def test_one_forged_heartbeat_pauses_the_setpoints_and_ends_nothing(state, forge
     assert f.state != "aborted"
     assert f.setpoints_since(since), "on again with the vehicle's own next reports"
     assert [event.kind for event in f.events if "conflicting" in event.text] == ["implausible"]
-
-
-@pytest.mark.parametrize("other", [{"vehicle_type": 1}, {"autopilot": 3}])
-def test_another_vehicles_heartbeat_under_the_same_ids_does_not_count(other):
-    f = flying_in("mission")
-    for _ in range(3):
-        f.hear(heartbeat(POSCTL, False, **other))
-        f.run_for(0.1)
-    assert f.state == "mission" and f.companion.status().armed
-    assert len([event for event in f.events if "conflicting" in event.text]) == 1
 
 
 @pytest.mark.parametrize("answers", [[], [0]])

@@ -46,15 +46,6 @@ def test_the_operator_reads_hit_recovery_and_outcome():
     assert all(len(text) <= 50 for text in texts)
 
 
-def test_the_hits_text_leaves_with_the_recovery_setpoint():
-    f = at_wall(INTO_WALL)
-    f.run_until(lambda: "detection" in f.kinds())
-    at_us = f.event("detection").time_us
-    assert [m.text[:5] for t, m in sent(f, "STATUSTEXT") if t == at_us] == ["Hit 1"]
-    kinds = [decoded([frame])[0].get_type() for t, frame in f.sent if t == at_us]
-    assert kinds.index("SET_POSITION_TARGET_LOCAL_NED") < kinds.index("STATUSTEXT"), "the setpoint first"
-
-
 def test_a_vehicle_hit_while_it_hovers_is_pushed():
     f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
     f.run_to("mission")
@@ -62,15 +53,6 @@ def test_a_vehicle_hit_while_it_hovers_is_pushed():
     f.vehicle.push_m_s2 = (0.0, -12.0)
     f.step()
     assert sent(f, "STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
-
-
-def test_an_early_end_is_told_with_its_reason():
-    f = flight()
-    f.run_to("mission")
-    f.companion.stop("Ctrl-C")
-    f.run_to_end()
-    last = sent(f, "STATUSTEXT")[-1][1]
-    assert (last.text, last.severity) == ("Mission test aborted, hits: 0: Ctrl-C", 3)
 
 
 def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_the_end():
@@ -144,10 +126,3 @@ def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_e
     f.companion.stop("Ctrl-C")
     f.run_to_end(0.5)
     assert "Fourth" in [message.text for _, message in sent(f, "STATUSTEXT")]
-
-
-def test_both_can_be_switched_off():
-    f = flight(companion={"operator": {"status_texts": False, "values_hz": 0}})
-    f.run_to_end()
-    assert sent(f, "STATUSTEXT") == sent(f, "NAMED_VALUE_FLOAT") == []
-    assert f.now_us > EPOCH_US

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from companion.mavlink.delivery import Delivery
 from companion.messages import (
     Attitude,
     Battery,
@@ -130,20 +129,6 @@ def test_the_port_at_the_end_of_the_line_is_named_with_what_is_wrong_with_it(cha
     assert finding.verdict is Verdict.DOUBTFUL and remedy in finding.remedy
 
 
-def test_a_rate_above_px4s_own_and_a_usb_port_that_is_allowed_are_in_order():
-    fast = surveyed({**HEALTHY, **ON_TELEM2, "MAV_1_RATE": 80_000}, line=UART)
-    assert verdicts(fast)["MAV_1_RATE"] is Verdict.GOOD
-    on_usb = surveyed({**HEALTHY, "CBRK_USB_CHK": 197_848}, line=SerialLine(None))
-    assert verdicts(on_usb)["port"] is Verdict.GOOD
-
-
-def test_clocks_that_drift_apart_are_no_uneven_arrival():
-    delivery = Delivery()
-    for number in range(2_500):
-        delivery.arrived(5_000_000 + 4_000 * number, 10**15 + round(1.01 * 4_000 * number))
-    assert delivery.jitter_us == pytest.approx(0.0, abs=10.0)
-
-
 @pytest.mark.parametrize(("is_signed", "answers", "verdict"), [(1, 0, Verdict.BAD), (1, 1, None), (0, 0, None)])
 def test_a_vehicle_that_signs_and_does_not_answer_wants_a_key(is_signed, answers, verdict):
     # Given a heartbeat of MAVLink 2, with a signature or without
@@ -234,17 +219,6 @@ def test_what_is_measured_is_judged(wrong, item, verdict):
     assert verdicts(surveyed(**wrong))[item] is verdict
 
 
-def test_answers_that_nobody_asked_for_make_no_round_trip():
-    # Given a vehicle that answers in 200 ms, and a program beside whose answers come by
-    survey = start_survey(CompanionConfig(), 0)
-    advance(survey, [PX4], 0)
-    for now_us in range(50_000, 3_000_000, 50_000):
-        advance(survey, [TimeSyncAnswer(1000 * (now_us - 1_777), 1)], now_us)
-    # Then nothing is known of ours
-    found = {finding.item: finding for finding in findings(survey)}["time"]
-    assert (found.verdict, found.found) == (Verdict.DOUBTFUL, "TIMESYNC is not answered")
-
-
 def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
     known = {name: value for name, value in HEALTHY.items() if name != "COM_OF_LOSS_T"}
     survey = surveyed(known)
@@ -260,10 +234,3 @@ def test_silence_is_told_after_the_stated_wait():
     advance(survey, [], 10_100_000)
     assert survey.finished
     assert "no PX4" in (survey.refusal or "")
-
-
-def test_an_autopilot_that_is_not_px4_is_refused():
-    survey = start_survey(CompanionConfig(), 0)
-    advance(survey, [Heartbeat(1, 1, 2, 3, False, 0, 3)], 0)
-    assert survey.finished
-    assert "ArduPilot" in (survey.refusal or "")

@@ -1,7 +1,6 @@
 """A recovery: by attitude until the vehicle rests and the errors of its own estimate are known, then by a position."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -9,17 +8,16 @@ from companion.core import Limiter
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.envelope import SetpointError
-from companion.flight.recovering import Recover, as_the_vehicle_has_it, why_no_lean
+from companion.flight.recovering import Recover, why_no_lean
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, AttitudeSetpoint, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.strapdown import LEVEL, ZERO
-from companion.reflex.config import FADED_US, FADES_FROM_US, MOST_HELD_S, THRUST_LEARNT_S, EstimateConfig
+from companion.reflex.config import EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.normal import Normal
-from tests.companion.hostile import flight_in
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -70,36 +68,6 @@ def test_it_is_flown_by_attitude_until_it_rests_and_then_by_the_place_where_it_d
     assert [event.kind for event in flight.events].count("hand_over") == 1
 
 
-def test_it_is_not_handed_over_before_the_errors_of_the_vehicles_estimate_are_known(monkeypatch):
-    monkeypatch.setattr(MotionEstimator, "update", lambda self, sample: None)
-    flight = flight_with()
-    recover, estimator = Recover(flight, 0), flight.collisions[0].estimator
-    for since_us in range(100_000, 1_600_000, 20_000):
-        estimator.motion = replace(estimator.motion, position_ned_m=(2.4, 0.0, -2.0), velocity_ned_m_s=(0.0, 0.0, 0.0))
-        hears(flight, recover, since_us, 2.4, 0.0)
-    assert isinstance(recover.target(0).setpoint(0), AttitudeSetpoint)
-
-
-def test_every_position_has_those_errors_until_px4_has_put_them_right_whoever_asks_for_it():
-    # Given an estimate that is wrong by 0.2 m and 0.3 m/s, a wind of 1 m/s^2 from the south, and a tilt that is wrong
-    flight = flight_with()
-    record, asked = flight.collisions[0], Target((1.0, 2.0, -3.0), 0.5, (0.1, 0.0, 0.0))
-    record.estimator.has_converged = True
-    record.estimator.position_error_m, record.estimator._hidden_error_m_s = (0.2, 0.0, 0.0), (0.0, 0.3, 0.0)
-    record.estimator.external_m_s2, record.estimator.level_m_s2 = (1.0, 0.0, 0.0), (0.0, 0.5, 0.0)
-    hit_us = record.sample_time_boot_us
-    # Then the vehicle is asked for what its own estimate will show there, and for a tilt against both
-    sent = as_the_vehicle_has_it(flight, asked, hit_us + 1_000_000)
-    assert sent == Target((1.2, 2.0, -3.0), 0.5, (0.1, 0.3, 0.0), (-1.0, -0.5, 0.0))
-    # less and less of it,
-    half = as_the_vehicle_has_it(flight, asked, hit_us + (FADES_FROM_US + FADED_US) // 2)
-    assert half.position_ned_m == pytest.approx((1.1, 2.0, -3.0))
-    # and for the position alone once they are right again, or as long as nobody knows them
-    assert as_the_vehicle_has_it(flight, asked, hit_us + FADED_US) == asked
-    record.estimator.has_converged = False
-    assert as_the_vehicle_has_it(flight, asked, hit_us + 1_000_000) == asked
-
-
 def test_it_is_not_handed_over_on_the_obstacle():
     flight = flight_with()
     recover = Recover(flight, 0)
@@ -117,14 +85,6 @@ def test_it_is_not_handed_over_on_the_obstacle():
 def test_where_an_attitude_is_not_safe_the_plain_place_of_law_paper_is_sent(loss_s, learnt_s, word):
     flight = flight_with(loss_s, learnt_s)
     assert word in why_no_lean(flight)
-    _, sent = hears(flight, Recover(flight, 0), 100_000, 2.9, -0.5)
-    assert isinstance(sent, PositionSetpoint)
-    assert sent.velocity_ned_m_s is None and sent.acceleration_ned_m_s2 is None
-
-
-@pytest.mark.parametrize("law", ["paper", "normal"])
-def test_the_other_laws_send_their_place_from_the_first_moment_on(law):
-    flight = flight_with(law=law)
     _, sent = hears(flight, Recover(flight, 0), 100_000, 2.9, -0.5)
     assert isinstance(sent, PositionSetpoint)
     assert sent.velocity_ned_m_s is None and sent.acceleration_ned_m_s2 is None
@@ -162,17 +122,3 @@ def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_
         assert flight.mission.fence.nearest_inside(*place[:2]) == pytest.approx(place[:2], abs=1e-4)
         assert math.hypot(*(sent().velocity_ned_m_s or ZERO)) <= limits.max_speed_m_s + 1e-9
         assert math.hypot(*(sent().acceleration_ned_m_s2 or ZERO)) <= 9.81 * math.tan(math.radians(limits.max_tilt_deg))
-
-
-def test_the_setpoints_that_leave_after_a_recovery_have_the_errors(monkeypatch):
-    # Given a flight that holds after a clipped hit
-    f = flight_in("holding")
-    core = f.companion.core
-    core.flight.loss_s, core.flight.thrust.known_s = MOST_HELD_S, THRUST_LEARNT_S
-    (record,) = core.flight.collisions
-    monkeypatch.setattr(MotionEstimator, "update", lambda self, sample: None)
-    record.estimator.has_converged, record.estimator.position_error_m = True, (0.25, 0.0, 0.0)
-    # When it streams its next setpoint
-    f.run_for(0.1)
-    # Then that is beside the place which the flight wants by the error
-    assert f.vehicle.setpoints[-1][1].x - core.flight.target.position_ned_m[0] == pytest.approx(0.25, abs=0.001)

@@ -7,8 +7,8 @@ import pytest
 from companion.fence import Fence
 from companion.motion.strapdown import ZERO
 from companion.reflex.config import WAY_S, RecoveryConfig
-from companion.reflex.halfspace import Surface, away_from, inside_fence, projected
-from companion.reflex.laws import RECOVERY_LAWS, Contact, MotionState
+from companion.reflex.halfspace import Surface, inside_fence, projected
+from companion.reflex.laws import RECOVERY_LAWS, Contact
 
 AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)
 ALL_SPEEDS = (0.5, 1.0, 2.0, 3.5, 5.0)
@@ -56,10 +56,6 @@ def test_the_papers_own_numbers():
     assert goal_of("paper", Contact(0, AT, ZERO, SOUTH)) == AT, "hit while hovering: stay"
 
 
-def test_eq_3_is_asked_for_at_once_and_never_changed():
-    assert not RECOVERY_LAWS["paper"].follows and not RECOVERY_LAWS["paper"].leans
-
-
 def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
     # 2 m/s at 60 degrees from the normal: 1 m/s into the wall, 1.73 along it
     touched = hit(2.0, math.radians(60))
@@ -90,26 +86,6 @@ def test_turning_or_mirroring_the_world_turns_or_mirrors_the_recovery(name, tang
         assert other_goal == pytest.approx(change(goal))
 
 
-def test_along_the_wall_adaptive_comes_to_rest_where_the_motion_along_it_ends():
-    touched = hit(2.0, math.radians(60))
-    goal = goal_of("adaptive", touched, touched.rebound(0.2))
-    assert off_m(touched, goal) == pytest.approx(0.35)
-    beside_m = math.sqrt(math.dist(goal, AT) ** 2 - off_m(touched, goal) ** 2)
-    assert beside_m == pytest.approx(math.sqrt(3) * WAY_S)
-
-
-def test_a_hovering_vehicle_that_is_struck_gives_way():
-    struck = Contact(0, AT, ZERO, (0.0, 1.0, 0.0))
-    goal = goal_of("adaptive", struck, MotionState((4.0, -1.95, -1.5), (0.0, 0.45, 0.0)))
-    assert goal[:2] == pytest.approx((4.0, -1.65)), "0.35 m from where it was struck, more than it takes to stop"
-
-
-def test_what_overtook_the_vehicle_needs_no_more_clearance():
-    # Given one that is struck from behind while it flies away from what strikes it
-    fled = Contact(0, AT, (-3.0, 0.0, 0.0), SOUTH)
-    assert fled.rebound(0.45).velocity_ned_m_s == (-3.0, 0.0, 0.0), "it goes on leaving"
-
-
 # --- half-spaces
 
 
@@ -122,19 +98,6 @@ def test_projected_into_a_corner_a_vector_has_its_least_part_along_both_normals(
     assert found[2] == -1.0
     assert projected(found, sides) == pytest.approx(found, abs=0.02)
     assert projected((-3.0, 0.0, 0.0), [(SOUTH, 0.5)]) == (-3.0, 0.0, 0.0), "what is inside stays"
-
-
-@pytest.mark.parametrize(
-    ("normal", "away"),
-    [
-        ((-0.9, 0.1, 0.3), (-0.9939, 0.1104, 0.0)),  # a wall, and the vehicle leant: height is held
-        ((0.05, 0.0, 0.99), (0.0504, 0.0, 0.9987)),  # a ceiling: away is down
-        ((0.0, 0.0, -1.0), (0.0, 0.0, -1.0)),  # a floor
-        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-    ],
-)
-def test_away_is_level_from_a_wall_and_straight_from_what_is_steep(normal, away):
-    assert away_from(normal) == pytest.approx(away, abs=1e-3)
 
 
 ROOM = Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4)
@@ -151,19 +114,6 @@ def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
     low = Contact(0, (0.0, 0.0, -0.6), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
     goal = goal_of("adaptive", low)
     assert in_room((), low.position_ned_m, goal) == pytest.approx((0.0, 0.0, -0.4))
-
-
-FENCE, FENCE_AT = Fence(radius_m=5.0, max_height_m=6.0), (10.0, 0.0, 2.0)
-
-
-def test_the_way_back_is_shortened_at_the_fence_not_bent():
-    clamped = inside_fence(FENCE, FENCE_AT, (10.0, 3.0, 0.0), (18.0, 3.0, 0.0))
-    assert math.hypot(clamped[0] - 10.0, clamped[1]) == pytest.approx(5.0)
-    assert clamped == pytest.approx((14.0, 3.0, 0.0)), "still on the line from the contact to the wish"
-
-
-def test_a_contact_outside_the_fence_is_answered_with_the_nearest_place_inside():
-    assert inside_fence(FENCE, FENCE_AT, (17.0, 0.0, 0.0), (19.0, 0.0, 0.0)) == pytest.approx((15.0, 0.0, 0.0))
 
 
 NORTH_WALL = Surface((3.0, 2.0, -1.5), SOUTH, 0.5)

@@ -1,9 +1,8 @@
 """An interrupted mission taken up again: from which step, from where, and in whose coordinates."""
 
 import pytest
-from pydantic import ValidationError
 
-from companion.mission.model import Mission, steps_to_fly
+from companion.mission.model import steps_to_fly
 from tests.companion.fake_vehicle import FakeVehicle, flight, mission
 from tests.flying import EPOCH_US, Flight
 
@@ -66,9 +65,3 @@ def test_the_hits_of_before_count_for_what_the_mission_expects():
     f.run_to_end()
     assert f.event("expect").data["met"] is True
     assert f.report.outcome == "completed"
-
-
-def test_a_step_that_there_is_not():
-    resume = {"at_step": 8, **FIRST, "armed_boot_us": 0}
-    with pytest.raises(ValidationError, match="there is no 8"):
-        Mission.model_validate({"name": "t", "items": ITEMS, "resume": resume})

@@ -10,8 +10,8 @@ from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, remembered, touch_of
 from companion.memory.route import route
 from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
-from companion.mission.item_trajectory import SpeedLimits, home_around, passed, trajectory_around
-from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
+from companion.mission.item_trajectory import SpeedLimits, passed, trajectory_around
+from companion.mission.items import OrbitItem, PathItem
 from companion.mission.trajectory import CurveProfile
 from companion.reflex.normal import Normal
 
@@ -51,44 +51,12 @@ def test_the_way_round_a_touch_keeps_the_clearance_and_is_the_shortest():
     assert least_m < length_m(START, places) < least_m + 0.3
 
 
-def test_an_unsure_normal_is_passed_in_a_wider_bow():
-    sure, unsure = (route(around(wall(0.0, error_rad=math.radians(e))), START, GOAL) for e in (5.0, 40.0))
-    assert unsure[0][0] < sure[0][0] - 0.2
-    # a wall that is turned by 40 degrees against what is believed is within it
-    turned_end = Point(4.0 - REACHES_M * math.sin(math.radians(40)), REACHES_M * math.cos(math.radians(40)))
-    assert assumed_area(wall(0.0, error_rad=math.radians(40.0))).buffer(1e-9).covers(turned_end)
-
-
-def test_from_a_recoverys_setpoint_near_the_wall_the_way_leads_off_and_round():
-    near = (4.0 - 0.45, 0.0, -1.5)
-    known = around(wall(0.0))
-    places = route(known, near, GOAL)
-    trajectory = LineString([near[:2], *[place[:2] for place in places]])
-    assert trajectory.distance(core(known.patches[0])) >= 0.45 - 0.03
-    assert not known.block((near, (0.0, 0.0, -1.5))), "straight away from the wall is always free"
-
-
-def test_from_beside_the_wall_no_way_leads_through_it():
-    """However near the vehicle is, and whatever the normal's error: the wall itself is never crossed."""
-    known = around(wall(0.0, 1.0, 2.0, error_rad=math.radians(40.0)))
-    for off_m in (0.08, 0.2, 0.3, 0.5):
-        start = (4.0 - off_m, 1.0, -1.5)
-        places = route(known, start, GOAL)
-        assert not LineString([start[:2], *[place[:2] for place in places]]).intersects(core(known.patches[0]))
-
-
 def test_a_vehicle_inside_what_is_remembered_knows_that_it_is_not_there():
     """A door that was opened, or a place estimate that has drifted."""
     known = around(wall(0.0))
     assert route(known, (4.05, 0.0, -1.5), GOAL) == (GOAL,)
     beside = (3.85, 0.0, -1.5)
     assert route(known, (4.05, 0.0, -1.5), beside) == (beside,)
-
-
-def test_what_reaches_no_further_than_its_touch_is_still_as_wide_as_it_is_thick():
-    cart = Patch(((4.0, 0.0, -1.5),), (-1.0, 0.0, 0.0), ERROR_RAD, 0.0, 0)
-    assert core(cart).bounds == pytest.approx((3.9, -0.1, 4.0, 0.1), abs=0.11) and core(cart).area > 0.005
-    assert around(cart).block((START, GOAL))
 
 
 def test_a_goal_in_the_wall_cannot_be_reached_one_beside_it_can():
@@ -108,13 +76,6 @@ def test_where_the_fence_is_high_enough_the_way_leads_over_it():
     assert route(around(wall(-1.0, 0.0, 1.0), ceiling(2.2), fence=room), START, GOAL) is None
 
 
-def test_a_known_ceiling_limits_the_height():
-    known = around(ceiling(2.0, north_m=3.0))
-    assert known.block(((0.0, 0.0, -1.8), (6.0, 0.0, -1.8)))
-    assert not known.block(((0.0, 0.0, -1.2), (6.0, 0.0, -1.2)))
-    assert route(known, START, (3.0, 0.0, -1.8)) is None
-
-
 def test_ways_stay_inside_a_fence_with_a_bend():
     """An L-shaped room with a pillar in its bend."""
     room = Fence(polygon_ne_m=((-1, -1), (5, -1), (5, 5), (3, 5), (3, 1), (-1, 1)), max_height_m=3)
@@ -124,27 +85,7 @@ def test_ways_stay_inside_a_fence_with_a_bend():
     assert length_m(START, places) < length_m(START, [(4.0, 0.0, -1.5), goal])
 
 
-def test_a_route_is_found_soon_also_among_many_patches():
-    patches = [
-        wall(0.7 * (row % 2) - 3.0 + 1.9 * column, north_m=1.5 + 1.3 * row) for row in range(4) for column in range(4)
-    ]
-    places = route(around(*patches), START, (7.5, 0.0, -1.5))
-    trajectory = LineString([START[:2], *[place[:2] for place in places]])
-    assert min(trajectory.distance(core(patch)) for patch in patches) >= CLEARANCE_M - SLACK_M
-
-
 # --- items
-
-
-def test_a_line_in_whose_way_something_stands_is_led_round_it():
-    planned = trajectory_around(GoToItem(position_ned_m=GOAL), START, PACE, around(wall(0.0)))
-    assert planned.is_detour and planned.trajectory.target_m == GOAL and 7.0 < planned.trajectory.distance_m < 8.0
-
-
-def test_a_velocity_is_flown_as_it_is():
-    """It asks for a motion: so a wall is felt for."""
-    item = VelocityItem(velocity_ned_m_s=(1.0, 0.0, 0.0), duration_s=5.0)
-    assert not trajectory_around(item, START, PACE, around(wall(0.0))).is_detour
 
 
 def test_a_paths_point_in_a_wall_is_left_out_but_not_its_last():
@@ -163,12 +104,6 @@ def test_an_orbit_is_flown_round_what_stands_in_it():
     places = [planned.trajectory.at(planned.trajectory.duration_s * n / 400)[0] for n in range(401)]
     assert min(Point(place[:2]).distance(core(known.patches[0])) for place in places) > REACH_M + LEAST_FREE_M
     assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
-
-
-def test_home_below_a_ceiling_leaves_out_the_climb():
-    planned = home_around((7.0, 0.0, -1.5), ReturnItem(height_m=2.3), PACE, around(ceiling(2.3, north_m=7.0)))
-    heights = [-planned.trajectory.at(planned.trajectory.duration_s * n / 50)[0][2] for n in range(20)]
-    assert planned.is_detour and max(heights) < 2.3 - REACH_M
 
 
 def test_what_has_been_flown_of_a_path_is_not_flown_again():

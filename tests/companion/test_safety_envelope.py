@@ -39,11 +39,6 @@ def place_of(target: Target) -> tuple:
     return tuple(p - o for p, o in zip(target.position_ned_m, ORIGIN, strict=True))
 
 
-def test_what_is_inside_passes_untouched():
-    target = asked((3.0, 1.0, -2.0), (2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    assert bounded(target, around(), FENCE, LIMITS) == (target, "")
-
-
 @pytest.mark.parametrize(
     ("place", "vehicle", "expected", "reason"),
     [
@@ -62,19 +57,6 @@ def test_a_place_outside_is_moved_in_and_stood_still_at(place, vehicle, expected
     assert (target.velocity_ned_m_s, target.acceleration_ned_m_s2, target.yaw_rad) == (None, None, 0.3)
 
 
-def test_a_velocity_is_scaled_down_in_its_direction():
-    target, reason = bounded(asked((0.0, 0.0, -1.5), (3.0, 4.0, 0.0), (1.0, 0.0, 0.0)), around(), FENCE, LIMITS)
-    assert target.velocity_ned_m_s == pytest.approx((1.8, 2.4, 0.0))
-    assert reason == "velocity above 3 m/s"
-
-
-def test_on_the_way_up_from_the_ground_the_ground_is_the_floor():
-    target = asked((0.0, 0.0, 0.0))
-    assert bounded(target, around((0.0, 0.0, 0.0), has_floor=False), FENCE, LIMITS) == (target, "")
-    under, reason = bounded(asked((0.0, 0.0, 50.0)), around((0.0, 0.0, 0.0), has_floor=False), FENCE, LIMITS)
-    assert place_of(under)[2] == pytest.approx(0.0) and "outside the fence" in reason
-
-
 def test_an_acceleration_is_bounded_by_the_tilt_and_by_gravity():
     place = (0.0, 0.0, -1.5)
     anywhere = Surroundings(None, None, True)
@@ -85,25 +67,6 @@ def test_an_acceleration_is_bounded_by_the_tilt_and_by_gravity():
     assert reason == "tilt above 45 degrees"
     target, _ = bounded(asked(place, (0.0, 0.0, 0.0), (0.0, 0.0, -80.0)), anywhere, FENCE, LIMITS)
     assert target.acceleration_ned_m_s2[2] >= -GRAVITY_M_S2
-
-
-@pytest.mark.parametrize("height_m", [0.6, 1.0, 3.9])
-@pytest.mark.parametrize(("down_m_s", "down_m_s2"), [(0.0, 8.0), (2.5, 0.0), (1.0, 9.0), (-2.5, 0.0), (0.0, -9.0)])
-def test_held_for_com_of_loss_t_a_setpoint_leads_neither_below_the_floor_nor_out_of_the_top(
-    height_m, down_m_s, down_m_s2
-):
-    """By PX4's own loops: velocity gain MPC_Z_VEL_P_ACC = 4, height gain MPC_Z_P = 1; held for 1 s."""
-    place = (0.0, 0.0, -height_m)
-    wanted = asked(place, (0.0, 0.0, down_m_s), (0.0, 0.0, down_m_s2))
-    target, _ = bounded(wanted, around(place), FENCE, LIMITS)
-
-    down_m, speed_m_s, step_s = -height_m, 0.0, 0.001
-    for _ in range(1000):
-        wish_m_s = target.velocity_ned_m_s[2] + place_of(target)[2] - down_m
-        ahead_m_s2 = (target.acceleration_ned_m_s2 or (0.0, 0.0, 0.0))[2]
-        speed_m_s += step_s * (ahead_m_s2 + 4.0 * (wish_m_s - speed_m_s))
-        down_m += step_s * speed_m_s
-    assert -4.0 - 0.01 <= down_m <= -0.5 + 0.01
 
 
 @pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
@@ -118,11 +81,6 @@ def test_what_is_not_finite_is_a_fault_and_nothing_else(broken):
                 bounded(replace(good, **spoilt), around(), FENCE, LIMITS)
     with pytest.raises(SetpointError):
         bounded(replace(good, yaw_rad=broken), around(), FENCE, LIMITS)
-
-
-def test_a_yaw_is_turned_into_one_turn():
-    target, _ = bounded(replace(asked((0.0, 0.0, -1.5)), yaw_rad=7.0), around(), FENCE, LIMITS)
-    assert target.yaw_rad == pytest.approx(7.0 - math.tau)
 
 
 @given(POINT, POINT, st.one_of(st.none(), POINT))
@@ -162,16 +120,6 @@ def test_the_stream_is_held_back_and_it_is_told():
     assert f.event("envelope").text.startswith("setpoint held back: moves faster than 2 m/s")
     f.run_for(1.5)
     assert f.vehicle.setpoints[-1][1].x == pytest.approx(6.0), "it arrives all the same"
-
-
-def test_a_hit_may_make_the_setpoint_jump():
-    into_wall = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
-    f = in_mission(
-        into_wall, vehicle=FakeVehicle(wall_north_m=3.0), limits={"max_speed_m_s": 2.5}, recovery={"law": "paper"}
-    )
-    f.run_to("recovering")
-    f.step()
-    assert f.vehicle.setpoints[-1][1].x == pytest.approx(2.0, abs=0.15)
 
 
 def test_an_estimate_that_jumps_does_not_send_the_vehicle_flying():

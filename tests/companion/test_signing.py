@@ -144,24 +144,6 @@ def test_what_is_sent_is_later_than_all_sent_and_heard_whatever_the_clock_says(s
     assert stamps[2] == NOW + 51, "500 us are 50 steps of 10"
 
 
-def test_the_last_stamp_there_is_ends_nothing(signing):
-    signing.opened(packed(end=vehicle(stamp=2**48 - 1)), NOW_US)
-    for _ in range(2):
-        assert signing.signed(plain(), NOW_US)[-12:-6] == b"\xff" * 6
-
-
-def test_what_radios_cannot_sign_is_dropped_without_being_news(signing):
-    radio = mav.MAVLink_radio_status_message(100, 100, 100, 10, 10, 0, 0)
-    assert signing.opened(plain(radio, component=68), NOW_US) == b""
-    assert signing.refused == {}
-    # Nor is it a way in for what hides in it: bytes that are no packet pass nowhere
-    hidden = plain(mav.MAVLink_statustext_message(6, plain()))
-    for damaged in (hidden, hidden[:-1] + bytes((hidden[-1] ^ 1,)), plain(radio)[:-1] + b"\0" + plain()):
-        assert signing.opened(damaged + packed(), NOW_US).count(plain()) <= 1
-    signing = Signing(KEY, NOW)
-    assert signing.opened(b"\xfd\x09\0" + plain() + plain()[:5], NOW_US) == b""
-
-
 def test_what_lasts_is_told_once_a_run_with_the_last_of_it(signing):
     def hear(packet: bytes, now_us: int) -> str | None:
         signing.opened(packet, now_us)
@@ -173,21 +155,6 @@ def test_what_lasts_is_told_once_a_run_with_the_last_of_it(signing):
     ]
     wrong = packed(end=vehicle(key=OTHER_KEY))
     assert [hear(wrong, NOW_US + step * LASTING_US) for step in range(2)] == [None, None], "two of them are no run"
-
-
-def test_a_message_that_is_not_in_the_dialect_keeps_its_signature(signing):
-    content = b"\xfd\x01\x01\0\0\x01\x01\xff\xff\xff" + b"\x07" + b"\0\0" + b"\x03" + (NOW + 1).to_bytes(6, "little")
-    unknown = content + hashlib.sha256(KEY + content).digest()[:6]
-    assert signing.opened(unknown + packed(end=vehicle(stamp=NOW + 2)), NOW_US) == unknown + plain()
-    assert signing.refused == {}
-
-
-def test_stray_bytes_that_look_like_the_beginning_of_an_unknown_message_swallow_no_genuine_packet(signing):
-    genuine = b"".join(packed(end=vehicle(stamp=NOW + number)) for number in range(3))
-    # Given MAVLink 1's first bytes, of a message that no dialect knows, whose length ends where another packet begins
-    stray = bytes((0xFE, len(genuine) - 2, 0, 0, 0, 0xF0))
-    received = stray + genuine + packed(end=vehicle(stamp=NOW + 3))
-    assert signing.opened(received, NOW_US) == 4 * plain()
 
 
 @settings(max_examples=300, deadline=None)

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from companion.messages import LocalPosition
-from companion.reflex.config import HELD_M_S2, SMOOTHING_S
+from companion.reflex.config import HELD_M_S2
 from companion.reflex.sustained_force import SustainedForceMonitor
 from tests.simulated import SimulatedFlight, simulated, wall
 
@@ -94,72 +94,6 @@ def glide(t):
 )
 def test_a_lean_that_something_else_explains_is_no_wall(seconds, velocity_m_s, tilt_m_s2, goal_m):
     assert watched(seconds, velocity_m_s, tilt_m_s2, goal_m, goes=goal_m[1] > 0.0) is None
-
-
-def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new():
-    """Given a vehicle found pressing north, when it is sent back south and its lean returns to level."""
-    monitor, found = SustainedForceMonitor(), []
-    for step in range(200):
-        t = step * EVERY_S
-        lean = min(0.8 * max(0.0, t - 0.6), 2.4) if not found else max(0.0, 2.4 - 2.0 * (t - found[0]))
-        sample = LocalPosition(1_000_000 + round(t * 1e6), (0.0, 0.0, -1.5), (0.0, 0.0, 0.0))
-        monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, lean)))
-        goal = (-0.35 if found else 1.0, 0.0, -1.5)
-        if monitor.step(sample, leaning_north(lean), goal) is not None:
-            found.append(t)
-    assert len(found) == 1
-
-
-HOVER, FULL_M_S2 = 0.5, 19.6133
-
-
-def watched_below(seconds, fraction, climbed_m=lambda t: 0.0, asked_m=0.2, is_told=True):
-    """The first time at which something is found above, and what; functions of the time, 3 s of hovering before it."""
-    monitor = SustainedForceMonitor()
-    for step in range(-150, round(seconds / EVERY_S)):
-        t = step * EVERY_S
-        now_us = 10_000_000 + round(t * 1e6)
-        climbed, before = (climbed_m(max(each, 0.0)) for each in (t, t - EVERY_S))
-        sample = LocalPosition(now_us, (0.0, 0.0, -climbed), (0.0, 0.0, (before - climbed) / EVERY_S))
-        if is_told:
-            monitor.gain.set_fraction(now_us, fraction(t) if t > 0.0 else HOVER)
-        monitor.add_imu((0.0, 0.0, -FULL_M_S2 * HOVER))
-        held = monitor.step(sample, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -asked_m if t > 0.0 else 0.0))
-        if held is not None:
-            return t, held
-    return None
-
-
-def pressing(t):
-    """The loops command 1 m/s^2 more each second. The accelerometer goes on showing a hover's."""
-    return HOVER + t / FULL_M_S2
-
-
-def test_more_and_more_thrust_that_nothing_shows_of_presses_on_what_is_above():
-    at_s, held = watched_below(5.0, pressing)
-    # Then it is told with the low-pass filter's delay
-    assert at_s == pytest.approx(HELD_M_S2 + SMOOTHING_S, abs=0.1)
-    assert held.normal.direction_ned == (0.0, 0.0, 1.0) and held.peak_specific_force_m_s2 == pytest.approx(
-        HELD_M_S2, abs=0.1
-    )
-
-
-@pytest.mark.parametrize(
-    ("fraction", "climbed_m", "asked_m"),
-    [
-        (lambda t: HOVER + 0.1, lambda t: 0.05 * FULL_M_S2 * t * t, 20.0),
-        (pressing, lambda t: 0.15 * t, 2.0),
-        (lambda t: HOVER + 0.15, lambda t: -0.1 * math.sin(math.pi * min(t, 1.0)), 0.2),
-        (pressing, lambda t: 0.15, 0.2),
-    ],
-    ids=["thrust that is there", "rises, if weakly", "let down by a motor, and back", "is where it is to be"],
-)
-def test_nothing_is_above_a_vehicle(fraction, climbed_m, asked_m):
-    assert watched_below(3.0, fraction, climbed_m, asked_m) is None
-
-
-def test_without_the_thrust_asked_for_nothing_is_said():
-    assert watched_below(5.0, pressing, is_told=False) is None
 
 
 # --- in flight

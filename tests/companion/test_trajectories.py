@@ -41,15 +41,6 @@ def test_velocity_is_the_derivative_of_position_within_the_limits(name):
     assert tuple(position[-1]) == pytest.approx(trajectory.target_m, abs=1e-6)
 
 
-def test_a_curve_passes_through_its_points_and_does_not_stop_there():
-    trajectory = WAYS["curve"]
-    samples = [trajectory.at(t) for t in np.arange(0.0, trajectory.duration_s, 0.005)]
-    for point in ZIGZAG[1:-1]:
-        place, velocity, _ = min(samples, key=lambda sample: math.dist(sample[0], point))
-        assert math.dist(place, point) < 0.01
-        assert math.hypot(*velocity) > 0.7
-
-
 def test_a_curve_is_a_natural_cubic_spline():
     """As scipy's, over its own knots."""
     points = np.array(ZIGZAG)
@@ -59,35 +50,6 @@ def test_a_curve_is_a_natural_cubic_spline():
     trajectory = CurveProfile(ZIGZAG, 3.0, 2.0)
     for t in np.linspace(0.0, trajectory.duration_s, 50):
         assert np.linalg.norm(looked_at - np.array(trajectory.at(t)[0]), axis=1).min() < 1e-3
-
-
-def test_a_curve_is_slow_where_it_bends_and_fast_where_it_does_not():
-    trajectory = WAYS["hairpin"]
-    speeds = [math.hypot(*trajectory.at(t)[1]) for t in np.arange(0.0, trajectory.duration_s, 0.01)]
-    turn = [
-        s
-        for t, s in zip(np.arange(0.0, trajectory.duration_s, 0.01), speeds, strict=True)
-        if trajectory.at(t)[0][0] > 4.95
-    ]
-    assert max(speeds) > 2.0
-    assert min(turn) < 0.8
-
-
-def test_a_curve_that_turns_back_on_itself_all_but_stops_there():
-    trajectory = CurveProfile([(3.0, 4.0, -2.5), (1.0, 2.0, -2.0), (3.0, 4.0, -2.5)], 2.0, 2.0)
-    at_s = np.arange(0.0, trajectory.duration_s, 0.005)
-    furthest = max((trajectory.at(t) for t in at_s), key=lambda sample: math.dist(sample[0], (3.0, 4.0, -2.5)))
-    assert math.hypot(*furthest[1]) < 0.1
-    assert all(math.isfinite(sum(part)) for t in at_s for part in trajectory.at(t))
-    assert tuple(trajectory.at(1e9)[0]) == (3.0, 4.0, -2.5)
-
-
-def test_points_on_one_another_are_one_point():
-    trajectory = CurveProfile([(0.0, 0.0, -1.0), (0.0, 0.0, -1.0), (2.0, 0.0, -1.0)], 1.0, 1.0)
-    assert trajectory.distance_m == pytest.approx(2.0)
-    place, still = (1.0, 0.0, -1.0), (0.0, 0.0, 0.0)
-    for nowhere in (CurveProfile([place, place], 1.0, 1.0), LineProfile(place, place, 1.0, 1.0)):
-        assert (nowhere.duration_s, nowhere.at(0.0)) == (0.0, (place, still, still))
 
 
 @pytest.mark.parametrize(("velocity", "duration_s", "top"), [([1, 0, 0], 3.0, 1.0), ([0, -3, 0], 2.0, 2.0)])
@@ -120,26 +82,6 @@ def test_the_speed_grows_slower_than_it_falls(trajectory):
     assert changes.max() == pytest.approx(1.0, abs=0.05)
     assert changes.min() < -1.1
     assert math.dist(trajectory.at(trajectory.duration_s - 1e-6)[0], trajectory.target_m) < 1e-4
-
-
-def test_straight_up_no_speed_leans_the_vehicle():
-    up = LineProfile((0.0, 0.0, -1.0), (0.0, 0.0, -5.0), 2.0, 2.0, 1.0)
-    assert up.at(0.5)[2] == (0.0, 0.0, -2.0)
-    aside = LineProfile((0.0, 0.0, -1.0), (3.0, 0.0, -5.0), 2.0, 2.0, 1.0)
-    assert aside.at(0.2)[2][0] == pytest.approx(1.0)
-
-
-def test_a_head_wind_takes_its_part_of_the_lean_for_speeding_up():
-    speeds = SpeedLimits(1.0, 2.0, speeding_up_m_s2=1.0)
-    north = (5.0, 0.0, 0.0)
-    # Given what a hover leans by against the wind, then it is taken off along the way, and only there
-    assert speeds.against((0.3, 0.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.7)
-    assert speeds.against((-0.3, 0.2, 0.0), north).speeding_up_m_s2 == pytest.approx(1.0)
-    assert speeds.against((1.2, 0.0, 0.0), north).speeding_up_m_s2 == pytest.approx(0.4)
-    # and a pace that is slower than that already stays what it is
-    slower = SpeedLimits(1.0, 2.0, speeding_up_m_s2=0.2).against((1.2, 0.0, 0.0), north)
-    assert slower.speeding_up_m_s2 == pytest.approx(0.2)
-    assert speeds.against((1.2, 0.0, 0.0), (0.0, 0.0, -1.0)).speeding_up_m_s2 == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("speed_m_s", "tried_m_s"), [(2.0, 0.5), (0.8, 0.3), (0.2, 0.2)])

@@ -156,28 +156,6 @@ def test_a_client_that_never_reads_is_named_and_only_it_misses_anything(bench):
     assert got == packet(1) * (len(got) // len(packet(1)))
 
 
-@pytest.mark.parametrize("bench", [("udpin", "tcpin")], indirect=True)
-@pytest.mark.parametrize("floods", ["udp", "tcp"])
-def test_a_client_that_floods_is_named_and_the_vehicle_is_heard_at_once(bench, floods):
-    flooding = bench.udp(0) if floods == "udp" else bench.tcp(1)
-    flooding.setblocking(False)
-    content, news = packet(10) * 60, []
-    for _ in range(400):
-        for _ in range(20):
-            try:
-                flooding.send(content)
-            except BlockingIOError:
-                break
-        assert bench.says(packet(1)) == packet(1)
-        bench.shared.send(packet(1))
-        news += filter(None, [bench.shared.news()])
-    if floods == "udp":
-        assert len(news) == 1 and "sends more than the link to the vehicle carries" in news[0]
-    else:
-        # It is not read meanwhile, so it waits and loses nothing
-        assert news == []
-
-
 @pytest.mark.parametrize("bench", [("udpin",)], indirect=True)
 def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
     clients = [bench.udp() for _ in range(MOST_CLIENTS + 1)]

@@ -59,16 +59,6 @@ def test_the_load_of_each_core_is_that_since_the_last_reading(linux):
     assert second.cpu_percent == (0, 50)
 
 
-def test_a_core_that_comes_or_goes_and_a_counter_that_runs_back_are_no_fault(linux):
-    reader = ComputerReader(linux, linux)
-    stat(linux, (500, 0, 0, 500, 0, 0, 0, 0, 0, 0))
-    reader.read(0)
-    stat(linux, (500, 0, 0, 500, 0, 0, 0, 0, 0, 0), (0, 0, 0, 0, 0, 0, 0, 0, 0, 0))
-    assert reader.read(0).cpu_percent == (50, 0)
-    stat(linux, (600, 0, 0, 499, 0, 0, 0, 0, 0, 0), (0, 0, 0, 0, 0, 0, 0, 0, 0, 0))
-    assert reader.read(0).cpu_percent == (100, 0)
-
-
 def test_a_computer_without_a_sensor_has_no_temperature(linux):
     stat(linux, (0, 0, 0, 100, 0, 0, 0, 0, 0, 0))
     first, second = sorted((linux / "sys/class/thermal").glob("*/temp"))
@@ -76,12 +66,6 @@ def test_a_computer_without_a_sensor_has_no_temperature(linux):
     assert ComputerReader(linux, linux).read(0).temperature_deg_c == 48
     first.unlink()
     assert ComputerReader(linux, linux).read(0).temperature_deg_c is None
-
-
-def test_this_computer_is_read_as_it_is(tmp_path):
-    status = ComputerReader(tmp_path).read(0)
-    assert status.uptime_ms > 0 and status.cpu_percent and all(0 <= load <= 100 for load in status.cpu_percent)
-    assert 0 < status.memory_used_mib < status.memory_total_mib and 0 < status.disk_used_mib <= status.disk_total_mib
 
 
 def decoded(status):

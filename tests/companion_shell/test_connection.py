@@ -3,7 +3,6 @@
 import os
 import pty
 import socket
-import threading
 import tty
 
 import pytest
@@ -58,34 +57,6 @@ def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
     connection.close()
 
 
-def test_a_peers_name_means_its_address_in_the_family_of_the_socket(peer, monkeypatch):
-    # Given a name that has both addresses, IPv6 first
-    lookup = socket.getaddrinfo
-
-    def both(host, port, family=0, *more, **flags):
-        if host != "vehicle":
-            return lookup(host, port, family, *more, **flags)
-        return [
-            (socket.AF_INET6, socket.SOCK_DGRAM, 17, "", ("::1", port, 0, 0)),
-            (socket.AF_INET, socket.SOCK_DGRAM, 17, "", (LOCAL, port)),
-        ][family == socket.AF_INET :]
-
-    monkeypatch.setattr(socket, "getaddrinfo", both)
-    # When it is the peer on a socket of IPv4
-    connection = open_connection(f"udpin://{LOCAL}:0", "vehicle")
-    # Then it is heard
-    peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
-    assert connection.receive(2.0) == HEARTBEAT
-    connection.close()
-
-
-def test_a_peer_of_ipv4_is_heard_on_a_socket_of_both_families(peer):
-    connection = open_connection("udpin://[::]:0", LOCAL)
-    peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
-    assert connection.receive(2.0) == HEARTBEAT
-    connection.close()
-
-
 @pytest.mark.parametrize(
     ("url", "named"),
     [
@@ -125,13 +96,6 @@ def test_the_older_form_listens_where_it_names_no_host(monkeypatch, host):
     assert open_connection(f"udp://{host}:14540") == (host, 14540)
 
 
-def test_udpin_drops_what_nobody_is_there_to_take():
-    connection = udp_in(LOCAL, 0)
-    connection.send(b"nobody")
-    assert connection.receive(0.0) == b""
-    connection.close()
-
-
 @pytest.mark.parametrize("scheme", ["udpout", "udp"])
 def test_udpout_sends_first_and_hears_only_the_address_it_speaks_to(peer, scheme):
     connection = open_connection(f"{scheme}://{LOCAL}:{peer.getsockname()[1]}")
@@ -150,15 +114,6 @@ def test_udpout_sends_first_and_hears_only_the_address_it_speaks_to(peer, scheme
     assert peer.recv(100) == b"second"
     peer.sendto(HEARTBEAT, address)
     assert connection.receive(2.0) == HEARTBEAT
-    connection.close()
-
-
-def test_udpout_to_a_closed_port_is_silence_not_an_error(peer):
-    port = peer.getsockname()[1]
-    peer.close()
-    connection = open_connection(f"udpout://{LOCAL}:{port}")
-    connection.send(b"anyone?")
-    assert connection.receive(0.05) == b""
     connection.close()
 
 
@@ -213,26 +168,6 @@ def test_the_beginning_of_a_packet_is_kept_until_the_rest_has_come():
     os.close(far)
 
 
-def test_a_packet_that_a_full_pipe_cannot_take_does_not_stall_the_loop():
-    # Given a stream whose other end never reads
-    ours, theirs = socket.socketpair()
-    stream = Stream(ours, "there")
-    # When more is sent than the buffers hold
-    done = threading.Event()
-
-    def flood():
-        for _ in range(20):
-            stream.send(b"\0" * 65_536)
-        done.set()
-
-    threading.Thread(target=flood, daemon=True).start()
-    # Then sending returns all the same, and the stream is whole
-    assert done.wait(15)
-    assert not stream.broken
-    stream.close()
-    theirs.close()
-
-
 @pytest.mark.parametrize(
     ("url", "named"),
     [
@@ -272,8 +207,3 @@ def test_a_port_in_use_is_said_so(peer):
     port = peer.getsockname()[1]
     with pytest.raises(ConnectionSetupError, match=f"{port} is already in use"):
         open_connection(f"udpin://{LOCAL}:{port}")
-
-
-def test_a_refused_connection_is_said_so(peer):
-    with pytest.raises(ConnectionSetupError, match="refused"):
-        open_connection(f"tcpout://{LOCAL}:{peer.getsockname()[1]}")

@@ -1,6 +1,5 @@
 """A stream that ended is there again within a second of the other end's return, and nothing waits for it meanwhile."""
 
-import errno
 import os
 import pty
 import socket
@@ -119,19 +118,6 @@ def test_a_serial_device_is_found_again_under_another_name(tmp_path, by_id, clos
     assert connection.counts.reconnects == 1
 
 
-def test_a_serial_device_without_a_link_is_looked_for_at_its_path(tmp_path, by_id, closing):
-    # Given a device that udev has no link for, as /dev/ttyAMA0; here the path is a link that the test moves
-    path = tmp_path / "ttyAMA0"
-    line = closing(Line(path))
-    connection = closing(open_connection(f"serial://{path}:115200"))
-    line.close()
-    until_told(connection, "lost")
-    again = closing(Line(path))
-    until_told(connection, "again")
-    again.say(b"after")
-    assert until_heard(connection) == b"after"
-
-
 def test_whoever_waits_begins_without_a_device(by_id, closing):
     # Given a Pixhawk that is not plugged in
     link = by_id / "usb-3D_Robotics_PX4_FMU_v5-if00"
@@ -147,41 +133,10 @@ def test_whoever_waits_begins_without_a_device(by_id, closing):
     assert until_heard(connection) == b"first" and connection.counts.reconnects == 0
 
 
-def test_whoever_waits_begins_without_a_server(closing):
-    with socket.create_server((LOCAL, 0)) as listener:
-        port = listener.getsockname()[1]
-    connection = closing(open_connection(f"tcpout://{LOCAL}:{port}", waits=True))
-    assert "connection refused. Waiting" in until_told(connection, "Waiting")
-    listener = closing(socket.create_server((LOCAL, port)))
-    assert until_told(connection, "connected") == f"connected: {LOCAL}:{port}"
-    closing(listener.accept()[0]).sendall(b"first")
-    assert until_heard(connection) == b"first"
-
-
 def test_a_port_that_may_not_be_opened_is_told_at_once_to_whoever_waits(tmp_path):
     # Waiting gives nobody the rights to a device; here it is a folder
     with pytest.raises(ConnectionSetupError, match="cannot be opened"):
         open_connection(f"serial://{tmp_path}:115200", waits=True)
-
-
-def test_a_port_that_cannot_be_closed_is_opened_anew_all_the_same(by_id, closing, monkeypatch):
-    link = by_id / "vehicle"
-    line = closing(Line(link))
-    connection = closing(open_connection(f"serial://{link}:115200"))
-
-    # Given a driver that fails to close the port of a device that has gone
-    def fails():
-        raise OSError(errno.EIO, os.strerror(errno.EIO))
-
-    monkeypatch.setattr(connection._stream, "close", fails)
-    line.close()
-    until_told(connection, "lost")
-    # When the device comes back
-    again = closing(Line(link))
-    # Then it is opened
-    until_told(connection, "again")
-    again.say(b"after")
-    assert until_heard(connection) == b"after"
 
 
 def test_a_port_whose_driver_does_not_return_is_waited_for_by_nobody(by_id, closing, monkeypatch):
@@ -234,16 +189,6 @@ def test_a_router_that_was_restarted_is_connected_to_again(closing):
     router.sendall(b"after")
     assert until_heard(connection) == b"after" and router.recv(8) == b"setpoint"
     assert connection.counts.reconnects == 1
-
-
-def test_a_socket_that_met_itself_is_no_server(closing, monkeypatch):
-    # Given that the kernel chose the port that is asked for: on one machine TCP connects such a socket with itself
-    itself = closing(socket.socket())
-    itself.bind((LOCAL, 0))
-    itself.connect(itself.getsockname())
-    monkeypatch.setattr(streams.socket, "create_connection", lambda *_: itself)
-    with pytest.raises(ConnectionSetupError, match="refused"):
-        open_connection(f"tcpout://{LOCAL}:{itself.getsockname()[1]}")
 
 
 def test_a_client_that_closed_is_followed_by_the_next_at_once(closing):

@@ -97,14 +97,6 @@ def test_what_systemd_could_not_take_is_told_at_the_next_step(systemd):
     assert manager.news() is None
 
 
-def test_a_systemd_that_is_gone_is_one_sentence_and_no_error(tmp_path):
-    manager = ServiceManager(str(tmp_path / "nobody"), None)
-    for now_us in range(3):
-        manager.stepped(True, False, lambda: "", now_us)
-    assert manager.news() == "systemd is not told: No such file or directory"
-    assert manager.news() is None
-
-
 @pytest.mark.parametrize("environment", [{}, {"NOTIFY_SOCKET": ""}, {"NOTIFY_SOCKET": "vsock:2:1234"}])
 def test_nobody_is_told_where_no_systemd_asks(environment):
     assert service_manager(environment) is None

@@ -4,7 +4,6 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.mavlink.decode import Decoder
-from companion.shell.clock import Clock, round_down_to_stamp_us
 from companion.shell.tlog import FLUSH_INTERVAL_US, TlogWriter, may_be_logged, read_tlog
 
 EPOCH_US = 1_600_000_000_000_000
@@ -69,14 +68,6 @@ def test_a_killed_writer_leaves_all_but_the_last_moment(tmp_path):
     # Then at most the flush interval is missing
     assert EPOCH_US + 4000 * 999 - last_us <= FLUSH_INTERVAL_US
     writer.close()
-
-
-def test_the_clock_gives_stamps_that_never_go_back():
-    clock = Clock()
-    times_us = [clock.now_us() for _ in range(1000)]
-    assert times_us == sorted(times_us)
-    assert all(time_us % 4 == 0 for time_us in times_us)
-    assert round_down_to_stamp_us(1007) == 1004
 
 
 def test_a_packet_is_what_its_header_and_its_checksum_say():

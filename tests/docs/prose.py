@@ -1,12 +1,8 @@
-"""Sentences of Markdown and how long they are: `python -m tests.docs.prose FILE...`, or of the whole manual."""
+"""Sentences of Markdown and how long they are."""
 
 import re
 import statistics
-import sys
 from dataclasses import dataclass
-from pathlib import Path
-
-from tests.docs.pages import by_hand
 
 # What is no prose: code, comments, pictures, marks of tables and lists, addresses of links.
 _LEFT_OUT = (
@@ -61,16 +57,3 @@ def figures(texts):
 def without_tables(text):
     """Cells are short and would make the mean look better than the prose is."""
     return "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("|"))
-
-
-def main(names):
-    paths = [Path(name) for name in names] or by_hand()
-    texts = [path.read_text(encoding="utf-8") for path in paths]
-    found = figures(texts)
-    count = sum(len(text.split()) for text in texts)
-    print(f"{len(paths)} pages, {count} words; {found.sentences} sentences of {found.mean:.1f} words, ", end="")
-    print(f"{100 * found.long_share:.1f} % over {LONG}")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

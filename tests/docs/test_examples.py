@@ -149,26 +149,3 @@ def test_every_block_says_what_it_is_and_python_is_run_somewhere():
         languages = {language for language, _ in blocks(path)}
         assert languages <= LANGUAGES, path
         assert "python" not in languages or name_of(path) in PYTHON_PAGES, path
-
-
-@pytest.mark.parametrize(
-    ("shown", "printed", "is_same"),
-    [
-        ("Hit at 2 m/s.", "Hit at 1.9 m/s.", True),
-        ("Hit at 2 m/s.", "Hit at 3 m/s.", False),
-        ("Hit at 2 m/s.", "Touch at 2 m/s.", False),
-        ("one\n...\nfour", "one\ntwo\nthree\nfour", True),
-        ("Seen after ... ms", "Seen after 17 ms", True),
-        ("", "anything", True),
-    ],
-)
-def test_what_counts_as_the_same_output(shown, printed, is_same):
-    assert (differs(shown, printed) is None) is is_same
-
-
-def test_a_command_that_does_not_exist_is_found():
-    with pytest.raises(SystemExit):
-        parsed(["rebound", "fly", "wall", "--no-such-option"])
-    with pytest.raises(argparse.ArgumentError):
-        parsed(["make", "nothing"])
-    assert parsed(["pip", "install", "x"]) is None

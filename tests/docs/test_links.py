@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.docs.pages import ROOT, blocks, manual, name_of
+from tests.docs.pages import ROOT, manual, name_of
 
 NOTES = sorted((ROOT / "bench" / "notes").glob("*.md"))
 _LINK = re.compile(r"\[[^]]*\]\((?!https?:)([^)#\s]*)(?:#([^)\s]+))?\)")
@@ -74,10 +74,3 @@ def test_pages_of_the_site_link_to_no_file_outside_it():
         if target and (ROOT / "docs") not in (path.parent / target).resolve().parents
     ]
     assert outside == []
-
-
-def test_a_broken_link_and_a_missing_heading_are_found(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("# One\n\n## Two words\n\n[a](#two-words) [b](#three) [c](no.md)\n\n```text\n[d](none.md)\n```\n")
-    assert list(broken(page)) == [" has no heading #three", "no.md does not exist"]
-    assert blocks(page) == [("text", "[d](none.md)\n")]

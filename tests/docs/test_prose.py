@@ -5,7 +5,7 @@ import re
 import pytest
 
 from tests.docs.pages import ROOT, by_hand, manual, name_of
-from tests.docs.prose import figures, plain, sentences, words
+from tests.docs.prose import figures, plain
 
 MOST_WORDS = 25_000
 MOST_MEAN, MOST_LONG_SHARE = 18.0, 0.08
@@ -49,11 +49,3 @@ def test_a_page_uses_the_words_of_the_field(path):
 def test_a_page_names_no_place_of_work(path):
     found = re.findall(r"/work/\S+|issue \d+|https?://(?:localhost|127)\S*", path.read_text(encoding="utf-8"))
     assert found == []
-
-
-def test_a_long_sentence_and_an_unwanted_word_are_found():
-    # Given two short sentences, a long one, code that does not count, and a word that the field does not use
-    text = "# Head\n\nOne two. Long " + "word " * 30 + "end.\n\n```sh\nrebound fly\n```\n\nThe misfit is `misfit`.\n"
-    assert [len(words(sentence)) for sentence in sentences(text)] == [2, 32, 4]
-    assert figures([text]).long_share == pytest.approx(1 / 3)
-    assert complaints(text) == ["'misfit': say weighted residual"]

@@ -1,7 +1,5 @@
 """The generated pages are those of the code, and say something of everything."""
 
-import ast
-
 import pytest
 
 from bench.reference import events
@@ -23,11 +21,6 @@ def test_a_page_is_as_the_code_has_it(name):
 
 def test_every_kind_of_event_has_its_meaning():
     assert set(events.data_keys()) | events.ELSEWHERE == set(MEANINGS["events"])
-
-
-def test_an_event_that_is_told_under_a_name_is_found():
-    call = next(events._calls(ast.parse('flight.report(now_us, "hold", text, hold_s=3)')))
-    assert call.args[1].value == "hold"
 
 
 @pytest.mark.parametrize("states", [flight_states.TABLE, guard_states.TABLE], ids=["flight", "guard"])

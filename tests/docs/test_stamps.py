@@ -20,11 +20,6 @@ def code(tmp_path, monkeypatch):
     return path
 
 
-def test_a_fresh_stamp_is_found_and_is_not_old(code):
-    (stamp,) = stamps.stamps_in(PAGE.format(stamp=stamps.stamp_text("make bumps", ["code"]) + "."))
-    assert (stamp.command, stamp.paths, stamp.is_old) == ("make bumps", ("code",), False)
-
-
 @pytest.mark.parametrize(
     ("change", "is_old"),
     [(("x + 1", "x + 2"), True), (("# one", "# two"), False), (("Bump.", "Bumps."), False), (("Says.", ""), False)],
@@ -34,11 +29,6 @@ def test_what_the_code_does_makes_a_stamp_old_and_what_it_says_does_not(code, ch
     code.write_text(code.read_text().replace(*change))
     assert [stamp.is_old for stamp in stamps.stamps_in(text)] == [is_old]
     assert bool(list(stamps.complaints("bumps.md", text))) is is_old
-
-
-def test_a_picture_without_a_stamp_is_named():
-    (complaint,) = stamps.complaints("bumps.md", PAGE.format(stamp=""))
-    assert "'Hits'" in complaint
 
 
 def test_only_a_release_fails_on_old_stamps(code, tmp_path, capsys):

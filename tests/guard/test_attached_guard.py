@@ -77,28 +77,6 @@ def test_the_programs_own_heartbeats_and_time_questions_have_none_of_the_guards_
     assert "COMMAND_LONG" in sent and not sent & {"HEARTBEAT", "TIMESYNC"}
 
 
-def test_a_program_is_given_back_to_when_its_setpoints_no_longer_lead_into_what_was_hit():
-    # Given a program that flies on into the wall
-    air = AttachedFlight(GuardConfig(then="previous"))
-    air.take_off()
-    ends = air.fly_by(1.5)
-    air.run_until(lambda: air.guard.core.machine.holds, 20.0)
-    air.run_to(State.GIVING_BACK, 10.0)
-    held_s = air.time_s
-    air.run_for(2.0)
-    assert air.state is State.GIVING_BACK and air.setpoints("program", held_s) == []
-    assert len(air.told("not_back")) == 1 and "lead into what was hit" in air.told("not_back")[0]
-    # When it turns back
-    ends()
-    air.every(REPEATED_EVERY_S, lambda: air.velocity(-0.5))
-    assert air.run_to(State.WATCHING, 1.0) < 0.1
-    back_s = air.time_s
-    air.run_for(1.0)
-    # Then its setpoints count again
-    assert air.mode == OFFBOARD and len(air.setpoints("program", back_s)) > 15
-    assert air.kinds().count("detection") == 1
-
-
 def test_a_program_that_commands_a_mode_while_the_guard_holds_has_its_way():
     air = holding()
     air.run_for(0.2)
@@ -121,15 +99,6 @@ def test_the_guard_makes_way_for_a_programs_setpoints_before_its_offboard_and_af
     ends()
     air.run_until(lambda: air.mode != OFFBOARD, 3.0)
     assert air.setpoints("guard", began_s + 0.1) == []
-
-
-def test_a_stiff_hit_after_which_the_guard_leans_is_recovered_from_in_peace():
-    air = AttachedFlight(airframe="rigid")
-    air.fly_into_the_wall(2.5)
-    air.run_to(State.WATCHING, 10.0)
-    assert "recovered" in air.kinds() and "crossed" not in air.kinds()
-    assert air.sent_by("guard", "SET_ATTITUDE_TARGET", air.event_s("take_over")) != []
-    assert air.setpoints("program", air.event_s("take_over") + 0.004, air.event_s("given_back")) == []
 
 
 # --- the gate

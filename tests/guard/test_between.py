@@ -8,7 +8,7 @@ import pytest
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.guard.between import BURST_S, Between, datagrams
+from companion.guard.between import BURST_S, Between
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS, would_move
@@ -221,13 +221,6 @@ def test_far_beside_the_touch_a_surface_may_be_nearer_than_its_likely_direction_
     assert len(air.vehicle.truth.hits) == 1
 
 
-def test_a_program_whose_setpoints_end_meanwhile_is_not_waited_for():
-    air = hit(by_places, then="previous")
-    air.run_to(State.GIVING_BACK, 10.0)
-    air.stop_all()
-    assert air.run_until(lambda: air.mode == "AUTO.LOITER", 3.0) > 0.5
-
-
 def test_in_a_recovery_a_stick_is_obeyed_at_once():
     air = hit(by_places)
     pilot = sticks(air, 0.0)
@@ -276,18 +269,6 @@ def test_a_stream_that_a_program_slows_down_is_asked_for_again_and_one_that_it_s
     assert [message_id for message_id, _ in again] == [31, 105]
     assert all(0 < interval_us <= 20_000 for _, interval_us in again)
     assert [kind for kind, _ in air.told_by_clients] == ["interval"] * 4
-
-
-def test_beside_a_programs_setpoints_the_guard_sends_none_of_its_own():
-    air = BetweenFlight()
-    air.take_off()
-    air.run_for(0.5)
-    assert air.setpoints("guard", air.time_s - 0.5) != []
-    air.every(0.052, lambda: air.velocity(0.0))
-    air.run_for(0.5)
-    began_s = air.time_s
-    air.run_for(1.0)
-    assert air.setpoints("guard", began_s) == []
 
 
 def test_the_vehicles_questions_of_the_time_are_the_programs_to_answer_and_the_guards_answers_are_its_own():
@@ -411,19 +392,6 @@ def test_packets_of_every_message_pass_both_ways_byte_by_byte_in_each_senders_or
     assert {number for number in IDS if number not in {message_id_of(packet) for packet in passed}} == set()
 
 
-def test_what_of_the_vehicle_is_no_packet_passes_too_and_of_a_client_it_stays():
-    chance = random.Random(2)
-    noise = bytes(byte for byte in chance.randbytes(300) if byte not in (0xFD, 0xFE))
-    packet = packet_of(ANY_STICKS)
-    between = Between(LINK_BYTES_S, signs=False)
-    assert b"".join(between.to_clients(noise + packet + noise + packet)) == noise + packet + noise + packet
-    between.hear("a", noise + packet + noise + packet[:9], 0)
-    assert between.to_vehicle(100_000) == [packet]
-    # Neither the beginning of a packet that never ends holds up what others say
-    between.hear("b", packet, 0)
-    assert between.to_vehicle(200_000) == [packet]
-
-
 def test_hostile_bytes_break_nothing_and_no_setpoint_passes_while_it_is_closed():
     chance = random.Random(3)
     between = Between(LINK_BYTES_S, signs=False)
@@ -470,14 +438,6 @@ def test_a_client_that_floods_takes_no_turn_from_another_and_is_named():
     assert not between.waits and between.has_room("flood")
 
 
-def test_the_guards_own_packets_count_and_need_not_wait():
-    between = Between(92_160, signs=False)
-    between.to_vehicle(0)
-    assert not between.sends(long(176, 1, 6)) and between.sends(
-        packet_of(dialect.MAVLink_statustext_message(4, b"hit"))
-    )
-
-
 def test_two_clients_that_speak_as_one_are_told_of_once_and_one_that_comes_back_is_not():
     between, packet = Between(LINK_BYTES_S, signs=False), packet_of(ANY_STICKS)
     between.hear("a", packet, 0)
@@ -502,8 +462,3 @@ def test_a_client_that_signs_alone_and_one_that_does_not_are_told_of(signs, says
     assert news is not None and news.startswith("a ") and says in news
     assert between.news() is None
     assert len(between.to_vehicle(6_000_000)) == 6, "they pass all the same"
-
-
-def test_a_datagram_holds_whole_packets_and_no_more_than_a_frame():
-    packets = [b"a" * 280] * 11
-    assert [len(datagram) for datagram in datagrams(packets, 1_452)] == [1_400, 1_400, 280]

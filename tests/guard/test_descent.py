@@ -26,29 +26,30 @@ def throttle(deflection):
     return Sticks((0.0, 0.0, deflection, 0.0))
 
 
-@pytest.mark.parametrize("mode", [AUTO_LAND, AUTO_PRECLAND, STABILIZED, MANUAL, ACRO])
-def test_a_landing_mode_and_a_hand_on_the_thrust_mean_what_lets_the_vehicle_down(mode):
-    assert is_meant(mode)
+@pytest.mark.parametrize(
+    ("mode", "samples", "is_so"),
+    [
+        # A landing mode, and a hand on the thrust
+        *((mode, (), True) for mode in (AUTO_LAND, AUTO_PRECLAND, STABILIZED, MANUAL, ACRO)),
+        # A pilot of whom nothing was ever heard may mean it
+        *((mode, (), True) for mode in (ALTCTL, POSCTL)),
+        (AUTO_LOITER, (), False),
+        # A setpoint that sinks
+        (OFFBOARD, (down(1.1 * SAME_M_S),), True),
+        (OFFBOARD, (down(SAME_M_S),), False),
+        (POSCTL, (down(None),), False),
+        (AUTO_LOITER, (down(2.0), down(0.0)), False),
+        # A throttle below its middle, where sticks ask for velocities
+        (POSCTL, (throttle(-1.5 * STICK_DEADZONE),), True),
+        (ALTCTL, (throttle(-0.9 * STICK_DEADZONE),), False),
+        (AUTO_LOITER, (throttle(-1.0),), False),
+    ],
+)
+def test_whoever_flies_means_what_lets_the_vehicle_down(mode, samples, is_so):
+    assert is_meant(mode, *samples) is is_so
 
 
-def test_a_vehicle_that_says_it_lands_is_meant_to():
-    assert is_meant(AUTO_LOITER, landed=LandedState.LANDING) and not is_meant(AUTO_LOITER)
-
-
-@pytest.mark.parametrize("mode", [AUTO_LOITER, OFFBOARD, POSCTL])
-def test_a_setpoint_that_sinks_means_it_while_it_is_renewed(mode):
-    assert is_meant(mode, down(1.1 * SAME_M_S)) and not is_meant(mode, down(SAME_M_S))
-    assert not is_meant(mode, down(None)) and not is_meant(mode, down(2.0), down(0.0))
+def test_a_setpoint_counts_while_it_is_renewed_and_a_vehicle_that_says_it_lands_is_meant_to():
     # PX4 keeps a setpoint for COM_OF_LOSS_T, 1 s
-    assert is_meant(mode, down(2.0), now_us=SECOND - 1) and not is_meant(mode, down(2.0), now_us=SECOND)
-
-
-@pytest.mark.parametrize("mode", [ALTCTL, POSCTL])
-def test_a_pilot_of_whom_nothing_was_ever_heard_may_mean_it(mode):
-    assert is_meant(mode) and not is_meant(AUTO_LOITER)
-
-
-@pytest.mark.parametrize("mode", [ALTCTL, POSCTL])
-def test_a_throttle_below_its_middle_means_it_where_sticks_ask_for_velocities(mode):
-    assert is_meant(mode, throttle(-1.5 * STICK_DEADZONE)) and not is_meant(mode, throttle(-0.9 * STICK_DEADZONE))
-    assert not is_meant(AUTO_LOITER, throttle(-1.0))
+    assert is_meant(OFFBOARD, down(2.0), now_us=SECOND - 1) and not is_meant(OFFBOARD, down(2.0), now_us=SECOND)
+    assert is_meant(AUTO_LOITER, landed=LandedState.LANDING)

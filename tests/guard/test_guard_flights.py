@@ -138,19 +138,6 @@ def test_a_pilot_who_chooses_a_mode_while_the_guard_holds_has_the_vehicle_at_onc
     assert air.state is State.WATCHING
 
 
-def test_sticks_moved_while_the_guard_holds_give_the_pilot_the_position_mode_though_px4_would_not():
-    """COM_RC_OVERRIDE's default: sticks do not end OFFBOARD."""
-    air = Air()
-    stick = air.pushed_into_the_wall()
-    air.run_for(0.3)
-    assert air.state is State.RECOVERING, "letting go is no taking over"
-    stick[0] = -0.6
-    assert air.run_until(lambda: air.mode == "POSCTL", 1.0) < 0.15
-    assert air.state is State.STOOD_DOWN
-    air.run_for(1.0)
-    assert air.mode == "POSCTL"
-
-
 def test_a_mode_that_a_person_chose_just_before_the_vehicle_is_given_back_is_not_overruled():
     air = recovering()
     air.set_mode(MANUAL_POSITION)
@@ -338,15 +325,6 @@ def test_below_the_height_of_the_ground_nothing_is_a_hit():
     air.run_until(lambda: air.position[0] > 3.6, 20.0)
     air.run_for(1.0)
     assert air.state is State.WATCHING and air.told("detection") == []
-
-
-def test_a_vehicle_that_a_hit_throws_down_is_watched_to_the_ground():
-    air = Air()
-    air.take_off()
-    north, east, down = air.position
-    air.guard.core.flight.origin_ned_m = (north, east, down + 0.05)
-    air.step()
-    assert air.guard.core.situation().off_reason is None
 
 
 def test_a_report_of_the_ground_moves_heights_and_fence_only_while_somebody_else_flies():

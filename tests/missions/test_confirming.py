@@ -197,19 +197,6 @@ def test_places_that_are_not_believed_for_half_a_second_are_no_lean_on_an_obstac
     assert (air.report.collisions, air.report.obstacles) == ((), ())
 
 
-def test_the_hits_allowed_are_not_used_up_by_hits_that_were_none():
-    def forge(air: Flight) -> None:
-        for _ in range(3):
-            air.step(imu(air, -40.0))
-            air.run_to("mission")
-            air.run_for(0.6)  # what the velocity was is taken from half a second
-        air.run_to_end()
-        assert (air.report.outcome, air.report.unconfirmed) == ("completed", 3)
-        assert "policy" not in air.kinds()
-
-    fly_on(forge)
-
-
 @pytest.mark.parametrize("airframe", ["foldable", "rigid"])
 @pytest.mark.parametrize("hz", [250, 50])
 def test_a_hit_on_a_wall_is_confirmed(airframe, hz):
