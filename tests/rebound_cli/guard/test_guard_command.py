@@ -34,31 +34,6 @@ pytestmark = pytest.mark.realtime
 PATIENT = ("--set", "companion.link.heartbeat_wait_s=30")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (("--connect", "nowhere"), "'nowhere' is not a connection address"),
-        (("--connect", "udpin://127.0.0.1:0", "--modes", "POSCTL,WARP"), "'WARP' is no mode of PX4"),
-        (("--connect", "udpin://127.0.0.1:0", "--set", "max_hits=0"), "max_hits"),
-        (("--connect", "udpin://127.0.0.1:0", "--config", "no.yaml"), "no.yaml"),
-        (("--connect", "udpin://127.0.0.1:0", "--between", "serial:///dev/ttyS0:9600"), "clients come by udpin://"),
-    ],
-)
-def test_what_is_wrong_is_one_sentence(arguments, says):
-    done = run("guard", *arguments)
-    assert done.returncode == 78
-    assert says in done.stderr
-    assert "Traceback" not in done.stderr
-
-
-def test_a_faulty_file_is_named_with_its_line(tmp_path):
-    file = tmp_path / "guard.yaml"
-    file.write_text("then: hold\nmax_hit: 3\n")
-    done = run("guard", "--connect", "udpin://127.0.0.1:0", "--config", file)
-    assert done.returncode == 78
-    assert f"{file}:2" in done.stderr and "max_hit" in done.stderr
-
-
 def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
     quick = ("--set", "companion.link.heartbeat_wait_s=0.3")
     done = run("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path, *quick)
