@@ -55,19 +55,9 @@ def test_one_command_flies_into_the_wall_recovers_and_lands(wall_flight):
         kinds.index(kind) for kind in ("connected", "takeoff", "item", "detection", "recovered", "landing", "done")
     ]
     assert order == sorted(order)
-
-
-def test_the_companion_sees_the_hit_and_the_setpoint_goes_back_from_it(wall_flight):
-    folder, result = wall_flight
-    (hit,) = json.loads(result.stdout)["collisions"]
-    log = read_flight_log(folder / "flight.tlog")
-    # Given the setpoints sent before and after the detection
-    start_us = log.position_at_us[0] - 1e6 * json.loads(result.stdout)["duration_s"]
-    assert start_us < log.setpoint_at_us[0]
-    target = hit["recovery_setpoint_ned_m"]
-    at_target = abs(log.setpoint_ned_m - target).max(axis=1) < 0.002
-    # Then the recovery setpoint was sent for some seconds, clear of the hit and no further than the rebound carries
-    assert at_target.sum() > 50
+    # And the recovery setpoint was sent for some seconds, clear of the hit and no further than the rebound carries
+    log, target = read_flight_log(folder / "flight.tlog"), hit["recovery_setpoint_ned_m"]
+    assert (abs(log.setpoint_ned_m - target).max(axis=1) < 0.002).sum() > 50
     assert 0.35 < log.position_ned_m[:, 0].max() - target[0] < 0.7
 
 
@@ -106,10 +96,11 @@ def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
 
 
 def test_a_flight_that_hangs_is_ended(tmp_path):
-    # Given a flight and less virtual time than it needs
+    # Given a flight and less virtual time than it needs; the square takes about 35 s
     document = load_document(SQUARE)
     world = world_from(document)
     mission = mission_from(document, world)
+    assert 100 < virtual_time_limit_s(mission) < 300
     vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     recorder = FlightRecorder(tmp_path)
     # When it runs, then it is given up
@@ -143,9 +134,3 @@ def test_a_vehicle_that_reboots_before_the_flight_is_flown_on_its_new_clock(tmp_
     recorder.close()
     report = companion.report()
     assert (report.outcome, len(report.collisions)) == ("completed", 1)
-
-
-def test_the_limit_of_virtual_time_leaves_room():
-    mission = mission_from(load_document(SQUARE))
-    # the square takes about 35 s
-    assert 100 < virtual_time_limit_s(mission) < 300
