@@ -4,10 +4,11 @@ import json
 import socket
 
 import pytest
-from pymavlink.dialects.v20 import development as dialect
 
 from rebound_cli import exit_codes
 from rebound_cli.main import main
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.hil.parameters import px4_parameters
 from tests.rebound_cli.command import (
     SQUARE,
     WALL,
@@ -15,9 +16,6 @@ from tests.rebound_cli.command import (
     run,
     run_here,
 )
-
-MULTICOPTER, PLANE = dialect.MAV_TYPE_QUADROTOR, dialect.MAV_TYPE_FIXED_WING
-PX4, ARDUPILOT = dialect.MAV_AUTOPILOT_PX4, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
 
 
 def test_a_missing_mission_file():
@@ -42,6 +40,12 @@ def test_an_address_that_nobody_can_answer_from(tmp_path, command, url):
     out = ("--out", tmp_path / "run") if command[0] != "preflight" else ()
     assert_one_clear_sentence(run_here(*command, "--connect", url, *out), url.split("//")[1].split(":")[0])
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("format_name", ["env", "params", "airframe"])
+def test_an_airframe_is_printed_whole_in_every_format(format_name):
+    result = run_here("airframe", "px4", "--airframe", "rigid", "--format", format_name)
+    assert all(parameter.name in result.stdout for parameter in px4_parameters(load_built_in("rigid")))
 
 
 CONNECTED = ("fly", SQUARE, "--connect")
