@@ -24,8 +24,12 @@ def systemd(tmp_path, monkeypatch):
 class Reader:
     """Answers for a person, and meanwhile reads what systemd is told: its queue holds few datagrams."""
 
-    def __init__(self, systemd, world):
-        self._systemd, self._world, self.told = systemd, world, []
+    def __init__(self, systemd):
+        self._systemd, self.told = systemd, []
+
+    def beside(self, world):
+        self._world = world
+        return self
 
     def read(self):
         while True:
@@ -42,10 +46,10 @@ class Reader:
 
 
 def test_a_flight_tells_systemd_that_it_is_ready_alive_how_it_goes_and_when_it_ends(systemd, tmp_path):
-    readers = []
-    companion, *_ = fly(tmp_path, confirm=lambda world: readers.append(Reader(systemd, world)) or readers[0])
-    readers[0].read()
-    told = readers[0].told
+    reader = Reader(systemd)
+    companion, *_ = fly(tmp_path, confirm=reader.beside)
+    reader.read()
+    told = reader.told
     assert companion.report().outcome == "completed"
     lines = [line for _, line in told]
     # Ready once, at the vehicle's first heartbeat, long before it is armed; the end is told last, once
