@@ -183,19 +183,8 @@ def test_an_airframe_file_is_laid_over_its_base(tmp_path):
     assert text.startswith(f"{own}:3: mas_kg: unknown key") and "did you mean 'mass_kg'?" in text
 
 
-def test_thousands_of_faults_are_told_without_a_schema_of_the_mission(monkeypatch):
-    # Given a mission with the same mistake on every line
-    asked = []
-
-    class Counted(Mission):
-        @classmethod
-        def model_json_schema(cls, *arguments, **options):
-            asked.append(cls)
-            return super().model_json_schema(*arguments, **options)
-
+def test_of_thousands_of_faults_the_first_ones_are_shown():
     lines = "".join(f"  - wait: {{mistake{n}: 1}}\n" for n in range(200))
     found = parse_document(f"name: demo\nitems:\n{lines}", "demo.yaml")
-    # When it is checked, then the answer is short, and took no schema, which is a tenth of a second each
-    text = complaint(validated, Counted, found, found.data)
-    assert len(text.splitlines()) == 6 and "more" in text
-    assert asked == []
+    said = complaint(validated, Mission, found, found.data).splitlines()
+    assert len(said) == 6 and said[0].startswith("demo.yaml:3: items.0.wait: ") and "more" in said[-1]

@@ -250,16 +250,6 @@ def test_samples_without_times_are_refused(tmp_path):
         read(tmp_path, [OLD_COPTER, *[("IMU", 0, 0, 0, 0, 0, -9.81)] * 5], formats)
 
 
-@pytest.mark.parametrize("name", ["flight.bin", "flight.log"])
-@pytest.mark.parametrize("content", [b"", b"ULO", bytes(9000), b"FMT, 128\n", b"a letter\n" * 900])
-def test_a_foreign_file_is_refused_in_a_sentence(tmp_path, content, name):
-    path = tmp_path / name
-    path.write_bytes(content)
-    with pytest.raises(LogError) as refused:
-        read_log(path)
-    assert str(path) in str(refused.value) and "\n" not in str(refused.value)
-
-
 def test_what_is_missing_is_said_with_its_cost(tmp_path):
     losses = read(tmp_path, [COPTER, *IMU]).losses
     assert any("no ATT" in loss and "direction of a hit" in loss for loss in losses)

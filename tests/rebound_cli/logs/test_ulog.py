@@ -217,14 +217,6 @@ def test_a_log_without_inertial_samples_is_one_sentence(tmp_path):
         read(tmp_path, {"vehicle_attitude": ([("float[4]", "q")], [(START, (1.0, 0.0, 0.0, 0.0))])})
 
 
-@pytest.mark.parametrize("length", [0, 3, 8, 20, 60, 150, 200])
-def test_a_log_cut_short_in_its_head_is_one_sentence(tmp_path, length):
-    path = tmp_path / "cut.ulg"
-    path.write_bytes(ulog(IMU, started_us=START)[:length])
-    with pytest.raises(LogError, match=r"^[^\n]*cut\.ulg: [^\n]*\.$"):
-        read_log(path)
-
-
 def test_a_log_cut_short_in_its_data_is_read_to_there(tmp_path):
     whole = ulog(IMU, started_us=START)
     path = tmp_path / "cut.ulg"
