@@ -19,7 +19,6 @@ from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
 from rebound_cli.replay.watching import Findings
-from rebound_cli.report.shown_flight import recorded_flight
 from sim_vehicle.scene import Scene
 from tests.docs.pages import ROOT
 from tests.rebound_cli.logs.ulog_file import every
@@ -28,17 +27,16 @@ SIDE = math.sqrt(0.5)
 
 
 @pytest.fixture(scope="module")
-def flight(wall_flight):
-    folder, _ = wall_flight
-    return recorded_flight(folder), read_telemetry(folder / "flight.tlog")
+def flight(wall, wall_folder):
+    return wall, read_telemetry(wall_folder / "flight.tlog")
 
 
 @pytest.fixture(scope="module")
-def exported(wall_flight, tmp_path_factory):
+def exported(wall_folder, tmp_path_factory):
     """Both files, as the command writes them."""
     out = tmp_path_factory.mktemp("exported")
     for kind in ("mcap", "ulg"):
-        assert main(["logs", "export", str(wall_flight[0]), "--format", kind, "--out", str(out / f"wall.{kind}")]) == 0
+        assert main(["logs", "export", str(wall_folder), "--format", kind, "--out", str(out / f"wall.{kind}")]) == 0
     return out
 
 
@@ -263,9 +261,9 @@ def test_each_mode_of_px4s_has_its_state_and_no_other_passes_for_manual(flight, 
     assert [pushed[axis][0] for axis in ("pitch", "roll", "throttle", "yaw")] == pytest.approx([0.1, 0.2, 0.3, 0.4])
 
 
-def test_places_are_not_left_out_of_a_file_full_of_them(wall_flight, tmp_path, capsys):
+def test_places_are_not_left_out_of_a_file_full_of_them(wall_folder, tmp_path, capsys):
     out = tmp_path / "wall.mcap"
-    words = ["logs", "export", str(wall_flight[0]), "--format", "mcap", "--no-position", "--out", str(out)]
+    words = ["logs", "export", str(wall_folder), "--format", "mcap", "--no-position", "--out", str(out)]
     assert main(words) == 1
     assert "--no-position" in capsys.readouterr().err and not out.exists()
 

@@ -7,7 +7,6 @@ import resource
 import sys
 import threading
 import time
-from contextlib import closing
 from typing import Any
 from unittest.mock import Mock
 
@@ -15,6 +14,7 @@ import pytest
 
 from companion.companion import StepResult
 from companion.mavlink.packet import message_id_of
+from companion.messages import ComputerStatus
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
 from companion.shell.connection import MOST_DATAGRAMS
 from companion.shell.tlog import read_tlog
@@ -24,6 +24,7 @@ from rebound_cli.background import MOST_WAITING, Background
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import (
+    COMPUTER_EVERY_US,
     HANDING_OVER_US,
     Computer,
     ConfirmAtOnce,
@@ -104,10 +105,21 @@ class Restarted(ConfirmAtOnce):
             super().poll(companion)
 
 
+class EverySecond:
+    """A computer that is the same every second."""
+
+    due_us = 0
+
+    def status(self, now_us):
+        if now_us < self.due_us:
+            return None
+        self.due_us = now_us + COMPUTER_EVERY_US
+        return ComputerStatus(now_us, 90_500, (5, 50), 61, 812, 3792, 9_000, 30_000)
+
+
 def test_the_ground_station_is_told_of_the_computer_every_second_and_a_replay_tells_the_same(tmp_path):
-    # When a mission is flown beside a computer that is watched: it is read aside, and told a second later
-    with closing(Computer(tmp_path)) as computer:
-        companion, _, recorder, _, problem = fly(tmp_path, computer=computer)
+    # When a mission is flown beside a computer that is watched
+    companion, _, recorder, _, problem = fly(tmp_path, computer=EverySecond())
     # Then the vehicle's link carries its status once a second from the vehicle's first packets to the end
     assert problem is None and companion.report().outcome == "completed"
     sent_us = [
@@ -115,11 +127,23 @@ def test_the_ground_station_is_told_of_the_computer_every_second_and_a_replay_te
     ]
     report = companion.report()
     lasted_s = (report.ended_at_us - report.started_at_us) / 1e6
-    assert lasted_s - 3.5 <= len(sent_us) <= lasted_s + 1.0
+    assert lasted_s - 2.5 <= len(sent_us) <= lasted_s + 1.0
     assert all(0.9e6 < b - a < 1.2e6 for a, b in itertools.pairwise(sent_us))
     # And the flight is decided again to the bit, with what the computer said then
     assert_comes_again(tmp_path)
     assert recorder.writer.loss is None
+
+
+def test_the_computer_is_read_aside_and_told_a_second_later(tmp_path):
+    # Given a computer that is asked for the first time
+    computer = Computer(tmp_path)
+    assert computer.status(5) is None
+    # When it has been read
+    computer.close()
+    # Then that is told once, when the next is due
+    assert computer.status(4 + COMPUTER_EVERY_US) is None
+    assert computer.status(5 + COMPUTER_EVERY_US).at_us == 5
+    assert computer.status(6 + COMPUTER_EVERY_US) is None
 
 
 def test_a_full_disk_ends_no_flight_and_is_told(tmp_path):
