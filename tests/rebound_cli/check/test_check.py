@@ -11,6 +11,7 @@ import yaml
 from matplotlib.figure import Figure
 
 from rebound_cli.check.legs import flown_legs
+from rebound_cli.check.picture import ends
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.documents import parse_document
 from rebound_cli.figure.ground import draw_obstacles, footprint
@@ -56,6 +57,8 @@ items:
     ]
     assert [flown.length_m for flown in legs] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
     assert legs[-1].ends_s is None, "nobody knows how long the wait is"
+    # and in the picture each place where a way ends has the item's number, once however often it is flown
+    assert ends([*legs, *legs]) == {(0.0, 0.0): ["1"], (4.0, 0.0): ["2"]}
 
 
 def test_what_stands_in_the_way_is_named_with_the_place():

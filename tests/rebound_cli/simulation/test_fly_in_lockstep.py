@@ -13,7 +13,7 @@ from rebound_cli.results.flight_log import read_flight_log
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.simulation.lockstep import run_lockstep, virtual_time_limit_s
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.rebound_cli.command import SQUARE, WALL, events_of, run_here
+from tests.rebound_cli.command import HOP, SQUARE, WALL, assert_comes_again, events_of, run_here
 
 pytestmark = pytest.mark.flight
 
@@ -77,6 +77,14 @@ def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
     assert resolved["companion"]["estimate"]["guards"]["centre_m"] == 0.145 and resolved["sim"]["seed"] == 2
     # And nobody says what the rigid frame bears
     assert "not known" not in result.stdout and "broken" not in result.stdout
+
+
+def test_a_mission_is_flown_over_a_line_that_loses_every_seventh_packet(without_pictures, tmp_path):
+    lossy = ("--set", "sim.faults=[{kind: wire, at_s: 0, loss: 0.15}]")
+    flown = run_here("fly", SQUARE, "--lockstep", *HOP, *lossy, "--json", "--out", tmp_path / "run")
+    assert flown.returncode == 0, flown.stdout
+    assert json.loads(flown.stdout)["stream_rates_hz"]["HIGHRES_IMU"] == pytest.approx(0.85 * 250, rel=0.05)
+    assert_comes_again(tmp_path / "run")
 
 
 def test_a_flight_that_hangs_is_ended(tmp_path):
