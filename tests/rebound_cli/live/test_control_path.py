@@ -16,7 +16,7 @@ from companion.companion import StepResult
 from companion.mavlink.packet import message_id_of
 from companion.messages import ComputerStatus
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
-from companion.shell.connection import MOST_DATAGRAMS
+from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from companion.shell.tlog import read_tlog
 from rebound_cli import background
 from rebound_cli import fly as command
@@ -351,9 +351,11 @@ def test_garbage_is_collected_while_disarmed_only():
 def test_a_fault_around_the_flight_leaves_a_summary_and_is_told_then(tmp_path, monkeypatch):
     # Given a flight that a fault of the program ended
     said = "Fault around the flight; the vehicle was handed over."
+    connection = Mock(counts=LinkCounts())
+    monkeypatch.setattr(command, "open_signed", lambda *_: connection)
     monkeypatch.setattr(command, "fly_realtime", Mock(side_effect=FlightFaultError(said)))
     result = run_here("fly", SQUARE, "--connect", "udpin://127.0.0.1:0", "--yes", "--out", tmp_path)
     # Then what is known of it is in its folder
     assert result.returncode == 1 and result.stderr == f"rebound: {said}\n"
     summary = json.loads((tmp_path / run_folder.SUMMARY_NAME).read_text())
-    assert summary["outcome"] == "failed" and summary["reason"] == said
+    assert summary["outcome"] == "failed" and summary["reason"] == said and connection.close.called
