@@ -196,13 +196,9 @@ def new_ulog(flight: ShownFlight, log: Log) -> bytes:
     ]
     rows += _own_rows(flight, log)
     rows += _true_rows(flight, log)
-    started_us = min(row.boot_us for row in rows)
-    head = _MAGIC + struct.pack("<Q", started_us) + _message("B", bytes(_FLAG_BITS_SIZE))
-    head += _keyed("I", "char[7] sys_name", b"Rebound")
     kinds = (one.sample.vehicle_type for one in heard if isinstance(one.sample, messages.Heartbeat))
-    kind = next(kinds, QUADROTOR)
-    head += _keyed("P", "int32_t MAV_TYPE", struct.pack("<i", kind))
-    return _with_rows(head, rows)
+    parameters = {"int32_t MAV_TYPE": struct.pack("<i", next(kinds, QUADROTOR))}
+    return written(rows, min(row.boot_us for row in rows), {"char[7] sys_name": b"Rebound"}, parameters)
 
 
 def _with_modes(log: Log) -> Iterator[LoggedSample]:
@@ -227,22 +223,21 @@ def _true_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
         yield Row(time_us, _TRUE_ATTITUDE, series["attitude_wxyz"][row].tolist())
 
 
-def _with_rows(head: bytes, rows: Sequence[Row]) -> bytes:
-    """A log that begins so, with these in the order of time."""
+def written(rows: Sequence[Row], started_us: int, info: Mapping[str, bytes], parameters: Mapping[str, bytes]) -> bytes:
+    """A whole log, its rows in the order of time. Keys of `info` and `parameters` begin with the value's type."""
+    head = [_MAGIC, struct.pack("<Q", started_us), _message("B", bytes(_FLAG_BITS_SIZE))]
+    head += (_message("I", bytes([len(key)]) + key.encode() + value) for key, value in info.items())
+    head += (_message("P", bytes([len(key)]) + key.encode() + value) for key, value in parameters.items())
     topics = list(dict.fromkeys(row.topic for row in rows if row.topic is not None))
     numbers = {topic: number for number, topic in enumerate(topics)}
     formats = map(_format, topics)
     added = (_message("A", struct.pack("<BH", 0, number) + name.encode()) for (name, _), number in numbers.items())
-    written = (_written(row, numbers) for row in sorted(rows, key=lambda row: row.boot_us))
-    return b"".join([head, *formats, *added, *written])
+    data = (_data(row, numbers) for row in sorted(rows, key=lambda row: row.boot_us))
+    return b"".join([*head, *formats, *added, *data])
 
 
 def _message(kind: str, content: bytes) -> bytes:
     return _HEAD.pack(len(content), ord(kind)) + content
-
-
-def _keyed(kind: str, key: str, value: bytes) -> bytes:
-    return _message(kind, bytes([len(key)]) + key.encode() + value)
 
 
 def _format(topic: tuple[str, str]) -> bytes:
@@ -250,7 +245,7 @@ def _format(topic: tuple[str, str]) -> bytes:
     return _message("F", f"{name}:uint64_t timestamp;{fields};".encode())
 
 
-def _written(row: Row, numbers: Mapping[tuple[str, str], int]) -> bytes:
+def _data(row: Row, numbers: Mapping[tuple[str, str], int]) -> bytes:
     if row.topic is None:
         level, text = row.values
         return _message("L", level + struct.pack("<Q", row.boot_us) + text.encode("utf-8", "replace"))

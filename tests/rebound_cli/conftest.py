@@ -3,6 +3,7 @@
 import pytest
 
 from rebound_cli import fly
+from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL, run_here
 
 
@@ -11,6 +12,17 @@ def wall_flight(tmp_path_factory):
     """The wall mission, flown once: its folder, to be left as it is, and what the command printed."""
     folder = tmp_path_factory.mktemp("flights") / "wall"
     return folder, run_here("fly", WALL, "--lockstep", "--json", "--out", folder)
+
+
+@pytest.fixture(scope="session")
+def wall_folder(wall_flight):
+    return wall_flight[0]
+
+
+@pytest.fixture(scope="session")
+def wall(wall_folder):
+    """All that its page shows."""
+    return recorded_flight(wall_folder)
 
 
 @pytest.fixture

@@ -2,24 +2,20 @@
 
 import json
 import socket
-import threading
 
 import pytest
-from pymavlink.dialects.v20 import development as dialect
 
+from rebound_cli import exit_codes
 from rebound_cli.main import main
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.hil.parameters import px4_parameters
 from tests.rebound_cli.command import (
     SQUARE,
     WALL,
     assert_one_clear_sentence,
-    free_port,
-    processes_naming,
     run,
     run_here,
 )
-
-MULTICOPTER, PLANE = dialect.MAV_TYPE_QUADROTOR, dialect.MAV_TYPE_FIXED_WING
-PX4, ARDUPILOT = dialect.MAV_AUTOPILOT_PX4, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
 
 
 def test_a_missing_mission_file():
@@ -44,6 +40,12 @@ def test_an_address_that_nobody_can_answer_from(tmp_path, command, url):
     out = ("--out", tmp_path / "run") if command[0] != "preflight" else ()
     assert_one_clear_sentence(run_here(*command, "--connect", url, *out), url.split("//")[1].split(":")[0])
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("format_name", ["env", "params", "airframe"])
+def test_an_airframe_is_printed_whole_in_every_format(format_name):
+    result = run_here("airframe", "px4", "--airframe", "rigid", "--format", format_name)
+    assert all(parameter.name in result.stdout for parameter in px4_parameters(load_built_in("rigid")))
 
 
 CONNECTED = ("fly", SQUARE, "--connect")
@@ -103,50 +105,31 @@ def test_nothing_waits_to_arm_a_vehicle_that_nobody_has_looked_at_and_none_for_a
     assert not (tmp_path / "run").exists()
 
 
-def fly_without_reply(folder, *extra):
-    port = free_port()
-    options = ("--set", "companion.link.heartbeat_wait_s=1.0", "--out", folder, "--yes", "--json", *extra)
-    return port, lambda: run_here("fly", SQUARE, "--connect", f"udpin://127.0.0.1:{port}", *options)
-
-
-def assert_failed(result, folder, *words):
-    """A flight that never began: the reason on stderr and in the summary, and the run folder complete."""
+def test_a_flight_that_never_begins_leaves_a_whole_folder_with_the_reason(tmp_path):
+    options = ("--set", "companion.link.heartbeat_wait_s=1.0", "--out", tmp_path, "--yes", "--json")
+    result = run_here("fly", SQUARE, "--connect", "udpin://127.0.0.1:0", *options)
     assert result.returncode == 1 and "Traceback" not in result.stderr
     summary = json.loads(result.stdout)
-    assert summary["outcome"] == "failed"
-    assert summary == json.loads((folder / "summary.json").read_text())
-    for word in words:
+    assert summary["outcome"] == "failed" and summary == json.loads((tmp_path / "summary.json").read_text())
+    for word in ("HEARTBEAT", "1 s"):
         assert word in summary["reason"] and word in result.stderr
-    assert (folder / "flight.tlog").exists()
-    assert processes_naming(folder) == []
-
-
-def test_no_heartbeat(tmp_path):
-    _, fly = fly_without_reply(tmp_path / "run")
-    assert_failed(fly(), tmp_path / "run", "HEARTBEAT", "1 s")
+    assert (tmp_path / "flight.tlog").exists()
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "vehicle_type", "word"), [(ARDUPILOT, MULTICOPTER, "PX4"), (PX4, PLANE, "multicopter")]
+    ("options", "words"),
+    [
+        (("--connect", "nowhere"), "'nowhere' is not a connection address"),
+        (("--modes", "POSCTL,WARP"), "'WARP' is no mode of PX4"),
+        (("--set", "max_hits=0"), "max_hits"),
+        (("--config", "no.yaml"), "no.yaml"),
+        (("--between", "serial:///dev/ttyS0:9600"), "clients come by udpin://"),
+    ],
 )
-def test_a_vehicle_that_is_no_px4_multicopter(tmp_path, autopilot, vehicle_type, word):
-    port, fly = fly_without_reply(tmp_path / "run")
-    mavlink = dialect.MAVLink(None, 1, 1)
-    packet = bytes(dialect.MAVLink_heartbeat_message(vehicle_type, autopilot, 0x51, 0, 3, 3).pack(mavlink))
-    is_over = threading.Event()
-
-    def announce():
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
-            while not is_over.wait(0.2):
-                vehicle.sendto(packet, ("127.0.0.1", port))
-
-    announcer = threading.Thread(target=announce)
-    announcer.start()
-    try:
-        assert_failed(fly(), tmp_path / "run", word)
-    finally:
-        is_over.set()
-        announcer.join()
+def test_what_is_wrong_with_a_guard_is_no_reason_to_start_it_again(options, words):
+    result = run_here("guard", "--connect", "udpin://127.0.0.1:0", *options)
+    assert_one_clear_sentence(result, words)
+    assert result.returncode == exit_codes.CONFIGURATION
 
 
 @pytest.mark.parametrize("command", ["paper", "results", "detectors", "campaign", "recoveries"])

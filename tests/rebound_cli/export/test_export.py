@@ -19,7 +19,6 @@ from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
 from rebound_cli.replay.watching import Findings
-from rebound_cli.report.shown_flight import recorded_flight
 from sim_vehicle.scene import Scene
 from tests.docs.pages import ROOT
 from tests.rebound_cli.logs.ulog_file import every
@@ -28,17 +27,16 @@ SIDE = math.sqrt(0.5)
 
 
 @pytest.fixture(scope="module")
-def flight(wall_flight):
-    folder, _ = wall_flight
-    return recorded_flight(folder), read_telemetry(folder / "flight.tlog")
+def flight(wall, wall_folder):
+    return wall, read_telemetry(wall_folder / "flight.tlog")
 
 
 @pytest.fixture(scope="module")
-def exported(wall_flight, tmp_path_factory):
+def exported(wall_folder, tmp_path_factory):
     """Both files, as the command writes them."""
     out = tmp_path_factory.mktemp("exported")
     for kind in ("mcap", "ulg"):
-        assert main(["logs", "export", str(wall_flight[0]), "--format", kind, "--out", str(out / f"wall.{kind}")]) == 0
+        assert main(["logs", "export", str(wall_folder), "--format", kind, "--out", str(out / f"wall.{kind}")]) == 0
     return out
 
 
@@ -109,11 +107,16 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     moved = LocalPosition(1_000_000, (3.0, 2.0, -1.0), (0.0, 0.0, 0.0))
     attitude = next(h for h in log.heard if type(h.sample).__name__ == "Attitude")
     heard = (replace(attitude, sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
-    imu = LoggedSample(*log.imu()[0])
-    topics = mcap_of(shown, replace(log, heard=(imu, *heard, LoggedSample(log.heard[-1].at_us, moved))))
+    imu, end_us = LoggedSample(*log.imu()[0]), log.heard[-1].at_us
+    here = LoggedSample(end_us, GlobalPosition(47.397742, 8.545594, 488.0))
+    topics = mcap_of(shown, replace(log, heard=(imu, *heard, LoggedSample(end_us, moved), here)))
     ((_, _, found),) = topics["/pose"]
     assert found["pose"]["position"] == {"x": 2.0, "y": 3.0, "z": 1.0}
     assert [found["pose"]["orientation"][axis] for axis in "wxyz"] == pytest.approx(flu_to_enu)
+    # and a position on Earth becomes a fix
+    ((schema, _, fix),) = topics["/location"]
+    assert schema == "foxglove.LocationFix"
+    assert (fix["latitude"], fix["longitude"], fix["altitude"]) == (47.397742, 8.545594, 488.0)
 
 
 def test_the_scene_has_each_obstacle_where_it_is_and_what_moves_goes_on(flight):
@@ -184,14 +187,6 @@ def entities_of(rows):
     return [(at_ns, entity) for _, at_ns, data in rows for entity in data["entities"]]
 
 
-def test_a_position_on_earth_becomes_a_fix(flight):
-    shown, log = flight
-    here = LoggedSample(log.heard[-1].at_us, GlobalPosition(47.397742, 8.545594, 488.0))
-    ((schema, _, fix),) = mcap_of(shown, replace(log, heard=(*log.heard, here)))["/location"]
-    assert schema == "foxglove.LocationFix"
-    assert (fix["latitude"], fix["longitude"], fix["altitude"]) == (47.397742, 8.545594, 488.0)
-
-
 # --- ULog -------------------------------------------------------------------------------------------------------
 
 
@@ -255,26 +250,20 @@ def test_a_mode_of_the_ulog_begins_when_it_was_told(exported, flight):
 def test_each_mode_of_px4s_has_its_state_and_no_other_passes_for_manual(flight, main, sub, nav_state):
     shown, log = flight
     beat = next(heard for heard in log.heard if isinstance(heard.sample, Heartbeat))
-    strange = replace(beat, sample=replace(beat.sample, custom_mode=main << 16 | sub << 24))
-    written = ulog_of(shown, replace(log, heard=(LoggedSample(*log.imu()[0]), strange)))
-    assert written.get_dataset("vehicle_status").data["nav_state"].tolist() == [nav_state]
-
-
-def test_a_failsafe_and_the_pilots_sticks_are_in_the_ulog(flight):
-    # Given a vehicle that calls its state critical, and a pilot who pushes forward, right, up and clockwise
-    shown, log = flight
-    beat = next(heard for heard in log.heard if isinstance(heard.sample, Heartbeat))
-    critical = replace(beat, sample=replace(beat.sample, system_status=5))
+    # Given a vehicle that calls its state critical
+    strange = replace(beat, sample=replace(beat.sample, custom_mode=main << 16 | sub << 24, system_status=5))
     sticks = LoggedSample(beat.at_us, Sticks((0.1, 0.2, 0.3, 0.4)))
-    written = ulog_of(shown, replace(log, heard=(LoggedSample(*log.imu()[0]), critical, sticks)))
-    assert written.get_dataset("vehicle_status").data["failsafe"].tolist() == [1]
+    written = ulog_of(shown, replace(log, heard=(LoggedSample(*log.imu()[0]), strange, sticks)))
+    status = written.get_dataset("vehicle_status").data
+    assert (status["nav_state"].tolist(), status["failsafe"].tolist()) == ([nav_state], [1])
+    # And the pilot who pushes forward, right, up and clockwise
     pushed = written.get_dataset("manual_control_setpoint").data
     assert [pushed[axis][0] for axis in ("pitch", "roll", "throttle", "yaw")] == pytest.approx([0.1, 0.2, 0.3, 0.4])
 
 
-def test_places_are_not_left_out_of_a_file_full_of_them(wall_flight, tmp_path, capsys):
+def test_places_are_not_left_out_of_a_file_full_of_them(wall_folder, tmp_path, capsys):
     out = tmp_path / "wall.mcap"
-    words = ["logs", "export", str(wall_flight[0]), "--format", "mcap", "--no-position", "--out", str(out)]
+    words = ["logs", "export", str(wall_folder), "--format", "mcap", "--no-position", "--out", str(out)]
     assert main(words) == 1
     assert "--no-position" in capsys.readouterr().err and not out.exists()
 

@@ -38,17 +38,13 @@ def test_a_person_at_a_terminal_gets_it_from_a_process_beside(begun, tmp_path):
     assert begun == [[sys.executable, "-m", "rebound_cli.figure.showing", str(tmp_path)]]
 
 
-@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
-def test_a_drone_is_left_alone(begun, stream, tmp_path, monkeypatch):
-    # Given the base install, which lacks what draws; or nobody at a terminal
-    if stream is Terminal:
-        monkeypatch.setattr(showing, "find_spec", lambda _: None)
-    assert f"rebound report {tmp_path}" in said(stream(), tmp_path).replace("\n", "")
+def test_a_drone_is_left_alone_and_of_a_flight_in_which_nothing_was_heard_there_is_none(begun, tmp_path, monkeypatch):
+    assert said(Terminal(), tmp_path, b"") == ""
+    # Given nobody at a terminal, or the base install, which lacks what draws
+    assert f"rebound report {tmp_path}" in said(io.StringIO(), tmp_path)
+    monkeypatch.setattr(showing, "find_spec", lambda _: None)
+    assert f"rebound report {tmp_path}" in said(Terminal(), tmp_path).replace("\n", "")
     assert begun == []
-
-
-def test_of_a_flight_in_which_nothing_was_heard_there_is_none(begun, tmp_path):
-    assert said(Terminal(), tmp_path, b"") == "" and begun == []
 
 
 def test_the_base_install_is_enough_to_write_one(wall_flight, tmp_path):

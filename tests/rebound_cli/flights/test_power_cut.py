@@ -6,12 +6,11 @@ import shutil
 import pytest
 
 from companion.errors import ReboundError
-from companion.shell.tlog import TlogWriter
 from rebound_cli.background import Background
 from rebound_cli.replay.recording import read_recording, reproduce
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import EVENTS_NAME, INPUTS_NAME, TLOG_NAME
-from tests.rebound_cli.flights.flying import EPOCH_US, record
+from tests.rebound_cli.flights.flying import record
 
 
 @pytest.fixture(scope="module")
@@ -35,13 +34,8 @@ def cut(flight, tmp_path):
     return at
 
 
-def test_the_flight_is_small_and_all_its_files_hold_something(flight):
-    sizes = [(flight / name).stat().st_size for name in (TLOG_NAME, EVENTS_NAME, INPUTS_NAME)]
-    assert all(200 < size < 20_000 for size in sizes), sizes
-    assert reproduce(read_recording(flight)).first_difference is None
-
-
 def test_packets_cut_at_any_byte_are_decided_again_as_far_as_they_go(flight, cut):
+    assert reproduce(read_recording(flight)).first_difference is None
     # Events and inputs reach the disk before the packets of their step: the packets alone may be behind.
     whole = read_recording(flight)
     most = 0
@@ -82,20 +76,6 @@ def test_a_damaged_line_of_a_flight_that_is_over_is_no_power_cut(cut):
     run_folder.write_json(folder / run_folder.SUMMARY_NAME, {"collisions": []})
     with pytest.raises(ReboundError, match="damaged"):
         read_recording(folder)
-
-
-def test_what_the_packets_must_not_be_ahead_of_is_on_the_disk_before_them(tmp_path):
-    # Given a log whose packets wait
-    path = tmp_path / "flight.tlog"
-    lengths = []
-    writer = TlogWriter(path, lambda: lengths.append(path.stat().st_size))
-    writer.write(EPOCH_US, [b"first"])
-    # When they are written, and later ones
-    writer.flush()
-    writer.write(EPOCH_US + 4000, [b"second"])
-    writer.close()
-    # Then what goes first was called while none of them had been
-    assert lengths == [0, 8 + len(b"first")]
 
 
 def test_a_recorder_brings_lines_and_packets_to_the_disk_in_that_order(tmp_path, monkeypatch):

@@ -2,7 +2,6 @@
 
 import contextlib
 import errno
-import fcntl
 import os
 from collections import namedtuple
 
@@ -19,7 +18,6 @@ from rebound_cli.flights.kept import (
     kept_flights,
     limits_of,
     make_room_for_next,
-    room_for,
 )
 from rebound_cli.results.run_folder import EVENTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
@@ -157,26 +155,24 @@ def test_nothing_is_removed_that_is_not_a_flight_of_a_vehicle_which_we_have_name
     assert (elsewhere / TLOG_NAME).exists()
 
 
-def test_a_flight_that_another_program_records_stays(tmp_path, disk):
+def test_a_flight_that_another_program_records_stays_until_it_is_closed(tmp_path, disk):
     # Given two flights, of which the older is being recorded
-    older = pretend(tmp_path, "20260101T000000Z-guard", MB)
+    older = tmp_path / "20260101T000000Z-guard"
+    older.mkdir()
     pretend(tmp_path, "20260102T000000Z-guard", MB)
     present = pretend(tmp_path, PRESENT, BLOCK)
     disk(tmp_path, 50 * GIB)
-    with (older / EVENTS_NAME).open("a") as recorded:
-        fcntl.flock(recorded, fcntl.LOCK_SH)
-        # When nothing may be kept, then that one is
-        Ring(present, DiskConfig.model_validate({"max_use_mb": 0})).make_room(EPOCH_US)
-        assert names(tmp_path) == ["20260101T000000Z-guard", PRESENT]
+    kept, seen = Ring(present, DiskConfig.model_validate({"max_use_mb": 0})), []
 
+    def make_room(_):
+        kept.make_room(EPOCH_US)
+        seen.append(names(tmp_path))
 
-def test_a_recorder_marks_its_flight_as_being_flown_until_it_is_closed(tmp_path):
-    folder = tmp_path / PRESENT
-    folder.mkdir()
-    seen = []
-    record(folder, 3, make_room=lambda now_us: seen.append(kept_flights(tmp_path)[0].is_being_flown()))
-    assert seen == [True] * 3
-    assert not kept_flights(tmp_path)[0].is_being_flown()
+    # When nothing may be kept, then that one is, until its recorder is closed
+    record(older, 3, make_room=make_room)
+    assert seen == [[older.name, PRESENT]] * 3
+    kept.make_room(EPOCH_US + LOOK_EVERY_US)
+    assert names(tmp_path) == [PRESENT]
 
 
 def test_a_power_cut_while_one_is_removed_leaves_no_half_of_it(tmp_path, disk, monkeypatch):
@@ -206,10 +202,6 @@ def test_on_a_disk_that_is_as_good_as_full_packets_end_events_go_on_and_it_is_to
     assert (folder / TLOG_NAME).stat().st_size == 0
     assert len((folder / EVENTS_NAME).read_text().splitlines()) == len(recorder.events) > 2
     assert recorder.writer.loss.startswith("log has gaps: less than 10 MiB of the disk are free")
-    # And with room again packets are written
-    disk(tmp_path, LAST_BYTES)
-    again = Ring(folder, DiskConfig.model_validate({"keep_free_mb": 10}))
-    again.make_room(EPOCH_US)
 
 
 def test_a_folder_that_cannot_be_removed_does_not_end_the_flight(tmp_path, disk, monkeypatch):
@@ -243,19 +235,3 @@ def test_room_is_made_before_a_flight_has_a_folder(tmp_path, disk, monkeypatch):
     # And where nothing was flown yet there is nothing to do
     monkeypatch.setattr(ring.run_folder, "RUNS_FOLDER", tmp_path / "none")
     make_room_for_next(None, DiskConfig())
-
-
-def test_a_folder_that_a_person_names_is_looked_after_by_that_person(tmp_path):
-    assert room_for(tmp_path, tmp_path, DiskConfig()) is None
-    assert room_for(tmp_path, None, DiskConfig()) is not None
-
-
-def test_what_is_free_is_what_this_disk_says(tmp_path):
-    # Nothing pretended: the flight is recorded by a ring on the disk of this machine.
-    folder = tmp_path / PRESENT
-    folder.mkdir()
-    recorder = record(
-        folder, 50, Background("log"), Ring(folder, DiskConfig.model_validate({"keep_free_mb": 0})).make_room
-    )
-    assert recorder.writer.loss is None
-    assert (folder / TLOG_NAME).stat().st_size > 200

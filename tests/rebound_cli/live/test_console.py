@@ -85,7 +85,6 @@ def test_progress_in_a_pipe_is_a_line_a_tenth():
 
 
 def test_only_what_is_compiled_has_a_progress():
-    # Given a kernel of ours that numba has compiled for whole numbers
     numba = pytest.importorskip("numba")
 
     def kernel(value):
@@ -107,33 +106,17 @@ def test_only_what_is_compiled_has_a_progress():
     assert stream.getvalue() == ""
 
 
-def test_without_a_place_for_compiled_kernels_there_is_a_reason_and_no_fault():
-    place = "/dev/null/cache"
-    code = "import sim_vehicle.physics.jit as jit; print(jit.NOT_KEPT); print(jit.njit(lambda: 7)())"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env={**os.environ, "NUMBA_CACHE_DIR": place},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    reason, value = done.stdout.splitlines()
-    assert reason.startswith(place) and value == "7", done.stderr
-
-
-def test_kernels_are_kept_in_the_users_cache(tmp_path):
-    code = "import numba, sim_vehicle.physics.jit as jit; print(jit.NOT_KEPT, numba.config.CACHE_DIR)"
-    env = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env={**env, "XDG_CACHE_HOME": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.stdout.startswith(f"None {tmp_path}/px4-rebound/kernels-"), done.stderr
+def test_kernels_are_kept_in_the_users_cache_and_without_a_place_there_is_a_reason_and_no_fault(tmp_path):
+    code = "import numba, sim_vehicle.physics.jit as j; print(j.NOT_KEPT, numba.config.CACHE_DIR)\n"
+    code += "print(j.NOT_KEPT and j.njit(lambda: 7)())"
+    users = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    for environment, said, value in (
+        ({**users, "XDG_CACHE_HOME": str(tmp_path)}, f"None {tmp_path}/px4-rebound/kernels-", "None"),
+        ({**users, "NUMBA_CACHE_DIR": "/dev/null/cache"}, "/dev/null/cache", "7"),
+    ):
+        asked = [sys.executable, "-c", code]
+        done = subprocess.run(asked, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120)
+        assert done.stdout.startswith(said) and done.stdout.splitlines()[1] == value, done.stderr
 
 
 def test_the_vehicles_progress_is_shown_by_who_waits_for_it_and_ctrl_c_ends_that(tmp_path, monkeypatch):

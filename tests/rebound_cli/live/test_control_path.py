@@ -1,7 +1,6 @@
 """Disks, terminals, garbage and faults beside the control path: none of them ends a flight in the air."""
 
 import gc
-import io
 import itertools
 import json
 import resource
@@ -9,6 +8,7 @@ import sys
 import threading
 import time
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -21,7 +21,6 @@ from companion.shell.tlog import read_tlog
 from rebound_cli import background
 from rebound_cli import fly as command
 from rebound_cli.background import MOST_WAITING, Background
-from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import (
@@ -35,8 +34,8 @@ from rebound_cli.live.realtime import (
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.timing import TOO_LATE_US, Timing, undisturbed
-from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event
-from tests.rebound_cli.live.flying import EPOCH_US, HOP_SETS, fly
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, run_here, start, wait_for_event
+from tests.rebound_cli.live.flying import EPOCH_US, fly
 
 
 class Gone:
@@ -284,15 +283,6 @@ class Queued:
         return self.datagrams.pop(0) if self.datagrams else b""
 
 
-def exchanged(tmp_path, datagrams, late_us):
-    stepping: Any = Stepping(EPOCH_US)
-    queued: Any = Queued(datagrams, EPOCH_US + late_us)
-    recorder = FlightRecorder(tmp_path)
-    Loop(stepping, queued, queued, recorder, Console(sys.stderr), Interrupts()).exchange()
-    recorder.close()
-    return stepping, queued
-
-
 def test_what_comes_while_a_writer_rests_is_made_together_and_the_end_waits_for_no_rest(monkeypatch):
     monkeypatch.setattr(background, "REST_S", 60.0)
     writer, done, first = Background("log"), [], threading.Event()
@@ -310,16 +300,24 @@ def test_what_comes_while_a_writer_rests_is_made_together_and_the_end_waits_for_
     assert done == [0, 1, 2]
 
 
-def test_after_a_stall_all_that_has_arrived_is_one_step(tmp_path):
-    stepping, _ = exchanged(tmp_path, [b"old", b"newer", b"newest"], 3_000_000)
-    assert stepping.received == [b"oldnewernewest"]
-    assert stepping.notes == [("late", "setpoints 3000 ms late, PX4 needs two a second")]
+LATE = ("late", "setpoints 3000 ms late, PX4 needs two a second")
 
 
-def test_who_sends_without_end_does_not_keep_a_step_from_being_taken(tmp_path):
-    stepping, queued = exchanged(tmp_path, [b"x"] * 1000, 0)
-    assert stepping.received == [b"x" * MOST_DATAGRAMS] and len(queued.datagrams) == 1000 - MOST_DATAGRAMS
-    assert stepping.notes == []
+@pytest.mark.parametrize(
+    ("datagrams", "late_us", "taken", "notes"),
+    [([b"old", b"newer", b"newest"], 3_000_000, 3, [LATE]), ([b"x"] * 1000, 0, MOST_DATAGRAMS, [])],
+    ids=["a stall", "who sends without end"],
+)
+def test_all_that_has_arrived_is_one_step_that_nobody_keeps_from_being_taken(
+    tmp_path, datagrams, late_us, taken, notes
+):
+    stepping: Any = Stepping(EPOCH_US)
+    queued: Any = Queued(datagrams, EPOCH_US + late_us)
+    recorder = FlightRecorder(tmp_path)
+    Loop(stepping, queued, queued, recorder, Console(sys.stderr), Interrupts()).exchange()
+    recorder.close()
+    assert stepping.received == [b"".join(datagrams[:taken])] and len(queued.datagrams) == len(datagrams) - taken
+    assert stepping.notes == notes
 
 
 def test_lateness_is_measured_and_told_each_time_it_doubles():
@@ -350,32 +348,14 @@ def test_garbage_is_collected_while_disarmed_only():
     assert gc.isenabled() and gc.get_freeze_count() == 0 and sys.getswitchinterval() == switch_interval_s
 
 
-def test_a_fault_around_the_flight_leaves_a_summary_and_is_raised_then(tmp_path, monkeypatch):
+def test_a_fault_around_the_flight_leaves_a_summary_and_is_told_then(tmp_path, monkeypatch):
     # Given a flight that a fault of the program ended
-    document = load_mission_document(SQUARE, HOP_SETS)
-    problem = FlightFaultError("Fault around the flight; the vehicle was handed over.")
-
-    def breaks(*arguments):
-        raise problem
-
-    monkeypatch.setattr(command, "fly_realtime", breaks)
-    flight = command.Flight(
-        mission_from(document), None, tmp_path, FlightRecorder(tmp_path), Console(io.StringIO()), Interrupts()
-    )
-    connection: Any = Silent()
-    flown = command._fly_connected(flight, connection, ConfirmAtOnce())
-    with pytest.raises(FlightFaultError, match="handed over"):
-        command._finish(flight, flown, False)
+    said = "Fault around the flight; the vehicle was handed over."
+    connection = Mock(counts=LinkCounts())
+    monkeypatch.setattr(command, "open_signed", lambda *_: connection)
+    monkeypatch.setattr(command, "fly_realtime", Mock(side_effect=FlightFaultError(said)))
+    result = run_here("fly", SQUARE, "--connect", "udpin://127.0.0.1:0", "--yes", "--out", tmp_path)
     # Then what is known of it is in its folder
+    assert result.returncode == 1 and result.stderr == f"rebound: {said}\n"
     summary = json.loads((tmp_path / run_folder.SUMMARY_NAME).read_text())
-    assert summary["outcome"] == "failed" and summary["reason"] == str(problem) and connection.is_closed
-
-
-class Silent:
-    """A connection that nobody uses."""
-
-    counts = LinkCounts()
-    is_closed = False
-
-    def close(self):
-        self.is_closed = True
+    assert summary["outcome"] == "failed" and summary["reason"] == said and connection.close.called

@@ -1,5 +1,6 @@
 """`--connect`: nothing arms before the person has said yes, and the link is kept alive meanwhile."""
 
+import contextlib
 import itertools
 import json
 import signal
@@ -9,7 +10,16 @@ import time
 import pytest
 
 from companion.shell.tlog import read_tlog
-from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, vehicle_on_air, wait_for_event
+from tests.rebound_cli.command import (
+    HOP,
+    SQUARE,
+    assert_comes_again,
+    events_of,
+    run,
+    start,
+    vehicle_on_air,
+    wait_for_event,
+)
 
 pytestmark = pytest.mark.realtime
 
@@ -17,15 +27,14 @@ COMPANION = 191
 HEARTBEAT, SET_POSITION_TARGET, COMMAND_LONG = 0, 84, 76
 
 
-@pytest.fixture
-def address():
-    """A vehicle on the air and the address at which it expects its companion."""
-    with vehicle_on_air() as port:
-        yield f"udpin://127.0.0.1:{port}"
-
-
-def fly(address, folder, *options, stdin=subprocess.DEVNULL):
-    return start("fly", SQUARE, "--connect", address, "--out", folder, *HOP, *options, stdin=stdin)
+@contextlib.contextmanager
+def flown(folder, *options, key=None):
+    """Beside a vehicle on the air; both sign where there is a key."""
+    signing = () if key is None else ("--signing-key", key)
+    with vehicle_on_air(*signing) as port:
+        address = f"udpin://127.0.0.1:{port}"
+        words = ("fly", SQUARE, "--connect", address, "--out", folder, *HOP, *signing, *options)
+        yield start(*words, stdin=subprocess.PIPE)
 
 
 def sent_by_companion(folder, message_id):
@@ -37,14 +46,14 @@ def sent_by_companion(folder, message_id):
     ]
 
 
-def test_without_a_yes_nothing_is_armed(address, tmp_path):
+def test_without_a_yes_nothing_is_armed(tmp_path):
     # Given a vehicle that is ready and a person who takes their time
     folder = tmp_path / "run"
-    process = fly(address, folder, stdin=subprocess.PIPE)
-    wait_for_event(folder, "plan")
-    time.sleep(1.5)
-    # When the person does not say yes
-    stdout, _ = process.communicate("later\n", timeout=20)
+    with flown(folder) as process:
+        wait_for_event(folder, "plan")
+        time.sleep(1.5)
+        # When the person does not say yes
+        stdout, _ = process.communicate("later\n", timeout=20)
     # Then the flight ends there, with the plan shown, no setpoint sent, and heartbeats all the while
     assert process.returncode == 1
     summary = json.loads((folder / "summary.json").read_text())
@@ -57,32 +66,21 @@ def test_without_a_yes_nothing_is_armed(address, tmp_path):
     assert_comes_again(folder)
 
 
-def assert_flying_until_stopped(process, folder):
-    """It arms; then Ctrl-C ends it in good order. Returns stdout and stderr."""
-    wait_for_event(folder, "armed")
-    process.send_signal(signal.SIGINT)
-    stdout, stderr = process.communicate(timeout=20)
-    assert process.returncode == 1
-    assert json.loads((folder / "summary.json").read_text())["outcome"] == "aborted"
-    return stdout, stderr
-
-
-def test_a_yes_flies_the_plan_of_a_vehicle_without_truth(address, tmp_path):
-    folder = tmp_path / "run"
-    process = fly(address, folder, "--json", stdin=subprocess.PIPE)
-    wait_for_event(folder, "plan")
-    process.stdin.write("y\n")
-    process.stdin.flush()
-    stdout, stderr = assert_flying_until_stopped(process, folder)
+def test_a_yes_flies_the_plan_of_a_vehicle_without_truth_and_ctrl_c_ends_it(tmp_path):
+    # Given a vehicle and a companion with one key
+    folder, key = tmp_path / "run", tmp_path / "key"
+    assert run("key", "new", key).returncode == 0
+    with flown(folder, "--json", key=key) as process:
+        wait_for_event(folder, "plan")
+        process.stdin.write("y\n")
+        process.stdin.flush()
+        wait_for_event(folder, "armed")
+        process.send_signal(signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=20)
+    assert process.returncode == 1 and "Fly this plan?" in stderr
     summary = json.loads(stdout)
     unknown = ("airframe", "seed", "false_detections", "missed_contacts", "recontacts")
     assert [summary[key] for key in unknown] == [None] * 5
-    assert "Fly this plan?" in stderr
+    assert summary["outcome"] == "aborted" and set(summary["refused_packets"]) <= {"old"}
     assert not (folder / "truth.npz").exists()
     assert_comes_again(folder)
-
-
-def test_yes_on_the_command_line_shows_the_plan_and_does_not_ask(address, tmp_path):
-    process = fly(address, tmp_path / "run", "--yes")
-    stdout, _ = assert_flying_until_stopped(process, tmp_path / "run")
-    assert "fence" in stdout.lower() and "Fly this plan?" not in stdout

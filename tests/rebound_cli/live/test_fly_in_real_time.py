@@ -8,7 +8,6 @@ import tomllib
 
 import pytest
 
-from companion.shell.tlog import read_tlog
 from tests.rebound_cli.command import (
     HANGS_S,
     HOP,
@@ -26,13 +25,6 @@ from tests.rebound_cli.command import (
 )
 
 pytestmark = pytest.mark.realtime
-
-# A hit within three seconds of take-off.
-NEAR_WALL = (
-    *("--set", "items.0.takeoff.height_m=0.9", "--set", "items.1.go_to.position_ned_m=[5, 0, -0.9]"),
-    *("--set", "sim.walls.0.point_ned_m=[1.5, 0, -1.5]"),
-)
-SET_ATTITUDE_TARGET = 82
 
 
 def summary_of(folder):
@@ -80,28 +72,6 @@ def test_ctrl_c_hands_the_vehicle_over_and_finishes_the_log(tmp_path):
     assert_comes_again(folder)
 
 
-def test_a_flight_killed_while_it_recovers_leaves_a_log_complete_to_the_last_second(tmp_path):
-    # Given a flight that has just been hit
-    folder = tmp_path / "run"
-    process = start("fly", WALL, "--sim", *QUICK, *NEAR_WALL, "--out", folder)
-    wait_for_event(folder, "detection", timeout_s=60.0)
-    assert len(processes_naming(folder)) == 2
-    time.sleep(0.6)
-    # When it is killed without a chance to clean up
-    os.kill(process.pid, signal.SIGKILL)
-    killed_at_us = time.time_ns() // 1000
-    process.communicate(timeout=10)
-    # Then the log ends less than a second before, and the recovery setpoint is in it; the events are whole
-    packets = list(read_tlog(folder / "flight.tlog"))
-    assert killed_at_us - packets[-1][0] < 1_000_000
-    happened = {event["kind"]: event["time_us"] for event in events_of(folder)}
-    detected_at_us = happened["detection"]
-    assert any(packet[7] == SET_ATTITUDE_TARGET and at_us >= detected_at_us for at_us, packet in packets)
-    # And the vehicle's process ends by itself, and all of it can be decided again
-    wait_until_gone(folder)
-    assert assert_comes_again(folder).is_cut
-
-
 def test_a_second_ctrl_c_ends_at_once(tmp_path):
     # Given a vehicle that has stopped answering, so that the first Ctrl-C has to wait
     folder = tmp_path / "run"
@@ -119,15 +89,6 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path):
     assert process.returncode == 130
     assert len(stderr.strip().splitlines()) == 1 and "ended at once" in stderr
     wait_until_gone(folder)
-
-
-def test_the_simulated_vehicle_alone_stops_when_asked(tmp_path):
-    process = start("sim", "--port", "0", "--remote", "127.0.0.1:9", "--truth", tmp_path / "truth.npz")
-    assert "foldable" in process.stdout.readline()
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(timeout=10) == 0
-    assert (tmp_path / "truth.npz").exists()
-    process.communicate()
 
 
 def test_version():

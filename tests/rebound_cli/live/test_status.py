@@ -45,18 +45,17 @@ def hand_over(server, *events, running_s=5.0):
 
 
 def test_who_asks_hears_the_latest_state_and_how_old_it_is(server, path):
+    # Its owner alone may ask, before the first step too
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert ask(path)["age_s"] is None and text_of(ask(path)).endswith("starting")
     hand_over(server, ARMED, HIT)
     status = ask(path)
     assert status["command"] == "guard" and status["folder"] == "/runs/now" and status["pid"] == os.getpid()
     assert status["state"] == "watching" and status["armed"] is True and status["position_ned_m"] == [1.0, 2.0, -3.0]
     assert status["hits"] == 1 and status["last_event"] == "hit 1: 30.0 m/s^2" and status["running_s"] == 5.0
     assert 0.0 <= status["age_s"] < 60.0 and status["schema"] == 1
-
-
-def test_before_the_first_step_the_program_is_starting(server, path):
-    status = ask(path)
-    assert status["age_s"] is None
-    assert text_of(status).endswith("starting")
+    standing = text_of({**status, "age_s": 3.2})
+    assert standing.endswith("The program has told nothing for 3.2 s: its loop stands still.")
 
 
 def test_a_hit_between_two_snapshots_is_counted(server, path):
@@ -83,21 +82,7 @@ def test_the_state_is_looked_at_ten_times_a_second_however_often_it_is_handed_ov
     assert 1 <= len(looked) <= 1 + 10 * (time.monotonic() - began_s)
 
 
-def test_only_its_owner_may_ask(server, path):
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600
-
-
-def test_what_a_client_writes_is_never_read(server, path):
-    hand_over(server)
-    with socket.socket(socket.AF_UNIX) as client:
-        client.connect(str(path))
-        # It may be answered, and done with, before it has written.
-        with contextlib.suppress(BrokenPipeError):
-            client.sendall(b"disarm\n" * 100)
-    assert ask(path)["state"] == "watching"
-
-
-def test_a_client_that_never_reads_or_has_gone_keeps_nobody_from_an_answer(server, path):
+def test_a_client_that_writes_never_reads_or_has_gone_keeps_nobody_from_an_answer(server, path):
     # Given clients that connect and do nothing, and others that go at once
     hand_over(server)
     silent = [socket.socket(socket.AF_UNIX) for _ in range(3)]
@@ -106,24 +91,14 @@ def test_a_client_that_never_reads_or_has_gone_keeps_nobody_from_an_answer(serve
     for _ in range(2):
         with socket.socket(socket.AF_UNIX) as client:
             client.connect(str(path))
+            # It may be answered, and done with, before it has written.
+            with contextlib.suppress(BrokenPipeError):
+                client.sendall(b"disarm\n" * 100)
     # When another asks, then it is answered, and handing over took no waiting
     hand_over(server)
     assert ask(path)["state"] == "watching"
     for client in silent:
         client.close()
-
-
-def test_a_loop_that_stands_still_is_named(server, path):
-    hand_over(server)
-    status = {**ask(path), "age_s": 3.2}
-    assert text_of(status).endswith("The program has told nothing for 3.2 s: its loop stands still.")
-
-
-def test_closing_ends_the_thread_and_takes_the_socket_away(path):
-    server = StatusServer(path, {"command": "guard", "folder": "-"})
-    server.close()
-    assert not path.exists()
-    assert not any(thread.name == "rebound status" for thread in threading.enumerate())
 
 
 def test_the_socket_of_a_program_that_was_killed_is_taken_over(path):
@@ -133,7 +108,9 @@ def test_the_socket_of_a_program_that_was_killed_is_taken_over(path):
     # When a program begins, then it is asked there
     server = StatusServer(path, {"command": "fly", "folder": "-"})
     assert ask(path)["command"] == "fly"
+    # And its end takes the socket away
     server.close()
+    assert not path.exists() and not any(thread.name == "rebound status" for thread in threading.enumerate())
 
 
 def test_the_socket_of_a_program_that_runs_is_left_to_it(server, path, monkeypatch):

@@ -12,7 +12,7 @@ from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.watching import watch_log
 from tests.rebound_cli.logs import dataflash_file
 from tests.rebound_cli.logs.test_telemetry import Writer
-from tests.rebound_cli.logs.ulog_file import every, message, sensor_combined, ulog
+from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 
 ULOG = ulog(
     {
@@ -96,7 +96,7 @@ def test_bytes_from_anywhere(tmp_path, content, name):
 def test_a_head_that_ends_in_a_damaged_message(tmp_path):
     # Given a message of no type that is said to be longer than what is left of the file, by just so much that its
     # reader, going back over it, meets the beginning of an earlier message, and so for ever
-    note = message("I", bytes([14]) + b"char[900] text" + bytes(900))
+    note = struct.pack("<HB", 915, ord("I")) + bytes([14]) + b"char[900] text" + bytes(900)
     head = ULOG[:59] + 13 * note
     size = len(head) + 1 - 59 - len(note)
     assert size > 10_000

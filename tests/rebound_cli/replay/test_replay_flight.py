@@ -11,14 +11,9 @@ from rebound_cli.replay.recording import read_recording, reproduce
 
 
 @pytest.fixture
-def flown(wall_flight):
-    return wall_flight[0]
-
-
-@pytest.fixture
-def flight(flown, tmp_path):
+def flight(wall_folder, tmp_path):
     """A copy to spoil."""
-    return shutil.copytree(flown, tmp_path / "wall")
+    return shutil.copytree(wall_folder, tmp_path / "wall")
 
 
 def replay(capsys, *arguments):
@@ -27,22 +22,22 @@ def replay(capsys, *arguments):
     return code, out.out, out.err
 
 
-def test_a_lockstep_flight_is_decided_again_to_the_bit(flown, tmp_path, capsys):
-    code, text, _ = replay(capsys, flown, "--expect", "1", "--out", tmp_path)
+def test_a_lockstep_flight_is_decided_again_to_the_bit(wall_folder, tmp_path, capsys):
+    code, text, _ = replay(capsys, wall_folder, "--expect", "1", "--out", tmp_path)
     assert code == 0
     assert "identical: every decision of the flight came again to the bit" in text
     assert "1 collision" in text
     # With its page, and with the flight's own times
     (page,) = tmp_path.iterdir()
     assert page.name == "report.html" and f"page: {page}" in text
-    (hit,) = json.loads((flown / "summary.json").read_text())["collisions"]
+    (hit,) = json.loads((wall_folder / "summary.json").read_text())["collisions"]
     assert f"{hit['detected_at_s']:.3f} s  HIT" in text
 
 
-def test_a_program_reads_the_same_and_an_expectation_that_fails_is_exit_code_1(flown, tmp_path, capsys):
-    code, text, error = replay(capsys, flown, "--json", "--expect", "none", "--out", tmp_path)
+def test_a_program_reads_the_same_and_an_expectation_that_fails_is_exit_code_1(wall_folder, tmp_path, capsys):
+    code, text, error = replay(capsys, wall_folder, "--json", "--expect", "none", "--out", tmp_path)
     found = json.loads(text)
-    (hit,) = json.loads((flown / "summary.json").read_text())["collisions"]
+    (hit,) = json.loads((wall_folder / "summary.json").read_text())["collisions"]
     impact, touchdown = found["impacts"]
     assert touchdown["kind"] == "landing" and not touchdown["is_collision"]
     assert found["reproduction"]["identical"]
@@ -70,15 +65,12 @@ def test_a_folder_from_before_the_baselines_left_the_drone_is_decided_again(flig
     assert reproduce(read_recording(flight)).first_difference is None
 
 
-def test_a_changed_packet_is_found(flight):
+def test_a_changed_packet_or_an_event_that_does_not_come_again_is_found(flight):
     # Given a flight in whose log one setpoint has another byte
     recording = read_recording(flight)
     step = next(step for step in recording.steps if len(step.sent) == 1 and len(step.sent[0]) > 40)
     step.sent = [step.sent[0][:20] + bytes([step.sent[0][20] ^ 1]) + step.sent[0][21:]]
     assert reproduce(recording).first_difference == f"at {step.time_us} us another packet was sent"
-
-
-def test_an_event_that_does_not_come_again_is_found(flight):
     (flight / "events.jsonl").open("a").write('{"time_us": 1, "kind": "x", "text": "", "data": {}}\n')
     assert "did not come again" in reproduce(read_recording(flight)).first_difference
 
@@ -90,8 +82,8 @@ def test_steps_in_which_nothing_came_count(flight):
     assert reproduce(read_recording(flight)).first_difference is not None
 
 
-def test_another_detector_or_rate_is_looked_at_without_comparing(flown, tmp_path, capsys):
-    code, text, _ = replay(capsys, flown, "--rate", "50", "--detector", "fused", "--out", tmp_path)
+def test_another_detector_or_rate_is_looked_at_without_comparing(wall_folder, tmp_path, capsys):
+    code, text, _ = replay(capsys, wall_folder, "--rate", "50", "--detector", "fused", "--out", tmp_path)
     assert code == 0
     assert "with --detector, --rate the flight's own decisions cannot come again" in text
     assert "IMU at 50 Hz (recorded at 250)" in text
@@ -127,23 +119,23 @@ def test_a_damaged_folder_is_one_sentence(flight, spoil, words, capsys):
     assert error.startswith("rebound: ") and words in error and len(error.strip().splitlines()) == 1
 
 
-def test_arguments_that_make_no_sense_are_refused(flown, tmp_path, capsys):
+def test_arguments_that_make_no_sense_are_refused(wall_folder, tmp_path, capsys):
     for arguments, words in (
         ((tmp_path,), "no flight.tlog in this folder"),
         ((tmp_path / "none.ulg",), "No such file"),
-        ((flown, "--detector", "magic"), "there is no detector 'magic'"),
-        ((flown, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
+        ((wall_folder, "--detector", "magic"), "there is no detector 'magic'"),
+        ((wall_folder, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
     ):
         code, _, error = replay(capsys, *arguments)
         assert code == 1 and words in error, error
     for arguments in (("--rate", "0"), ("--rate", "fast"), ("--expect", "some")):
         with pytest.raises(SystemExit):
-            main(["replay", str(flown), *arguments])
+            main(["replay", str(wall_folder), *arguments])
 
 
-def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(flown, tmp_path, capsys):
+def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(wall_folder, tmp_path, capsys):
     # Given an IMU stream too slow to see a hit by
-    arguments = (flown / "flight.tlog", "--rate", "10", "--expect", "none", "--out", tmp_path)
+    arguments = (wall_folder / "flight.tlog", "--rate", "10", "--expect", "none", "--out", tmp_path)
     assert main(["replay", *map(str, arguments)]) == 1
     said = capsys.readouterr().out
     assert "0 % of the flight was watched" in said and "that shows none" in said
@@ -153,16 +145,13 @@ def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(flown, tmp
     assert main(["replay", *map(str, arguments[:3]), *map(str, arguments[5:])]) == 1
 
 
-def test_a_log_that_is_cut_in_flight_is_read_to_its_end_and_says_so(flown, tmp_path, capsys):
-    content = (flown / "flight.tlog").read_bytes()
+def test_a_log_that_is_cut_in_flight_is_read_to_its_end_and_says_so(wall_folder, tmp_path, capsys):
+    content = (wall_folder / "flight.tlog").read_bytes()
     (tmp_path / "cut.tlog").write_bytes(content[: len(content) // 2])
-    for log, is_cut in ((flown / "flight.tlog", False), (tmp_path / "cut.tlog", True)):
+    for log, is_cut in ((wall_folder / "flight.tlog", False), (tmp_path / "cut.tlog", True)):
         _, text, _ = replay(capsys, log, "--any-mode", "--out", tmp_path / "out")
         assert ("ends in flight" in text) is is_cut
-
-
-def test_a_log_that_is_cut_before_the_flight_is_no_evidence(flown, tmp_path, capsys):
-    content = (flown / "flight.tlog").read_bytes()
+    # And cut before the flight it is no evidence
     (tmp_path / "cut.tlog").write_bytes(content[: len(content) // 10])
     code, text, _ = replay(capsys, tmp_path / "cut.tlog", "--out", tmp_path / "out")
     assert code == 1 and "no flight was heard: that is no evidence" in text

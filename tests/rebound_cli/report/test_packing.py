@@ -25,19 +25,9 @@ def test_a_column_takes_two_bytes_a_number_where_it_fits_and_four_elsewhere(most
 def test_what_is_not_finite_is_none_and_harms_no_neighbour():
     again = unpacked(packed(np.array([1.0, np.nan, -np.inf, 2.0]), 0.001))
     assert np.isnan(again).tolist() == [False, True, True, False] and np.allclose(again[[0, 3]], [1.0, 2.0])
-
-
-def test_a_column_of_nothing_is_one_too():
-    assert len(unpacked(packed(np.array([]), 0.1))) == 0
-    assert np.isnan(unpacked(packed(np.array([np.nan]), 0.1))).all()
-
-
-def test_a_number_beyond_four_bytes_is_none_and_not_another_one():
+    # Nor is a number beyond four bytes another one; and a column of nothing is one
     assert np.isnan(unpacked(packed(np.array([0.0, 1e9]), 1e-5))).any()
-
-
-def test_all_rows_of_a_short_flight_stay():
-    assert kept_rows(np.linspace(0.0, 99.0, 100), np.zeros(100), np.array([]), 1.0, 100).tolist() == list(range(100))
+    assert len(unpacked(packed(np.array([]), 0.1))) == 0
 
 
 def test_of_a_long_flight_all_round_a_hit_stay_and_the_loudest_of_everything_else():
@@ -48,5 +38,6 @@ def test_of_a_long_flight_all_round_a_hit_stay_and_the_loudest_of_everything_els
     assert set(np.flatnonzero(np.abs(seconds - 500.0) <= 1.0)) <= set(rows)
     assert 1234 in rows and len(rows) == 500
     assert (np.diff(rows) > 0).all()
-    # and nothing of the flight is left out for long
+    # and nothing of the flight is left out for long, of a short one nothing at all
     assert np.diff(seconds[rows]).max() < 5.0
+    assert len(kept_rows(seconds, loud, np.array([]), 1.0, 10_000)) == 10_000

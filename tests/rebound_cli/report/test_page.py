@@ -24,7 +24,6 @@ from tests.rebound_cli.report.opened import Opened, rows
 
 PACKAGE = Path(rebound_cli.report.__file__).parent / "web"
 HOSTILE = "</script><img src=x onerror=alert(1)><script>alert(2)</script><!-- &amp;"
-MEGABYTE = 1_000_000
 
 
 @pytest.fixture(scope="session")
@@ -37,11 +36,8 @@ def opened(wall_page):
     return Opened(wall_page)
 
 
-def test_every_simulated_flight_leaves_one_below_two_megabytes(wall_page):
-    assert len(wall_page.encode()) < 2 * MEGABYTE
-
-
-def test_it_loads_nothing(opened):
+def test_it_is_below_two_megabytes_and_loads_nothing(wall_page, opened):
+    assert len(wall_page.encode()) < 2_000_000
     # Given every element that could
     assert opened.attributes("src") == [] and opened.attributes("href") == []
     assert not {"link", "img", "iframe", "object", "embed", "base", "form"} & {tag for tag, _ in opened.tags}
@@ -106,9 +102,7 @@ def test_a_hit_has_its_place_its_normal_with_its_error_and_its_reasons(wall_fold
     why = "\n".join(moment["reasons"])
     assert re.search(r"Push sideways: 33\.\d m/s², a hit from 1\.\d on \(\d+\.\d times\): speaks for a contact\.", why)
     assert "A landing: no" in why and "A person's hand: no" in why and "Verdict: wall, a collision" in why
-
-
-def test_what_came_nearest_to_a_hit_is_told_with_why_it_was_none(opened):
+    # And what came nearest to a hit, with why it was none
     (moment,) = (moment for moment in opened.data["moments"] if moment["kind"] == "closest")
     assert "Verdict: no hit." in moment["reasons"][-1]
     imu = opened.table("imu")
@@ -227,14 +221,10 @@ def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
     assert data["obstacles"] == [] and "truth" not in data["tables"]
 
 
-def test_a_flight_that_was_cut_off_has_one(wall_folder, tmp_path):
+def test_a_flight_that_was_cut_off_has_one_and_one_in_which_nothing_was_heard_has_none(wall_folder, tmp_path, capsys):
     folder = shutil.copytree(wall_folder, tmp_path / "cut")
     (folder / "summary.json").unlink()
     assert "the recording was cut off" in Opened(page(recorded_flight(folder))).data["sentence"]
-
-
-def test_of_a_folder_in_which_nothing_was_heard_one_sentence_says_so(wall_folder, tmp_path, capsys):
-    folder = shutil.copytree(wall_folder, tmp_path / "silent")
     (folder / "flight.tlog").write_bytes(b"")
     (folder / "report.html").unlink()
     assert main(["report", str(folder)]) == 1

@@ -69,6 +69,7 @@ def test_a_real_vehicle_is_told_of_by_its_telemetry_alone():
 def test_each_of_several_hits_has_its_number_and_the_landing_comes_last():
     lines = told(hit(), hit())
     assert [line[:2] for line in lines[:2]] == ["1.", "2."] and lines[2:] == ["Landed safely."]
+    assert told(collisions=[]) == ["No hit.", "Landed safely."]
 
 
 def test_what_went_wrong_is_told_and_no_landing_is_claimed():
@@ -87,7 +88,3 @@ def test_what_went_wrong_is_told_and_no_landing_is_claimed():
     assert "2 hits not seen." in lines
     assert "1 hit before the vehicle had recovered from the one before." in lines
     assert not any("afely" in line for line in lines)
-
-
-def test_a_flight_without_a_hit():
-    assert told(collisions=[]) == ["No hit.", "Landed safely."]

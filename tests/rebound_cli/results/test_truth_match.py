@@ -125,16 +125,9 @@ def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
     assert entry["truth"]["rebound_speed_m_s"] == pytest.approx(0.3)
     assert entry["detected_at_s"] == pytest.approx(9.0045)
     assert (summary["duration_s"], summary["realtime_factor"]) == (25.0, 50.0)
-
-
-def test_a_simulator_that_stalls_after_a_hit_moves_nothing_of_before():
-    # Given a simulator that stood still for half a second, 0.4 s after the contact
-    path = path_of([(9.9, 3.7, -1.6), (10.0, 3.8, -1.5), (11.0, 3.0, -1.47), (12.0, 2.76, -1.5)])
+    # and a simulator that stands still for half a second, 0.4 s after the contact, changes none of it
     truth = FlightTruth([hit(10_000)], path, EPOCH_US + 500_000, stalls=[(10_400_000, 500_000)])
-    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
-    # Then the latency is what it was
-    assert summary["collisions"][0]["truth"]["detection_latency_ms"] == pytest.approx(4.5)
-    assert summary["collisions"][0]["truth"]["contact_at_s"] == pytest.approx(9.0)
+    assert build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS) == summary
 
 
 def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contact():
@@ -142,8 +135,9 @@ def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contac
     path = path_of([(10.0, 3.8, -1.5), (11.0, 3.0, -1.5), (12.0, 2.46, -1.5)])
     drifted = dataclasses.replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
     summary = build_summary(Flown(report_of(collision(10_004)), 0.5, FlightTruth([drifted], path, EPOCH_US)), FACTS)
-    # Then its setpoint of 2.8 m was at 2.5 m, and it went 4 cm past that
-    assert summary["collisions"][0]["truth"]["overshoot_m"] == pytest.approx(0.04)
+    # Then its setpoint of 2.8 m was at 2.5 m, 1.3 m off the wall, which faces south; and it went 4 cm past that
+    found = summary["collisions"][0]["truth"]
+    assert (found["overshoot_m"], found["stopped_off_m"]) == pytest.approx((0.04, 1.3))
 
 
 def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
@@ -158,15 +152,6 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
     assert (second["overshoot_m"], second["height_lost_m"]) == pytest.approx((0.3, 0.3))
 
 
-def test_where_it_stopped_is_measured_from_where_it_touched_in_the_frame_that_it_believed_in():
-    # Given a contact at 3.8 m of a vehicle that believed itself 0.3 m further north, and a setpoint at 2.8 m
-    drifted = dataclasses.replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
-    truth = FlightTruth([drifted], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
-    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
-    # Then it stopped 1.3 m off the wall, which faces south
-    assert summary["collisions"][0]["truth"]["stopped_off_m"] == pytest.approx(1.3)
-
-
 def test_the_papers_stress_analysis_is_of_the_papers_frame():
     truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
     flown = Flown(report_of(collision(10_004)), 0.5, truth)
@@ -177,14 +162,12 @@ def test_the_papers_stress_analysis_is_of_the_papers_frame():
     assert foldable == pytest.approx(185.0 / hit(10_000).peak_force_n, abs=1e-3) and rigid is None
 
 
-def test_a_real_vehicle_has_no_truth():
+def test_without_truth_nothing_is_counted_and_without_a_contact_zero():
     summary = build_summary(Flown(report_of(collision(10_004)), 25.0, None), FlightFacts("wall", None, None, 0.5))
     unknown = ("false_detections", "missed_contacts", "recontacts", "seed", "airframe")
     assert [summary[key] for key in unknown] == [None] * 5
     assert summary["collisions"][0]["truth"] is None
 
-
-def test_a_flight_with_truth_and_no_contact_counts_zero_not_null():
     truth = FlightTruth([], path_of([(10.0, 0.0, 0.0)]), EPOCH_US)
     summary = build_summary(Flown(report_of(), 0.5, truth), FACTS)
     assert [summary[key] for key in ("false_detections", "missed_contacts", "recontacts")] == [0, 0, 0]

@@ -1,19 +1,15 @@
 """The guard as a service of a real systemd: installed, booted, hit, killed, hung, configured wrongly."""
 
-import contextlib
-import grp
 import json
 import os
-import pty
-import select
+import shutil
 import subprocess
 import sys
-import threading
-import tty
 
 import pytest
 
 from tests.rebound_cli.command import taken_off
+from tests.rebound_cli.live.cable import Cable
 from tests.rebound_cli.service.sandbox import ROOT, Sandbox, why_not
 
 pytestmark = [pytest.mark.realtime, pytest.mark.skipif(why_not() is not None, reason=str(why_not()))]
@@ -65,35 +61,11 @@ def test_installed_booted_hit_killed_hung_and_configured_wrongly(rebound_vehicle
         assert sandbox.shown("ActiveState") == "failed" and sandbox.shown("NRestarts") == "0"
 
 
-@contextlib.contextmanager
-def serial_cable():
-    """Two serial ports, and what goes into one comes out of the other."""
-    pairs = [pty.openpty() for _ in range(2)]
-    (near, far), is_over = pairs, threading.Event()
-
-    def carry():
-        ends = {near[0]: far[0], far[0]: near[0]}
-        while not is_over.is_set():
-            for end in select.select(list(ends), [], [], 0.1)[0]:
-                os.write(ends[end], os.read(end, 4096))
-
-    for _, port in pairs:
-        tty.setraw(port)
-        os.fchown(port, 0, grp.getgrnam("dialout").gr_gid)
-        os.fchmod(port, 0o660)
-    thread = threading.Thread(target=carry)
-    thread.start()
-    try:
-        yield os.ttyname(near[1]), os.ttyname(far[1])
-    finally:
-        is_over.set()
-        thread.join()
-        for descriptor in (*near, *far):
-            os.close(descriptor)
-
-
 def test_ready_at_the_first_heartbeat_on_the_one_device_that_it_may_open(tmp_path):
-    with serial_cable() as (ours, theirs), Sandbox(tmp_path / "sandbox") as sandbox:
+    with Cable(tmp_path / "pixhawk") as cable, Sandbox(tmp_path / "sandbox") as sandbox:
+        ours = cable.plug()
+        shutil.chown(ours, "root", "dialout")
+        os.chmod(ours, 0o660)
         # Given a computer that is up before the vehicle is
         sandbox.boot()
         sandbox.install_rebound()
@@ -104,7 +76,7 @@ def test_ready_at_the_first_heartbeat_on_the_one_device_that_it_may_open(tmp_pat
         assert sandbox.shown("ActiveState") == "activating"
         # When the vehicle starts
         simulator = [sys.executable, "-m", "rebound_cli", "sim", "--port", "0", "--remote", "127.0.0.1:9"]
-        link = ["--link", f"serial://{theirs}:921600", "--stop-with-stdin"]
+        link = ["--link", cable.vehicle_url, "--stop-with-stdin"]
         vehicle = subprocess.Popen([*simulator, *link], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
         try:
             # Then the service is ready, and sees it over that device alone: no network, no other

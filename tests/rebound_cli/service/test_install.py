@@ -112,18 +112,17 @@ def test_an_upgrade_keeps_every_value_that_a_person_wrote(system, capsys):
     )
 
 
-def test_a_link_that_is_a_network_now_leaves_no_rule_for_a_port(system):
-    service(system, "install", connect=f"serial://{UART}:921600")
-    (system.root / "etc/rebound/service.yaml").write_text(f"connect: {UDP}\n")
-    service(system, "install")
-    assert UDEV not in files(system.root)
-
-
 def test_a_guard_without_a_file_has_all_defaults(system):
     service(system, "install")
     assert "then: hold" in (system.root / "etc/rebound/guard.yaml").read_text()
     assert "--wait" in values((system.root / UNIT).read_text(), "ExecStart")[0].split()
     assert values((system.root / UNIT).read_text(), "WantedBy") == ["multi-user.target"]
+    # A link that is a network now leaves no rule for a port and no device
+    (system.root / "etc/rebound/service.yaml").write_text(f"connect: {UDP}\n")
+    service(system, "install")
+    text = (system.root / UNIT).read_text()
+    assert UDEV not in files(system.root)
+    assert values(text, "PrivateDevices") == ["yes"] and values(text, "DeviceAllow") == []
 
 
 def test_a_mission_is_never_flown_at_boot_or_by_a_restart(system, capsys):
@@ -153,14 +152,11 @@ def test_what_is_wrong_is_said_before_anything_is_written(system, options, words
     assert files(system.root) == set() and system.called == []
 
 
-def test_a_mission_that_names_a_file_beside_it_says_that_it_is_copied(system, tmp_path):
+def test_what_is_wrong_in_a_persons_files_is_named_with_its_place(system, tmp_path):
     mission = tmp_path / "mine.yaml"
     mission.write_text((ROOT / "missions" / "square.yaml").read_text() + "\nobstacles:\n  file: hall.json\n")
     with pytest.raises(Exception, match=r"obstacles\.file: the mission is copied to /etc/rebound"):
         service(system, "install", mission=mission)
-
-
-def test_settings_that_a_person_got_wrong_are_named_with_their_line(system):
     service(system, "install")
     (system.root / "etc/rebound/service.yaml").write_text("run: guard\nconect: udpin://:1\n")
     with pytest.raises(Exception, match=r"service.yaml:2: conect: unknown key 'conect'; did you mean 'connect'"):
@@ -174,26 +170,16 @@ def test_options_of_install_belong_to_install(what, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_a_system_without_systemd_is_one_sentence(system, monkeypatch):
-    monkeypatch.setattr(shutil, "which", lambda program: None)
-    with pytest.raises(ServiceError, match="has no systemd"):
-        service(system, "install")
-    assert files(system.root) == set()
-
-
-def test_a_program_in_a_home_is_refused(system, monkeypatch):
+def test_a_system_that_is_unfit_is_one_sentence(system, monkeypatch):
     monkeypatch.setattr("rebound_cli.service.system.sys.prefix", "/home/pi/rebound")
     assert hidden_program() == "/home/pi/rebound"
     monkeypatch.setattr(command, "hidden_program", hidden_program)
     with pytest.raises(ServiceError, match="/home/pi/rebound is hidden from the service: install Rebound in /opt"):
         service(system, "install")
-    assert files(system.root) == set()
-
-
-def test_a_step_that_systemd_refuses_is_named(system, monkeypatch):
-    monkeypatch.setattr(System, "call", lambda self, *words: 5)
-    with pytest.raises(ServiceError, match=r"`systemd-sysusers .*` failed with exit code 5"):
+    monkeypatch.setattr(shutil, "which", lambda program: None)
+    with pytest.raises(ServiceError, match="has no systemd"):
         service(system, "install")
+    assert files(system.root) == set()
 
 
 def test_exit_codes_that_no_restart_mends_end_the_service():
@@ -242,11 +228,6 @@ def test_a_guard_in_between_has_its_device_and_the_network_that_its_clients_come
     assert values(text, "RestrictAddressFamilies") == ["AF_UNIX AF_INET AF_INET6"]
 
 
-def test_a_link_over_a_network_has_no_device():
-    text = unit(connect=UDP)
-    assert values(text, "PrivateDevices") == ["yes"] and values(text, "DeviceAllow") == []
-
-
 def test_words_that_mean_something_to_systemd_are_taken_literally():
     command_line = values(unit(signing_key='/var/lib/rebound/my $key 100%".key'), "ExecStart")[0]
     assert command_line.endswith('--signing-key "/var/lib/rebound/my $$key 100%%\\".key"')
@@ -265,14 +246,12 @@ def test_systemd_finds_nothing_to_complain_of_and_little_exposed(connect, run):
 
 
 @NEEDS_SYSTEMD
-def test_systemd_finds_what_is_wrong_in_a_unit():
+def test_what_is_wrong_in_a_unit_or_not_as_it_was_installed_is_found(system, capsys):
     verified, exposure = analysed("[Service]\nType=notify\nExecStart=/bin/true\nRestartStep=5\n")
     assert verified.verdict.value == "no" and "RestartStep" in verified.found
     assert exposure.verdict.value == "no" and float(exposure.found.split()[0]) > 9
 
-
-@NEEDS_SYSTEMD
-def test_what_is_installed_is_checked(system, capsys):
+    # Of a whole installation
     assert service(system, "check") == 1
     assert "is not there" in capsys.readouterr().out
     service(system, "install", guard=GUARD)

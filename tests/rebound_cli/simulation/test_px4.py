@@ -5,11 +5,8 @@ import socket
 
 import pytest
 
-from sim_vehicle.airframe import load_built_in
-from sim_vehicle.hil.parameters import px4_parameters
 from tests.rebound_cli.command import (
     WALL,
-    assert_one_clear_sentence,
     processes_naming,
     run,
     start,
@@ -31,22 +28,8 @@ def next_line_with(process, words):
     raise AssertionError(f"it ended without saying {words!r}")
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-@pytest.mark.parametrize("format_name", ["env", "params", "airframe"])
-def test_the_airframe_is_printed_whole_in_every_format(format_name):
-    result = run("airframe", "px4", "--airframe", "rigid", "--format", format_name)
-    assert result.returncode == 0, result.stderr
-    for parameter in px4_parameters(load_built_in("rigid")):
-        assert parameter.name in result.stdout
-
-
 def test_the_body_alone_serves_a_px4_and_writes_the_truth(tmp_path):
-    port, path = free_port(), tmp_path / "truth.npz"
+    port, path = SIMULATOR_PORT, tmp_path / "truth.npz"
     options = ("--port", port, "--mission", WALL, "--speed", "0", "--truth", path)
     process = start("sim", "--autopilot", "px4", *options)
     next_line_with(process, f"TCP port {port}")
@@ -72,21 +55,16 @@ def test_ctrl_c_while_waiting_for_px4_ends_everything(tmp_path):
     wait_until_gone(folder)
 
 
-def test_a_companions_port_that_is_taken_leaves_no_folder(tmp_path):
-    folder = tmp_path / "run"
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.bind(("0.0.0.0", 14540 + INSTANCE))
-        result = run("fly", WALL, "--sim", "px4", "--instance", INSTANCE, "--out", folder)
-    assert_one_clear_sentence(result, 14540 + INSTANCE)
-    assert not folder.exists()
-
-
-def test_a_simulators_port_that_is_taken_is_one_sentence(tmp_path):
-    with socket.socket() as other:
-        other.bind(("0.0.0.0", SIMULATOR_PORT))
-        other.listen(1)
-        result = run("fly", WALL, "--sim", "px4", "--instance", INSTANCE, "--json", "--out", tmp_path / "run")
-    assert result.returncode == 1
+@pytest.mark.parametrize(
+    ("kind", "port"), [(socket.SOCK_DGRAM, 14540 + INSTANCE), (socket.SOCK_STREAM, SIMULATOR_PORT)]
+)
+def test_a_port_that_is_taken_is_one_sentence(tmp_path, kind, port):
+    with socket.socket(socket.AF_INET, kind) as other:
+        other.bind(("0.0.0.0", port))
+        if kind == socket.SOCK_STREAM:
+            other.listen(1)
+        result = run("fly", WALL, "--sim", "px4", "--instance", INSTANCE, "--out", tmp_path / "run")
     sentence = result.stderr.strip().splitlines()[-1]
-    assert sentence.startswith("rebound: ")
-    assert f"TCP port {SIMULATOR_PORT} is in use" in sentence
+    assert result.returncode == 1 and sentence.startswith("rebound: ") and str(port) in sentence
+    # Tried before anything is written
+    assert kind == socket.SOCK_STREAM or not (tmp_path / "run").exists()

@@ -1,4 +1,4 @@
-"""How fast `rebound sim` goes: paused as a job of the shell is, and by the variable that PX4's simulators go by."""
+"""`rebound sim` paused as a job of the shell is."""
 
 import os
 import signal
@@ -56,15 +56,3 @@ def test_a_stopped_job_is_a_pause_after_which_it_goes_on_where_it_stood():
     # Of a second's samples none is left out between what was sent before and what is sent now
     assert stamps[0] - last_s < 0.03
     assert max(later - earlier for earlier, later in pairwise(stamps)) < 0.03
-
-
-def test_px4s_variable_sets_speed_and_time_outs(monkeypatch):
-    monkeypatch.setenv("PX4_SIM_SPEED_FACTOR", "3")
-    with simulated() as (client, _):
-        _, sender = client.recvfrom(2048)
-        link = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
-        client.sendto(dialect.MAVLink_param_request_read_message(1, 1, b"COM_OF_LOSS_T", -1).pack(link), sender)
-        parser = dialect.MAVLink(None)
-        while (message := parser.decode(bytearray(client.recv(2048)))).get_type() != "PARAM_VALUE":
-            pass
-    assert (message.param_id, message.param_value) == ("COM_OF_LOSS_T", pytest.approx(0.9))

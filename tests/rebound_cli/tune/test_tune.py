@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from companion.messages import Attitude, Heartbeat, ImuSample
-from companion.mission.config import CompanionConfig
+from companion.messages import Attitude, Heartbeat
 from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.logs.log import LoggedSample
 from rebound_cli.main import main
@@ -21,18 +20,15 @@ from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 from tests.rebound_cli.replay.flying import LATERAL, flight
 
 
-def shares(log):
-    return {margin.setting: margin.share for margin in margins([log], LATERAL)}
-
-
 def test_a_margin_is_the_largest_sign_of_a_hit_over_the_threshold():
-    # Given a healthy flight with one jolt of 3 m/s^2, where 4 is the threshold and noise of 0.3 times 6 is below it
-    found = shares(flight(push_m_s2=3.0))
-    assert found["threshold_m_s2"] == pytest.approx(3.0 / 4.0, abs=0.15)
-
-
-def test_a_flight_without_jolts_is_far_from_the_threshold():
-    assert shares(flight(hit_us=None)) == {"threshold_m_s2": None}
+    # Given a healthy flight with one jolt of 2 m/s^2, where 4 is the threshold and noise of 0.3 times 6 is below it
+    log = flight(push_m_s2=2.0)
+    (margin,) = margins([log], LATERAL)
+    assert (margin.setting, margin.share) == ("threshold_m_s2", pytest.approx(2.0 / 4.0, abs=0.15))
+    # Then what needs no change stays as it was; without a jolt it is far from the threshold
+    value, reason = advise([log], LATERAL, [margin]).settings["lateral", "threshold_m_s2"]
+    assert value == 4.0 and "as it was" in reason
+    assert [margin.share for margin in margins([flight(hit_us=None)], LATERAL)] == [None]
 
 
 def test_a_threshold_that_a_healthy_flight_crosses_is_raised_with_a_reserve():
@@ -44,18 +40,6 @@ def test_a_threshold_that_a_healthy_flight_crosses_is_raised_with_a_reserve():
     assert value == pytest.approx(RESERVE * 6.0, rel=0.15)
     assert advice.false_alarms_left == 0
     assert watch_log(log, advice.config).collisions == []
-
-
-def test_what_needs_no_change_stays_as_it_was():
-    log = flight(push_m_s2=2.0)
-    advice = advise([log], LATERAL, margins([log], LATERAL))
-    value, reason = advice.settings["lateral", "threshold_m_s2"]
-    assert value == 4.0 and "as it was" in reason
-
-
-def test_the_smallest_hit_that_shows_is_far_above_the_noise():
-    promise = watch_log(flight(hit_us=None), CompanionConfig()).promise
-    assert promise.force_m_s2 > 5 * 0.3 and promise.false_alarms_per_h < 1.0
 
 
 def healthy_log(path, duration_s, falls=False):
@@ -127,17 +111,6 @@ def test_logs_that_teach_nothing_are_refused(tmp_path, capsys):
     assert code == 1 and "there is no detector 'magic'" in error
 
 
-def fallen(log):
-    """From 5 s on it shows no force for half a second."""
-    heard = [
-        replace(item, sample=replace(item.sample, specific_force_frd_m_s2=(0.3, 0.2, -1.0)))
-        if isinstance(item.sample, ImuSample) and 5_000_000 <= item.at_us < 5_500_000
-        else item
-        for item in log.heard
-    ]
-    return replace(log, heard=tuple(heard))
-
-
 def leaning(log, degrees):
     """From 5 s on it leans so far to the right."""
     half_rad = math.radians(degrees) / 2
@@ -146,12 +119,11 @@ def leaning(log, degrees):
     return replace(log, heard=tuple(heard))
 
 
-def test_a_flight_that_tipped_over_or_fell_is_no_healthy_one():
+def test_a_flight_that_tipped_over_is_no_healthy_one():
     healthy = flight(hit_us=None)
     assert crash(healthy) is None
     assert crash(leaning(healthy, 50.0)) is None
     assert crash(leaning(healthy, 111.0)) == "it tipped to 111 degrees at 5.0 s"
-    assert crash(fallen(healthy)) == "it fell at 5.0 s"
     # Carried by hand or taken apart on the bench, it may lie on its back
     beats = [
         replace(h, sample=replace(h.sample, armed=False)) for h in healthy.heard if isinstance(h.sample, Heartbeat)
