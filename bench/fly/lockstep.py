@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
 from rebound_cli.inputs import SimulatedWorld
@@ -16,11 +15,10 @@ from rebound_cli.results.flight_log import FlightLog, read_flight_log
 from rebound_cli.results.run_folder import TLOG_NAME, FlightRecorder
 from rebound_cli.results.summary import Flown
 from rebound_cli.results.truth_match import FlightTruth, Vector3
-from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle
 
 # The slowest hit into a surface that a detector's bars promise to find.
@@ -105,37 +103,3 @@ def judged_flight(
     parts = frame.foot_depth_m, frame.motor_radius_m, frame.guard_radius_m
     obstacles = {obstacle.name: obstacle for _, obstacle in scene.obstacles()}
     return JudgedFlight(mission, report, events, truth, scene.start.position_ned_m, *parts, obstacles)
-
-
-class SteppedFlight:
-    """A mission beside the simulated vehicle, interval by interval, without a log."""
-
-    def __init__(self, mission: Mission, scene: Scene, airframe: Airframe) -> None:
-        self.mission = mission
-        self.standing_m = airframe.geometry.foot_depth_m
-        self.companion, self.vehicle = Companion(mission), SimulatedVehicle(airframe, scene, scene.seed)
-        self.companion.confirm_plan()
-        self._pending = b""
-
-    def fly_until(self, boot_us: float) -> None:
-        """With the companion; its last packets are on their way."""
-        while self.vehicle.time_boot_us < boot_us and not self.companion.finished:
-            self.fly()
-
-    def fly(self) -> tuple[bytes, StepResult]:
-        """One interval; what the vehicle said in it, and what the companion made of that."""
-        said = b"".join(self.vehicle.step(self._pending))
-        result = self.companion.step(said, EPOCH_US + self.vehicle.time_boot_us)
-        self._pending = b"".join(result.sent_frames)
-        return said, result
-
-    def fall(self, most_s: float) -> None:
-        """Without the companion, until the vehicle is on the ground."""
-        until_us = self.vehicle.time_boot_us + most_s * 1e6
-        while self.vehicle.time_boot_us < until_us and not self.is_down:
-            self.vehicle.step(self._pending)
-            self._pending = b""
-
-    @property
-    def is_down(self) -> bool:
-        return float(self.vehicle.truth.series()["position_ned_m"][-1, 2]) > -self.standing_m - STANDS_M

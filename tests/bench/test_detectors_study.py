@@ -11,10 +11,9 @@ from bench.fly import cruise
 from bench.fly.campaign import Campaign, Results
 from bench.fly.wire import ASKED_HZ
 from bench.main import main
-from bench.rows.tables import MET, MISSED, REPORTED, Bar, per_cent, summary_text
+from bench.rows.tables import MET, MISSED, REPORTED
 from bench.studies import detectors
-from bench.studies.detector_tables import all_bars
-from bench.studies.detectors import rows
+from bench.studies.detectors import all_bars, rows
 
 pytestmark = pytest.mark.slow
 
@@ -81,15 +80,6 @@ def test_each_figure_has_its_bar(changes, word):
 
 def test_one_quiet_hour_proves_nothing():
     assert {bar.verdict for bar in bars(hours=1.0) if "in simulated flights" in bar.what} == {REPORTED}
-
-
-def test_a_hundred_per_cent_is_said_only_of_all():
-    assert (per_cent(1.0), per_cent(0.9999), per_cent(0.995, 2)) == ("100.0", "99.9", "99.50")
-
-
-def test_missed_bars_are_named_on_the_terminal():
-    text = summary_text([Bar("a", "1", "2", False, "3 hits"), Bar("b", "", "", None), Bar("c", "", "", True)])
-    assert text == "1 of 2 bars are met.\n  missed: a: wanted 1, measured 2 (3 hits)"
 
 
 def test_the_command_writes_tables_and_rows(tmp_path, monkeypatch, capsys):
