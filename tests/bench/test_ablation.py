@@ -34,13 +34,6 @@ def test_where_a_rule_changes_nothing_there_is_no_copy():
     assert copies.found == {}
 
 
-def test_afterwards_the_companion_is_as_it_was():
-    before = halfspace.plus, attitude_law.plus
-    with switched([RULE]):
-        assert halfspace.plus is not before[0] and attitude_law.plus is not before[1]
-    assert (halfspace.plus, attitude_law.plus) == before
-
-
 def test_a_copy_that_fails_is_told():
     def failing():
         raise ValueError

@@ -8,7 +8,7 @@ import pytest
 
 from bench.detectors.config import BaselineConfig
 from bench.detectors.contact import Threshold
-from bench.detectors.lateral import LateralDetector
+from bench.detectors.force import LateralDetector
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.reflex.detector import Phase, Situation
 from companion.reflex.halfspace import plus

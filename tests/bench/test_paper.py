@@ -11,7 +11,7 @@ from bench.cases.walls import approach
 from bench.detectors.config import BaselineMission
 from bench.fly.cruise import head_on
 from bench.rows.paper import StudyFlight, ends_the_one_before, fly, share_received
-from bench.studies.paper import command, scenarios, single, walls
+from bench.studies.paper import command, scenarios, single
 from bench.studies.paper.claims import CLAIMS, FAILED, PASSED, claim
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
@@ -111,15 +111,6 @@ def test_every_study_states_the_papers_detector_law_and_gain(study):
         assert flight.mission["recovery"] == {"law": "paper", "gamma": 0.5}
 
 
-def test_the_wall_stands_square_to_the_flight_before_braking_begins():
-    mission = BaselineMission.model_validate(approach(4.0, heading_deg=120.0))
-    go_to, wall = mission.items[1].go_to, mission.sim["walls"][0]
-    towards = np.array(go_to.position_ned_m[:2]) / np.hypot(*go_to.position_ned_m[:2])
-    assert wall["normal_ned"][:2] == pytest.approx(-towards)
-    wall_m, target_m = np.hypot(*wall["point_ned_m"][:2]), np.hypot(*go_to.position_ned_m[:2])
-    assert target_m - wall_m > 4.0**2 / (2 * go_to.acceleration_m_s2)
-
-
 @pytest.fixture(scope="module")
 def sample():
     """The row of the sample scenario."""
@@ -143,23 +134,6 @@ def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
         moved = sample | {"setpoint_m": [x - wrong_m, *beside]}
         rows = scenarios.SAMPLE.conclude(pd.DataFrame([moved])).rows
         assert [row["claim"] for row in rows if row["verdict"] == FAILED] == ["setpoint by eq. 3, back from x(t_c)"]
-
-
-def like(sample, study, **changes):
-    """The sample's row under the names of a study's flights: for what is written, not for what is flown."""
-    flights = [
-        {**sample, **flight.names, "airframe": flight.airframe, "seed": flight.seed, **changes}
-        for flight in study.flights(1)
-    ]
-    return pd.DataFrame(flights)
-
-
-def test_a_vehicle_that_hits_again_or_overshoots_makes_the_directions_red(sample):
-    assert verdicts(walls.ANY_SIDE, like(sample, walls.ANY_SIDE, past_m=0.02)) == {PASSED}
-    bad = like(sample, walls.ANY_SIDE, past_m=0.2, again=1, second_hits=1)
-    for name in ("gaps_s", "later_folds_m", "later_peaks_n"):
-        bad[name] = [[0.1]] * len(bad)
-    assert verdicts(walls.ANY_SIDE, bad) == {FAILED}
 
 
 def test_a_guard_that_swings_in_while_the_arms_unfold_ends_the_same_collision():
