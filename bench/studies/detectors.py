@@ -65,30 +65,24 @@ def run_detectors(options: Namespace) -> int:
 
 def rows(campaign: Campaign, results: Results) -> pd.DataFrame:
     """One for each case, rate and detector: the case's own numbers, the truth's, and what the detector reported."""
-    found = []
-    for at, result in results.results.items():
-        case = {name: value for name, value in asdict(campaign.cases[at]).items() if name != "detectors"}
-        truth = {f"true_{name}": value for name, value in result.items() if name != "rates"}
-        for rate, heard in result["rates"].items():
-            for detector, entry in heard["detectors"].items():
-                told = {"possible_ms": heard.get("possible_ms"), **entry}
-                found.append({"case": at, **case, **truth, "rate": int(rate), "detector": detector, **told})
-    frame = pd.DataFrame(found)
+    cases = {at: {"case": at, **asdict(campaign.cases[at])} for at in results.results}
+    found = [{**cases[at], **row} for at, one in results.results.items() for row in one["rows"]]
+    frame = pd.DataFrame(found).drop(columns="detectors")
     # A detector that finds nothing tells nothing of it.
     return frame.reindex(columns=[*frame.columns, *(name for name in OF_FOUND if name not in frame.columns)])
 
 
 def campaigns_of(hits: int, hours: float, first_seed: int, vehicles: str) -> list[Campaign]:
     """Hits, hands and healthy flights by the named vehicles, or each by one of its own."""
-
-    def campaign(name: str, size: dict[str, float], cases: Sequence[Any], work_out: Callable[[Any], Json]) -> Campaign:
-        drawn = [replace(case, is_drawn=vehicles == "drawn") for case in cases]
-        return Campaign(name, {**size, "first_seed": first_seed, "vehicles": vehicles}, drawn, work_out)
-
+    flown: dict[str, tuple[dict[str, float], Sequence[Any], Callable[[Any], Json]]] = {
+        "hits": ({"hits": hits}, hit_cases(hits, first_seed), work_out_hit),
+        "hands": ({"hits": hits}, hand_cases(hits, first_seed), work_out_hand),
+        "flights": ({"hours": hours}, flight_cases(hours, first_seed), work_out_flight),
+    }
+    named = {"first_seed": first_seed, "vehicles": vehicles}
     return [
-        campaign("hits", {"hits": hits}, hit_cases(hits, first_seed), work_out_hit),
-        campaign("hands", {"hits": hits}, hand_cases(hits, first_seed), work_out_hand),
-        campaign("flights", {"hours": hours}, flight_cases(hours, first_seed), work_out_flight),
+        Campaign(name, {**size, **named}, [replace(case, is_drawn=vehicles == "drawn") for case in cases], work_out)
+        for name, (size, cases, work_out) in flown.items()
     ]
 
 

@@ -154,13 +154,11 @@ def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
 def test_the_default_detector_finds_them_and_lets_hands_be():
     # Given a hit over a bad link, an obstacle that comes, and a hand
     for settings in ({"link": JITTERY}, {"is_struck": True}):
-        scored = work_out_hit(draw_case("any", 1, ("fused",), **settings))
         # Then the hits are found at every rate, with no alarm before, and the hand is no collision
-        for at_rate in scored["rates"].values():
-            assert "latency_ms" in at_rate["detectors"]["fused"] and at_rate["detectors"]["fused"]["false"] == 0
-    for at_rate in work_out_hand(draw_hand(6, ("fused",)))["rates"].values():
-        entry = at_rate["detectors"]["fused"]
-        assert entry["collisions"] == [] and entry["told_after_ms"] is not None
+        for row in work_out_hit(draw_case("any", 1, ("fused",), **settings))["rows"]:
+            assert "latency_ms" in row and row["false"] == 0
+    for row in work_out_hand(draw_hand(6, ("fused",)))["rows"]:
+        assert row["collisions"] == [] and row["told_after_ms"] is not None
 
 
 # --- healthy flights
