@@ -12,7 +12,7 @@ import numpy as np
 from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
-from bench.fly.lockstep import JudgedFlight, fly_in
+from bench.fly.lockstep import JudgedFlight, fly
 from bench.rows.contacts import JudgedContact, Role, contacts_of
 from bench.rows.heard import angle_deg
 from bench.rows.judge import failures
@@ -66,7 +66,7 @@ def work_out(case: tuple[MissionCase, tuple[str, ...]]) -> Json:
     with tempfile.TemporaryDirectory() as folder, switched(rules) as copies:
         flight: JudgedFlight | None = None
         try:
-            flight = fly_in(Path(folder), *flyable(mission, drawn))
+            flight = fly(*flyable(mission, drawn), Path(folder))
         finally:
             copies.leave(lambda: {"failure": "the companion failed"} if flight is None else verdict(flight))
         return {"with": verdict(flight), "without": copies.found}
