@@ -4,10 +4,10 @@ import ast
 
 import pytest
 
-from bench.reference import events
+from bench.reference import program
 from bench.reference.command import FOLDER, PAGES, page_text
 from bench.reference.markdown import MEANINGS
-from bench.reference.states import mermaid_diagram, transitions
+from bench.reference.program import mermaid_diagram, transitions
 from companion.flight import states as flight_states
 from companion.guard import states as guard_states
 from rebound_cli import exit_codes
@@ -22,11 +22,11 @@ def test_a_page_is_as_the_code_has_it(name):
 
 
 def test_every_kind_of_event_has_its_meaning():
-    assert set(events.data_keys()) | events.ELSEWHERE == set(MEANINGS["events"])
+    assert set(program.data_keys()) | program.ELSEWHERE == set(MEANINGS["events"])
 
 
 def test_an_event_that_is_told_under_a_name_is_found():
-    call = next(events._calls(ast.parse('flight.report(now_us, "hold", text, hold_s=3)')))
+    call = next(program._calls(ast.parse('flight.report(now_us, "hold", text, hold_s=3)')))
     assert call.args[1].value == "hold"
 
 

@@ -253,6 +253,18 @@ def test_a_guard_that_swings_in_while_the_vehicle_leaves_is_counted_apart_and_en
     assert (figures["again"], figures["returned"]) == (1, 1)
 
 
+def test_a_bounce_before_anybody_told_of_the_hit_belongs_to_it():
+    judged = flight(hits=[hit(speed_m_s=0.6), hit(at_s=10.1, speed_m_s=0.6), hit(at_s=10.6, speed_m_s=0.6)])
+    assert [contact.role for contact in contacts_of(judged)] == [Role.HIT, Role.AGAIN, Role.HIT]
+
+
+@pytest.mark.parametrize(("at_s", "returned"), [(10.08, 0), (10.2, 1)])
+def test_what_slides_on_to_its_next_guard_has_come_back_only_where_it_could_have_been_turned(at_s, returned):
+    inwards = path((0, 0, 0, 0), (10, 1.8, 0, 2), (at_s, 1.96, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(inwards, at_s))
+    assert (figures["again"], figures["returned"]) == (1, returned)
+
+
 def _touched_again(series, at_s=10.08):
     judged = bounced(series=series, hits=[hit(), hit(at_s=at_s, place=(1.96, 0.0, -2.08))])
     return judged, contacts_of(judged)
