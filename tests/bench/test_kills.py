@@ -4,9 +4,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import pandas as pd
 import pytest
 
-from bench.studies.kills import KILLED_S, SPEEDS_M_S, _killed, cases, work_out
+from bench.studies.kills import KILLED_S, SPEEDS_M_S, _killed, cases, kills_table, work_out
 from tests.bench.random_missions.made_up import hit
 
 
@@ -53,3 +54,11 @@ def test_a_second_contact_is_the_hardest_after_the_kill_the_touch_itself_apart(k
     flight: Any = SimpleNamespace(vehicle=vehicle, step_alone=lambda: b"")
     kill = _killed(flight, touch)
     assert kill["again_m_s"] == pytest.approx(again_m_s) and kill["ground_m_s"] == pytest.approx(0.5)
+
+
+def test_the_table_counts_the_hard_contacts_by_the_instant_of_the_kill():
+    # Given two kills in one bin, one of which ended in a second contact, and one before the touch
+    kills = pd.DataFrame({"kill_s": [0.61, 0.69, -0.05], "again_m_s": [0.9, 0.2, 1.5], "ground_m_s": [0.7, 1.1, None]})
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in kills_table(kills).splitlines()]
+    assert ["600 to 700 ms", "2", "1 (50.0 %)", "0.90", "0.90", "1.10"] in rows
+    assert ["**before the touch**", "1", "1 (100.0 %)", "1.50", "–", "–"] in rows

@@ -12,7 +12,7 @@ from bench.detectors.config import BaselineMission
 from bench.fly.cruise import head_on
 from bench.rows.paper import StudyFlight, ends_the_one_before, fly, share_received
 from bench.studies.paper import command, scenarios, single
-from bench.studies.paper.claims import CLAIMS, FAILED, PASSED, claim
+from bench.studies.paper.study import CLAIMS, FAILED, PASSED, claim
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
 
