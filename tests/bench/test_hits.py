@@ -155,6 +155,7 @@ def test_the_bound_is_clopper_and_pearsons_and_hits_by_one_vehicle_count_as_fewe
     together = [(4, 4), (0, 4), (0, 4), (0, 4)] * 25
     assert at_most_of_groups(together) == pytest.approx(at_most(25, 100), abs=3e-3)
     assert at_most_of_groups([(0, 50)] * 300) == at_most(0, 300)
+    assert at_most_of_groups([]) == at_most_of_groups([(3, 3)]) == 1.0
 
 
 def test_a_page_counts_misses_by_cell_and_names_them():

@@ -77,6 +77,12 @@ def test_one_hit_in_fifty_that_overshoots_or_touches_again_is_too_many(changes):
     assert verdicts(bars_of(made_up(count=100, **changes)), "overshoot")[0] == MET
 
 
+@pytest.mark.parametrize(("changes", "word"), [({"lost_m": 0.11}, "height lost"), ({"risen_m": 0.06}, "height gained")])
+def test_one_hit_beyond_a_limit_on_height_is_enough_if_it_was_on_something_upright(changes, word):
+    assert verdicts(bars_of(made_up(**changes)), word) == [MISSED, MISSED]
+    assert verdicts(bars_of(made_up(**changes, steepness=0.8)), word) == [MET, MET]
+
+
 def test_every_failure_is_listed_with_seed_cause_and_the_command_to_see_it_again():
     flights, hits = frames(made_up(failing=[17]))
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in failures_table(flights).splitlines()]
