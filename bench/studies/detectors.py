@@ -37,8 +37,7 @@ FOUND_BARS |= {("rigid", 246): 1.0, ("rigid", 100): 0.995, ("rigid", 50): 0.97}
 LATE_BAR, HOURS_BAR = 0.01, 10.0
 # v_c is judged as a share of the speed from here on.
 FAST_M_S, SPEED_ERROR_BAR_M_S, SPEED_ERROR_BAR = 2.0, 0.05, 0.03
-HEAD_ON_DEG, HEAD_ON_BAR_DEG, ALL_BAR_DEG, NORMAL_FROM_M_S = 30.0, 10.0, 20.0, 1.0
-NORMAL_BAR = 0.95
+HEAD_ON_DEG, HEAD_ON_BAR_DEG, ALL_BAR_DEG, NORMAL_FROM_M_S, NORMAL_BAR = 30.0, 10.0, 20.0, 1.0, 0.95
 # The family of a hit, in words, and from which speed on the bar speaks of it.
 BESIDE = {
     "link": ("link with jitter, loss and reordering", SLOWEST_M_S),
@@ -173,9 +172,12 @@ def _figures(hits: pd.DataFrame) -> dict[str, object]:
 
 def hands_table(hands: pd.DataFrame) -> str:
     groups = hands.assign(wrong=hands["collisions"].map(bool)).groupby(["grip", "detector", "rate"])
-    figures = groups.agg(
-        hands=("wrong", "size"), taken_for_a_collision=("wrong", "sum"), told=("told_after_ms", "count")
-    )
+    counted = {
+        "hands": ("wrong", "size"),
+        "taken_for_a_collision": ("wrong", "sum"),
+        "told": ("told_after_ms", "count"),
+    }
+    figures = groups.agg(**counted)
     return table(figures.assign(after_ms=groups["told_after_ms"].median().round(1)).reset_index())
 
 
@@ -194,9 +196,7 @@ def alarms_table(flights: pd.DataFrame, *keys: str) -> str:
 
 def all_bars(frames: Mapping[str, pd.DataFrame]) -> list[Bar]:
     """Frames are by campaign."""
-    ours, hands, flights = (
-        frame[frame["detector"] == DEFAULT] for frame in (frames[name] for name in ("hits", "hands", "flights"))
-    )
+    ours, hands, flights = (frames[name].query("detector == @DEFAULT") for name in ("hits", "hands", "flights"))
     bars: list[Bar] = []
     for (airframe, rate), hits in ours.groupby(list(USUAL)):
         where, least = f"{airframe}, {rate} Hz", FOUND_BARS[airframe, rate]
@@ -207,9 +207,8 @@ def all_bars(frames: Mapping[str, pd.DataFrame]) -> list[Bar]:
             beside = hits[(hits["family"] == family) & (hits["speed_m_s"] >= from_m_s)]
             bars.append(share_bar(f"{where}, {what}: detected", beside["latency_ms"].notna(), least))
     for (rate, grip), held in hands.groupby(["rate", "grip"]):
-        bars.append(
-            share_bar(f"{rate} Hz, {grip} by a hand in hover: no collision", ~held["collisions"].map(bool), 1.0)
-        )
+        what = f"{rate} Hz, {grip} by a hand in hover: no collision"
+        bars.append(share_bar(what, ~held["collisions"].map(bool), 1.0))
     return bars + [_alarm_bar(rate, flown) for rate, flown in flights.groupby("rate")]
 
 
