@@ -119,6 +119,7 @@ def test_the_horizontal_threshold_looks_sideways_alone():
 
     assert fly("fuzzy", lifted) == []
     assert fly("fuzzy", wall(9.6)) == [] and len(fly("fuzzy", wall(10.0))) == 1
+    assert len(fly("fuzzy", lambda t: (0.0, -10.0, 0.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0))) == 1
 
 
 # --- `lateral`

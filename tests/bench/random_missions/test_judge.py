@@ -234,10 +234,12 @@ def test_a_goal_called_out_of_reach_is_one_behind_something():
 def test_contacts_in_a_recovery_are_the_same_surface_again_or_another():
     again, other = hit(at_s=10.5), hit(at_s=11.0, obstacle="pole", normal=(1.0, 0.0, 0.0))
     landing = hit(at_s=15.0, obstacle="step", normal=(0.0, 0.0, -1.0))
-    judged = bounced(hits=[hit(), again, other, landing])
-    assert [contact.role for contact in contacts_of(judged)] == [Role.HIT, Role.AGAIN, Role.NEXT, Role.LANDING]
+    face = hit(at_s=10.8, normal=(0.0, 1.0, 0.0))
+    judged = bounced(hits=[hit(), again, face, other, landing])
+    roles = [Role.HIT, Role.AGAIN, Role.NEXT, Role.NEXT, Role.LANDING]
+    assert [contact.role for contact in contacts_of(judged)] == roles
     (figures,) = recoveries(judged, contacts_of(judged))
-    assert (figures["again"], figures["others"]) == (1, 1)
+    assert (figures["again"], figures["others"]) == (1, 2)
 
 
 def test_a_guard_that_swings_in_while_the_vehicle_leaves_is_counted_apart_and_ends_no_recovery():
