@@ -54,11 +54,6 @@ class Case:
     kills_s: tuple[float, ...]
 
 
-def kills_campaign(kills: int, first_seed: int) -> Campaign:
-    parameters = {"kills": kills, "first_seed": first_seed}
-    return Campaign("kills", parameters, cases(kills, first_seed), work_out)
-
-
 def cases(kills: int, first_seed: int) -> list[Case]:
     """Airframes and IMU rates in turn; all else as the seed draws it."""
     found: list[Case] = []
@@ -131,7 +126,8 @@ def _hardest(hits: Sequence[Hit]) -> float:
 
 def run_kills(options: Namespace) -> int:
     """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
-    page, campaign = Page(options.out, "kills"), kills_campaign(options.kills, options.first_seed)
+    page, parameters = Page(options.out, "kills"), {"kills": options.kills, "first_seed": options.first_seed}
+    campaign = Campaign("kills", parameters, cases(**parameters), work_out)
     results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
     flights = list(results.results.values())
     kills = pd.json_normalize(flights, "kills", ["touch_m_s"])
