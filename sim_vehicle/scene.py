@@ -95,8 +95,9 @@ def check_wind_can_be_held(scene: Scene, airframe: Airframe) -> None:
     weight_n = airframe.weight_n + airframe.drag_n_s_m * scene.wind_ned_m_s[2]
     leans_n = weight_n * math.tan(airframe.control.tilt_max_rad)
     lifts_n = math.sqrt(max(0.0, (ARMS * airframe.motors.max_thrust_n) ** 2 - weight_n**2))
-    if push_n > min(leans_n, lifts_n):
+    most_n = min(leans_n, lifts_n)
+    if push_n > most_n:
         raise SceneError(
-            f"wind_ned_m_s pushes with {push_n:.1f} N, and {airframe.name} holds against {min(leans_n, lifts_n):.1f} N; "
+            f"wind_ned_m_s pushes with {push_n:.1f} N, and {airframe.name} holds against {most_n:.1f} N; "
             "choose less wind, or an airframe with less drag"
         )

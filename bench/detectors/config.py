@@ -4,11 +4,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from bench.detectors.contact import Threshold
-from bench.detectors.fuzzy import FuzzyDetector
+from bench.detectors.force import FuzzyDetector, LateralDetector, ThresholdDetector
 from bench.detectors.hybrid import HybridDetector
-from bench.detectors.lateral import LateralDetector
 from bench.detectors.momentum import MomentumDetector
-from bench.detectors.threshold import ThresholdDetector
 from bench.detectors.tracking import TrackingDetector
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission

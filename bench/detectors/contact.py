@@ -1,10 +1,22 @@
 """What every baseline has: a loudness, a threshold, and one impact for one contact."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from companion.messages import MessageId, Vector3
-from companion.reflex.detector import DetectorState, Impact, Phase
+from companion.messages import (
+    Attitude,
+    AttitudeTarget,
+    ImuSample,
+    LocalPosition,
+    MessageId,
+    Quaternion,
+    Sample,
+    Vector3,
+)
+from companion.motion.strapdown import LEVEL
+from companion.reflex.detector import DetectorState, Impact, Phase, Situation
+from companion.reflex.thrust import ThrustGain
 from companion.strict_model import Positive, StrictModel
 
 # A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
@@ -17,11 +29,20 @@ class Threshold(StrictModel):
     threshold_m_s2: Positive
 
 
+@dataclass(slots=True)
+class BaselineState(DetectorState):
+    """Adds what the vehicle said last of its attitude and its thrust; changed in place."""
+
+    attitude_wxyz: Quaternion = LEVEL
+    thrust: ThrustGain = field(default_factory=ThrustGain)
+
+
 class Baseline:
-    """Built from its settings, as the drone's own detector is."""
+    """Built from its settings, as the drone's own detector is. Each looks at samples of one kind."""
 
     losses: ClassVar[Mapping[MessageId, str]] = {}
-    state: ClassVar[type[DetectorState]]
+    state: ClassVar[type[BaselineState]] = BaselineState
+    looks_at: ClassVar[type[ImuSample | LocalPosition]] = ImuSample
 
     def __init__(self, config: Threshold | None, averaging_interval_us: int) -> None:
         self._least_m_s2 = 0.0 if config is None else config.threshold_m_s2
@@ -29,6 +50,23 @@ class Baseline:
 
     def initial(self) -> Any:
         return self.state(threshold_m_s2=self._least_m_s2)
+
+    def step(self, state: Any, sample: Sample, situation: Situation) -> tuple[Any, Impact | None]:
+        if isinstance(sample, Attitude):
+            state.attitude_wxyz = sample.attitude_wxyz
+        elif isinstance(sample, AttitudeTarget):
+            state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
+        elif isinstance(sample, self.looks_at):
+            return state, self.look(state, sample, situation)
+        return state, None
+
+    def look(self, s: Any, sample: Any, situation: Situation) -> Impact | None:
+        """What one of its samples shows."""
+        raise NotImplementedError
+
+    def free_until_us(self, s: DetectorState, now_us: int) -> int:
+        """Before the sample's averaging window, or the gap before it."""
+        return min(now_us - self._averaging_us, s.last_sample_boot_us)
 
 
 def judge(

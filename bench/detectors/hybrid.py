@@ -21,14 +21,13 @@ left out above, are this project's.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
-from bench.detectors.contact import Baseline, judge
-from companion.messages import AttitudeTarget, ImuSample, MessageId, Sample, Vector3
+from bench.detectors.contact import Baseline, BaselineState, judge
+from companion.messages import ImuSample, MessageId, Vector3
 from companion.motion.strapdown import ZERO
-from companion.reflex.detector import DetectorState, Impact, Situation
-from companion.reflex.thrust import ThrustGain
+from companion.reflex.detector import Impact, Situation
 
 # A contact's first sample shows 70 % of itself at 250 Hz, all of it at 50 Hz.
 FORCE_GAIN_PER_S = 300.0
@@ -39,10 +38,9 @@ TORQUE_THRESHOLD_RAD_S2, TORQUE_GAIN_PER_S = 400.0, 100.0
 
 
 @dataclass(slots=True)
-class HybridState(DetectorState):
+class HybridState(BaselineState):
     """Adds the observers; body FRD, changed in place."""
 
-    thrust: ThrustGain = field(default_factory=ThrustGain)
     force_m_s2: Vector3 = ZERO
     wind_m_s2: Vector3 = ZERO
     rates_rad_s: Vector3 | None = None
@@ -57,19 +55,14 @@ class HybridDetector(Baseline):
         MessageId.ATTITUDE_TARGET: "the z axis is not watched, so pushes from above and below are not seen"
     }
 
-    def step(self, state: HybridState, sample: Sample, situation: Situation) -> tuple[HybridState, Impact | None]:
-        if isinstance(sample, AttitudeTarget):
-            state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-        if not isinstance(sample, ImuSample):
-            return state, None
-        now_us, before_us = sample.time_boot_us, state.last_sample_boot_us
-        dt_s = min(max(now_us - before_us, 1), 50_000) * 1e-6
-        push = self._force(state, sample, dt_s)
-        turning = self._torque(state, sample.angular_velocity_frd_rad_s, dt_s)
+    def look(self, s: HybridState, sample: ImuSample, situation: Situation) -> Impact | None:
+        now_us, free_until_us = sample.time_boot_us, self.free_until_us(s, sample.time_boot_us)
+        dt_s = min(max(now_us - s.last_sample_boot_us, 1), 50_000) * 1e-6
+        push = self._force(s, sample, dt_s)
+        turning = self._torque(s, sample.angular_velocity_frd_rad_s, dt_s)
         size = math.sqrt(push[0] ** 2 + push[1] ** 2 + push[2] ** 2)
-        is_loud = size >= state.threshold_m_s2 or turning >= TORQUE_THRESHOLD_RAD_S2
-        free_until_us = min(now_us - self._averaging_us, before_us)
-        return state, judge(state, now_us, free_until_us, push, size, is_loud, situation.off_reason)
+        is_loud = size >= s.threshold_m_s2 or turning >= TORQUE_THRESHOLD_RAD_S2
+        return judge(s, now_us, free_until_us, push, size, is_loud, situation.off_reason)
 
     def _force(self, s: HybridState, sample: ImuSample, dt_s: float) -> Vector3:
         """The observer's step; the force beyond wind, m/s^2."""

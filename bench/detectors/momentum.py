@@ -18,25 +18,15 @@ is of a higher order than one was not checked. Gain, threshold, running mean and
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
-from bench.detectors.contact import Baseline, judge
-from companion.messages import (
-    Attitude,
-    AttitudeTarget,
-    ImuSample,
-    LocalPosition,
-    MessageId,
-    Quaternion,
-    Sample,
-    Vector3,
-)
+from bench.detectors.contact import Baseline, BaselineState, judge
+from companion.messages import ImuSample, LocalPosition, MessageId, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import LEVEL, ZERO
-from companion.reflex.detector import DetectorState, Impact, Situation
-from companion.reflex.thrust import ThrustGain
+from companion.motion.strapdown import ZERO
+from companion.reflex.detector import Impact, Situation
 
 # Drag changes within a second; the model's error in seconds.
 MEAN_MEMORY_S = 1.0
@@ -47,11 +37,9 @@ GAIN_PER_S = 20.0
 
 
 @dataclass(slots=True)
-class MomentumState(DetectorState):
+class MomentumState(BaselineState):
     """Adds the observer. NED per unit mass; changed in place."""
 
-    thrust: ThrustGain = field(default_factory=ThrustGain)
-    attitude_wxyz: Quaternion = LEVEL
     velocity_boot_us: int | None = None
     integral_m_s: Vector3 = ZERO
     residual_m_s2: Vector3 = ZERO
@@ -61,28 +49,19 @@ class MomentumState(DetectorState):
 class MomentumDetector(Baseline):
     """See the module's text."""
 
-    name, state = "momentum", MomentumState
+    name, state, looks_at = "momentum", MomentumState, LocalPosition
     losses: ClassVar[Mapping[MessageId, str]] = {
         MessageId.ATTITUDE_TARGET: "thrust is taken for the accelerometer's mean, so that manoeuvres look like pushes"
     }
 
     def step(self, state: MomentumState, sample: Sample, situation: Situation) -> tuple[MomentumState, Impact | None]:
-        match sample:
-            case ImuSample():
-                elapsed_s = min(max(sample.time_boot_us - state.last_sample_boot_us, 0), 50_000) * 1e-6
-                state.last_sample_boot_us = sample.time_boot_us
-                state.thrust.learn(sample.time_boot_us, -sample.specific_force_frd_m_s2[2], elapsed_s)
-            case Attitude():
-                state.attitude_wxyz = sample.attitude_wxyz
-            case AttitudeTarget():
-                state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-            case LocalPosition():
-                return state, self._observe(state, sample, situation)
-            case _:
-                pass
-        return state, None
+        if isinstance(sample, ImuSample):
+            elapsed_s = min(max(sample.time_boot_us - state.last_sample_boot_us, 0), 50_000) * 1e-6
+            state.last_sample_boot_us = sample.time_boot_us
+            state.thrust.learn(sample.time_boot_us, -sample.specific_force_frd_m_s2[2], elapsed_s)
+        return super().step(state, sample, situation)
 
-    def _observe(self, s: MomentumState, sample: LocalPosition, situation: Situation) -> Impact | None:
+    def look(self, s: MomentumState, sample: LocalPosition, situation: Situation) -> Impact | None:
         """One step of the observer with one velocity."""
         now_us, v, before_us = sample.time_boot_us, sample.velocity_ned_m_s, s.velocity_boot_us
         s.velocity_boot_us = now_us

@@ -17,11 +17,11 @@ and its bound, were not checked. The error of the place, the running mean and th
 import math
 from dataclasses import dataclass
 
-from bench.detectors.contact import Baseline, judge
-from companion.messages import Attitude, LocalPosition, Quaternion, Sample
+from bench.detectors.contact import Baseline, BaselineState, judge
+from companion.messages import LocalPosition
 from companion.motion.rotation import ned_to_body
-from companion.motion.strapdown import LEVEL
-from companion.reflex.detector import DetectorState, Impact, Situation
+from companion.motion.strapdown import ZERO
+from companion.reflex.detector import Impact, Situation
 
 # The lag follows the speed within a second; velocities before that belong to another part of the path.
 MEAN_MEMORY_S = 1.0
@@ -32,10 +32,9 @@ BOUND_M = 0.3
 
 
 @dataclass(slots=True)
-class TrackingState(DetectorState):
+class TrackingState(BaselineState):
     """Adds the path's error; changed in place. `threshold_m_s2` stays 0: no force is looked at."""
 
-    attitude_wxyz: Quaternion = LEVEL
     setpoint_ned_m: tuple[float, float, float] | None = None
     position_boot_us: int = 0
     mean_m: float = 0.0
@@ -44,16 +43,12 @@ class TrackingState(DetectorState):
 class TrackingDetector(Baseline):
     """See the module's text."""
 
-    name, state = "tracking", TrackingState
+    name, state, looks_at = "tracking", TrackingState, LocalPosition
 
-    def step(self, state: TrackingState, sample: Sample, situation: Situation) -> tuple[TrackingState, Impact | None]:
-        if isinstance(sample, Attitude):
-            state.attitude_wxyz = sample.attitude_wxyz
-        if not isinstance(sample, LocalPosition):
-            return state, None
+    def look(self, state: TrackingState, sample: LocalPosition, situation: Situation) -> Impact | None:
         asked, now_us = situation.setpoint_position_ned_m, sample.time_boot_us
         if asked is None:
-            return state, judge(state, now_us, now_us, (0.0, 0.0, 0.0), 0.0, False, "no setpoint")
+            return judge(state, now_us, now_us, ZERO, 0.0, False, "no setpoint")
         last, state.setpoint_ned_m = state.setpoint_ned_m, asked
         p = sample.position_ned_m
         behind = (p[0] - asked[0], p[1] - asked[1], p[2] - asked[2])
@@ -68,4 +63,4 @@ class TrackingDetector(Baseline):
         # Thrown back from the setpoint with what it takes to be left behind this far in the time of the mean.
         force = ned_to_body(state.attitude_wxyz, behind)
         free_until_us = before_us - round(1e6 * MEAN_MEMORY_S)
-        return state, judge(state, now_us, free_until_us, force, 0.0, is_loud, situation.off_reason)
+        return judge(state, now_us, free_until_us, force, 0.0, is_loud, situation.off_reason)

@@ -20,13 +20,10 @@ from bench.cases.hits import (
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.cruise import FOLLOWED_S, PATIENCE_S
 from bench.fly.moments import Moment
+from bench.fly.stepped import Stepped
 from bench.fly.wire import FOUND_WITHIN_US
-from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
-from rebound_cli.simulation.lockstep import EPOCH_US
-from sim_vehicle.mavlink.link import Link
-from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -56,8 +53,6 @@ HITS_AN_APPROACH = MOMENTS * HITS_A_MOMENT
 # From a moment to the touch, at least: over a whole period of that stream. A guard that points elsewhere touches
 # later, that of a slow vehicle by a tenth of a second.
 LEAD_S, LED_PATIENCE_S = (0.01, 0.03), 0.5
-# By then the companion has decided whether what it told of was a hit (`confirmation.DECIDED_US`).
-DECIDED_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,20 +84,15 @@ class FlyingVehicle(SimulatedVehicle):
             self.truth.add_hit(self.state.hit, self._plant.world)
 
 
-@dataclass(slots=True)
-class Flight:
+class Flight(Stepped):
     """A vehicle in flight, and the guard that meets it over the wire."""
 
     vehicle: FlyingVehicle
-    link: Link
-    guard: Guard
 
-    def step(self) -> StepResult:
-        """One interval, all bytes both ways."""
-        self.vehicle.advance()
-        result = self.guard.step(b"".join(self.link.take()), EPOCH_US + self.vehicle.time_boot_us)
-        self.link.push(b"".join(result.sent_frames))
-        return result
+    def __init__(self, vehicle: FlyingVehicle, guard: Guard) -> None:
+        super().__init__(vehicle, guard)
+        self.guard = guard
+        self.links[0].introduce()
 
 
 def velocity_of(hit: HitCase, rng: np.random.Generator) -> Floats:
@@ -116,11 +106,8 @@ def begun(case: FlownHit, scene: Scene, keeps_path: bool) -> Flight:
     built, velocity = vehicle_of_hit(case.hit), velocity_of(case.hit, np.random.default_rng([case.hit.seed, 1]))
     vehicle = FlyingVehicle(built.airframe, scene, case.hit.seed, keeps_path)
     vehicle.begin_in_flight((0.0, 0.0, -HEIGHT_M), (float(velocity[0]), float(velocity[1]), 0.0))
-    link = vehicle.add_link(LinkKind.ONBOARD)
-    link.introduce()
     streams = {"highres_imu_hz": float(case.imu_hz), "window_s": WINDOW_S}
-    guard = Guard(GuardConfig.model_validate({"companion": {**built.settings, "streams": streams}}))
-    return Flight(vehicle, link, guard)
+    return Flight(vehicle, Guard(GuardConfig.model_validate({"companion": {**built.settings, "streams": streams}})))
 
 
 def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
@@ -220,7 +207,7 @@ class Approach:
             self.flight.step()
 
     def moment(self) -> Moment:
-        return Moment(self.flight.vehicle, self.flight.link, self.flight.guard)
+        return Moment(self.flight)
 
     def scene(self, met: str, lead_s: float, rng: np.random.Generator) -> Scene:
         """What is to be met after so long."""
@@ -246,16 +233,3 @@ def followed(flight: Flight, patience_s: float) -> Verdict:
     if not truth.hits:
         return Verdict(None, 0.0, told_us)
     return Verdict(truth.hits[0].contact_at_boot_us, truth.hits[0].closing_speed_m_s, told_us)
-
-
-def again(case: FlownHit, scene: Scene) -> tuple[Verdict, bool]:
-    """The same hit by a vehicle that has the obstacle before it from the beginning. Nothing is put there or rewound.
-
-    And whether the guard still counts what it told of when it has decided about it.
-    """
-    flight = begun(case, scene, keeps_path=True)
-    verdict = followed(flight, FREE_S + MOMENTS * APART_S + LED_PATIENCE_S)
-    decided_us = flight.vehicle.time_boot_us + 1e6 * DECIDED_S
-    while verdict.told_us is not None and flight.vehicle.time_boot_us < decided_us:
-        flight.step()
-    return verdict, bool(flight.guard.collisions()) == (verdict.told_us is not None)

@@ -7,20 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.results.flight_log import FlightLog, read_flight_log
-from rebound_cli.results.run_folder import TLOG_NAME, FlightRecorder
+from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
 from rebound_cli.results.truth_match import FlightTruth, Vector3
-from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
-from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle
 
 # The slowest hit into a surface that a detector's bars promise to find.
@@ -59,36 +55,22 @@ class JudgedFlight:
         return min(int(np.searchsorted(times_us, boot_us)), len(times_us) - 1)
 
 
-def flown_in(
-    folder: Path, mission: Mission, scene: Scene, airframe: Airframe
-) -> tuple[Flown, TruthRecorder, Sequence[Event]]:
+def flown_in(folder: Path, mission: Mission, scene: Scene, airframe: Airframe) -> tuple[Flown, Sequence[Event]]:
     """From take-off to the end, log and events left in the folder."""
     recorder = FlightRecorder(folder)
     try:
-        flown, truth = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
+        flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
     finally:
         recorder.close()
-    return flown, truth, tuple(recorder.events)
+    return flown, tuple(recorder.events)
 
 
-def flown_with_log(mission: Mission, scene: Scene, airframe: Airframe) -> tuple[Flown, FlightTruth, FlightLog]:
-    """The same; nothing is kept but what is returned."""
-    with tempfile.TemporaryDirectory() as name:
-        flown, _, _ = flown_in(Path(name), mission, scene, airframe)
-        log = read_flight_log(Path(name) / TLOG_NAME)
-    assert flown.truth is not None, "a lockstep flight has its truth"
-    return flown, flown.truth, log
-
-
-def fly(mission: Mission, scene: Scene, airframe: Airframe) -> JudgedFlight:
-    """The same, for a judge."""
-    with tempfile.TemporaryDirectory() as name:
-        return fly_in(Path(name), mission, scene, airframe)
-
-
-def fly_in(folder: Path, mission: Mission, scene: Scene, airframe: Airframe) -> JudgedFlight:
-    """The same in a folder that stays: a copy of the process that goes on by itself must not remove it."""
-    flown, _, events = flown_in(folder, mission, scene, airframe)
+def fly(mission: Mission, scene: Scene, airframe: Airframe, folder: Path | None = None) -> JudgedFlight:
+    """The same, for a judge. With copies of the process, which must not remove it, the folder is given."""
+    if folder is None:
+        with tempfile.TemporaryDirectory() as name:
+            return fly(mission, scene, airframe, Path(name))
+    flown, events = flown_in(folder, mission, scene, airframe)
     assert flown.truth is not None, "a lockstep flight has its truth"
     return judged_flight(mission, flown.report, events, flown.truth, scene, airframe)
 
@@ -105,37 +87,3 @@ def judged_flight(
     parts = frame.foot_depth_m, frame.motor_radius_m, frame.guard_radius_m
     obstacles = {obstacle.name: obstacle for _, obstacle in scene.obstacles()}
     return JudgedFlight(mission, report, events, truth, scene.start.position_ned_m, *parts, obstacles)
-
-
-class SteppedFlight:
-    """A mission beside the simulated vehicle, interval by interval, without a log."""
-
-    def __init__(self, mission: Mission, scene: Scene, airframe: Airframe) -> None:
-        self.mission = mission
-        self.standing_m = airframe.geometry.foot_depth_m
-        self.companion, self.vehicle = Companion(mission), SimulatedVehicle(airframe, scene, scene.seed)
-        self.companion.confirm_plan()
-        self._pending = b""
-
-    def fly_until(self, boot_us: float) -> None:
-        """With the companion; its last packets are on their way."""
-        while self.vehicle.time_boot_us < boot_us and not self.companion.finished:
-            self.fly()
-
-    def fly(self) -> tuple[bytes, StepResult]:
-        """One interval; what the vehicle said in it, and what the companion made of that."""
-        said = b"".join(self.vehicle.step(self._pending))
-        result = self.companion.step(said, EPOCH_US + self.vehicle.time_boot_us)
-        self._pending = b"".join(result.sent_frames)
-        return said, result
-
-    def fall(self, most_s: float) -> None:
-        """Without the companion, until the vehicle is on the ground."""
-        until_us = self.vehicle.time_boot_us + most_s * 1e6
-        while self.vehicle.time_boot_us < until_us and not self.is_down:
-            self.vehicle.step(self._pending)
-            self._pending = b""
-
-    @property
-    def is_down(self) -> bool:
-        return float(self.vehicle.truth.series()["position_ned_m"][-1, 2]) > -self.standing_m - STANDS_M

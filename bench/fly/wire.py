@@ -176,12 +176,11 @@ def streams_asked_hz(rate: int) -> dict[MessageId, float]:
 
 def watch_all(
     config: CompanionConfig, heard: Sequence[HeardStep], situations: Sequence[Situation]
-) -> tuple[list[Found], list[ImpactEstimate], int]:
-    """Collisions reported, touches that were reported as none, and how often the detector said it was blind."""
+) -> tuple[list[Found], list[ImpactEstimate]]:
+    """Collisions reported, and touches that were reported as none."""
     monitor = start_monitor(config, heard[0].time_boot_us)
     found: list[Found] = []
     touches: list[ImpactEstimate] = []
-    blind = 0
     for step in heard:
         seen = advance(monitor, step.samples, situations[step.index], step.time_boot_us)
         for estimate in seen.impacts:
@@ -193,7 +192,6 @@ def watch_all(
             for entry in found:
                 if entry.first.impact is final.impact:
                     entry.final = final
-        blind += sum("blind" in notice.text for notice in seen.notices)
     if found and monitor.estimator.estimate is not None and monitor.estimator.estimate.impact is found[-1].first.impact:
         found[-1].final = monitor.estimator.estimate
-    return found, touches, blind
+    return found, touches

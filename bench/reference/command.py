@@ -5,11 +5,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from bench.reference.api import api
-from bench.reference.commands import commands
-from bench.reference.events import events, messages
 from bench.reference.markdown import MEANINGS, code, table
 from bench.reference.models import airframe, companion, guard, mission, world
-from bench.reference.states import states
+from bench.reference.program import commands, events, messages, states
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "reference"

@@ -67,71 +67,69 @@ def first_possible(
 
 
 def work_out_hit(case: HitCase) -> Json:
-    """Fly it once, then let every detector hear it at every rate."""
+    """Fly it once, then let every detector hear it at every rate: a row for each."""
     vehicle = vehicle_of_hit(case)
     recording, hit = hit_of(case, vehicle.airframe)
     touch_us = hit.contact_at_boot_us
     floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
-    result: Json = {
-        "speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
-        "off_head_on_deg": angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
-        "clipped": _clipped(recording, hit),
-        "contact_s": hit.contact_duration_s,
-        "rates": {},
+    truth = {
+        "true_speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
+        "true_off_head_on_deg": angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
+        "true_clipped": _clipped(recording, hit),
+        "true_contact_s": hit.contact_duration_s,
     }
+    rows = []
     for rate, arrived in _heard(recording, case.seed, case.link):
         possible = first_possible(recording, arrived, touch_us, floor_m_s2)
-        entries = {}
-        for name, (found, touches, blind) in _watched(case.detectors, vehicle, recording, arrived):
-            told_us = [touch.impact.sample_time_boot_us for touch in touches]
-            entries[name] = _entry(found, hit, possible, blind) | {"touches": sum(t >= touch_us for t in told_us)}
         possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
-        result["rates"][rate] = {"possible_ms": possible_ms, "detectors": entries}
-    return result
+        for name, (found, touches) in _watched(case.detectors, vehicle, recording, arrived):
+            told = sum(touch.impact.sample_time_boot_us >= touch_us for touch in touches)
+            entry = _entry(found, hit, possible) | {"touches": told}
+            rows.append({**truth, "rate": rate, "possible_ms": possible_ms, "detector": name, **entry})
+    return {"rows": rows}
 
 
 def work_out_hand(case: HandCase) -> Json:
-    """Hold it once, then let every detector hear it at every rate."""
+    """Hold it once, then let every detector hear it at every rate: a row for each."""
     vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
     recording, began_us = hover_in_hand(case, vehicle.airframe)
-    rates = {}
+    rows = []
     for rate, arrived in _heard(recording, case.seed):
-        entries = {}
-        for name, (found, touches, _) in _watched(case.detectors, vehicle, recording, arrived):
+        for name, (found, touches) in _watched(case.detectors, vehicle, recording, arrived):
             told_us = [t.impact.sample_time_boot_us for t in touches if t.impact.sample_time_boot_us >= began_us]
             kinds, late_ms = [f.final.impact.kind.value for f in found], [1e-3 * (t - began_us) for t in told_us]
-            entries[name] = {"collisions": kinds, "told_after_ms": late_ms[0] if late_ms else None}
-        rates[rate] = {"detectors": entries}
-    return {"rates": rates}
+            entry = {"collisions": kinds, "told_after_ms": late_ms[0] if late_ms else None}
+            rows.append({"rate": rate, "detector": name, **entry})
+    return {"rows": rows}
 
 
 def work_out_flight(case: FlightCase) -> Json:
-    """Fly it, let every detector hear it at every rate, list what they report."""
+    """Fly it, let every detector hear it at every rate, list what they report: a row for each."""
     vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
     recording, phases = fly_healthy(case, vehicle.airframe)
-    samples, rates = recording.samples, {}
+    samples, rows = recording.samples, []
+    seconds = 1e-6 * (samples[-1].time_boot_us - samples[0].time_boot_us)
     for rate, arrived in _heard(recording, case.seed):
-        phase_at, entries = {step.time_boot_us: phases[step.index] for step in arrived}, {}
-        for name, (found, touches, blind) in _watched(case.detectors, vehicle, recording, arrived):
+        phase_at = {step.time_boot_us: phases[step.index] for step in arrived}
+        for name, (found, touches) in _watched(case.detectors, vehicle, recording, arrived):
             alarms = [
                 [round(1e-6 * f.time_boot_us, 3), phase_at[f.time_boot_us], f.first.impact.kind.value] for f in found
             ]
-            entries[name] = {"alarms": alarms, "touches": len(touches), "blind": blind}
-        rates[rate] = {"detectors": entries}
-    seconds = 1e-6 * (samples[-1].time_boot_us - samples[0].time_boot_us)
-    return {"seconds": seconds, "clipped": sum(samples[-1].clipping_counts), "rates": rates}
+            entry = {"alarms": alarms, "touches": len(touches)}
+            rows.append({"true_seconds": seconds, "rate": rate, "detector": name, **entry})
+    return {"rows": rows}
 
 
-def _heard(recording: VehicleRecording, seed: int, link: str | None = None) -> Iterator[tuple[str, list[HeardStep]]]:
-    """By rate, as a record names it: what comes over the link."""
+def _heard(recording: VehicleRecording, seed: int, link: str | None = None) -> Iterator[tuple[int, list[HeardStep]]]:
+    """By rate: what comes over the link."""
     fault = None if link is None else LINKS[link]
     for rate in ASKED_HZ:
-        yield str(rate), heard(recording, streams_asked_hz(rate), seed + rate, fault)
+        yield rate, heard(recording, streams_asked_hz(rate), seed + rate, fault)
 
 
 def _watched(
     detectors: Sequence[str], vehicle: BenchVehicle, recording: VehicleRecording, arrived: Sequence[HeardStep]
-) -> Iterator[tuple[str, tuple[list[Found], list[ImpactEstimate], int]]]:
+) -> Iterator[tuple[str, tuple[list[Found], list[ImpactEstimate]]]]:
     for name in detectors:
         yield name, watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
 
@@ -140,10 +138,10 @@ def _first_of(found: Sequence[Found], touch_us: float) -> Found | None:
     return next((f for f in found if touch_us <= f.time_boot_us <= touch_us + FOUND_WITHIN_US), None)
 
 
-def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> Json:
+def _entry(found: Sequence[Found], hit: Hit, possible: Possible) -> Json:
     """One detector's report on one hit."""
     touch_us = hit.contact_at_boot_us
-    entry: Json = {"false": sum(f.time_boot_us < touch_us for f in found), "blind": blind}
+    entry: Json = {"false": sum(f.time_boot_us < touch_us for f in found)}
     first = _first_of(found, touch_us)
     if first is None:
         return entry

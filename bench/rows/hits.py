@@ -1,12 +1,11 @@
 """What became of a hit in free flight, by the simulator's truth. SI units."""
 
 from time import process_time
-from typing import Any
 
 import numpy as np
 
 from bench.fly.campaign import Json
-from bench.fly.guarded import FREE_S, MOST_RECOVERY_S, Approach, FlownHit, Verdict, again, fly
+from bench.fly.guarded import FREE_S, MOST_RECOVERY_S, Approach, FlownHit, Verdict, approach_of, fly
 from bench.fly.wire import FOUND_WITHIN_US
 from bench.rows.contacts import tilts_deg
 from bench.rows.recovered import CAME_BACK_M
@@ -18,11 +17,13 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 
 def work_out_flown(case: FlownHit) -> Json:
-    """What became of it by the simulator's truth, and what it cost. SI units."""
+    """Its row by the simulator's truth, where it touched anything, and what it cost."""
     began_s = process_time()
     vehicle, guard, rest_us = fly(case)
-    cost = {"processor_s": round(process_time() - began_s, 4)}
-    return {**judged(vehicle, guard.collisions(), rest_us), "cost": cost}
+    processor_s = round(process_time() - began_s, 4)
+    row = judged(vehicle, guard.collisions(), rest_us)
+    hits = [row] if row.pop("touched") else []
+    return {"watched_s": row["seconds"], "false": row["false"], "processor_s": processor_s, "hits": hits}
 
 
 def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:
@@ -71,26 +72,23 @@ def returns(truth: FlightTruth, normal: np.ndarray, until_s: float) -> int:
 
 
 def work_out_approach(case: FlownHit) -> Json:
-    """Its hits in the order flown, and whether one of them, flown again from the beginning, is the same."""
+    """Its hits in the order flown."""
     began_s = process_time()
     approach = Approach(case)
     flown = list(approach.hits())
     cost_s = process_time() - began_s
     touched = [(number, verdict) for number, (_, verdict) in enumerate(flown) if verdict.touched_us is not None]
-    result: Json = {
+    return {
         "watched_s": round(1e-6 * approach.flight.vehicle.time_boot_us - FREE_S, 3),
         "false": approach.is_false or any(verdict.is_early for _, verdict in flown),
-        "hits": [_entry(number, verdict) for number, verdict in touched if not verdict.is_early],
-        "cost": {"processor_s": round(cost_s, 4)},
+        "hits": [_row(number, verdict) for number, verdict in touched if not verdict.is_early],
+        "processor_s": round(cost_s, 4),
     }
-    if flown:
-        scene, verdict = flown[case.hit.seed % len(flown)]
-        told, result["kept"] = again(case, scene)
-        result["agrees"] = verdict == told
-    return result
 
 
-def _entry(number: int, verdict: Verdict) -> list[Any]:
-    """Its number, which says what was met, the speed into the surface, and after how many ms it was found."""
+def _row(number: int, verdict: Verdict) -> Json:
+    """What was met, the speed into the surface, and after how many ms it was found."""
     late_us = verdict.late_us
-    return [number, round(verdict.closing_m_s, 3), None if late_us is None else round(1e-3 * late_us, 1)]
+    latency_ms = None if late_us is None else round(1e-3 * late_us, 1)
+    told = {"closing_m_s": round(verdict.closing_m_s, 3), "latency_ms": latency_ms, "found": late_us is not None}
+    return {"number": number, "approach": approach_of(number), **told}

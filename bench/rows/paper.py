@@ -1,8 +1,10 @@
 """The row of a flight of the paper: into a wall, by the truth and by what the companion reported. SI units."""
 
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,10 +12,11 @@ import numpy.typing as npt
 
 from bench.detectors.config import BaselineMission
 from bench.fly.campaign import Json
-from bench.fly.lockstep import flown_with_log
+from bench.fly.lockstep import flown_in
 from companion.report import FlightReport
 from rebound_cli.inputs import with_guards
-from rebound_cli.results.flight_log import FlightLog
+from rebound_cli.results.flight_log import FlightLog, read_flight_log
+from rebound_cli.results.run_folder import TLOG_NAME
 from rebound_cli.results.summary import FlightFacts, build_summary
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
 from sim_vehicle.airframe import Airframe, with_base
@@ -57,7 +60,11 @@ def fly(flight: StudyFlight) -> Json:
     airframe = Airframe.model_validate(with_base({"based_on": flight.airframe, "estimate": ESTIMATE, **flight.changes}))
     mission = BaselineMission.model_validate(with_guards(flight.mission, airframe))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
-    flown, truth, log = flown_with_log(mission, scene, airframe)
+    with tempfile.TemporaryDirectory() as folder:
+        flown, _ = flown_in(Path(folder), mission, scene, airframe)
+        log = read_flight_log(Path(folder) / TLOG_NAME)
+    truth = flown.truth
+    assert truth is not None, "a lockstep flight has its truth"
     report, settled_s = flown.report, mission.companion.settled.duration_s
     matches = match_contacts(report.collisions, truth.hits, settled_s)
     row = {

@@ -1,6 +1,5 @@
 """What a study shows of its rows: figures out of many, bars with a verdict, tables, and a page to look at."""
 
-import json
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -118,20 +117,14 @@ def text_of(value: float, digits: int = 1) -> str:
     return "-" if math.isnan(value) else f"{value:.{digits}f}"
 
 
-def write_rows(rows: Sequence[Mapping[str, object]], out: Path) -> None:
-    """As JSON, one a line."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text("".join(f"{json.dumps(row)}\n" for row in rows), encoding="utf-8")
-
-
 class Page:
     """A study's page, its pictures and its rows, in a folder that is made or refused before hours are flown for it."""
 
     def __init__(self, out: Path | None, name: str) -> None:
-        """`out`: the folder, or the page itself. Raises RunFolderError where it cannot be had."""
-        is_file = out is not None and out.suffix == ".md"
-        self.folder = BUILD / name if out is None else out.parent if is_file else out
-        self.path = out if out is not None and is_file else self.folder / f"{name}.md"
+        """`out`: the folder, the page itself or its rows. Raises RunFolderError where it cannot be had."""
+        out = BUILD / name if out is None else out
+        self.path = out.with_suffix(".md") if out.suffix in (".md", ".jsonl") else out / f"{name}.md"
+        self.folder = self.path.parent
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:

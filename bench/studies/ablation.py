@@ -12,7 +12,7 @@ import numpy as np
 from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
-from bench.fly.lockstep import JudgedFlight, fly_in
+from bench.fly.lockstep import JudgedFlight, fly
 from bench.rows.contacts import JudgedContact, Role, contacts_of
 from bench.rows.heard import angle_deg
 from bench.rows.judge import failures
@@ -66,7 +66,7 @@ def work_out(case: tuple[MissionCase, tuple[str, ...]]) -> Json:
     with tempfile.TemporaryDirectory() as folder, switched(rules) as copies:
         flight: JudgedFlight | None = None
         try:
-            flight = fly_in(Path(folder), *flyable(mission, drawn))
+            flight = fly(*flyable(mission, drawn), Path(folder))
         finally:
             copies.leave(lambda: {"failure": "the companion failed"} if flight is None else verdict(flight))
         return {"with": verdict(flight), "without": copies.found}
@@ -78,14 +78,19 @@ def verdict(flight: JudgedFlight) -> Json:
     hits = [contact for contact in contacts if contact.role is Role.HIT]
     found = zip(recoveries(flight, contacts), hits, strict=True)
     return {
-        "failures": [failure.cause for failure in failures(flight)],
+        "ends": not failures(flight),
         "hits": [_of_one(flight, figures, contact) for figures, contact in found],
     }
 
 
 def _of_one(flight: JudgedFlight, figures: Json, contact: JudgedContact) -> Json:
     found = {name: figures.get(name) for name in ("past_m", "lost_m", "risen_m", "returned", "closing_m_s")}
-    found["rest_s"] = _rests_after_s(flight, contact.hit)
+    rest_s = found["rest_s"] = _rests_after_s(flight, contact.hit)
+    found["recovered"] = False
+    # Of a hit that nobody answered there is no setpoint to be past.
+    if rest_s is not None and "past_m" in figures:
+        is_near = figures["past_m"] <= PAST_M and figures["lost_m"] <= LOST_M
+        found["recovered"] = is_near and rest_s <= REST_S and not figures["returned"]
     if contact.collision is not None:
         told, hit = flight.report.collisions[contact.collision], contact.hit
         found["normal_deg"] = round(angle_deg(told.normal_ned, hit.normal_ned), 1)
@@ -111,26 +116,14 @@ def flights_table(rules: Sequence[Rule], flights: Sequence[Json]) -> str:
     for rule in rules:
         known = [(one["with"], one["without"][rule.name]) for one in flights if rule.name in one["without"]]
         flown = [(kept, left) for kept, left in known if "hits" in left]
-        ends = sum(_ends(kept) - _ends(left) for kept, left in known)
-        recovers = sum(_recovered(kept) - _recovered(left) for kept, left in flown)
+        # A copy that died says nothing of its end.
+        ends = sum(kept.get("ends", False) - left.get("ends", False) for kept, left in known)
+        recovers = sum(hit["recovered"] for kept, _ in flown for hit in kept["hits"])
+        recovers -= sum(hit["recovered"] for _, left in flown for hit in left["hits"])
         changes = {label: _change(flown, key, times, digits) for key, (label, times, digits) in FIGURES.items()}
         counts = {"mattered": len(known), "ends": f"{ends:+d}", "recovers": f"{recovers:+d}"}
         rows.append({"rule": rule.name, "what it does": rule.does, **counts, **changes})
     return table(rows)
-
-
-def _ends(found: Json) -> bool:
-    return not found.get("failures", True)
-
-
-def _recovered(found: Json) -> int:
-    return sum(_is_recovered(hit) for hit in found["hits"])
-
-
-def _is_recovered(hit: Json) -> bool:
-    known = all(hit[name] is not None for name in ("past_m", "lost_m", "rest_s"))
-    is_near = known and hit["past_m"] <= PAST_M and hit["lost_m"] <= LOST_M
-    return is_near and hit["rest_s"] <= REST_S and not hit["returned"]
 
 
 def _change(pairs: Sequence[tuple[Json, Json]], name: str, times: float, digits: int) -> str:

@@ -2,100 +2,99 @@
 
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+
+import pandas as pd
 
 from bench.faults.catalogue import FLOWN, GROUPS
 from bench.fly.air import ENDS
-from bench.fly.campaign import Campaign, Json, Workers, run_campaign
+from bench.fly.campaign import Campaign, Results, Workers, run_campaign
 from bench.rows.faulted import work_out_seed
 from bench.rows.tables import Page, table
 from companion.errors import ConfigurationError
 
 GROUP_OF = {fault.name: group for group, faults in GROUPS.items() for fault in faults}
 _SHOWN = 3
+# Of a flight that broke off there are no such figures.
+COLUMNS: tuple[str, ...] = (
+    "seed",
+    "fault",
+    "complaints",
+    "outcome",
+    "hit",
+    "found",
+    "unseen",
+    "false",
+    "unconfirmed",
+    "tilt_deg",
+)
+COLUMNS += ("ground_m_s", "again_m_s", "after_told")
 
 
 def run_faults(options: Namespace) -> int:
     """0 when every row did what is expected of it."""
     if options.only is not None:
         return _only(options.only, options.seeds)
-    page, campaign = Page(options.out, "faults"), faults_campaign(options.seeds)
-    results = run_campaign(campaign, Workers(options.jobs))
-    found = by_name(list(results.results.values()))
-    failing = [name for name, every in found.items() if any(one["complaints"] for one in every)]
-    lead = f"{len(found)} faults, {sum(map(len, found.values()))} flights; {len(failing)} rows not as expected."
-    parts = {"": f"{lead}\n\n{faults_table(found)}", "What was not as expected": complaints(found)}
-    page.write("Faults and attacks", options.typed, parts)
-    print(
-        f"{len(found)} rows, {len(failing)} not as expected: {', '.join(failing) or 'none'}.\n{results.text(campaign)}"
-    )
+    # Not how many: more seeds go on where fewer ended.
+    campaign = Campaign("faults", {}, [(number, tuple(FLOWN)) for number in range(options.seeds)], work_out_seed)
+    page, results = Page(options.out, "faults"), run_campaign(campaign, Workers(options.jobs))
+    rows = fault_rows(results)
+    failing = list(rows[rows["complaints"].map(bool)]["fault"].unique())
+    lead = f"{rows['fault'].nunique()} faults, {len(rows)} flights; {len(failing)} rows not as expected."
+    parts = {"": f"{lead}\n\n{faults_table(rows)}", "What was not as expected": complaints(rows)}
+    page.write("Faults and attacks", options.typed, parts, rows=rows)
+    print(f"{lead} {', '.join(failing)}\n{results.text(campaign)}")
     return 1 if failing or results.failures else 0
 
 
-def faults_campaign(seeds: int) -> Campaign:
-    """A case is a seed with every fault."""
-    cases = [(number, tuple(FLOWN)) for number in range(seeds)]
-    # Not how many: more seeds go on where fewer ended.
-    return Campaign("faults", {}, cases, work_out_seed)
+def fault_rows(results: Results) -> pd.DataFrame:
+    """One a flight; the faults in the table's order."""
+    found = [{"seed": at, "fault": name, **one[name]} for name in FLOWN for at, one in results.results.items()]
+    return pd.DataFrame(found, columns=list(COLUMNS))
 
 
-def by_name(seeds: Sequence[Json]) -> dict[str, list[Json]]:
-    return {name: [seed[name] for seed in seeds] for name in FLOWN}
-
-
-def faults_table(found: Mapping[str, Sequence[Json]]) -> str:
+def faults_table(rows: pd.DataFrame) -> str:
     """A row a fault: what is injected, expected and happened, the worst of it, and the verdict."""
-    rows = []
-    for name, results in found.items():
-        fault = FLOWN[name]
-        bad = sum(bool(result["complaints"]) for result in results)
-        happened, worst = _flights(results)
-        rows.append(
-            {
-                "kind": GROUP_OF[name],
-                "fault": name,
-                "injected": fault.injected,
-                "expected": fault.expected.text(),
-                "n": len(results),
-                "happened": happened,
-                "worst": worst,
-                "verdict": f"**{bad} of {len(results)} not**" if bad else "holds",
-            }
-        )
-    return table(rows)
+    return table([_of_fault(str(name), flights) for name, flights in rows.groupby("fault", sort=False)])
 
 
-def _flights(results: Sequence[Json]) -> tuple[str, str]:
-    whole = [result for result in results if "tilt_deg" in result]
-    happened = _counted(ENDS.get(result.get("outcome", "broken"), "broken") for result in results)
-    hits = [result for result in whole if result["hit"]]
-    happened += f"; hits found {sum(result['found'] for result in hits)} of {len(hits)}"
-    told = (("unseen", "of them met unseen"), ("false", "counted for nothing"), ("unconfirmed", "taken back"))
-    for key, words in told:
-        number = sum(result.get(key, 0) for result in whole)
-        happened += f", {number} {words}" if number else ""
-    if not whole:
-        return happened, "–"
-    ground = [result["ground_m_s"] for result in whole if result["ground_m_s"] is not None]
-    again = max(result["again_m_s"] for result in whole)
-    worst = [f"tilt {max(result['tilt_deg'] for result in whole):.0f}°"]
-    worst += [f"ground {max(ground):.2f} m/s"] if ground else []
-    worst += [f"second contact {again:.2f} m/s"] if again > 0.0 else []
-    return happened, ", ".join(worst)
+def _of_fault(name: str, flights: pd.DataFrame) -> dict[str, object]:
+    bad = int(flights["complaints"].map(bool).sum())
+    hits = flights[flights["hit"].fillna(False).astype(bool)]
+    ends = flights["outcome"].map(ENDS).fillna("broken").value_counts(sort=False)
+    happened = ", ".join(f"{end} {count}" for end, count in ends.items())
+    happened += f"; hits found {hits['found'].sum()} of {len(hits)}"
+    for column, words in (
+        ("unseen", "of them met unseen"),
+        ("false", "counted for nothing"),
+        ("unconfirmed", "taken back"),
+    ):
+        count = int(flights[column].sum())
+        happened += f", {count} {words}" if count else ""
+    most = flights[["tilt_deg", "ground_m_s", "again_m_s"]].astype(float).max()
+    worst = [f"tilt {most['tilt_deg']:.0f}°"]
+    worst += [f"ground {most['ground_m_s']:.2f} m/s"] if flights["ground_m_s"].notna().any() else []
+    worst += [f"second contact {most['again_m_s']:.2f} m/s"] if most["again_m_s"] > 0.0 else []
+    return {
+        "kind": GROUP_OF[name],
+        "fault": name,
+        "injected": FLOWN[name].injected,
+        "expected": FLOWN[name].expected.text(),
+        "n": len(flights),
+        "happened": happened,
+        "worst": ", ".join(worst) if flights["tilt_deg"].notna().any() else "–",
+        "verdict": f"**{bad} of {len(flights)} not**" if bad else "holds",
+    }
 
 
-def complaints(found: Mapping[str, Sequence[Json]]) -> str:
+def complaints(rows: pd.DataFrame) -> str:
     """The commonest of each row, without the moment, so that one cause counts as one; of a traceback the last line."""
-    rows = []
-    for name, results in found.items():
-        texts = [text for result in results for text in result["complaints"]]
+    found = []
+    for name, texts in (
+        rows.explode("complaints").dropna(subset="complaints").groupby("fault", sort=False)["complaints"]
+    ):
         causes = Counter(text.strip().splitlines()[-1].partition(" at ")[0][:160] for text in texts)
-        rows += [{"fault": name, "times": count, "what": cause} for cause, count in causes.most_common(_SHOWN)]
-    return table(rows)
-
-
-def _counted(names: Iterable[str]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common())
+        found += [{"fault": name, "times": count, "what": cause} for cause, count in causes.most_common(_SHOWN)]
+    return table(found)
 
 
 def _only(name: str, seeds: int) -> int:

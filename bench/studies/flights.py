@@ -14,7 +14,6 @@ from pathlib import Path
 import pandas as pd
 import yaml
 
-from bench.fly.by_hand.stick_logs import logs_below
 from bench.fly.campaign import Json
 from bench.rows.tables import Page, at_most_an_hour, table
 from bench.studies.landings import CRASH_WITHIN_S
@@ -27,6 +26,7 @@ from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import replayed_flight
 from rebound_cli.report.writer import write_page
 
+SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
 LABELS = Path(__file__).with_name("flights.yaml")
 # A contact bounces and tumbles: ArduPilot's crash check waits for so long, too (crash_check.cpp, 2 s).
 ONE_EVENT_US = 2_000_000
@@ -126,7 +126,8 @@ def sums_text(rows: Sequence[Json]) -> str:
 def run_flights(options: Namespace) -> int:
     labels = yaml.safe_load((options.labels or LABELS).read_text()) or {}
     page, rows, refused = Page(options.out, "flights"), [], []
-    for path in logs_below(*options.folders):
+    files = (path for folder in options.folders for path in folder.rglob("*"))
+    for path in sorted(path for path in files if path.suffix.lower() in SUFFIXES):
         name = f"{path.parent.name}/{path.name}"
         config, listener = CompanionConfig(), Listener()
         try:

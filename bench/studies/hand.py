@@ -12,10 +12,9 @@ import pandas as pd
 from bench.cases.mishaps import FAMILIES
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
-from bench.fly.by_hand.stick_logs import LoggedSticks, logs_with_sticks
-from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, Watcher
+from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row
 from bench.fly.campaign import Campaign, Workers, rows_of
-from bench.rows.tables import at_most_an_hour, by_each, write_rows
+from bench.rows.tables import Page, at_most_an_hour, by_each
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.airframe import Airframe
@@ -35,25 +34,23 @@ THRUST_LEFT = 0.95
 
 @dataclass(frozen=True, slots=True)
 class HandCase:
-    """One flight; everything that is not here is drawn from the seed. Sticks that are not logged are drawn, too."""
+    """One flight; everything that is not here is drawn from the seed."""
 
     seed: int
     mode: str
-    logged: LoggedSticks | None = None
 
 
 def run_hand(options: Namespace) -> int:
     """0 when nothing was reported in the air, else 1."""
-    logs = [] if options.logs is None else logs_with_sticks(options.logs, options.flights)
-    cases = []
-    for seed in range(options.first_seed, options.first_seed + options.flights):
-        logged = logs[seed // 2 % len(logs)] if logs and (seed + seed // 4) % 2 else None
-        cases.append(HandCase(seed, HAND_MODES[seed % len(HAND_MODES)], logged))
-    parameters = {"flights": options.flights, "first_seed": options.first_seed, "logs": [log.log for log in logs]}
+    page = Page(options.out, "hand")
+    seeds = range(options.first_seed, options.first_seed + options.flights)
+    cases = [HandCase(seed, HAND_MODES[seed % len(HAND_MODES)]) for seed in seeds]
+    parameters = {"flights": options.flights, "first_seed": options.first_seed}
     rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs))
-    write_rows(rows, options.out)
     watched = by_rate(rows)
-    print(text_of(watched))
+    text = text_of(watched)
+    page.write("Flown hard by hand", options.typed, {"": text}, rows=pd.DataFrame(rows))
+    print(text)
     return 1 if any(_in_the_air(row) for row in watched) else 0
 
 
@@ -69,15 +66,14 @@ def fly_by_hand(case: HandCase) -> Row:
     scene = Scene.model_validate({"faults": FAMILIES[air](rng).faults})
     vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
     guards = [Guard(_config(built, imu_hz)) for imu_hz in IMU_HZ]
-    flight = GuardedFlight(vehicle, [Watcher(guard) for guard in guards])
-    tilts = Pilot(flight, airframe, parameters, wishes(case.logged, rng), case.mode, guards).fly()
+    flight = GuardedFlight(vehicle, *guards)
+    tilts = Pilot(flight, airframe, parameters, wishes(rng), case.mode, guards).fly()
     return {
         "seed": case.seed,
         "airframe": airframe.name,
         "mode": case.mode,
         "estimate": airframe.estimate.kind,
         "air": air,
-        "sticks": "drawn" if case.logged is None else case.logged.log,
         "flown_s": round(len(tilts) * STICKS_S, 1),
         "tilt_deg": [round(float(np.percentile(tilts, at)), 1) for at in (50, 90, 100)] if tilts else [],
         "touched": flight.touched_us is not None,
@@ -136,12 +132,11 @@ def by_rate(rows: Sequence[Row]) -> list[Row]:
 def text_of(rows: Sequence[Row]) -> str:
     """By IMU rate, mode and air what was reported in the air, then every report. The bar: 0."""
     frame = pd.DataFrame(rows).assign(false=[_in_the_air(row) for row in rows])
-    frame["of logs"] = ["drawn sticks" if sticks == "drawn" else "sticks of logs" for sticks in frame["sticks"]]
-    lines = by_each(frame[frame["watched_s"] > 0.0], ("imu_hz", "mode", "air", "of logs"), _figures)
+    lines = by_each(frame[frame["watched_s"] > 0.0], ("imu_hz", "mode", "air"), _figures)
     touched = frame[frame["touched"]]["seed"].nunique()
     lines += f"{touched} flights touched the ground; reports from then on do not count. Bar: 0 reported.\n"
     for row in frame.explode("false").dropna(subset="false").to_dict("records"):
-        where = f"seed {row['seed']}, {row['imu_hz']} Hz, {row['mode']}, {row['air']}, {row['sticks']}"
+        where = f"seed {row['seed']}, {row['imu_hz']} Hz, {row['mode']}, {row['air']}"
         lines += f"{where}: {row['false']}\n"
     return lines
 

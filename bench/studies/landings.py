@@ -9,7 +9,7 @@ import pandas as pd
 from bench.fly.by_hand.watched import IMU_HZ, Row
 from bench.fly.by_hand.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
 from bench.fly.campaign import Campaign, Workers, rows_of
-from bench.rows.tables import by_each, write_rows
+from bench.rows.tables import Page, by_each
 
 CRASH, NO_COLLISION = "crash", ("landing", "contact")
 # A crash is reported within this time of its greatest deceleration.
@@ -18,13 +18,14 @@ CRASH_WITHIN_S = 0.2
 
 def run_landings(options: Namespace) -> int:
     """0 when every landing and every fall was reported for what it was, else 1."""
-    first = options.first_seed
+    page, first = Page(options.out, "landings"), options.first_seed
     cases = [draw_case(seed, LANDINGS) for seed in range(first, first + options.landings)]
     cases += [draw_case(seed, FALLS) for seed in range(first, first + options.falls)]
     parameters = {"landings": options.landings, "falls": options.falls, "first_seed": first}
     rows = rows_of(Campaign("landings", parameters, cases, fly_to_the_ground), Workers(options.jobs))
-    write_rows(rows, options.out)
-    print(text_of(rows))
+    text = text_of(rows)
+    page.write("Landings and falls", options.typed, {"": text}, rows=pd.DataFrame(rows))
+    print(text)
     return 1 if any(row["wrong"] for row in rows) else 0
 
 

@@ -1,4 +1,4 @@
-"""Vigorous flight by hand: where its sticks come from, that it is vigorous, and what its table counts."""
+"""Vigorous flight by hand: its sticks, that it is vigorous, and what its table counts."""
 
 import itertools
 import math
@@ -7,75 +7,19 @@ import numpy as np
 import pytest
 
 from bench.fly.by_hand.hand_pilot import wishes
-from bench.fly.by_hand.stick_logs import LoggedSticks, StickLogError, logs_with_sticks, moved
 from bench.fly.by_hand.watched import STICKS_S
 from bench.studies.hand import HandCase, agile, fly_by_hand, text_of
 from sim_vehicle.airframe import load_built_in
 
 
-def table_of(flown, hz=10):
-    """Seconds, pitch, roll, throttle, yaw."""
-    return np.array([(place / hz, *four) for place, four in enumerate(flown)])
-
-
-def test_logged_sticks_are_those_of_the_flight_at_the_pilots_own_rate():
-    # Given a throttle that is up for 30 s, and roll that goes from stop to stop meanwhile
-    ground = [(0.0, 0.0, -1.0, 0.0)] * 50
-    air = [(0.0, -1.0 if place % 20 < 10 else 1.0, 0.4, 0.5) for place in range(300)]
-    # When the flight's sticks are taken
-    sticks = moved(table_of([*ground, *air, *ground]))
-    # Then they are those of the flight alone, with the hovering throttle in the middle
-    assert len(sticks) * STICKS_S == pytest.approx(29.9, abs=0.05)
-    assert sticks[:, 0].min() == -1.0 and sticks[:, 0].max() == 1.0
-    assert np.all(sticks[:, 1] == 0.0) and np.all(sticks[:, 2] == 0.0) and np.all(sticks[:, 3] == 0.5)
-    # and between two of its samples a stick is on its way
-    assert len(np.unique(sticks[:, 0])) > 2
-
-
-MOVING = [(0.0, -1.0 + 2.0 * (place % 2), 0.2, 0.0) for place in range(300)]
-
-
-@pytest.mark.parametrize(
-    "table",
-    [
-        pytest.param(table_of([(0.0, 0.0, 0.2, 0.0)] * 300), id="nobody moves them"),
-        pytest.param(table_of(MOVING[:100]), id="for a moment"),
-        pytest.param(table_of(MOVING, hz=5), id="at 5 Hz"),
-        pytest.param(np.empty((0, 5)), id="none"),
-    ],
-)
-def test_sticks_that_fly_nothing_hard_are_none(table):
-    assert len(moved(table)) == 0
-
-
-def test_a_folder_without_sticks_is_said_to_be_one(tmp_path):
-    # Given something else with a log's name
-    (tmp_path / "flight.bin").write_bytes(b"no log at all" * 99)
-    # When it is searched for sticks, then one sentence says that there are none
-    with pytest.raises(StickLogError, match="no log in it has moving sticks"):
-        logs_with_sticks(tmp_path, most=5)
-
-
 def test_drawn_sticks_reach_every_stop_and_never_pass_one():
     # Given two minutes of one seed
-    drawn = [wishes(None, np.random.default_rng(5)) for _ in range(2)]
+    drawn = [wishes(np.random.default_rng(5)) for _ in range(2)]
     first, second = (list(itertools.islice(one, round(120.0 / STICKS_S))) for one in drawn)
     values = np.array([(one.roll, one.pitch, one.throttle, one.yaw) for one in first])
     # Then each stick was at both stops, none beyond, and the same seed flies the same
     assert np.all(values.max(axis=0) == 1.0) and np.all(values.min(axis=0) == -1.0)
     assert first == second
-
-
-def test_logged_sticks_are_stretched_to_the_stops():
-    # Given sticks of a careful pilot, of which one moves more than the other
-    waves = np.sin(np.arange(5000) / 20.0)
-    rows = np.stack([0.2 * waves, 0.1 * waves, 0.0 * waves, 0.3 * waves], axis=1)
-    # When a minute of them is flown
-    flown = list(itertools.islice(wishes(LoggedSticks("a log", rows), np.random.default_rng(1)), 3000))
-    # Then the one that moves more reaches its stops, the other half of the way, and yaw is as it was
-    assert max(one.roll for one in flown) == pytest.approx(1.0, abs=0.01)
-    assert max(one.pitch for one in flown) == pytest.approx(0.5, abs=0.01)
-    assert max(one.yaw for one in flown) == pytest.approx(0.3, abs=0.01)
 
 
 def test_no_vehicle_is_asked_for_more_tilt_than_carries_its_weight():
@@ -92,7 +36,7 @@ def test_no_vehicle_is_asked_for_more_tilt_than_carries_its_weight():
 def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():
     # Given an hour at each rate, with one report in the air at 50 Hz and one after a touch at 100 Hz
     def row(imu_hz, reported):
-        vehicle = {"imu_hz": imu_hz, "mode": "STABILIZED", "sticks": "drawn", "seed": 1, "air": "calm"}
+        vehicle = {"imu_hz": imu_hz, "mode": "STABILIZED", "seed": 1, "air": "calm"}
         return {**vehicle, "watched_s": 3600.0, "tilt_deg": [20.0, 35.0, 50.0], "touched": False, "reported": reported}
 
     in_the_air, after = {"kind": "wall", "since_touch_s": None}, {"kind": "floor", "since_touch_s": 0.1}

@@ -117,12 +117,6 @@ def test_other_parameters_are_another_campaign(tmp_path):
     assert len({one.record_path() for one in (campaign(30), campaign(31), campaign(30, hits=5))}) == 3
 
 
-def test_another_version_of_the_code_is_another_campaign(monkeypatch):
-    before = campaign().record_path()
-    monkeypatch.setattr("bench.fly.campaign.code_version", lambda name: "changed")
-    assert campaign().record_path() != before
-
-
 @pytest.mark.parametrize("line", [b"nonsense", b"\xff", b"3", b'{"result":1}', b'{"case":[]}'])
 def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
     run_campaign(campaign(0), Workers(), tmp_path)
@@ -136,9 +130,3 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(running, "CONNECT_TIMEOUT_S", 0.5)
     with pytest.raises(CampaignError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         run_campaign(campaign(), Workers(scheduler="tcp://127.0.0.1:9"), tmp_path)
-
-
-def test_of_a_longer_campaigns_record_a_shorter_one_takes_its_own_cases(tmp_path):
-    run_campaign(campaign(), Workers(), tmp_path)
-    shorter = Campaign("throws", {"cases": 30}, campaign().cases[:12], throw)
-    assert set(run_campaign(shorter, Workers(), tmp_path).results) == {*range(12)} - {4}

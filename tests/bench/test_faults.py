@@ -17,10 +17,7 @@ from bench.faults.people import Taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.faulted import FaultedFlight
 from bench.fly.packets import ARM, SET_MODE, made, number_of, outside
-from bench.main import main
 from bench.rows.faulted import judged, work_out_fault, work_out_seed
-from bench.studies import faults as study
-from bench.studies.faults import faults_table
 from companion.mavlink.encode import COMPONENT_ID
 from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in
@@ -109,13 +106,6 @@ def test_what_the_companion_sends_once_it_has_heard_of_the_pilot_counts(air: Air
     assert air.after_told == 3
 
 
-def test_a_setpoint_outside_the_envelope_is_kept_with_its_moment(air: Air) -> None:
-    air.send(made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT))
-    assert air.outside == []
-    air.send(made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0}))
-    assert air.outside == ["outside the fence at 0.00 s"]
-
-
 class Sending(Injector):
     """One setpoint far outside, as if the companion had sent it."""
 
@@ -176,26 +166,3 @@ def test_a_killed_companion_leaves_a_vehicle_that_lands_and_a_log() -> None:
 def test_a_pilot_who_takes_over_in_the_climb_is_left_alone() -> None:
     result = work_out_fault(9, FLOWN["takes over in take-off"])
     assert result["outcome"] == "aborted" and result["complaints"] == [] and result["after_told"] == 0
-
-
-def test_the_table_counts_what_was_not_as_expected() -> None:
-    good: dict[str, Any] = {"complaints": [], "outcome": "completed", "hit": True, "found": True}
-    good |= {"tilt_deg": 20.0, "ground_m_s": 0.7, "again_m_s": 0.0}
-    bad = good | {"complaints": ["hit not found"], "found": False, "again_m_s": 0.4}
-    row = faults_table({"gust": [good, bad]}).splitlines()[-1]
-    cells = [cell.strip() for cell in row.split("|")[1:-1]]
-    assert cells[4:6] == ["2", "landed 2; hits found 1 of 2"] and cells[7] == "**1 of 2 not**"
-
-
-@pytest.mark.slow
-def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, capsys) -> None:
-    # Given one row, of which one seed has been flown before
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(study, "FLOWN", {"SIGTERM": FLOWN["SIGTERM"]})
-    words = ["faults", "--jobs", "1", "--out", str(tmp_path / "faults.md")]
-    assert main([*words, "--seeds", "1"]) == 0
-    # When two are asked for
-    assert main([*words, "--seeds", "2"]) == 0
-    # Then only the other is flown, and the table has both
-    assert "going on after 1 of 2 cases" in capsys.readouterr().err
-    assert "handed over" in (tmp_path / "faults.md").read_text()

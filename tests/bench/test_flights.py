@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from bench.main import main
-from bench.rows.tables import at_most_an_hour
-from bench.studies.flights import Event, events, mistakes, sums_text
+from bench.studies.flights import Event, events, mistakes
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind
 from rebound_cli.replay.report import replay_log
@@ -61,16 +60,7 @@ def test_what_follows_within_two_seconds_is_one_event():
     assert (len(first.findings), len(second.findings)) == (2, 1)
 
 
-def test_the_bound_on_no_event_is_three_an_hour():
-    assert at_most_an_hour(0, 1.0) == pytest.approx(3.0, abs=0.01)
-    assert at_most_an_hour(0, 1.5) < 2.0
-
-
 def test_a_log_that_cannot_be_read_is_named_and_a_folder_without_logs_is_an_error(tmp_path, capsys):
     (tmp_path / "empty.bin").write_bytes(b"")
     assert main(["flights", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
     assert "the file is empty" in (tmp_path / "out" / "flights.md").read_text()
-
-
-def test_no_hours_promise_nothing():
-    assert "an hour" not in sums_text([])

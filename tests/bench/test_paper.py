@@ -10,11 +10,9 @@ import pytest
 from bench.cases.walls import approach
 from bench.detectors.config import BaselineMission
 from bench.fly.cruise import head_on
-from bench.main import main
 from bench.rows.paper import StudyFlight, ends_the_one_before, fly, share_received
-from bench.studies.paper import command, rigid, scenarios, single, walls
-from bench.studies.paper.claims import CLAIMS, FAILED, PASSED, claim
-from bench.studies.paper.study import sampling_text
+from bench.studies.paper import command, scenarios, single
+from bench.studies.paper.study import CLAIMS, FAILED, PASSED, claim
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
 
@@ -88,10 +86,6 @@ def test_a_rigid_pulse_is_a_millisecond_and_a_foldable_one_is_fifty_times_longer
     assert foldable["width_s"] == pytest.approx(0.0372, abs=0.0005)
 
 
-def test_a_hover_takes_the_stated_share_of_thrust():
-    assert single.hover_share(1.0) == pytest.approx(0.70, abs=0.005)
-
-
 def hit_between(start_us, end_us):
     (template,) = [head_on(load_built_in("rigid"), 1.0).hit]
     return dataclasses.replace(template, contact_at_boot_us=start_us, ended_at_boot_us=end_us)
@@ -117,21 +111,6 @@ def test_every_study_states_the_papers_detector_law_and_gain(study):
         assert flight.mission["recovery"] == {"law": "paper", "gamma": 0.5}
 
 
-def test_directions_fill_the_circle():
-    headings = sorted(walls.heading_deg(seed) for seed in range(1, 51))
-    assert max(np.diff([*headings, headings[0] + 360.0])) < 15.0
-    assert [walls.off_axis_deg(h) for h in (0.0, 90.0, 350.0, 45.0, 280.0)] == [0.0, 0.0, 10.0, 45.0, 10.0]
-
-
-def test_the_wall_stands_square_to_the_flight_before_braking_begins():
-    mission = BaselineMission.model_validate(approach(4.0, heading_deg=120.0))
-    go_to, wall = mission.items[1].go_to, mission.sim["walls"][0]
-    towards = np.array(go_to.position_ned_m[:2]) / np.hypot(*go_to.position_ned_m[:2])
-    assert wall["normal_ned"][:2] == pytest.approx(-towards)
-    wall_m, target_m = np.hypot(*wall["point_ned_m"][:2]), np.hypot(*go_to.position_ned_m[:2])
-    assert target_m - wall_m > 4.0**2 / (2 * go_to.acceleration_m_s2)
-
-
 @pytest.fixture(scope="module")
 def sample():
     """The row of the sample scenario."""
@@ -149,63 +128,12 @@ def test_the_sample_scenario_agrees_and_its_picture_marks_everything(sample):
         assert re.search(r"\[s\]", axis.get_xlabel()) and re.search(r"\[(m|mm|m/s)\]", axis.get_ylabel())
 
 
-def test_the_same_flight_gives_the_same_row(sample):
-    assert fly(scenarios.SAMPLE.flights(1)[0]) == sample
-
-
 def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
     x, (north_m, *beside) = sample["contact_m"][0], sample["setpoint_m"]
     for wrong_m in (north_m - x, 2 * (x - north_m), (x - north_m) / 2):
         moved = sample | {"setpoint_m": [x - wrong_m, *beside]}
         rows = scenarios.SAMPLE.conclude(pd.DataFrame([moved])).rows
         assert [row["claim"] for row in rows if row["verdict"] == FAILED] == ["setpoint by eq. 3, back from x(t_c)"]
-
-
-def like(sample, study, **changes):
-    """The sample's row under the names of a study's flights: for what is written, not for what is flown."""
-    flights = [
-        {**sample, **flight.names, "airframe": flight.airframe, "seed": flight.seed, **changes}
-        for flight in study.flights(1)
-    ]
-    return pd.DataFrame(flights)
-
-
-def papers_numbers(axis):
-    """In each line that is the paper's own: where it is drawn across, or upright."""
-    lines = [line for line in axis.get_lines() if line.get_label() == "the paper's own number"]
-    return [line.get_ydata()[0] if line.get_ydata()[0] != 0 else line.get_xdata()[0] for line in lines]
-
-
-def test_the_papers_own_numbers_are_drawn_where_its_text_gives_any(sample):
-    _, velocity, _, fold = scenarios.SAMPLE.conclude(pd.DataFrame([sample])).pictures["sample_scenario.png"].axes
-    assert papers_numbers(velocity) == [1.4, -0.28] and papers_numbers(fold) == [30.0]
-    # 1.05 m back in its simulation, 0.95 m in its experiment, at 2.1 m/s
-    pictures = scenarios.EXPERIMENT.conclude(like(sample, scenarios.EXPERIMENT)).pictures
-    position, velocity = pictures["simulation_experiment.png"].axes
-    backs_m = [sample["track"]["touch_m"] - place_m for place_m in papers_numbers(position)]
-    assert backs_m == pytest.approx([1.05, 0.95]) and papers_numbers(velocity) == [2.1]
-    # 1 to 2.5 m/s, half of it back in metres
-    axes = walls.FLIGHT_TESTS.conclude(like(sample, walls.FLIGHT_TESTS)).pictures["flight_tests_rigid.png"].axes
-    assert sorted({speed for axis in axes[4:] for speed in papers_numbers(axis)}) == [1.0, 1.5, 2.0, 2.5]
-    assert papers_numbers(single.ARM.conclude(pd.DataFrame()).pictures["arm.png"].axes[0]) == [30.0]
-
-
-@pytest.mark.parametrize("study", [rigid.WHY, rigid.SAMPLING], ids=lambda study: study.title)
-def test_each_study_states_what_it_flew(sample, study):
-    flights = like(sample, study)
-    if "asked_hz" in flights:
-        flights["interval_us"] = [flight.changes["imu"]["integration_interval_us"] for flight in study.flights(1)]
-    findings = study.conclude(flights)
-    assert findings.rows and all(len(text.splitlines()) > 8 for text in findings.tables.values())
-    assert re.search(r"HIGHRES_IMU` as received: \d+ Hz, each sample the mean of \S+", sampling_text(flights))
-
-
-def test_a_vehicle_that_hits_again_or_overshoots_makes_the_directions_red(sample):
-    assert verdicts(walls.ANY_SIDE, like(sample, walls.ANY_SIDE, past_m=0.02)) == {PASSED}
-    bad = like(sample, walls.ANY_SIDE, past_m=0.2, again=1, second_hits=1)
-    for name in ("gaps_s", "later_folds_m", "later_peaks_n"):
-        bad[name] = [[0.1]] * len(bad)
-    assert verdicts(walls.ANY_SIDE, bad) == {FAILED}
 
 
 def test_a_guard_that_swings_in_while_the_arms_unfold_ends_the_same_collision():
@@ -220,31 +148,6 @@ def test_a_guard_that_swings_in_while_the_arms_unfold_ends_the_same_collision():
 # --- the document and the command ---------------------------------------------------------------------------------
 
 
-def table_of(heading: str) -> list[list[str]]:
-    """The rows of the table below a heading of the document."""
-    part = DOCUMENT.split(f"## {heading}\n", 1)[1].split("\n#", 1)[0]
-    lines = [line for line in part.splitlines() if line.startswith("|")]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
-
-
-def test_every_symbol_is_where_the_document_says():
-    rows = table_of("Symbols")
-    assert len(rows) > 20
-    for symbol, _, names, file in rows:
-        text = (ROOT / file.strip("`")).read_text()
-        for name in re.findall(r"`(\w+)`", names):
-            assert re.search(rf"\b{name}\b" if not name.startswith("_") else name, text), f"{symbol}: {name} in {file}"
-
-
-def test_every_equation_has_its_function_and_its_test():
-    rows = table_of("Equations")
-    assert {row[0][0] for row in rows} == set("123456") - {"5"}  # 4 and 5 are one row
-    for equation, function, file, test in rows:
-        text = (ROOT / file.strip("`")).read_text()
-        assert re.search(rf"(def|class) {function.strip('`')}\b", text), f"eq. {equation}"
-        assert "def test_" in (ROOT / test.strip("`")).read_text()
-
-
 def test_a_foldable_flight_at_one_metre_per_second_neither_returns_nor_overshoots():
     row = fly(StudyFlight({}, approach(1.0, cruise_s=1.5), "foldable", 1))
     assert row["hits"] == 1 and row["seen"] and not row["lost"]
@@ -252,14 +155,20 @@ def test_a_foldable_flight_at_one_metre_per_second_neither_returns_nor_overshoot
     assert 0.15 < row["rebound_m_s"] / row["impact_m_s"] < 0.3
 
 
-def test_a_count_that_makes_no_sense_is_refused(capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["paper", "--seeds", "0"])
-    assert ended.value.code == 2 and "whole number" in capsys.readouterr().err
+def test_every_symbol_and_equation_is_where_the_document_says():
+    def table_of(heading):
+        part = DOCUMENT.split(f"## {heading}\n", 1)[1].split("\n#", 1)[0]
+        lines = [line for line in part.splitlines() if line.startswith("|")]
+        return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
-
-@pytest.mark.parametrize(
-    "flight", [one for one in rigid.WHY.flights(1) if one.seed == 1], ids=lambda f: f"{f.airframe} {f.names['cause']}"
-)
-def test_whatever_is_changed_the_vehicle_reaches_its_wall(flight):
-    assert fly(flight)["hits"]
+    for symbol, _, names, file in table_of("Symbols"):
+        text = (ROOT / file.strip("`")).read_text()
+        for name in re.findall(r"`(\w+)`", names):
+            assert name in text, f"{symbol}: {name} in {file}"
+    equations = table_of("Equations")
+    assert {row[0][0] for row in equations} == set("123456") - {"5"}  # 4 and 5 are one row
+    for equation, function, file, test in equations:
+        assert re.search(rf"(def|class) {function.strip('`')}\b", (ROOT / file.strip("`")).read_text()), (
+            f"eq. {equation}"
+        )
+        assert "def test_" in (ROOT / test.strip("`")).read_text()

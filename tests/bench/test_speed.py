@@ -28,11 +28,6 @@ def test_no_program_calls_5_per_cent_more_functions_an_interval(calls, program):
     assert 0.0 < now <= MOST_MORE * held, f"{now:.1f} calls, held to {held:.1f}: docs/explanation/performance.md"
 
 
-@pytest.mark.slow
-def test_the_count_is_the_same_in_every_flight(calls):
-    assert calls_an_interval(fly) == calls
-
-
 @pytest.mark.realtime
 def test_each_hit_is_answered_long_before_px4_would_miss_a_setpoint():
     # Given a flight that is played to the loop of real flights until its hit (COM_OF_LOSS_T is 1 s)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from bench.reference import events
+from bench.reference import program
 from bench.reference.command import FOLDER, PAGES, page_text
 from bench.reference.markdown import MEANINGS
-from bench.reference.states import mermaid_diagram, transitions
+from bench.reference.program import mermaid_diagram, transitions
 from companion.flight import states as flight_states
 from companion.guard import states as guard_states
 from rebound_cli import exit_codes
@@ -20,7 +20,7 @@ def test_a_page_is_as_the_code_has_it(name):
 
 
 def test_every_kind_of_event_has_its_meaning():
-    assert set(events.data_keys()) | events.ELSEWHERE == set(MEANINGS["events"])
+    assert set(program.data_keys()) | program.ELSEWHERE == set(MEANINGS["events"])
 
 
 @pytest.mark.parametrize("states", [flight_states.TABLE, guard_states.TABLE], ids=["flight", "guard"])

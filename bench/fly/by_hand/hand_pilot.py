@@ -1,15 +1,17 @@
-"""A pilot who flies hard by sticks: takes off, strokes or a log's deflections, and back before it is too far or low."""
+"""A pilot who flies hard by sticks: takes off, strokes, and back before it is too far or low."""
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from bench.fly.by_hand.stick_logs import Floats, LoggedSticks
 from bench.fly.by_hand.watched import STICKS_S, GuardedFlight, Sticks
 from companion.guard.guard import Guard
 from companion.motion.config import GRAVITY_M_S2
 from sim_vehicle.airframe import Airframe
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 FLOWN_S = 60.0
 ARM_FROM_S, ASK_AGAIN_S, BEGIN_WITHIN_S = 6.0, 0.5, 40.0
@@ -18,7 +20,6 @@ BEGUN_M, LOWEST_M, HIGHEST_M, RADIUS_M = 12.0, 8.0, 40.0, 80.0
 # A stroke of the sticks lasts from a flick to a turn; a hand is never quite still (Ornstein-Uhlenbeck).
 STROKE_S, HAND_MEMORY_S, HAND_SHAKE = (0.15, 1.5), 0.3, 0.12
 STROKES, STROKE_SHARES = ("full", "part", "reversed", "released"), (0.35, 0.25, 0.25, 0.15)
-MINUTES_LOOKED_AT = 5
 # How a pilot holds the tilt by rates, and the climb by the throttle.
 CLIMB_P_PER_S = 2.0
 
@@ -115,27 +116,8 @@ class Pilot:
         return cos * north + sin * east, cos * east - sin * north
 
 
-def wishes(logged: LoggedSticks | None, rng: np.random.Generator) -> Iterator[Sticks]:
-    """Deflections, one every STICKS_S, without an end: drawn, or a log's from the liveliest of some minutes on."""
-    if logged is None:
-        return _drawn(rng)
-    rows, lasts = logged.rows, round(FLOWN_S / STICKS_S)
-    starts = rng.integers(max(len(rows) - lasts, 1), size=MINUTES_LOOKED_AT).tolist()
-    start = max(starts, key=lambda at: float(rows[at : at + lasts, :2].std()))
-    # Most pilots of logs are careful; the shape of their strokes is a hand's whatever their size.
-    most = float(np.abs(rows[start : start + lasts, :2]).max())
-    stretched = np.clip(rows * np.array([1.0 / most, 1.0 / most, 1.0, 1.0]), -1.0, 1.0)
-    return _again(stretched[start:], stretched)
-
-
-def _again(first: Floats, rows: Floats) -> Iterator[Sticks]:
-    while True:
-        yield from (Sticks(*row) for row in first.tolist())
-        first = rows
-
-
-def _drawn(rng: np.random.Generator) -> Iterator[Sticks]:
-    """Strokes on each stick for itself, roll and pitch together, under a hand that is never still."""
+def wishes(rng: np.random.Generator) -> Iterator[Sticks]:
+    """One every STICKS_S: strokes on each stick for itself, roll and pitch together, under a hand never still."""
     targets, shake, until_s = np.zeros(4), np.zeros(4), np.zeros(3)
     stick_groups, time_s = (np.array([0, 1]), np.array([2]), np.array([3])), 0.0
     while True:

@@ -1,20 +1,19 @@
 """A vehicle, whoever watches it and a ground station on virtual time; impacts that are reported, beside the truth."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, made
-from companion.companion import Companion
+from bench.fly.stepped import Stepped
+from companion.companion import Companion, StepResult
 from companion.guard.guard import Guard
 from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.detector import Impact, Phase
 from companion.report import Status
-from rebound_cli.simulation.lockstep import EPOCH_US
-from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -44,46 +43,32 @@ class Sticks:
 
 @dataclass
 class Watcher:
-    """Who watches, on a link of its own, and what was reported."""
+    """Who watches, and what was reported."""
 
     program: Guard | Companion
     reported: list[Row] = field(default_factory=list)
     watched_s: float = 0.0
     impact: Impact | None = None  # the newest
 
-    def step(self, link: Link, now_us: int) -> None:
-        """Only where there is something to hear or to send."""
-        heard = b"".join(link.take())
-        if heard or now_us >= self.program.next_deadline_us():
-            link.push(b"".join(self.program.step(heard, now_us).sent_frames))
 
+class GuardedFlight(Stepped):
+    """With a ground station. The world is the level ground alone."""
 
-@dataclass
-class GuardedFlight:
-    """One interval after the other, all bytes both ways. The world is the level ground alone."""
-
-    vehicle: SimulatedVehicle
-    watchers: Sequence[Watcher]
-    touched_us: int | None = None  # first touch of the ground since the latest `watch_for_ground`
-    last_touch_us: int | None = None
-    hardest_m_s2: float = 0.0  # since that touch: the largest specific force, mean over an interval
-    hardest_us: int | None = None
-    tilt_at_touch_deg: float = 0.0
-    sink_at_touch_m_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        self._links = [self.vehicle.add_link(LinkKind.ONBOARD) for _ in self.watchers]
-        self._station = self.vehicle.add_link(LinkKind.NORMAL)
-        for link in self._links:
+    def __init__(self, vehicle: SimulatedVehicle, *programs: Companion | Guard) -> None:
+        super().__init__(vehicle, *programs)
+        self.watchers = [Watcher(program) for program in programs]
+        self._station = vehicle.add_link(LinkKind.NORMAL)
+        for link in self.links:
             link.introduce()
-        self._body, self._depth_m = self.vehicle.state.body, self.vehicle.state.depth_m
+        self._body, self._depth_m = vehicle.state.body, vehicle.state.depth_m
         self._sent, self._sticks_s, self._beat_s = 0, 0.0, 0.0
         self._before = np.zeros(3)
         self.looks_for_ground = False
-
-    @property
-    def time_s(self) -> float:
-        return 1e-6 * self.vehicle.time_boot_us
+        self.touched_us: int | None = None  # first touch of the ground since the latest `watch_for_ground`
+        self.last_touch_us: int | None = None
+        self.hardest_m_s2 = 0.0  # since that touch: the largest specific force, mean over an interval
+        self.hardest_us: int | None = None
+        self.tilt_at_touch_deg = self.sink_at_touch_m_s = 0.0
 
     @property
     def status(self) -> Status:
@@ -129,19 +114,18 @@ class GuardedFlight:
         x, y, r = (round(FULL_STICK * limited(stick)) for stick in (now.pitch, now.roll, now.yaw))
         self._push("MANUAL_CONTROL", target=1, x=x, y=y, z=round(HALF_THROTTLE * (1.0 + limited(now.throttle))), r=r)
 
-    def step(self) -> None:
+    def step(self) -> list[StepResult]:
         if self.time_s >= self._beat_s:
             self._beat_s = self.time_s + BEAT_S
             self._push("HEARTBEAT", type=6, autopilot=8)
         self._before[:] = self._body[3:6]
-        self.vehicle.advance()
+        results = super().step()
         self._station.take()
-        for watcher, link in zip(self.watchers, self._links, strict=True):
-            watcher.step(link, EPOCH_US + self.vehicle.time_boot_us)
         if self.looks_for_ground:
             self._note_ground()
         for watcher in self.watchers:
             self._note_impact(watcher)
+        return results
 
     def _note_ground(self) -> None:
         """A contact with a stiff frame may begin and end within an interval: its force shows it then."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
-from bench.fly.by_hand.watched import GuardedFlight, Sticks, Watcher
+from bench.fly.by_hand.watched import GuardedFlight, Sticks
 from companion.companion import Companion
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
@@ -111,7 +111,7 @@ def begun(
         data = {"name": "landing", "items": [{"takeoff": {"height_m": MISSION_M}}, {"land": {}}], "companion": settings}
         companion = Companion(Mission.model_validate(data))
         companion.confirm_plan()
-        return GuardedFlight(vehicle, (Watcher(companion),)), error_m
+        return GuardedFlight(vehicle, companion), error_m
     low_m, high_m = FALLS_FROM_M if case.is_fall else LANDS_FROM_M
     # The vehicle corrects what it takes for an error of its height before it falls.
     height_m = float(rng.uniform(low_m + max(error_m, 0.0), high_m + min(error_m, 0.0)))
@@ -119,7 +119,7 @@ def begun(
     place = (away_m * math.cos(side_rad), away_m * math.sin(side_rad), -height_m)
     vehicle.begin_in_flight(place, (0.0, 0.0, 0.0))
     config = GuardConfig.model_validate({"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings})
-    return GuardedFlight(vehicle, (Watcher(Guard(config)),)), error_m
+    return GuardedFlight(vehicle, Guard(config)), error_m
 
 
 def falling(way: str, at_s: float, rng: np.random.Generator) -> list[dict[str, Any]]:

@@ -9,8 +9,7 @@ from bench.fly.campaign import Campaign, Workers, rows_of
 from bench.rows.paper import fly
 from bench.rows.tables import Page, table
 from bench.studies.paper import rigid, scenarios, single, walls
-from bench.studies.paper.claims import Claim, verdict_text
-from bench.studies.paper.study import sampling_text
+from bench.studies.paper.study import Claim, sampling_text, verdict_text
 
 STUDIES = (
     single.ARM,

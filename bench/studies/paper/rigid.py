@@ -9,8 +9,7 @@ from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import CRUISE_S, approach
 from bench.rows.paper import StudyFlight
 from bench.rows.tables import table
-from bench.studies.paper.claims import claim
-from bench.studies.paper.study import Findings, Study, flown_table
+from bench.studies.paper.study import Findings, Study, claim, flown_table
 
 # --- why our rigid vehicle does not do what the paper's did: one cause at a time. None is a setting anybody else uses.
 

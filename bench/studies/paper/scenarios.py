@@ -10,7 +10,6 @@ from bench.cases.walls import GAMMA_S, approach, pinned
 from bench.fly.campaign import Json
 from bench.rows.paper import StudyFlight
 from bench.rows.tables import rms
-from bench.studies.paper.claims import claim
 from bench.studies.paper.figures import (
     add_legend,
     draw_fold,
@@ -22,7 +21,7 @@ from bench.studies.paper.figures import (
     new_figure,
 )
 from bench.studies.paper.single import FOLD_MAX_M
-from bench.studies.paper.study import Findings, Study
+from bench.studies.paper.study import Findings, Study, claim
 from rebound_cli.inputs import load_mission_document
 
 MISSION_FILE = Path("missions/paper.yaml")

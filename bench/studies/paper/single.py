@@ -12,7 +12,6 @@ from bench.cases.walls import approach
 from bench.fly.cruise import AFTER_S, HeadOnHit, head_on
 from bench.rows.paper import Floats, StudyFlight
 from bench.rows.tables import table
-from bench.studies.paper.claims import claim
 from bench.studies.paper.figures import (
     CONTACT,
     add_legend,
@@ -22,7 +21,7 @@ from bench.studies.paper.figures import (
     mark_paper,
     new_figure,
 )
-from bench.studies.paper.study import Findings, Study, safety_text
+from bench.studies.paper.study import Findings, Study, claim, safety_text
 from rebound_cli.results.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.plant.plant import Plant

@@ -6,9 +6,8 @@ from matplotlib.figure import Figure
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import GAMMA_S, approach
 from bench.rows.paper import StudyFlight
-from bench.studies.paper.claims import claim, number
 from bench.studies.paper.figures import add_legend, draw_position, draw_velocity, mark_paper, new_figure
-from bench.studies.paper.study import Findings, Study, flown_table
+from bench.studies.paper.study import Findings, Study, claim, flown_table, number
 
 # --- the paper's flight tests, head-on at 1 to 2.5 m/s, and on to the 5 m/s of its design
 

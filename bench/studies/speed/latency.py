@@ -14,7 +14,7 @@ from pathlib import Path
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
-from bench.fly.lockstep import SteppedFlight
+from bench.fly.stepped import Stepped
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
@@ -28,6 +28,7 @@ from rebound_cli.results.timing import undisturbed
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
 
 SET_ATTITUDE_TARGET = 82
 BUSY_LOOPS = 2
@@ -62,13 +63,15 @@ def recorded(number: int) -> Recorded:
     """The flight of that number up to its hit, and what the vehicle says after it to whoever does nothing."""
     mission = mission_of(number)
     scene = Scene.model_validate(mission.sim or {})
-    flight = SteppedFlight(mission, scene, load_built_in(scene.airframe))
+    companion = Companion(mission)
+    companion.confirm_plan()
+    flight = Stepped(SimulatedVehicle(load_built_in(scene.airframe), scene, scene.seed), companion)
     said: list[bytes] = []
-    while not flight.companion.finished:
-        heard, result = flight.fly()
-        said.append(heard)
-        if any(event.kind == "detection" for event in result.events):
-            after = [b"".join(flight.vehicle.step(b"")) for _ in range(AFTER)]
+    while not companion.finished:
+        results = flight.step()
+        said.append(b"".join(frame for result in results for frame in result.received_frames))
+        if any(event.kind == "detection" for result in results for event in result.events):
+            after = [flight.step_alone() for _ in range(AFTER)]
             return Recorded(number, [*said, *after], len(said) - 1)
     raise AssertionError("the vehicle never met the wall")
 

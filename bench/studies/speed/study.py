@@ -32,7 +32,7 @@ def fly() -> tuple[float, float]:
         # What flights before have left is not this one's.
         gc.collect()
         mission, begun_s = mission_from(document, world), process_time()
-        flown, _, _ = flown_in(Path(folder), mission, world.scene, world.airframe)
+        flown, _ = flown_in(Path(folder), mission, world.scene, world.airframe)
         processor_s = process_time() - begun_s
     virtual_s = (flown.report.ended_at_us - flown.report.started_at_us) * 1e-6
     return virtual_s / flown.wall_clock_s, virtual_s / processor_s

@@ -71,36 +71,16 @@ def test_perfect_missions_meet_every_bar():
     assert {bar.verdict for bar in bars_of(made_up()) if bar.is_met is not None} == {MET}
 
 
-def test_one_failure_in_two_hundred_is_bearable_for_the_foldable_and_two_are_not():
-    assert verdicts(bars_of(made_up(failing=[3])), "missions that end") == [MET, MET]
-    assert verdicts(bars_of(made_up(failing=[3, 4])), "missions that end") == [MISSED, MET]
-    assert verdicts(bars_of(made_up(failing=range(1, 12))), "missions that end") == [MISSED, MISSED]
-
-
-@pytest.mark.parametrize(
-    ("changes", "word"),
-    [
-        ({"lost_m": 0.11}, "height lost"),
-        ({"risen_m": 0.06}, "height gained"),
-    ],
-)
-def test_one_hit_beyond_a_limit_on_height_is_enough(changes, word):
-    assert verdicts(bars_of(made_up(**changes)), word) == [MISSED, MISSED]
-
-
 @pytest.mark.parametrize("changes", [{"past_m": 0.06}, {"again": 1}])
 def test_one_hit_in_fifty_that_overshoots_or_touches_again_is_too_many(changes):
     assert verdicts(bars_of(made_up(count=50, **changes)), "overshoot")[0] == MISSED
     assert verdicts(bars_of(made_up(count=100, **changes)), "overshoot")[0] == MET
 
 
-def test_guards_that_swing_in_and_hits_that_pin_the_vehicle_are_reported_apart():
-    bars = bars_of(made_up(count=50, again=1, lost_m=0.5, leant_deg=70.0))
-    apart = [bar.measured for bar in bars if "swing in" in bar.what]
-    strict = [bar.measured for bar in bars if "without touching the surface again" in bar.what]
-    assert (apart[0], strict[0]) == ("100.00 %", "98.00 %")
-    assert verdicts(bars, "height lost")[0] == MISSED
-    assert "50.0 cm" not in next(bar.measured for bar in bars if "tip it" in bar.what)
+@pytest.mark.parametrize(("changes", "word"), [({"lost_m": 0.11}, "height lost"), ({"risen_m": 0.06}, "height gained")])
+def test_one_hit_beyond_a_limit_on_height_is_enough_if_it_was_on_something_upright(changes, word):
+    assert verdicts(bars_of(made_up(**changes)), word) == [MISSED, MISSED]
+    assert verdicts(bars_of(made_up(**changes, steepness=0.8)), word) == [MET, MET]
 
 
 def test_every_failure_is_listed_with_seed_cause_and_the_command_to_see_it_again():
@@ -153,11 +133,6 @@ def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsy
     (tmp_path / "docs").write_text("a file")
     assert main(["campaign", "--missions", "1", "--out", str(tmp_path / "docs")]) == 1
     assert "cannot be made" in capsys.readouterr().err
-
-
-def test_an_airframe_is_chosen_for_a_single_mission_only(capsys):
-    assert main(["campaign", "--airframe", "rigid"]) == 1
-    assert "--airframe belongs to --only" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [["corpus", "judge", "FOLDER"], ["campaign", "page"], ["soak", "--minutes", "2"]])

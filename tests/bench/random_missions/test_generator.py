@@ -6,14 +6,10 @@ import pytest
 import yaml
 
 from bench.cases.missions import (
-    WIND_MAX_M_S,
     MissionCase,
-    airframe_of,
     random_mission,
 )
-from bench.cases.vehicles import AIRFRAMES
 from companion.mission.model import Mission
-from sim_vehicle.scene import Scene, check_start_is_free
 
 SEEDS = range(1, 121)
 
@@ -26,12 +22,6 @@ def drawn():
 def test_the_same_seed_is_the_same_mission_and_another_seed_another(drawn):
     assert random_mission(MissionCase(7, "foldable")) == drawn[7]
     assert len({yaml.safe_dump(mission.data) for mission in drawn.values()}) == len(SEEDS)
-
-
-def test_both_airframes_fly_the_same_mission(drawn):
-    one, other = (random_mission(MissionCase(7, name)).data for name in AIRFRAMES)
-    assert other["sim"].pop("airframe") == "rigid" and one["sim"].pop("airframe") == "foldable"
-    assert one == other
 
 
 def test_every_mission_is_a_mission_file_that_reads_back_the_same(drawn):
@@ -65,9 +55,4 @@ def test_wind_and_gust_together_stay_within_five_metres_a_second(drawn):
         gusts = [fault["velocity_ned_m_s"] for fault in sim.get("faults", ())]
         north, east, _ = (sum(parts) for parts in zip(sim["wind_ned_m_s"], *gusts, strict=True))
         assert (north**2 + east**2) ** 0.5 == pytest.approx(mission.wind_m_s, abs=0.01)
-        assert mission.wind_m_s <= WIND_MAX_M_S
-
-
-def test_nothing_stands_in_the_start(drawn):
-    for mission in drawn.values():
-        check_start_is_free(Scene.model_validate(mission.data["sim"]), airframe_of(MissionCase(1, "foldable")))
+        assert mission.wind_m_s <= 5.0
