@@ -91,13 +91,11 @@ def check_start_is_free(scene: Scene, airframe: Airframe) -> None:
 
 def check_wind_can_be_held(scene: Scene, airframe: Airframe) -> None:
     """Raise SceneError if the steady wind is more than the vehicle can lean against."""
-    push_n = airframe.drag_n_s_m * math.hypot(*scene.wind_ned_m_s[:2])
-    weight_n = airframe.weight_n + airframe.drag_n_s_m * scene.wind_ned_m_s[2]
-    leans_n = weight_n * math.tan(airframe.control.tilt_max_rad)
-    lifts_n = math.sqrt(max(0.0, (ARMS * airframe.motors.max_thrust_n) ** 2 - weight_n**2))
-    most_n = min(leans_n, lifts_n)
-    if push_n > most_n:
+    north_m_s, east_m_s, down_m_s = scene.wind_ned_m_s
+    across_n, down_n = airframe.drag_n_s_m * math.hypot(north_m_s, east_m_s), airframe.drag_n_s_m * down_m_s
+    carried_n, most_n = airframe.weight_n + down_n, ARMS * airframe.motors.max_thrust_n
+    if across_n > carried_n * math.tan(airframe.control.tilt_max_rad) or math.hypot(across_n, carried_n) > most_n:
         raise SceneError(
-            f"wind_ned_m_s pushes with {push_n:.1f} N, and {airframe.name} holds against {most_n:.1f} N; "
-            "choose less wind, or an airframe with less drag"
+            f"wind_ned_m_s pushes {airframe.name} with {math.hypot(across_n, down_n):.1f} N, more than it can lean "
+            "against; choose less wind, or an airframe with less drag"
         )

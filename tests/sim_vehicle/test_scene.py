@@ -1,11 +1,15 @@
 """The `sim:` part of a mission file and airframe files: what is refused, and with which words."""
 
+import math
+import random
+
 import pytest
 from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, SceneError
-from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
+from sim_vehicle.vehicle import SimulatedVehicle
 
 
 @pytest.mark.parametrize(
@@ -57,6 +61,47 @@ def test_a_file_states_only_what_differs_from_its_base() -> None:
     assert own.mass_kg == 1.112
 
 
-def test_an_airframe_that_cannot_hover_is_refused() -> None:
-    with pytest.raises(ValidationError, match=r"raise motors\.max_thrust_n"):
-        Airframe.model_validate(with_base({"based_on": "foldable", "mass_kg": 1.5}))
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        ({"mass_kg": 1.5}, r"raise motors\.max_thrust_n"),
+        ({"motors": {"idle_fraction": 0.2}}, r"lower motors\.idle_fraction to 0\.18 or less"),
+        ({"geometry": {"foot_depth_m": 0.04}}, r"the hub, .* would begin in the ground"),
+        ({"geometry": {"guard_height_m": 0.17}}, r"the guards, .* would begin in the ground"),
+    ],
+)
+def test_an_airframe_that_cannot_stand_fly_or_land_is_refused(part: dict[str, object], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        Airframe.model_validate(with_base({"based_on": "foldable", **part}))
+
+
+def test_whatever_is_not_refused_stands_still_until_it_is_armed() -> None:
+    # Given airframes whose lengths and mass are drawn between half and twice those of the foldable one
+    chance, base, stood = random.Random(1), load_built_in("foldable").model_dump(), 0
+    for seed in range(30):
+        geometry = {key: length_m * math.exp(chance.uniform(-0.7, 0.7)) for key, length_m in base["geometry"].items()}
+        drawn = {**base, "geometry": geometry, "mass_kg": 1.0 * math.exp(chance.uniform(-0.7, 0.2))}
+        try:
+            airframe = Airframe.model_validate(drawn)
+        except ValidationError:
+            continue
+        # When they stand for a second
+        vehicle = SimulatedVehicle(airframe, Scene(), seed)
+        began_ned_m = vehicle.state.body[:3].copy()
+        while vehicle.time_boot_us < 1_000_000:
+            vehicle.advance()
+        # Then they are where they were
+        assert math.dist(vehicle.state.body[:3], began_ned_m) < 0.02
+        stood += 1
+    assert stood > 8
+
+
+@pytest.mark.parametrize(("wind_ned_m_s", "is_held"), [((0, 24, 0), True), ((18, 18, 0), False), ((0, 0, 20), False)])
+def test_a_wind_that_the_vehicle_cannot_lean_against_is_refused(wind_ned_m_s: list[float], is_held: bool) -> None:
+    # foldable leans by 30 degrees: its weight of 10.9 N times tan 30 degrees is 6.3 N, by its drag 25 m/s
+    scene = Scene.model_validate({"wind_ned_m_s": wind_ned_m_s})
+    if is_held:
+        check_wind_can_be_held(scene, load_built_in("foldable"))
+    else:
+        with pytest.raises(SceneError, match="choose less wind"):
+            check_wind_can_be_held(scene, load_built_in("foldable"))
