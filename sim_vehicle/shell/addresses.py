@@ -3,6 +3,7 @@
 udpout://127.0.0.1:14550          sends to this address, unasked
 udpin://0.0.0.0:14551             waits for clients, as many as come
 tcpin://0.0.0.0:5760              the same on TCP
+serial:///dev/ttyUSB0:57600       a serial line
 
 With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins with.
 """
@@ -12,6 +13,7 @@ import re
 from sim_vehicle.errors import LinkAddressError
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind, link_kind
 from sim_vehicle.shell.port import Address, Port
+from sim_vehicle.shell.serial_port import SerialPort
 from sim_vehicle.shell.tcp_port import TcpServerPort
 from sim_vehicle.shell.udp_ports import UdpPeerPort, UdpServerPort
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -22,7 +24,7 @@ GROUND_LISTEN_PORT, GROUND_PORT = 18570, 14550
 
 _ADDRESS = re.compile(r"^(?P<scheme>\w+)://(?P<rest>[^?]+)(\?set=(?P<set>\w+))?$")
 _HIGHEST_PORT = 65_535
-_FORMS = "udpout://HOST:PORT, udpin://HOST:PORT or tcpin://HOST:PORT"
+_FORMS = "udpout://HOST:PORT, udpin://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
 def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
@@ -31,7 +33,9 @@ def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
     if found is None:
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
     scheme, rest = found["scheme"], found["rest"]
-    kind = _kind(address, found["set"])
+    if scheme == "serial":
+        return SerialPort(vehicle, _kind(address, found["set"], LinkKind.ONBOARD), *_split(address, rest))
+    kind = _kind(address, found["set"], LinkKind.GROUND)
     host, port = _host_and_port(address, rest)
     if scheme == "udpout":
         return UdpPeerPort(vehicle, kind, 0, (host, port))
@@ -63,17 +67,22 @@ def px4_ports(
     return ports
 
 
-def _kind(address: str, name: str | None) -> LinkKind:
+def _kind(address: str, name: str | None, default: LinkKind) -> LinkKind:
     try:
-        return LinkKind.GROUND if name is None else link_kind(name)
+        return default if name is None else link_kind(name)
     except LinkAddressError as problem:
         raise LinkAddressError(f"{address!r}: {problem}") from problem
 
 
-def _host_and_port(address: str, rest: str) -> tuple[str, int]:
-    host, separator, number = rest.rpartition(":")
-    if not separator or not host or not number.isdecimal():
+def _split(address: str, rest: str) -> tuple[str, int]:
+    name, separator, number = rest.rpartition(":")
+    if not separator or not name or not number.isdecimal():
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
-    if int(number) > _HIGHEST_PORT:
+    return name, int(number)
+
+
+def _host_and_port(address: str, rest: str) -> tuple[str, int]:
+    host, port = _split(address, rest)
+    if port > _HIGHEST_PORT:
         raise LinkAddressError(f"{address!r} names no port: give one from 0 to {_HIGHEST_PORT}.")
-    return host, int(number)
+    return host, port
