@@ -15,9 +15,11 @@ from sim_vehicle.written import NotNegative, Part, Positive
 
 # Arms, each with a motor and a guard, and all of one length. `physics/layout.py` has their directions.
 ARMS = 4
-# Above MPC_THR_MIN and a tenth of the way to hover's thrust PX4 takes no vehicle for landed
+# Of all thrust, PX4's MPC_THR_MIN: with what a vehicle that is asked to fall still steers.
+THRUST_MIN = 0.12
+# Above this share of the way from MPC_THR_MIN to hover's thrust PX4 takes no vehicle for landed
 # (MulticopterLandDetector.cpp).
-LEAST_THRUST, LANDED_SHARE = 0.12, 0.1
+NO_THRUST_SHARE = 0.1
 BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
 
 Fraction = Annotated[float, Field(gt=0, lt=1)]
@@ -243,7 +245,7 @@ class Airframe(Part):
                 f"hovering would take {100 * self.hover_fraction:.0f} % of the greatest thrust; "
                 "raise motors.max_thrust_n or lower mass_kg so that it takes at most 90 %"
             )
-        most_idle = LEAST_THRUST + LANDED_SHARE * max(0.0, self.hover_fraction - LEAST_THRUST)
+        most_idle = THRUST_MIN + NO_THRUST_SHARE * max(0.0, self.hover_fraction - THRUST_MIN)
         if self.motors.idle_fraction > most_idle:
             raise ValueError(
                 f"motors that idle at {100 * self.motors.idle_fraction:.0f} % of their thrust keep PX4 from seeing a "

@@ -1,5 +1,6 @@
 """What every baseline has: a loudness, a threshold, and one impact for one contact."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -37,7 +38,7 @@ class BaselineState(DetectorState):
     thrust: ThrustGain = field(default_factory=ThrustGain)
 
 
-class Baseline:
+class Baseline(ABC):
     """Built from its settings, as the drone's own detector is. Each looks at samples of one kind."""
 
     losses: ClassVar[Mapping[MessageId, str]] = {}
@@ -60,9 +61,9 @@ class Baseline:
             return state, self.look(state, sample, situation)
         return state, None
 
+    @abstractmethod
     def look(self, s: Any, sample: Any, situation: Situation) -> Impact | None:
         """What one of its samples shows."""
-        raise NotImplementedError
 
     def free_until_us(self, s: DetectorState, now_us: int) -> int:
         """Before the sample's averaging window, or the gap before it."""

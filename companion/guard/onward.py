@@ -76,7 +76,8 @@ def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> boo
     goal = (north, east, down)
     # A surface may be longer than it is known to be: who is in front of it stays there.
     leads_behind = any(
-        patch.off_m(here) > 0.0 and patch.off_m(goal) - deviations * patch.bends_m(goal) < known.clearance_m
+        patch.off_m(here) > 0.0
+        and patch.off_m(goal) - deviations * patch.bends_m(patch.beside_m(goal)) < known.clearance_m
         for patch in known.patches
     )
     return leads_behind or known.block([here, goal])

@@ -58,9 +58,12 @@ class Patch:
         """How far a place is in front of the surface's plane."""
         return sum(n * (p - c) for n, p, c in zip(self.normal_ned, place_ned_m, self.centre_ned_m, strict=True))
 
-    def bends_m(self, place_ned_m: Vector3) -> float:
-        """Of a wall: one standard deviation of its plane there, because its normal is not known better."""
-        beside_m = _outside_m(self.along_m(place_ned_m), self.touched_along_m())
+    def beside_m(self, place_ned_m: Vector3) -> float:
+        """Of a wall: how far a place is beside all touches."""
+        return _outside_m(self.along_m(place_ned_m), self.touched_along_m())
+
+    def bends_m(self, beside_m: float) -> float:
+        """One standard deviation of its plane so far beside its touches, because its normal is not known better."""
         return beside_m * math.tan(min(self.normal_error_rad, MOST_ANGLE_RAD))
 
     def touched_along_m(self) -> tuple[float, float]:
@@ -186,15 +189,13 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     if patch.is_steep:
         beside_m = min(math.dist(place[:2], one[:2]) for one in patch.touches_ned_m)
         is_near = beside_m <= patch.assumed_beyond_m() + 2.0 * clearance_m
-        bends_m = beside_m * math.tan(min(patch.normal_error_rad, MOST_ANGLE_RAD))
     else:
-        along_m, height_m = patch.along_m(place), -place[2]
-        bends_m = patch.bends_m(place)
+        along_m, height_m, beside_m = patch.along_m(place), -place[2], patch.beside_m(place)
         is_near = (
             _outside_m(along_m, patch.assumed_along_m()) <= 2.0 * clearance_m
             and _outside_m(height_m, patch.assumed_heights_m()) <= 2.0 * clearance_m
         )
-    return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + bends_m
+    return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + patch.bends_m(beside_m)
 
 
 def _joined(patches: Sequence[Patch], touch: Patch) -> Patch:

@@ -6,6 +6,7 @@ It has no sensor for the ground, so a descent that stalls on an obstacle looks l
 
 import math
 
+from sim_vehicle.airframe import NO_THRUST_SHARE
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Vector3
 
@@ -13,9 +14,8 @@ from sim_vehicle.setpoint import Vector3
 WIDER_WHEN_LANDED = 2.5
 # A demand faster than this many times LNDMC_Z_VEL_MAX is a commanded descent.
 DESCENT_FACTOR = 1.1
-# How far between MPC_THR_MIN and hover thrust still counts as low, and as none.
+# How far between MPC_THR_MIN and hover thrust still counts as low.
 LOW_THRUST_SHARE = 0.6
-NO_THRUST_SHARE = 0.1
 # Each of the three stages has to last a third of the detection time of 1 s.
 STAGE_US = 1_000_000 // 3
 # Specific force below this for this long is a fall, never a landing.

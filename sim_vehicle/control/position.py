@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import ARMS
+from sim_vehicle.airframe import ARMS, THRUST_MIN
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
@@ -17,9 +17,7 @@ POSITION_LOOP_HZ = 100
 # from heading, and the vehicle flies off; so R_d asks for at most this much turn at a time.
 YAW_STEP_MAX_RAD = 0.5
 
-# Of all thrust, PX4's MPC_THR_MIN and MPC_THR_XY_MARG: with what a vehicle that is asked to fall still steers, and what
-# one that is asked to climb keeps for leaning.
-THRUST_MIN = 0.12
+# Of all thrust, PX4's MPC_THR_XY_MARG: what a vehicle that is asked to climb keeps for leaning.
 HORIZONTAL_MARGIN = 0.3
 
 # Rows of `SetpointRows`.
