@@ -7,7 +7,7 @@ from bench.detectors.contact import Baseline, BaselineState, judge
 from companion.messages import ImuSample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.detector import Impact, Phase, Situation
 from rebound_cli.logs.shaking import MEMORY_US
 

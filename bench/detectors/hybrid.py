@@ -26,7 +26,7 @@ from typing import ClassVar
 
 from bench.detectors.contact import Baseline, BaselineState, judge
 from companion.messages import ImuSample, MessageId, Vector3
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.detector import Impact, Situation
 
 # A contact's first sample shows 70 % of itself at 250 Hz, all of it at 50 Hz.

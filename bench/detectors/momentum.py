@@ -25,7 +25,7 @@ from bench.detectors.contact import Baseline, BaselineState, judge
 from companion.messages import ImuSample, LocalPosition, MessageId, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.detector import Impact, Situation
 
 # Drag changes within a second; the model's error in seconds.

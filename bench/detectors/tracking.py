@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from bench.detectors.contact import Baseline, BaselineState, judge
 from companion.messages import LocalPosition
 from companion.motion.rotation import ned_to_body
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.detector import Impact, Situation
 
 # The lag follows the speed within a second; velocities before that belong to another part of the path.

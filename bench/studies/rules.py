@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.fly.moments import Copies
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 
 Arguments = tuple[Any, ...]
 

@@ -8,15 +8,16 @@ from itertools import takewhile
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
 from companion.motion.history import MotionHistory
-from companion.motion.strapdown import ZERO, VelocityFix
+from companion.motion.strapdown import VelocityFix
+from companion.motion.vector import ZERO, plus, split, unit
 from companion.reflex.config import DECIDED_US, FADED_US
 from companion.reflex.confirmation import Hypothesis
 from companion.reflex.detector import DetectorState, Phase
-from companion.reflex.halfspace import away_from, plus, split
+from companion.reflex.halfspace import away_from
 from companion.reflex.impact import ImpactEstimator
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
-from companion.reflex.normal import Normal, unit, with_change
+from companion.reflex.normal import Normal, with_change
 from companion.report import CollisionReport
 
 

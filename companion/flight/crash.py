@@ -8,8 +8,8 @@ from companion.flight.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import LocalPosition, SetArmed
 from companion.motion.rotation import tilt_rad
+from companion.motion.vector import along, plus
 from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
-from companion.reflex.halfspace import along, plus
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:

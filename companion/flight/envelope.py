@@ -16,10 +16,10 @@ from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, along, plus
 from companion.reflex.attitude_law import brakable_m_s, held_off
 from companion.reflex.config import BEHIND_M, BRAKES_M_S2, HELD_S, NOTICED_S
-from companion.reflex.halfspace import Surface, along, plus, projected
+from companion.reflex.halfspace import Surface, projected
 
 LOSS_PARAMETER = "COM_OF_LOSS_T"
 

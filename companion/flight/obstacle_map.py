@@ -10,7 +10,8 @@ from companion.memory.patch import Patch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
-from companion.reflex.halfspace import Surface, plus
+from companion.motion.vector import plus
+from companion.reflex.halfspace import Surface
 from companion.reflex.laws import Contact
 from companion.reflex.normal import Normal
 

@@ -14,11 +14,11 @@ from companion.flight.obstacle_map import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
 from companion.motion.rotation import body_to_ned, yaw_rad
 from companion.motion.settling import SettlingMonitor
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, along, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Lean, wanted
 from companion.reflex.confirmation import hypothesis_of
-from companion.reflex.halfspace import Surface, along, inside_fence, plus, projected, split
+from companion.reflex.halfspace import Surface, inside_fence, projected
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law, MotionState
 from companion.reflex.motion_estimator import MotionEstimator

@@ -11,9 +11,8 @@ from companion.memory.patch import LEAST_SPEED_M_S
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Asked, Vector3
 from companion.motion.rotation import yaw_rad
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, along
 from companion.px4_mode import AUTO_LOITER, OFFBOARD, is_auto, mode_name
-from companion.reflex.halfspace import along
 
 # PX4 brakes by this where MPC_ACC_HOR is what docs/how-to/guard.md has it set to. With PX4's default it needs less room
 # (reflex.config.BRAKES_M_S2).

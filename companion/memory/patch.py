@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.config import FROM_BEHIND, STEEP
 from companion.reflex.halfspace import away_from
 from companion.reflex.normal import Normal

@@ -20,7 +20,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.motion.config import CURRENT_US, STAMP_RESOLUTION_US
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 
 
 @dataclass(slots=True)

@@ -4,7 +4,7 @@ import math
 
 from companion.messages import Vector3
 from companion.motion.config import SettledConfig
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 
 
 class SettlingMonitor:

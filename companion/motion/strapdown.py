@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from companion.messages import LocalPosition, Odometry, Quaternion, Vector3
 from companion.motion.config import CURRENT_US, GRAVITY_M_S2, KEPT_US, LONGEST_GAP_US
 from companion.motion.rotation import body_to_ned, ned_to_body, turned
+from companion.motion.vector import ZERO
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
-ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

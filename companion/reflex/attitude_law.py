@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from companion.messages import Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import LEVEL, ZERO
+from companion.motion.strapdown import LEVEL
+from companion.motion.vector import ZERO, along, limited, plus
 from companion.reflex import config as reflex
-from companion.reflex.halfspace import Surface, along, limited, plus, projected
+from companion.reflex.halfspace import Surface, projected
 
 
 @dataclass(frozen=True, slots=True)

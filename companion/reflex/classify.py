@@ -8,7 +8,8 @@ from companion.messages import Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S, SHOWN_US
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, tilt_rad
-from companion.motion.strapdown import LEVEL, ZERO
+from companion.motion.strapdown import LEVEL
+from companion.motion.vector import ZERO
 from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
 from companion.reflex.detector import Impact, ImpactKind, Situation
 

@@ -13,10 +13,10 @@ from statistics import median, stdev
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2, SAME_M_S
 from companion.motion.history import MotionHistory
-from companion.motion.strapdown import ZERO, VelocityFix
+from companion.motion.strapdown import VelocityFix
+from companion.motion.vector import ZERO, plus, split
 from companion.reflex.config import DECIDED_US, STRUCK_M_S, SURE
 from companion.reflex.detector import Evidence
-from companion.reflex.halfspace import plus, split
 from companion.reflex.impact import ImpactEstimate
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from companion.messages import ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.config import CLIPPED_SHARE, SHORT
 
 

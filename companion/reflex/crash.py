@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import tilt_rad
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, plus
 from companion.reflex.config import (
     CARRIED_SHARE,
     LOW_M,
@@ -17,7 +17,6 @@ from companion.reflex.config import (
     STILL_RAD_S,
     TIPPED_RAD,
 )
-from companion.reflex.halfspace import plus
 
 
 @dataclass(slots=True)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.config import EXCESS, MEAN_MEMORY_S, SPREAD_MEMORY_S
 
 

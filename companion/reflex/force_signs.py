@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from companion.messages import Vector3
 from companion.motion.config import CURRENT_US
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.config import CLEAR, JUMP, MEAN_MEMORY_S, SHAKING, FusedConfig
 from companion.reflex.detector import DetectorState, Impact, ImpactKind, Phase
 from companion.reflex.force_noise import ForceNoise

@@ -21,11 +21,11 @@ from typing import ClassVar
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.config import LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
+from companion.motion.vector import limited
 from companion.reflex.classify import classified, hovers
 from companion.reflex.config import LEARNT_S, SETTLED_US, WORSE_AFTER_US, FusedConfig
 from companion.reflex.detector import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.reflex.force_signs import FusedState
-from companion.reflex.halfspace import limited
 from companion.reflex.validity import VelocityValidity
 from companion.reflex.velocity_jump import VelocityJump
 

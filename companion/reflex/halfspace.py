@@ -6,41 +6,14 @@ from dataclasses import dataclass
 
 from companion.fence import Fence
 from companion.messages import Vector3
+from companion.motion.vector import along, plus, unit
 from companion.reflex.config import ROUNDS, STEEP
-from companion.reflex.normal import unit
 
 
 def away_from(normal_ned: Vector3) -> Vector3:
     """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
     n, e, d = normal_ned
     return unit((n, e, d if abs(d) > STEEP * math.hypot(n, e, d) else 0.0))
-
-
-def along(vector: Vector3, normal: Vector3) -> float:
-    """The component of a vector along a unit normal."""
-    return vector[0] * normal[0] + vector[1] * normal[1] + vector[2] * normal[2]
-
-
-def split(vector: Vector3, normal: Vector3) -> tuple[float, Vector3]:
-    """The component of a vector along a unit normal, and the vector without it."""
-    (u, v, w), (a, b, c) = vector, normal
-    along = u * a + v * b + w * c
-    return along, (u - along * a, v - along * b, w - along * c)
-
-
-def plus(vector: Vector3, factor: float, direction: Vector3) -> Vector3:
-    """vector + factor * direction."""
-    return (
-        vector[0] + factor * direction[0],
-        vector[1] + factor * direction[1],
-        vector[2] + factor * direction[2],
-    )
-
-
-def limited(vector: Vector3, most: float) -> Vector3:
-    """The vector, no longer than that."""
-    size = math.hypot(*vector)
-    return vector if size <= most else plus((0.0, 0.0, 0.0), most / size, vector)
 
 
 @dataclass(frozen=True, slots=True)

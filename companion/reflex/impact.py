@@ -7,7 +7,8 @@ from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sam
 from companion.motion.config import STAMP_RESOLUTION_US
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import ZERO, Strapdown
+from companion.motion.strapdown import Strapdown
+from companion.motion.vector import ZERO
 from companion.reflex.config import EstimateConfig
 from companion.reflex.contact_force import ContactForce
 from companion.reflex.detector import DetectorState, Evidence, Impact, Phase

@@ -18,9 +18,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, along, plus, split
 from companion.reflex.config import WAY_S, RecoveryConfig
-from companion.reflex.halfspace import along, plus, split
 
 
 @dataclass(frozen=True, slots=True)

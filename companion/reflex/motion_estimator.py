@@ -19,12 +19,12 @@ import numpy as np
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import DELAY_S, GRAVITY_M_S2, LATEST_S, LONGEST_GAP_US, SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.rotation import body_to_ned, turned
-from companion.motion.strapdown import LEVEL, ZERO, Strapdown
+from companion.motion.strapdown import LEVEL, Strapdown
+from companion.motion.vector import ZERO, along, limited, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
 from companion.reflex.correction import MODELS, Floats, error_response
-from companion.reflex.halfspace import along, limited, plus, split
 from companion.reflex.laws import Contact, MotionState
 
 

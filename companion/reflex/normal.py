@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, unit
 from companion.reflex.config import (
     APPROACH_M_S,
     APPROACH_RAD,
@@ -51,9 +51,3 @@ def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3)
     n, e, d = (after - before for before, after in zip(before_ned_m_s, after_ned_m_s, strict=True))
     size_m_s = math.hypot(n, e, d)
     return normal.with_direction((n, e, d), math.hypot(CHANGE_RAD, CHANGE_M_S / max(size_m_s, 1e-6)))
-
-
-def unit(vector: Vector3) -> Vector3:
-    """Unit vector; zero for a zero vector."""
-    length = math.hypot(*vector)
-    return (vector[0] / length, vector[1] / length, vector[2] / length) if length > 1e-9 else ZERO

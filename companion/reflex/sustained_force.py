@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, plus, split, unit
 from companion.reflex.config import (
     FOLLOWED_S,
     FREE_M_S,
@@ -26,9 +26,9 @@ from companion.reflex.config import (
     STEADY_M_S,
 )
 from companion.reflex.detector import Impact, ImpactKind
-from companion.reflex.halfspace import away_from, plus, split
+from companion.reflex.halfspace import away_from
 from companion.reflex.impact import ImpactEstimate
-from companion.reflex.normal import Normal, unit
+from companion.reflex.normal import Normal
 from companion.reflex.thrust import ThrustGain
 
 

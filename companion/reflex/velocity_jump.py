@@ -13,7 +13,8 @@ from itertools import pairwise
 from companion.messages import Vector3
 from companion.motion.config import LONGEST_GAP_US, YAW_SHARE
 from companion.motion.delay import Delay
-from companion.motion.strapdown import ZERO, VelocityFix
+from companion.motion.strapdown import VelocityFix
+from companion.motion.vector import ZERO
 from companion.reflex.config import (
     COMPARED,
     LAG_S,

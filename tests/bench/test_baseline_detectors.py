@@ -10,8 +10,8 @@ from bench.detectors.config import BaselineConfig
 from bench.detectors.contact import Threshold
 from bench.detectors.force import LateralDetector
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
+from companion.motion.vector import plus
 from companion.reflex.detector import Phase, Situation
-from companion.reflex.halfspace import plus
 from companion.reflex.monitor import advance, start_monitor
 
 TICK_US = 4_000

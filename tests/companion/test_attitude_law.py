@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO, along, plus
 from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, tilted, wanted
 from companion.reflex.config import LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S
-from companion.reflex.halfspace import Surface, along, plus
+from companion.reflex.halfspace import Surface
 
 HERE, FULL_M_S2 = (0.0, 0.0, -2.0), 16.0
 SOUTH = (-1.0, 0.0, 0.0)

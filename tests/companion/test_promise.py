@@ -2,7 +2,8 @@
 
 import pytest
 
-from companion.motion.strapdown import ZERO, VelocityFix
+from companion.motion.strapdown import VelocityFix
+from companion.motion.vector import ZERO
 from companion.reflex.config import EXCESS, FusedConfig
 from companion.reflex.force_signs import FusedState
 from companion.reflex.promise import promise_of

@@ -13,7 +13,8 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, AttitudeSetpoint, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
-from companion.motion.strapdown import LEVEL, ZERO
+from companion.motion.strapdown import LEVEL
+from companion.motion.vector import ZERO
 from companion.reflex.config import EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator

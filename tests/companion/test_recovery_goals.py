@@ -5,7 +5,7 @@ import math
 import pytest
 
 from companion.fence import Fence
-from companion.motion.strapdown import ZERO
+from companion.motion.vector import ZERO
 from companion.reflex.config import WAY_S, RecoveryConfig
 from companion.reflex.halfspace import Surface, inside_fence, projected
 from companion.reflex.laws import RECOVERY_LAWS, Contact
