@@ -181,6 +181,6 @@ class Companion(Stepped[FlightCore]):
             refused_messages=dict(flight.refusals.counts),
             unconfirmed=flight.unconfirmed,
             round_trip=flight.round_trip.report(),
-            promise=core.monitor.promise,
+            promise=core.reflex.monitor.promise,
             crashed=flight.crashed,
         )

@@ -7,18 +7,16 @@ replayed.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.damage import note_motors
-from companion.flight.detecting import collisions
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
-from companion.flight.recovering import as_the_vehicle_has_it
 from companion.flight.states import FINAL_STATES, State
 from companion.flight.vehicle_update import landed, note_height, situation_of, update_vehicle
 from companion.link.streams import StreamMonitor
@@ -35,11 +33,14 @@ from companion.messages import (
 )
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
+from companion.motion.vector import ZERO, plus
 from companion.px4_mode import mode_name
+from companion.reflex.collision import CollisionReport
 from companion.reflex.config import HELD_S, NOTICED_S
 from companion.reflex.detector import Situation
-from companion.reflex.monitor import CollisionMonitor, start_monitor
-from companion.report import CollisionReport, Event, Status
+from companion.reflex.impact import ImpactEstimate
+from companion.reflex.reflex import start_reflex
+from companion.report import Event, Status
 
 # MAVLink's heartbeat microservice: once a second.
 HEARTBEAT_INTERVAL_US = 1_000_000
@@ -70,8 +71,8 @@ MachineT = TypeVar("MachineT", bound=StateMachine)
 class Core(ABC, Generic[FlightT, MachineT]):
     """The state between two steps, and the part of a step that a flight and a guard share."""
 
-    def __init__(self, flight: FlightT, machine: MachineT, monitor: CollisionMonitor, now_us: int) -> None:
-        self.flight, self.machine, self.monitor = flight, machine, monitor
+    def __init__(self, flight: FlightT, machine: MachineT, now_us: int) -> None:
+        self.flight, self.machine, self.reflex = flight, machine, flight.reflex
         self.started_at_us = self.now_us = now_us
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self._sample_boot_us = 0
@@ -130,21 +131,16 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
         Heartbeats, setpoints and the log go on meanwhile. After a fault hits are not detected any more.
         """
-        flight, monitor = self.flight, self.monitor
+        flight = self.flight
         try:
             samples, refusal = self._hear(samples, now_us)
             note_height(flight)
-            impacts = () if flight.fault else collisions(flight, monitor, samples, self.situation(), now_us)
+            impacts = () if flight.fault else self._notice(samples, now_us)
             acks = [sample for sample in samples if isinstance(sample, CommandAck)]
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
-            unconfirmed = flight.unconfirmed
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
-            if flight.unconfirmed > unconfirmed:
-                self.monitor.reject()
-            if flight.collisions:
-                flight.collisions[-1].follow(monitor.state, monitor.estimator, positions)
+            self.reflex.follow(samples, flight.height_m, flight.vehicle.landed)
             note_motors(flight, samples, now_us)
-            flight.crash.update(samples, flight.height_m, flight.vehicle.landed)
         except Exception as error:
             return self.machine.fail(error, now_us)
         return moved
@@ -152,6 +148,18 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in the frame of this flight, and why the vehicle is refused."""
         return samples, update_vehicle(self.flight, samples, now_us)
+
+    def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
+        """The collisions that the samples show; what else they show is reported."""
+        flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
+        sees = self.reflex.monitor.no_data_reason is None
+        if sees is not (flight.no_data_since_us is None):
+            flight.no_data_since_us = None if sees else now_us
+        for notice in reaction.notices:
+            flight.report(now_us, notice.kind, notice.text, **notice.data)
+        if reaction.has_touched_down:
+            flight.note_touchdown()
+        return reaction.collisions
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         """Run the state machine; whether its state changed."""
@@ -165,7 +173,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         target = self.flight.target
         return situation._replace(
             landed_state=landed(self.flight, self._goes_down),
-            setpoint_position_ned_m=None if target is None else target.position_ned_m,
+            setpoint_position_ned_m=None if target is None or target.lean is not None else target.position_ned_m,
         )
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
@@ -173,7 +181,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
         An attitude is sent for each IMU sample.
         """
-        sample_us, target = self.monitor.estimator.strapdown.time_boot_us, self.flight.target
+        sample_us, target = self.reflex.sample_boot_us, self.flight.target
         follows_imu = target is not None and target.lean is not None and sample_us != self._sample_boot_us
         self._sample_boot_us = sample_us
         if not (moved or follows_imu) and now_us < self._setpoint_due_us:
@@ -240,7 +248,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if operator.values_hz and now_us >= self._values_due_us and not self.machine.finished:
             self._values_due_us = now_us + round(1e6 / operator.values_hz)
             latest = flight.collisions[-1] if flight.collisions else None
-            flight.outbox += values(self.machine.state, self.monitor, latest, hits, now_us - self.started_at_us)
+            flight.outbox += values(self.machine.state, self.reflex.monitor, latest, hits, now_us - self.started_at_us)
 
     def next_deadline_us(self) -> int:
         """When the next step is due if nothing arrives."""
@@ -257,7 +265,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             armed=vehicle.armed is True,
             position_ned_m=None if latest is None else latest.position_ned_m,
             speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
-            detector=self.monitor.describe(),
+            detector=self.reflex.monitor.describe(),
             round_trip_us=self.flight.round_trip.present_us,
         )
 
@@ -270,10 +278,11 @@ class FlightCore(Core[FlightContext, Machine]):
     """The core of one flight of a mission."""
 
     def __init__(self, mission: Mission, now_us: int) -> None:
-        monitor = start_monitor(mission.companion, now_us)
-        streams = StreamMonitor(mission.companion.streams, tuple(monitor.detector.losses))
-        flight = FlightContext(mission, Vehicle(), streams)
-        super().__init__(flight, Machine(flight, Connect(now_us)), monitor, now_us)
+        config = mission.companion
+        reflex = start_reflex(config, mission.recovery, config.settled, now_us)
+        streams = StreamMonitor(config.streams, tuple(reflex.monitor.detector.losses))
+        flight = FlightContext(mission, Vehicle(), streams, reflex)
+        super().__init__(flight, Machine(flight, Connect(now_us)), now_us)
 
     @property
     def _is_active(self) -> bool:
@@ -338,7 +347,7 @@ class Limiter:
             has_floor=has_floor,
             last_ned_m=None if moved else self.last_ned_m,
             since_last_s=(now_us - self.last_us) * 1e-6,
-            held_s=min(flight.loss_s or HELD_S, HELD_S) + NOTICED_S,
+            held_s=min(flight.reflex.loss_s or HELD_S, HELD_S) + NOTICED_S,
             known=known_surfaces(flight),
         )
         target, reason = bounded(wanted, around, flight.mission.fence, flight.mission.limits)
@@ -356,8 +365,14 @@ class Limiter:
 
         Raises SetpointError for one that is not finite.
         """
-        sent = as_the_vehicle_has_it(flight, target, time_boot_us)
-        if sent is target:
+        wrong = None if target.lean is not None else flight.reflex.left_wrong(time_boot_us)
+        if wrong is None:
             return target
+        sent = replace(
+            target,
+            position_ned_m=plus(target.position_ned_m, wrong.share, wrong.position_m),
+            velocity_ned_m_s=plus(target.velocity_ned_m_s or ZERO, wrong.share, wrong.velocity_m_s),
+            acceleration_ned_m_s2=plus(target.acceleration_ned_m_s2 or ZERO, -wrong.share, wrong.pushed_m_s2),
+        )
         around = Surroundings(None, flight.origin_ned_m, has_floor)
         return bounded(sent, around, flight.mission.fence, flight.mission.limits)[0]

@@ -21,7 +21,7 @@ DERIVED = {
 }
 # A damaged motor decides no hit and no recovery.
 OTHERS = {"motors.py"}
-FLIGHT = ("after_hit", "collision", "damage", "detecting", "recovering")
+FLIGHT = ("after_hit", "damage", "recovering")
 
 
 def sources() -> Iterator[Path]:

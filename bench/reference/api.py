@@ -12,7 +12,8 @@ import companion.mavsdk
 import sim_vehicle.testing
 from bench.reference.markdown import code, first_sentence, once, table
 from companion.guard.config import GuardConfig
-from companion.report import CollisionReport, Event
+from companion.reflex.collision import CollisionReport
+from companion.report import Event
 
 MODULES: tuple[ModuleType, ...] = (companion.mavsdk, sim_vehicle.testing)
 

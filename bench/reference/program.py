@@ -71,8 +71,11 @@ def data_keys() -> dict[str, list[str]]:
             at = {"report": 1, "Notice": 0}[_callee(call)]
             kind = call.args[at] if len(call.args) > at else None
             if isinstance(kind, ast.Constant) and isinstance(kind.value, str):
+                written = [key for data in call.args if isinstance(data, ast.Dict) for key in data.keys]
+                words = [key.value for key in written if isinstance(key, ast.Constant)]
+                words += [word.arg for word in call.keywords]
                 keys = found.setdefault(kind.value, [])
-                keys += [word.arg for word in call.keywords if word.arg and word.arg not in keys]
+                keys += [word for word in words if isinstance(word, str) and word not in keys]
     return found
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.fly.lockstep import JudgedFlight
-from companion.report import CollisionReport, Event
+from companion.reflex.collision import CollisionReport
+from companion.report import Event
 from rebound_cli.results.truth_match import LATE_SAMPLE_US
 from sim_vehicle.truth import Hit
 

@@ -9,7 +9,7 @@ from bench.fly.guarded import FREE_S, MOST_RECOVERY_S, Approach, FlownHit, Verdi
 from bench.fly.wire import FOUND_WITHIN_US
 from bench.rows.contacts import tilts_deg
 from bench.rows.recovered import CAME_BACK_M
-from companion.report import CollisionReport
+from companion.reflex.collision import CollisionReport
 from rebound_cli.results.truth_match import LATE_SAMPLE_US, FlightTruth
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.truth import Hit

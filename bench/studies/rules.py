@@ -86,7 +86,7 @@ RULES = (
         _REFLEX + "validity:VelocityValidity.correction_m_s",
         _says(0.0),
     ),
-    Rule("change", "the normal by the change of velocity", _FLIGHT + "collision:with_change", _argument(0)),
+    Rule("change", "the normal by the change of velocity", _REFLEX + "collision:with_change", _argument(0)),
     Rule("held off", "no attitude that leads into what is near", _REFLEX + "attitude_law:held_off", _argument(0)),
     Rule(
         "leaves",

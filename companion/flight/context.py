@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
-from companion.flight.collision import CollisionRecord
 from companion.flight.states import State, Trigger
 from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
@@ -26,11 +25,10 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
-from companion.reflex.attitude_law import Lean, attitude_and_thrust, turn_kept
-from companion.reflex.crash import CrashWatch
+from companion.reflex.attitude_law import Lean
+from companion.reflex.collision import CollisionRecord
 from companion.reflex.impact import ImpactEstimate
-from companion.reflex.sustained_force import SustainedForceMonitor
-from companion.reflex.thrust import ThrustGain
+from companion.reflex.reflex import Reflex
 from companion.report import Event, JsonValue, Outcome
 
 
@@ -54,8 +52,7 @@ class Target:
     def setpoint(self, time_us: int) -> PositionSetpoint | AttitudeSetpoint:
         """As it is sent."""
         if self.lean is not None and self.acceleration_ned_m_s2 is not None:
-            attitude_wxyz, thrust = attitude_and_thrust(self.acceleration_ned_m_s2, self.lean)
-            return AttitudeSetpoint(time_us, attitude_wxyz, thrust, turn_kept(self.lean.belief.yaw_rate_rad_s))
+            return self.lean.setpoint(time_us, self.acceleration_ned_m_s2)
         velocity, acceleration = self.velocity_ned_m_s, self.acceleration_ned_m_s2
         return PositionSetpoint(time_us, self.position_ned_m, self.yaw_rad, velocity, acceleration)
 
@@ -133,6 +130,7 @@ class FlightContext:
     mission: Mission
     vehicle: Vehicle
     streams: StreamMonitor
+    reflex: Reflex
     command_client: CommandClient = field(default_factory=CommandClient)
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
@@ -160,23 +158,17 @@ class FlightContext:
     file_awaited: str | None = None
     file_is_there: bool = False
     expectations: list[Expectation] = field(default_factory=list)
-    collisions: list[CollisionRecord] = field(default_factory=list)
     before_hit: BeforeHit | None = None
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)
-    loss_s: float | None = None  # the vehicle's COM_OF_LOSS_T
-    thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
-    thrust_boot_us: int = 0  # its newest sample
     told_by_position: bool = False  # that recoveries are not flown by attitude
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
-    crash: CrashWatch = field(default_factory=CrashWatch)
     crashed: str = ""  # how, once it has
     is_wreck: bool = False  # since then, until it is disarmed or flies again
     motors: MotorWatch = field(default_factory=MotorWatch)
-    sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     no_data_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
@@ -204,6 +196,15 @@ class FlightContext:
         if latest is None or origin is None or self.vehicle.is_position_old:
             return None
         return origin[2] - latest.position_ned_m[2]
+
+    @property
+    def collisions(self) -> list[CollisionRecord]:
+        """All so far."""
+        return self.reflex.hits
+
+    def note_unconfirmed(self) -> None:
+        """The newest hit was none."""
+        self.unconfirmed += 1
 
     def note_touchdown(self) -> None:
         """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""

@@ -2,26 +2,24 @@
 
 import math
 
-from companion.flight.collision import in_one_recovery
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
 from companion.flight.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import LocalPosition, SetArmed
 from companion.motion.rotation import tilt_rad
 from companion.motion.vector import along, plus
-from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
     """How, told with what is known; None of a vehicle that flies."""
-    watch, latest, attitude = flight.crash, flight.vehicle.history.latest(), flight.vehicle.attitude
+    watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest(), flight.vehicle.attitude
     if latest is None or attitude is None or not flight.vehicle.armed:
         return None
     hits = flight.collisions[flight.motors.earlier_hits :]
     has_unsettled = bool(hits) and hits[-1].settled_after_s is None
-    if watch.tipped.lasts_us >= TIPPED_US:
+    if watch.is_tipped:
         how = "tipped over"
-    elif has_unsettled and not goes_down and watch.low.lasts_us >= LOW_US:
+    elif has_unsettled and not goes_down and watch.is_low:
         how = "on the floor after a hit"
     elif has_unsettled and _is_pressed(flight, latest, now_us):
         how = "pressed to what was hit"
@@ -48,7 +46,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
 
 def _is_pressed(flight: FlightContext, latest: LocalPosition, now_us: int) -> bool:
     """Whether the time for the recovery is over, and the vehicle is still where it touches."""
-    recovery, settled = in_one_recovery(flight.collisions), flight.mission.companion.settled
+    recovery, settled = flight.reflex.in_one_recovery(), flight.mission.companion.settled
     if not recovery or now_us - recovery[-1].detected_at_us <= settled.timeout_s * 1e6:
         return False
     contact = recovery[0].contact
@@ -77,20 +75,21 @@ class Crashed(NoSetpoint):
             return Transition(Trigger.DISARMED, flight.crashed)
         if not flight.is_wreck:
             return Transition(Trigger.FLIES_AGAIN, f"{flight.crashed}; it flies again, in other hands")
-        lies, client = flight.crash.lying.lasts_us >= LIES_US, flight.command_client
-        if not lies:
+        watch, client = flight.reflex.crash, flight.command_client
+        if not watch.lies:
             client.cancel()
         elif flight.mission.on_crash == "disarm" and not client.busy and now_us >= self._ask_us:
             client.begin(SetArmed(False, self._is_forced))
         outcome = flight.command_outcome(inputs, False, now_us)
         if outcome is not None:
-            self._ask_us, self._is_forced = now_us + DISARM_NEWS_US, flight.crash.is_carried and not outcome.succeeded
+            self._ask_us, self._is_forced = now_us + DISARM_NEWS_US, watch.is_carried and not outcome.succeeded
         return None
 
     def _flies_again(self, flight: FlightContext) -> bool:
         """Whether it is upright, above the ground, and somewhere else."""
         latest, height_m = flight.vehicle.history.latest(), flight.height_m
-        if latest is None or height_m is None or self._place_ned_m is None or flight.crash.tipped.since_us is not None:
+        tips = flight.reflex.crash.tipped.since_us is not None
+        if latest is None or height_m is None or self._place_ned_m is None or tips:
             return False
         away_m = math.dist(latest.position_ned_m, self._place_ned_m)
         return min(away_m, height_m) > flight.mission.companion.min_detection_height_m

@@ -155,7 +155,8 @@ class Machine(StateMachine):
                     flight.step_index = 1
                 return FlyItems(flight, now_us)
             case State.RECOVERING:
-                recovery = Recover(flight, now_us)
+                assert flight.reflex.recovery is not None, "a collision begins one"
+                recovery = Recover(flight, flight.reflex.recovery)
                 return recovery if flight.expected_mode == OFFBOARD else TakeBack(flight, recovery, now_us)
             case State.HOLDING:
                 return HoldAfterRecovery(flight, now_us)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from companion.flight.collision import CollisionRecord, in_one_recovery
+from companion.fence import Fence
 from companion.flight.context import FlightContext
 from companion.flight.envelope import KnownSurface, touched
 from companion.flight.states import Trigger
@@ -11,6 +11,7 @@ from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.motion.vector import plus
+from companion.reflex.collision import CollisionRecord
 from companion.reflex.halfspace import Surface
 from companion.reflex.laws import Contact
 from companion.reflex.normal import Normal
@@ -44,6 +45,35 @@ def surroundings(flight: FlightContext) -> ObstacleMap:
     return ObstacleMap(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
 
 
+class FlightRoom:
+    """What a flight knows of the space around; local NED."""
+
+    def __init__(self, flight: FlightContext) -> None:
+        self._flight = flight
+
+    def surfaces(self, contact: Contact) -> Sequence[Surface]:
+        return remembered_surfaces(self._flight, contact)
+
+    def inside(self, contact_ned_m: Vector3, goal_ned_m: Vector3) -> Vector3:
+        origin = self._flight.origin_ned_m
+        assert origin is not None, "hits are detected only in flight"
+        return inside_fence(self._flight.mission.fence, origin, contact_ned_m, goal_ned_m)
+
+
+def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
+    """The setpoint inside a fence at that origin: where the line from the contact leaves it; local NED, metres.
+
+    For a contact outside the fence it is the nearest position inside.
+    """
+    (start_n, start_e, _), (end_n, end_e, end_d) = (
+        plus(place, -1.0, origin_ned_m) for place in (contact_ned_m, setpoint_ned_m)
+    )
+    n, e = fence.nearest_inside(end_n, end_e)
+    if fence.contains(start_n, start_e):
+        n, e = fence.shortened((start_n, start_e), (end_n, end_e))
+    return plus((n, e, min(max(end_d, -fence.max_height_m), -fence.min_height_m)), 1.0, origin_ned_m)
+
+
 def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:
     """What is known in front of a vehicle that has just been hit, besides what hit it. Local NED.
 
@@ -64,7 +94,7 @@ def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface
 def known_surfaces(flight: FlightContext) -> list[KnownSurface]:
     """Surfaces that a setpoint must not lead into: those hit in this recovery, and the obstacle map."""
     known = []
-    for record in in_one_recovery(flight.collisions):
+    for record in flight.reflex.in_one_recovery():
         surface = touched(record.contact.position_ned_m, record.contact.normal_ned)
         # A surface that the recovery setpoint lies behind does not count: the vehicle has slid past it.
         if surface.off_m(record.setpoint_ned_m) > 0.0:

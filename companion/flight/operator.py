@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from companion.flight.collision import CollisionRecord
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
+from companion.reflex.collision import CollisionRecord
 from companion.reflex.detector import Phase
 from companion.reflex.monitor import CollisionMonitor
 from companion.report import Event, JsonValue

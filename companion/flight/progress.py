@@ -106,7 +106,7 @@ class FlyItems(_OnTrajectory):
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
         known = surroundings(flight)
         speeds = replace(flight.speeds, factor=flight.tally.pace_factor)
-        speeds = speeds.against(flight.sustained_force.wind_m_s2, first_leg(action, start_m))
+        speeds = speeds.against(flight.reflex.sustained_force.wind_m_s2, first_leg(action, start_m))
         planned = trajectory_around(action, start_m, speeds, known)
         if planned.trajectory is None:
             self._out_of_reach = f"{describe_item(action)}: no way round what is known"
@@ -298,7 +298,7 @@ class FlyHome(_OnTrajectory):
         flight.going_home = True
         flight.yaw_rad = flight.target.yaw_rad
         start = flight.mission_ned_m(flight.target.position_ned_m)
-        wind_m_s2, homewards = flight.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0)
+        wind_m_s2, homewards = flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0)
         speeds = replace(flight.speeds, factor=1.0).against(wind_m_s2, homewards)
         planned = home_around(start, flight.returning_as, speeds, surroundings(flight))
         self._is_cut_off = planned.trajectory is None

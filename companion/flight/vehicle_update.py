@@ -40,9 +40,9 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 flight.report(now_us, "implausible", text, message=sample.message)
             continue
         elif isinstance(sample, messages.Parameter) and sample.name == LOSS_PARAMETER:
-            if flight.loss_s is None and sample.value > HELD_S:
+            if flight.reflex.loss_s is None and sample.value > HELD_S:
                 flight.report(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
-            flight.loss_s = round(sample.value, 3)  # single precision on the wire
+            flight.reflex.loss_s = round(sample.value, 3)  # single precision on the wire
         elif isinstance(sample, messages.TimeSyncRequest):
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, messages.TimeSyncAnswer):
@@ -84,7 +84,7 @@ def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
     if asked is None:
         return
     flight.outbox.append(asked)
-    if flight.loss_s is None:
+    if flight.reflex.loss_s is None:
         flight.outbox.append(messages.ReadParameter(LOSS_PARAMETER))
     text = flight.round_trip.alarm() if flight.vehicle.armed else None
     if text is not None:
@@ -130,4 +130,6 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool) 
         descent_commanded=goes_down,
         flown_by_hand=is_by_hand(flight.vehicle.custom_mode or 0),
         has_climbed=flight.has_climbed,
+        has_position=flight.has_position,
+        is_wreck=flight.is_wreck,
     )

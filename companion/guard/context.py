@@ -57,6 +57,10 @@ class GuardContext(FlightContext):
             north, east, down = ((p - b) / since_s for p, b in zip(asked.place_ned_m, before.place_ned_m, strict=True))
             self.asked = Asked(asked.place_ned_m, (north, east, down))
 
+    def note_unconfirmed(self) -> None:
+        FlightContext.note_unconfirmed(self)
+        self.hits -= 1
+
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""
         FlightContext.note_touchdown(self)

@@ -12,17 +12,18 @@ from companion.guard.watching import GuardConnect, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
-from companion.reflex.monitor import start_monitor
+from companion.reflex.reflex import start_reflex
 
 
 class GuardCore(Core[GuardContext, GuardMachine]):
     """`keeps_others_out`: see GuardContext."""
 
     def __init__(self, config: GuardConfig, keeps_others_out: bool, now_us: int) -> None:
-        monitor = start_monitor(config.companion, now_us)
-        streams = StreamMonitor(config.companion.streams, tuple(monitor.detector.losses))
-        guard = GuardContext(config.as_mission(), Vehicle(), streams, config=config, keeps_others_out=keeps_others_out)
-        super().__init__(guard, GuardMachine(guard, GuardConnect(now_us)), monitor, now_us)
+        mission = config.as_mission()
+        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, now_us)
+        streams = StreamMonitor(config.companion.streams, tuple(reflex.monitor.detector.losses))
+        guard = GuardContext(mission, Vehicle(), streams, reflex, config=config, keeps_others_out=keeps_others_out)
+        super().__init__(guard, GuardMachine(guard, GuardConnect(now_us)), now_us)
         self.is_enabled = False  # asked for, and not yet taken up
 
     @property
@@ -65,8 +66,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         self.is_enabled = False
         moved = super()._act(samples, inputs, now_us)
         if moved and self.machine.state is State.CONNECTING:
-            # After a restart of the vehicle, perhaps by a hit, nothing that was measured before is valid.
-            self.monitor = start_monitor(guard.config.companion, now_us)
+            guard.reflex.restart(now_us)
         return moved
 
     def _note_sent(self, target: Target, now_us: int) -> None:

@@ -12,7 +12,8 @@ from companion.guard.states import State
 from companion.guard.watching import OWN_STREAMS, GuardConnect
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
-from companion.report import CollisionReport, RoundTripReport
+from companion.reflex.collision import CollisionReport
+from companion.report import RoundTripReport
 
 
 class Guard(Stepped[GuardCore]):

@@ -99,11 +99,8 @@ class Recovering:
 
 
 def recovered(guard: GuardContext, recover: Recover, inputs: Inputs, now_us: int) -> bool:
-    """One step of the recovery; whether it is over, be it that the hit was none, which then does not count."""
-    before = guard.unconfirmed
-    is_over = recover.step(guard, inputs, now_us) is not None
-    guard.hits -= guard.unconfirmed - before
-    return is_over
+    """One step of the recovery; whether it is over, be it that the hit was none."""
+    return recover.step(guard, inputs, now_us) is not None
 
 
 def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:

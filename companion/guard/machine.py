@@ -219,10 +219,10 @@ class GuardMachine(StateMachine):
                 mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
                 guard.command_client.cancel()
-                return TakeOver(guard, Recover(guard, now_us), now_us)
+                return TakeOver(guard, self._recover(), now_us)
             case State.RECOVERING:
                 if transition.trigger is Trigger.HIT:
-                    return Recovering(Recover(guard, now_us), now_us)
+                    return Recovering(self._recover(), now_us)
                 assert isinstance(self.handler, TakeOver), "the table leads here from there alone"
                 return Recovering(self.handler.recover, now_us)
             case State.GIVING_BACK:
@@ -237,6 +237,11 @@ class GuardMachine(StateMachine):
             case State.ENDED:
                 self.outcome = transition.text
                 return Released()
+
+    def _recover(self) -> Recover:
+        recovery = self.flight.reflex.recovery
+        assert recovery is not None, "a hit begins one"
+        return Recover(self.flight, recovery)
 
 
 def has_moved(before: Sticks, now: Sticks) -> bool:

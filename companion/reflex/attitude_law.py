@@ -15,7 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from companion.messages import Quaternion, Vector3
+from companion.messages import AttitudeSetpoint, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import LEVEL
@@ -47,6 +47,11 @@ class Lean:
     full_m_s2: float  # specific force at full thrust
     yaw_rad: float
     held_s: float  # for so long PX4 flies it on, if nothing follows
+
+    def setpoint(self, time_us: int, acceleration_ned_m_s2: Vector3) -> AttitudeSetpoint:
+        """As it is sent."""
+        attitude_wxyz, thrust = attitude_and_thrust(acceleration_ned_m_s2, self)
+        return AttitudeSetpoint(time_us, attitude_wxyz, thrust, turn_kept(self.belief.yaw_rate_rad_s))
 
 
 def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector3:

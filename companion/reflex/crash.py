@@ -10,12 +10,15 @@ from companion.motion.rotation import tilt_rad
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import (
     CARRIED_SHARE,
+    LIES_US,
     LOW_M,
+    LOW_US,
     LYING_SHARE,
     RESTS_M_S,
     STILL_M_S2,
     STILL_RAD_S,
     TIPPED_RAD,
+    TIPPED_US,
 )
 
 
@@ -41,6 +44,18 @@ class CrashWatch:
     is_carried: bool = False  # not by its thrust, which points along body z
     force_frd_m_s2: Vector3 = ZERO
     rates_frd_rad_s: Vector3 = ZERO
+
+    @property
+    def is_tipped(self) -> bool:
+        return self.tipped.lasts_us >= TIPPED_US
+
+    @property
+    def is_low(self) -> bool:
+        return self.low.lasts_us >= LOW_US
+
+    @property
+    def lies(self) -> bool:
+        return self.lying.lasts_us >= LIES_US
 
     def update(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """`height_m`: above the arming position, None where it is not known."""

@@ -50,10 +50,11 @@ class Situation(NamedTuple):
 
     `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming;
     `has_climbed`: the vehicle has been higher than a take-off reaches since it stood on the ground or touched it. The
-    setpoint is the one last sent, local NED. `descent_commanded`: the vehicle goes down because it was told to, or by
-    the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks. The
-    monitor fills in `validity` of the vehicle's velocity, which lacks a part of a hit that was clipped, `strapdown` and
-    `history`. All have heard the sample already.
+    setpoint is the place last sent, local NED, where one is flown to. `descent_commanded`: the vehicle goes down
+    because it was told to, or by the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`:
+    by a pilot's sticks. `has_position`: one came of late. `is_wreck`: it has crashed and not flown since; that it
+    bounces and is picked up is not told. The monitor fills in `validity` of the vehicle's velocity, which lacks a part
+    of a hit that was clipped, `strapdown` and `history`. All have heard the sample already.
     """
 
     off_reason: str | None = None
@@ -67,6 +68,8 @@ class Situation(NamedTuple):
     flown_by_hand: bool = False
     has_climbed: bool = True
     history: MotionHistory | None = None
+    has_position: bool = True
+    is_wreck: bool = False
 
     @property
     def why_off(self) -> str | None:

@@ -1,10 +1,9 @@
-"""Keep-out half-spaces: touched surfaces, remembered surfaces, and the fence with its floor and ceiling."""
+"""Keep-out half-spaces: touched surfaces and remembered ones."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from companion.fence import Fence
 from companion.messages import Vector3
 from companion.motion.vector import along, plus, unit
 from companion.reflex.config import ROUNDS, STEEP
@@ -33,20 +32,6 @@ class Surface:
         """Distance of a position from touching, m; negative behind the surface."""
         (n, e, d), (a, b, c), (x, y, z) = place_ned_m, self.normal_ned, self.point_ned_m
         return (n - x) * a + (e - y) * b + (d - z) * c
-
-
-def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
-    """The setpoint inside a fence at that origin: where the line from the contact leaves it; local NED, metres.
-
-    For a contact outside the fence it is the nearest position inside.
-    """
-    (start_n, start_e, _), (end_n, end_e, end_d) = (
-        plus(place, -1.0, origin_ned_m) for place in (contact_ned_m, setpoint_ned_m)
-    )
-    n, e = fence.nearest_inside(end_n, end_e)
-    if fence.contains(start_n, start_e):
-        n, e = fence.shortened((start_n, start_e), (end_n, end_e))
-    return plus((n, e, min(max(end_d, -fence.max_height_m), -fence.min_height_m)), 1.0, origin_ned_m)
 
 
 def projected(vector: Vector3, sides: Sequence[tuple[Vector3, float]]) -> Vector3:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from pydantic import field_validator
 
-from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample
+from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vector3
 from companion.motion.config import KEPT_US
 from companion.reflex.classify import classified
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
@@ -59,7 +59,7 @@ class Notice:
 
     kind: str  # of the event
     text: str
-    data: Mapping[str, float] = field(default_factory=dict)
+    data: Mapping[str, float | str | Vector3] = field(default_factory=dict)
 
 
 @dataclass(slots=True)

@@ -156,7 +156,7 @@ class Followed:
         known = Situation(off_reason="connect") if stepped.core is None else stepped.core.situation()
         result = stepped.step(received, now_us)
         assert stepped.core is not None, "the first step begins it"
-        monitor = stepped.core.monitor
+        monitor = stepped.core.reflex.monitor
         if monitor is not self._watch and self.listener is not None:
             self.listener.listen(monitor)
         self._watch = monitor

@@ -17,6 +17,7 @@ from companion.reflex.detector import ImpactKind, Situation
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
 from companion.reflex.promise import Promise
+from companion.reflex.reflex import start_reflex
 from rebound_cli.logs.log import Demand, Log, LoggedSample, Told
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
@@ -37,7 +38,9 @@ class Circumstances:
         self._why_not = not_flying if modes is None else why_not
         settings = GuardConfig.model_construct(companion=config, modes=tuple(modes or ()))
         streams = StreamMonitor(config.streams, ())
-        self._guard = GuardContext(settings.as_mission(), Vehicle(), streams, config=settings, keeps_others_out=False)
+        mission = settings.as_mission()
+        reflex = start_reflex(config, mission.recovery, config.settled, 0)
+        self._guard = GuardContext(mission, Vehicle(), streams, reflex, config=settings, keeps_others_out=False)
         self._now_us = 0
 
     def hear(self, told: Sequence[Told], now_us: int) -> Sequence[str]:

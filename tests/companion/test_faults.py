@@ -7,7 +7,7 @@ import pytest
 
 from companion.flight.context import Target
 from companion.flight.progress import FlyItems
-from companion.reflex import monitor
+from companion.reflex import reflex
 from tests.companion.fake_vehicle import LOITER, flight
 from tests.flying import Flight
 
@@ -27,7 +27,7 @@ def in_mission() -> Flight:
     return f
 
 
-@pytest.mark.parametrize(("place", "name"), [(FlyItems, "step"), (FlyItems, "target"), (monitor, "advance")])
+@pytest.mark.parametrize(("place", "name"), [(FlyItems, "step"), (FlyItems, "target"), (reflex, "advance")])
 def test_whatever_breaks_in_the_air_the_vehicle_is_handed_over(monkeypatch, place, name):
     f = in_mission()
     broken_at_us = f.now_us
@@ -76,7 +76,7 @@ def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
     f = flight(confirmed=False)
     f.run_until(f.companion.plan_is_ready)
     commands = len(f.vehicle.commands)
-    monkeypatch.setattr(monitor, "advance", breaks)
+    monkeypatch.setattr(reflex, "advance", breaks)
     assert f.run_to_end(1.0).outcome == "failed"
     assert len(f.vehicle.commands) == commands and f.vehicle.setpoints == []
 

@@ -6,14 +6,13 @@ import random
 import pytest
 
 from companion.flight.context import Inputs
-from companion.flight.recovering import Recover
 from companion.messages import Attitude, LocalPosition
 from companion.motion.config import SAME_M_S
 from companion.motion.strapdown import Strapdown
 from companion.reflex.config import TILT_PER_S, EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
-from tests.companion.test_recovering import AT, HIT_US, SOUTH, flight_with
+from tests.companion.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
 NORTH = (1.0, 0.0, 0.0)
 ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
@@ -117,7 +116,7 @@ def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(a
 
 def recovering(**hit):
     flight = flight_with(estimator=reckoned(**hit))
-    return flight, flight.collisions[0], Recover(flight, 0)
+    return flight, flight.collisions[0], recover_in(flight)
 
 
 def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():

@@ -5,20 +5,23 @@ import math
 import pytest
 
 from companion.core import Limiter
-from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.envelope import SetpointError
-from companion.flight.recovering import Recover, why_no_lean
+from companion.flight.obstacle_map import FlightRoom
+from companion.flight.recovering import Recover
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, AttitudeSetpoint, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
+from companion.reflex.collision import CollisionRecord
 from companion.reflex.config import EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.normal import Normal
+from companion.reflex.recovery import Recovery
+from companion.reflex.reflex import start_reflex
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -33,17 +36,26 @@ def flight_with(
 ) -> FlightContext:
     """A flight that has just hit a wall in the north, at 2 m/s and measured whole unless told otherwise."""
     mission = Mission.model_validate({**MISSION, "recovery": {"law": law}})
-    flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
-    flight.origin_ned_m, flight.loss_s = (0.0, 0.0, 0.0), loss_s
-    flight.vehicle.attitude = Attitude(HIT_US, LEVEL)
-    flight.thrust.full_m_s2, flight.thrust.known_s = 16.0, learnt_s
+    config = mission.companion
+    reflex = start_reflex(config, mission.recovery, config.settled, 0)
+    flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams), reflex)
+    flight.origin_ned_m, reflex.loss_s = (0.0, 0.0, 0.0), loss_s
+    flight.vehicle.attitude = reflex.monitor.gate.latest = Attitude(HIT_US, LEVEL)
+    reflex.thrust.full_m_s2, reflex.thrust.known_s = 16.0, learnt_s
     if estimator is None:
         contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US)
-    goal, normal = (2.5, 0.0, -2.0), Normal(SOUTH, 0.2)
-    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, goal, normal, 20.0, estimator))
+    normal = Normal(SOUTH, 0.2)
+    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, normal, 20.0, estimator))
     return flight
+
+
+def recover_in(flight: FlightContext) -> Recover:
+    reflex, settled = flight.reflex, flight.mission.companion.settled
+    record, room = flight.collisions[-1], FlightRoom(flight)
+    reflex.recovery = Recovery(record, reflex.law, flight.mission.recovery, settled, room, (), flight.vehicle.history)
+    return Recover(flight, reflex.recovery)
 
 
 def hears(flight: FlightContext, recover: Recover, since_us: int, north_m: float, north_m_s: float):
@@ -56,7 +68,7 @@ def hears(flight: FlightContext, recover: Recover, since_us: int, north_m: float
 
 def test_it_is_flown_by_attitude_until_it_rests_and_then_by_the_place_where_it_does():
     flight = flight_with()
-    recover, kinds = Recover(flight, 0), []
+    recover, kinds = recover_in(flight), []
     for since_us in range(100_000, 1_600_000, 20_000):
         left = math.exp(-since_us / 0.2e6)
         _, sent = hears(flight, recover, since_us, 2.4 + 0.2 * left, -1.0 * left)
@@ -71,7 +83,7 @@ def test_it_is_flown_by_attitude_until_it_rests_and_then_by_the_place_where_it_d
 
 def test_it_is_not_handed_over_on_the_obstacle():
     flight = flight_with()
-    recover = Recover(flight, 0)
+    recover = recover_in(flight)
     for since_us in range(100_000, 1_600_000, 20_000):
         _, sent = hears(flight, recover, since_us, 2.95, 0.0)
     # Then it is flown off
@@ -85,8 +97,8 @@ def test_it_is_not_handed_over_on_the_obstacle():
 )
 def test_where_an_attitude_is_not_safe_the_plain_place_of_law_paper_is_sent(loss_s, learnt_s, word):
     flight = flight_with(loss_s, learnt_s)
-    assert word in why_no_lean(flight)
-    _, sent = hears(flight, Recover(flight, 0), 100_000, 2.9, -0.5)
+    assert word in flight.reflex.why_by_position
+    _, sent = hears(flight, recover_in(flight), 100_000, 2.9, -0.5)
     assert isinstance(sent, PositionSetpoint)
     assert sent.velocity_ned_m_s is None and sent.acceleration_ned_m_s2 is None
 
@@ -94,7 +106,7 @@ def test_where_an_attitude_is_not_safe_the_plain_place_of_law_paper_is_sent(loss
 def test_a_surface_goes_along_while_it_pushes():
     # Given a screen that carries a vehicle south
     flight = flight_with()
-    recover = Recover(flight, 0)
+    recover = recover_in(flight)
     for since_us in range(100_000, 600_000, 20_000):
         flight.collisions[0].estimator.external_m_s2 = (-3.0, 0.0, 0.0)
         hears(flight, recover, since_us, 3.0 - 0.8e-6 * since_us, -0.8)

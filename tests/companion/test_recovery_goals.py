@@ -5,9 +5,10 @@ import math
 import pytest
 
 from companion.fence import Fence
+from companion.flight.obstacle_map import inside_fence
 from companion.motion.vector import ZERO
 from companion.reflex.config import WAY_S, RecoveryConfig
-from companion.reflex.halfspace import Surface, inside_fence, projected
+from companion.reflex.halfspace import Surface, projected
 from companion.reflex.laws import RECOVERY_LAWS, Contact
 
 AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)

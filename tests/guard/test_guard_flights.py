@@ -396,7 +396,7 @@ def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_
     # Given a guard that stands by; the last thing it saw was a contact, in which the vehicle lost its power
     air = kind()
     air.run_to(State.STANDING_BY, 10.0)
-    monitor = air.guard.core.monitor
+    monitor = air.guard.core.reflex.monitor
     monitor.state = replace(monitor.state, phase=Phase.CONTACT, last_loud_boot_us=10**12)
     # When the vehicle is restarted, and sends what it sends by default
     air.command(REBOOT, 1)
@@ -406,7 +406,7 @@ def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_
     air.run_to(State.STANDING_BY, 30.0)
     rates = [event.data for event in air.events if event.kind == "streams"]
     assert len(rates) == 2 and rates[1]["HIGHRES_IMU"] == pytest.approx(250, abs=10)
-    assert air.guard.core.monitor.state.phase is not Phase.CONTACT
+    assert air.guard.core.reflex.monitor.state.phase is not Phase.CONTACT
     if kind is AttachedFlight:
         # And the next flight's hit is answered: this ends when the guard holds
         air.fly_into_the_wall()

@@ -145,7 +145,7 @@ class GuardedFlight(Stepped):
         core = watcher.program.core
         if core is None:
             return
-        monitor = core.monitor
+        monitor = core.reflex.monitor
         if monitor.state.phase is not Phase.OFF:
             watcher.watched_s += 1e-6 * self.vehicle.interval_us
         estimate = monitor.estimator.estimate

@@ -4,7 +4,8 @@ import numpy as np
 
 from bench.fly.lockstep import JudgedFlight
 from companion.mission.model import Mission
-from companion.report import CollisionReport, Event, FlightReport
+from companion.reflex.collision import CollisionReport
+from companion.report import Event, FlightReport
 from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.truth import Hit
 from sim_vehicle.world import Wall

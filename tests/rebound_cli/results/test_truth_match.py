@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from companion.report import CollisionReport, FlightReport
+from companion.reflex.collision import CollisionReport
+from companion.report import FlightReport
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
 from sim_vehicle.truth import Hit

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import takewhile
 
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
@@ -18,7 +17,33 @@ from companion.reflex.impact import ImpactEstimator
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.normal import Normal, with_change
-from companion.report import CollisionReport
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionReport:
+    """One collision, as the companion measured it from telemetry. Positions are the vehicle's local NED.
+
+    `impact_velocity_ned_m_s` is v_c of the paper: the velocity just before contact. `normal_ned` is the horizontal unit
+    direction of the obstacle's push, taken over the whole contact. `peak_specific_force_m_s2` is the largest specific
+    force perpendicular to thrust in one IMU sample. `settled_after_s` runs from the detection to the start of the
+    interval in which the vehicle stayed settled; None when it did not settle. `overshoot_m` is the largest distance
+    past the setpoint, away from the obstacle, until the recovery ended. `rebound_speed_m_s` is the largest speed along
+    the normal until 0.1 s after the contact; 0 when it never moved back, None when the vehicle's velocity was not
+    valid then (a clipped hit).
+    """
+
+    detected_at_us: int
+    sample_time_boot_us: int
+    detector: str
+    position_ned_m: Vector3
+    impact_velocity_ned_m_s: Vector3
+    impact_speed_m_s: float
+    normal_ned: Vector3
+    peak_specific_force_m_s2: float
+    recovery_setpoint_ned_m: Vector3
+    settled_after_s: float | None
+    overshoot_m: float
+    rebound_speed_m_s: float | None
 
 
 def level(normal: Normal) -> Normal:
@@ -34,10 +59,10 @@ class CollisionRecord:
     sample_time_boot_us: int
     detector: str
     contact: Contact
-    setpoint_ned_m: Vector3
     contact_normal: Normal  # by the contact's force; level unless the obstacle is steep
     peak_specific_force_m_s2: float
     estimator: MotionEstimator
+    setpoint_ned_m: Vector3 = ZERO  # where to rest, as its recovery has it now
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     after_ned_m_s: Vector3 | None = None  # the velocity after the contact
     hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
@@ -74,12 +99,12 @@ class CollisionRecord:
             for sample in positions:
                 self.estimator.update(sample)
 
-    def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
+    def is_rejected(self, now_boot_us: int, places: MotionHistory) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
         if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
         hypothesis, self.hypothesis = self.hypothesis, None
-        return hypothesis.is_rejected(self.fixes, places, position_noise_m)
+        return hypothesis.is_rejected(self.fixes, places, self.estimator.config.position_noise_m)
 
     def is_rebound(self, time_boot_us: int) -> bool:
         """Whether a velocity, which may be late, shows the rebound. Later the vehicle's own controller makes it."""
@@ -110,8 +135,3 @@ class CollisionRecord:
             overshoot_m=self.overshoot_m,
             rebound_speed_m_s=self.rebound_speed_m_s,
         )
-
-
-def in_one_recovery(records: Sequence[CollisionRecord]) -> list[CollisionRecord]:
-    """The last hits, the newest first, without a recovery in between."""
-    return list(takewhile(lambda record: not record.is_over, reversed(records)))

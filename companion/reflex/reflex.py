@@ -1,0 +1,253 @@
+"""The door of the reflex: samples in; what was touched, and the way to rest from it, out.
+
+A step of a flight calls `step` with its samples, `begin` for a collision that it recovers from, `recovery.take` with
+each position until the vehicle rests, and `follow` at the end. Pure: the same calls give the same bits.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import takewhile
+from typing import NamedTuple
+
+from companion.messages import AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample, Vector3
+from companion.motion.config import KEPT_US, LONGEST_GAP_US, SettledConfig
+from companion.motion.rotation import body_to_ned, tilt_rad
+from companion.motion.vector import plus
+from companion.reflex import config as numbers
+from companion.reflex.attitude_law import Lean
+from companion.reflex.collision import CollisionRecord, level
+from companion.reflex.config import RecoveryConfig
+from companion.reflex.confirmation import hypothesis_of
+from companion.reflex.crash import CrashWatch
+from companion.reflex.detector import ImpactKind, Phase, Situation
+from companion.reflex.halfspace import Surface
+from companion.reflex.impact import ImpactEstimate
+from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
+from companion.reflex.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
+from companion.reflex.motion_estimator import MotionEstimator
+from companion.reflex.recovery import Recovery, Room
+from companion.reflex.sustained_force import SustainedForceMonitor
+from companion.reflex.thrust import ThrustGain
+
+
+class Reaction(NamedTuple):
+    """What the samples of one step have shown. `collisions` are to be recovered from."""
+
+    collisions: Sequence[ImpactEstimate] = ()
+    has_touched_down: bool = False
+    notices: Sequence[Notice] = ()
+
+
+class LeftWrong(NamedTuple):
+    """What a vehicle's own estimate has wrong after a hit, and what pushes it; local NED. `share`: of them, by now."""
+
+    share: float
+    position_m: Vector3
+    velocity_m_s: Vector3
+    pushed_m_s2: Vector3
+
+
+@dataclass(slots=True)
+class Reflex:
+    """Changed only by its methods."""
+
+    config: CollisionMonitorConfig
+    law_config: RecoveryConfig
+    settled: SettledConfig
+    monitor: CollisionMonitor
+    hits: list[CollisionRecord] = field(default_factory=list)
+    recovery: Recovery | None = None  # of the newest
+    loss_s: float | None = None  # for so long the vehicle flies its last setpoint on: PX4's COM_OF_LOSS_T
+    thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
+    thrust_boot_us: int = 0  # its newest sample
+    sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
+    crash: CrashWatch = field(default_factory=CrashWatch)
+
+    # --- what was touched
+
+    def restart(self, now_us: int) -> None:
+        """Of a vehicle that has restarted, perhaps by a hit, nothing that was measured before is valid."""
+        self.monitor = start_monitor(self.config, now_us)
+
+    def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
+        """Take the samples received since the last step, in order; call it without any, too."""
+        result = advance(self.monitor, samples, situation, now_us)
+        notices, impacts = list(result.notices), result.impacts
+        if not situation.is_wreck:
+            notices += [notice for estimate in impacts if (notice := self._contact_notice(estimate)) is not None]
+        has_touched_down = any(estimate.impact.is_ground for estimate in impacts)
+        # A crash is told where no hit is looked for, too.
+        found = [] if situation.off_reason else [estimate for estimate in impacts if estimate.impact.is_collision]
+        self._learn_thrust(samples, situation.has_climbed and not has_touched_down)
+        held = None if found else self._held(samples, situation)
+        if held is not None:
+            found = [held]
+            notices.append(_held_notice(held))
+        return Reaction(found, has_touched_down, notices)
+
+    def _contact_notice(self, estimate: ImpactEstimate) -> Notice | None:
+        """What is no collision, and a crash; a collision is told with its recovery."""
+        kind, force_m_s2 = estimate.impact.kind, estimate.peak_specific_force_m_s2
+        if not estimate.impact.is_collision:
+            text = f"{kind.value}: {force_m_s2:.1f} m/s^2, no collision"
+            return Notice("contact", text, {"touched": kind.value, "specific_force_m_s2": force_m_s2})
+        if kind is not ImpactKind.CRASH:
+            return None
+        tilt_deg = math.degrees(tilt_rad(self.monitor.estimator.strapdown.valid_wxyz))
+        down_m_s = estimate.velocity_ned_m_s[2]
+        text = f"crash: {force_m_s2:.0f} m/s^2, sinking at {down_m_s:.1f} m/s, tilted by {tilt_deg:.0f} degrees"
+        return Notice("crash", text, {"specific_force_m_s2": force_m_s2, "down_m_s": down_m_s, "tilt_deg": tilt_deg})
+
+    def _learn_thrust(self, samples: Sequence[Sample], is_up: bool) -> None:
+        """What thrust there is, from all flight in free air; before the detector is armed, too."""
+        for sample in samples:
+            if isinstance(sample, AttitudeTarget):
+                self.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
+            elif isinstance(sample, ImuSample):
+                elapsed_us, self.thrust_boot_us = sample.time_boot_us - self.thrust_boot_us, sample.time_boot_us
+                if is_up and self.monitor.state.phase is not Phase.CONTACT and elapsed_us < LONGEST_GAP_US:
+                    self.thrust.learn(sample.time_boot_us, -sample.specific_force_frd_m_s2[2], 1e-6 * elapsed_us)
+
+    def _held(self, samples: Sequence[Sample], situation: Situation) -> ImpactEstimate | None:
+        """A sustained external force that no detector shows: only while the vehicle flies to a position."""
+        force, flown_to = self.sustained_force, situation.setpoint_position_ned_m
+        if not situation.has_position:
+            force.forget()  # half a second without a position is no tilt that lasted half a second
+        if situation.off_reason is not None or situation.descent_commanded or not situation.has_position:
+            flown_to = None
+        for sample in samples:
+            if type(sample) is ImuSample:
+                force.add_imu(sample.specific_force_frd_m_s2)
+            elif type(sample) is AttitudeTarget:
+                force.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
+            elif isinstance(sample, LocalPosition) and self._is_attitude_heard:
+                late_us = force.time_us - sample.time_boot_us
+                if late_us >= KEPT_US:
+                    force.forget()
+                elif late_us >= 0:
+                    continue
+                held = force.step(sample, self.monitor.estimator.strapdown.valid_wxyz, flown_to)
+                if held is not None:
+                    return held
+        return None
+
+    # --- the way to rest
+
+    def begin(self, estimate: ImpactEstimate, room: Room, now_us: int) -> CollisionRecord:
+        """Record a collision, and begin to recover from it: the motion just before it, and the goal by that."""
+        impact, normal, earlier = estimate.impact, level(estimate.normal), self.in_one_recovery()
+        place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
+        before, law = next(iter(earlier), None), self.law
+        is_second = (
+            law.follows
+            and before is not None
+            and not (before.estimator.has_converged or before.estimator.is_fully_measured)
+        )
+        if before is not None and is_second:
+            # The vehicle's estimate is still wrong from the hit before.
+            place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
+        contact = Contact(estimate.time_boot_us, place, velocity, normal.direction_ned, normal.error_rad)
+        expected, first_us = contact.rebound(self.law_config.restitution), impact.sample_time_boot_us
+        record = CollisionRecord(
+            detected_at_us=now_us,
+            sample_time_boot_us=first_us,
+            detector=self.config.detector,
+            contact=contact,
+            contact_normal=normal,
+            peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
+            estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second),
+        )
+        if before is None and self._is_attitude_heard:
+            reported_wxyz = self.monitor.estimator.strapdown.attitude_wxyz
+            force_ned = body_to_ned(reported_wxyz, impact.specific_force_frd_m_s2)
+            record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
+        record.estimator.note_contact(estimate.is_fully_measured, first_us)
+        surfaces = [
+            Surface(each.contact.position_ned_m, each.normal.direction_ned, self.law_config.clearance_m)
+            for each in earlier
+            if each.contact.time_boot_us < contact.time_boot_us
+        ]
+        places = self.monitor.estimator.history
+        self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, places)
+        self.hits.append(record)
+        return record
+
+    def take_back(self) -> None:
+        """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
+        self.hits.pop()
+        self.monitor.reject()
+
+    def lean(self, yaw_rad: float) -> tuple[Vector3, Lean]:
+        """The acceleration wanted by the present recovery, local NED, and what makes attitude and thrust of it."""
+        assert self.recovery is not None and self.loss_s is not None, "only a known one lets it lean"
+        return self.recovery.lean(self.thrust.full_m_s2, yaw_rad, self.loss_s + numbers.NOTICED_S)
+
+    def follow(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
+        """Take the samples of the step for the motion after the newest hit, and for what shows a crash."""
+        if self.hits:
+            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
+            self.hits[-1].follow(self.monitor.state, self.monitor.estimator, positions)
+        self.crash.update(samples, height_m, landed)
+
+    def left_wrong(self, time_boot_us: int) -> LeftWrong | None:
+        """The errors that the newest hit has left in the vehicle's estimate and tilt, and what its integrators have
+        forgotten while it was flown by attitude. They fade out, as PX4 puts all of it right by itself.
+        """
+        record = self.hits[-1] if self.hits else None
+        if record is None or not (self.law.leans and record.estimator.has_converged):
+            return None
+        left_us = record.sample_time_boot_us + numbers.FADED_US - time_boot_us
+        if left_us <= 0:
+            return None
+        estimator, share = record.estimator, min(1.0, left_us / (numbers.FADED_US - numbers.FADES_FROM_US))
+        pushed = plus(estimator.external_m_s2, 1.0, estimator.level_m_s2)
+        return LeftWrong(share, estimator.position_error_m, estimator.velocity_error_m_s, pushed)
+
+    # --- by which law
+
+    @property
+    def law(self) -> Law:
+        """The one that is asked for, or what is flown in its place."""
+        return RECOVERY_LAWS["paper" if self.why_by_position is not None else self.law_config.law]
+
+    @property
+    def why_by_position(self) -> str | None:
+        """Why a vehicle that would be flown by attitude cannot be, for people; else None."""
+        if not RECOVERY_LAWS[self.law_config.law].leans:
+            return None
+        if self.loss_s is None or self.loss_s > numbers.MOST_HELD_S:
+            told = "is not known" if self.loss_s is None else f"is {self.loss_s:g} s"
+            return f"COM_OF_LOSS_T {told}; an attitude is safe to hold for {numbers.MOST_HELD_S:g} s"
+        if self.thrust.known_s < numbers.THRUST_LEARNT_S:
+            return "the thrust is not known yet"
+        return None if self._is_attitude_heard else "no attitude is heard"
+
+    # --- what is known
+
+    def in_one_recovery(self) -> list[CollisionRecord]:
+        """The last hits, the newest first, without a recovery in between."""
+        return list(takewhile(lambda record: not record.is_over, reversed(self.hits)))
+
+    @property
+    def sample_boot_us(self) -> int:
+        """Of the newest IMU sample, by the vehicle's clock."""
+        return self.monitor.estimator.strapdown.time_boot_us
+
+    @property
+    def _is_attitude_heard(self) -> bool:
+        return self.monitor.gate.latest is not None
+
+
+def start_reflex(
+    config: CollisionMonitorConfig, law_config: RecoveryConfig, settled: SettledConfig, now_us: int
+) -> Reflex:
+    """A reflex before its first sample; `now_us` is on the clock of `step`."""
+    return Reflex(config, law_config, settled, start_monitor(config, now_us))
+
+
+def _held_notice(held: ImpactEstimate) -> Notice:
+    normal, force_m_s2, lasted_s = held.normal.direction_ned, held.peak_specific_force_m_s2, held.time_error_us * 1e-6
+    side = "horizontal" if normal[2] == 0.0 else "downward" if normal[2] > 0.0 else "upward"
+    text = f"something is in the way: {side} external force of {force_m_s2:.1f} m/s^2 for {lasted_s:.1f} s"
+    return Notice("in_the_way", text, {"normal_ned": normal, "push_m_s2": force_m_s2, "lasted_s": lasted_s})
