@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 from companion.memory.patch import Patch
 from companion.messages import Vector3
 from companion.reflex.collision import CollisionReport
-from companion.reflex.promise import Promise
+from companion.reflex.health import Promise
 
 JsonValue: TypeAlias = "bool | int | float | str | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
 

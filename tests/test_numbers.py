@@ -16,7 +16,7 @@ DERIVED = {
     "reflex/motion_estimator.py": {3},  # axes
     "reflex/impact.py": {4},  # a beginning that is known by two windows: half of half a window
     "reflex/monitor.py": {3},  # shown decimals
-    "reflex/promise.py": {3, 3600},  # shown decimals; seconds an hour
+    "reflex/health.py": {3, 3600},  # shown decimals; seconds an hour
     "flight/damage.py": {3},  # shown decimals
 }
 # A damaged motor decides no hit and no recovery.

@@ -10,7 +10,7 @@ from bench.fly.campaign import Json
 from bench.fly.lockstep import JudgedFlight
 from bench.rows.contacts import JudgedContact, Role, phases_of, tilts_deg
 from companion.reflex.collision import CollisionReport
-from companion.reflex.halfspace import away_from
+from companion.reflex.surface import away_from
 from rebound_cli.results.summary import LONGEST_RECOVERY_S
 from rebound_cli.results.truth_match import Vector3
 from sim_vehicle.truth import Hit

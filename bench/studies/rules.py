@@ -53,19 +53,19 @@ RULES = (
     Rule(
         "hand",
         "a soft force on a hovering vehicle waits",
-        _REFLEX + "force_signs:FusedState.may_be_hand",
+        _REFLEX + "fused:FusedState.may_be_hand",
         _says(False),
     ),
     Rule(
         "turning drag",
         "a turning vehicle needs more force for a hit",
-        _REFLEX + "force_signs:FusedState.side_threshold_m_s2",
+        _REFLEX + "fused:FusedState.side_threshold_m_s2",
         lambda arguments, found: arguments[0].threshold_m_s2,
     ),
     Rule(
         "second sample",
         "a weak force shows in two samples together",
-        _REFLEX + "force_signs:FusedState._together_m_s2",
+        _REFLEX + "fused:FusedState._together_m_s2",
         _says(0.0),
     ),
     Rule(
@@ -77,13 +77,13 @@ RULES = (
     Rule(
         "attitude by rates",
         "no clipped attitude",
-        _REFLEX + "validity:VelocityValidity.tilt_error_rad",
+        _REFLEX + "correction:VelocityValidity.tilt_error_rad",
         _says(0.0),
     ),
     Rule(
         "trust",
         "a larger velocity jump while a hit is corrected",
-        _REFLEX + "validity:VelocityValidity.correction_m_s",
+        _REFLEX + "correction:VelocityValidity.correction_m_s",
         _says(0.0),
     ),
     Rule("change", "the normal by the change of velocity", _REFLEX + "collision:with_change", _argument(0)),

@@ -19,7 +19,7 @@ from companion.motion.config import GRAVITY_M_S2
 from companion.motion.vector import ZERO, along, plus
 from companion.reflex.attitude_law import brakable_m_s, held_off
 from companion.reflex.config import BEHIND_M, BRAKES_M_S2, HELD_S, NOTICED_S
-from companion.reflex.halfspace import Surface, projected
+from companion.reflex.surface import Surface, projected
 
 LOSS_PARAMETER = "COM_OF_LOSS_T"
 

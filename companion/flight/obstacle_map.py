@@ -12,9 +12,8 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.motion.vector import plus
 from companion.reflex.collision import CollisionRecord
-from companion.reflex.halfspace import Surface
 from companion.reflex.laws import Contact
-from companion.reflex.normal import Normal
+from companion.reflex.surface import Normal, Surface
 
 
 def remember(flight: FlightContext, hits: int, now_us: int) -> None:

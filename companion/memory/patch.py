@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from companion.messages import Vector3
 from companion.motion.vector import ZERO
 from companion.reflex.config import FROM_BEHIND, STEEP
-from companion.reflex.halfspace import away_from
-from companion.reflex.normal import Normal
+from companion.reflex.surface import Normal, away_from
 
 # One touch shows one place. Half a metre to every side is assumed. A trajectory round it then passes a metre beside the
 # touch, clear of a pole or a door leaf. A surface that is longer costs one more hit.
@@ -133,7 +132,7 @@ def touch_of(
 ) -> Patch | None:
     """The patch of one hit, from the vehicle's centre and velocity; None where the direction is not known.
 
-    ``normal`` is horizontal, steep or zero (see halfspace.away_from). ``reach_m``: centre to the guards' rim.
+    ``normal`` is horizontal, steep or zero (see surface.away_from). ``reach_m``: centre to the guards' rim.
     """
     n, e, d = velocity_ned_m_s
     is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S

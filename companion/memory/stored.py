@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from companion.memory.patch import REACHES_M, Patch
 from companion.reflex.config import STEEP
-from companion.reflex.halfspace import away_from
+from companion.reflex.surface import away_from
 from companion.strict_model import NotNegative, PositionNed, Positive, StrictModel
 
 OnUnreachable: TypeAlias = Literal["land", "return", "continue", "abort"]
@@ -23,7 +23,7 @@ class KnownPatch(StrictModel):
     touches_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1)]
     """Places on the surface; of a wall two near its ends."""
     normal_ned: PositionNed
-    """Of any length; a wall's counts as horizontal, see halfspace.away_from."""
+    """Of any length; a wall's counts as horizontal, see surface.away_from."""
     normal_error_deg: Annotated[NotNegative, Field(le=90.0)] = 15.0
     """One standard deviation; the normal of one whole contact."""
     reaches_m: NotNegative = REACHES_M

@@ -24,8 +24,8 @@ class StreamsConfig(StrictModel):
     extended_sys_state_hz: Rate = 5.0
     """Take-off and touchdown last longer than a second."""
     attitude_target_hz: Rate = 30.0
-    """The thrust asked for changes by less than a third of the greatest within 33 ms (see reflex.thrust). Asked for
-    only by a detector that uses it."""
+    """The thrust asked for changes by less than a third of the greatest within 33 ms (see reflex.free_flight).
+    Asked for only by a detector that uses it."""
     odometry_hz: Rate = 30.0
     """PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of."""
     vibration_hz: Rate = 1.0

@@ -21,7 +21,7 @@ from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO, along, limited, plus
 from companion.reflex import config as reflex
-from companion.reflex.halfspace import Surface, projected
+from companion.reflex.surface import Surface, projected
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,10 @@ from companion.motion.vector import ZERO, plus, split, unit
 from companion.reflex.config import DECIDED_US, FADED_US
 from companion.reflex.confirmation import Hypothesis
 from companion.reflex.detector import DetectorState, Phase
-from companion.reflex.halfspace import away_from
 from companion.reflex.impact import ImpactEstimator
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
-from companion.reflex.normal import Normal, with_change
+from companion.reflex.surface import Normal, away_from, with_change
 
 
 @dataclass(frozen=True, slots=True)

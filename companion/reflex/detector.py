@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple, Protocol, TypeVar
 from companion.messages import LandedState, MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
-from companion.reflex.validity import VelocityValidity
+from companion.reflex.correction import VelocityValidity
 
 
 class Phase(Enum):

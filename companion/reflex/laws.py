@@ -35,7 +35,7 @@ class MotionState:
 class Contact:
     """The vehicle at the time of contact t_c: x(t_c), v_c, and the obstacle's outward normal; NED, SI.
 
-    The normal is horizontal, or the obstacle's own where that is steep (see halfspace.away_from); zero: not known.
+    The normal is horizontal, or the obstacle's own where that is steep (see surface.away_from); zero: not known.
     """
 
     time_boot_us: int

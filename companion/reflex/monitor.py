@@ -15,11 +15,9 @@ from companion.motion.config import KEPT_US
 from companion.reflex.classify import classified
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
 from companion.reflex.detector import Detector, DetectorState, Impact, ImpactKind, Phase, Situation
-from companion.reflex.force_signs import FusedState
-from companion.reflex.fused import FusedDetector
+from companion.reflex.fused import FusedDetector, FusedState
+from companion.reflex.health import Promise, SampleGate, StreamHealth, promise_of
 from companion.reflex.impact import ImpactEstimate, ImpactEstimator
-from companion.reflex.promise import Promise, promise_of
-from companion.reflex.stream_health import SampleGate, StreamHealth
 from companion.strict_model import StrictModel
 
 # Optional streams besides HIGHRES_IMU.

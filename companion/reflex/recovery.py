@@ -17,8 +17,8 @@ from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Lean, wanted
 from companion.reflex.collision import CollisionRecord
 from companion.reflex.config import RecoveryConfig
-from companion.reflex.halfspace import Surface, projected
 from companion.reflex.laws import Contact, Law, MotionState
+from companion.reflex.surface import Surface, projected
 
 
 class Room(Protocol):

@@ -21,14 +21,14 @@ from companion.reflex.config import RecoveryConfig
 from companion.reflex.confirmation import hypothesis_of
 from companion.reflex.crash import CrashWatch
 from companion.reflex.detector import ImpactKind, Phase, Situation
-from companion.reflex.halfspace import Surface
+from companion.reflex.free_flight import ThrustGain
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
 from companion.reflex.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.recovery import Recovery, Room
+from companion.reflex.surface import Surface
 from companion.reflex.sustained_force import SustainedForceMonitor
-from companion.reflex.thrust import ThrustGain
 
 
 class Reaction(NamedTuple):

@@ -26,10 +26,9 @@ from companion.reflex.config import (
     STEADY_M_S,
 )
 from companion.reflex.detector import Impact, ImpactKind
-from companion.reflex.halfspace import away_from
+from companion.reflex.free_flight import ThrustGain
 from companion.reflex.impact import ImpactEstimate
-from companion.reflex.normal import Normal
-from companion.reflex.thrust import ThrustGain
+from companion.reflex.surface import Normal, away_from
 
 
 @dataclass(slots=True)

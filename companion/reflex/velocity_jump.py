@@ -90,7 +90,7 @@ class VelocityJump:
         """Learn delay and standard deviation from the newest step, limited to what is no hit.
 
         An estimate that jumps repeatedly gets a larger standard deviation. It rises fast and falls slowly (see
-        `force_noise`).
+        `free_flight`).
         """
         self.delay.learn(*self.newest)
         square = (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) / 3.0

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from companion.messages import ImuSample, MessageId, Sample
 from companion.reflex.detector import Detector, DetectorState, Impact, Phase, Situation
-from companion.reflex.force_signs import FusedState
+from companion.reflex.fused import FusedState
 from companion.reflex.monitor import CollisionMonitor
 
 # Of one sample, or of many.

@@ -14,9 +14,9 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind, Situation
+from companion.reflex.health import Promise
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
-from companion.reflex.promise import Promise
 from companion.reflex.reflex import start_reflex
 from rebound_cli.logs.log import Demand, Log, LoggedSample, Told
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request

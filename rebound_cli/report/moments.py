@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from companion.messages import Vector3
 from companion.reflex.detector import Evidence, ImpactKind, Phase
-from companion.reflex.normal import Normal
+from companion.reflex.surface import Normal
 from rebound_cli.replay.listening import PHASES, Shown, Tested
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight

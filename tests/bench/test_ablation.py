@@ -6,16 +6,16 @@ import pytest
 
 from bench.studies.ablation import flights_table
 from bench.studies.rules import RULES, Rule, switched
-from companion.reflex import attitude_law, halfspace
+from companion.reflex import attitude_law, surface
 
-RULE = Rule("away", "away from what was hit", "companion.reflex.halfspace:plus", lambda arguments, found: (9, 9, 9))
+RULE = Rule("away", "away from what was hit", "companion.reflex.surface:plus", lambda arguments, found: (9, 9, 9))
 NOT_RECOVERED = {"recovered": False}
 RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "rest_s": 1.2, "normal_deg": 5.0, "recovered": True}
 
 
 def flown(copies):
     """Three steps, of which the second is the rule's."""
-    steps = [("first",), halfspace.plus((0, 0, 0), 1.0, (1, 0, 0)), attitude_law.plus((1, 0, 0), 1.0, (1, 0, 0))]
+    steps = [("first",), surface.plus((0, 0, 0), 1.0, (1, 0, 0)), attitude_law.plus((1, 0, 0), 1.0, (1, 0, 0))]
     copies.leave(lambda: {"steps": steps})
     return steps
 
@@ -29,7 +29,7 @@ def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
 
 
 def test_where_a_rule_changes_nothing_there_is_no_copy():
-    same = Rule("same", "", "companion.reflex.halfspace:plus", lambda arguments, found: found)
+    same = Rule("same", "", "companion.reflex.surface:plus", lambda arguments, found: found)
     with switched([same]) as copies:
         flown(copies)
     assert copies.found == {}
@@ -40,7 +40,7 @@ def test_a_copy_that_fails_is_told():
         raise ValueError
 
     with switched([RULE]) as copies:
-        halfspace.plus((0, 0, 0), 1.0, (1, 0, 0))
+        surface.plus((0, 0, 0), 1.0, (1, 0, 0))
         copies.leave(failing)
     assert copies.found == {"away": {"failure": "the copy died"}}
 

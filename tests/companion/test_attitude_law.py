@@ -12,7 +12,7 @@ from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, plus
 from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, tilted, wanted
 from companion.reflex.config import LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S
-from companion.reflex.halfspace import Surface
+from companion.reflex.surface import Surface
 
 HERE, FULL_M_S2 = (0.0, 0.0, -2.0), 16.0
 SOUTH = (-1.0, 0.0, 0.0)

@@ -7,9 +7,8 @@ import pytest
 
 from companion.messages import ImuSample, LocalPosition, Odometry
 from companion.reflex.config import EstimateConfig
-from companion.reflex.contact_force import ContactForce
 from companion.reflex.detector import Impact, ImpactKind
-from companion.reflex.impact import ImpactEstimator
+from companion.reflex.impact import ContactForce, ImpactEstimator
 from tests.companion.watching import Watch
 
 CONFIG = EstimateConfig()

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from companion.reflex.normal import normal_of
+from companion.reflex.surface import normal_of
 
 
 def turned(angle_deg, size=1.0):

@@ -12,7 +12,7 @@ from companion.memory.patch import (
     touch_of,
 )
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
-from companion.reflex.normal import Normal
+from companion.reflex.surface import Normal
 
 CLEARANCE_M = 0.55
 SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)

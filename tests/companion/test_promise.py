@@ -5,8 +5,8 @@ import pytest
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO
 from companion.reflex.config import EXCESS, FusedConfig
-from companion.reflex.force_signs import FusedState
-from companion.reflex.promise import promise_of
+from companion.reflex.fused import FusedState
+from companion.reflex.health import promise_of
 
 FIXES = [VelocityFix(time_us, ZERO, ZERO) for time_us in range(0, 1_000_001, 20_000)]
 CONFIG = FusedConfig()

@@ -19,9 +19,9 @@ from companion.reflex.collision import CollisionRecord
 from companion.reflex.config import EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
-from companion.reflex.normal import Normal
 from companion.reflex.recovery import Recovery
 from companion.reflex.reflex import start_reflex
+from companion.reflex.surface import Normal
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)

@@ -8,8 +8,8 @@ from companion.fence import Fence
 from companion.flight.obstacle_map import inside_fence
 from companion.motion.vector import ZERO
 from companion.reflex.config import WAY_S, RecoveryConfig
-from companion.reflex.halfspace import Surface, projected
 from companion.reflex.laws import RECOVERY_LAWS, Contact
+from companion.reflex.surface import Surface, projected
 
 AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)
 ALL_SPEEDS = (0.5, 1.0, 2.0, 3.5, 5.0)

@@ -13,7 +13,7 @@ from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, as
 from companion.mission.item_trajectory import SpeedLimits, passed, trajectory_around
 from companion.mission.items import OrbitItem, PathItem
 from companion.mission.trajectory import CurveProfile
-from companion.reflex.normal import Normal
+from companion.reflex.surface import Normal
 
 REACH_M, MARGIN_M = 0.2, 0.35
 CLEARANCE_M = REACH_M + MARGIN_M

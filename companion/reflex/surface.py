@@ -1,4 +1,4 @@
-"""The obstacle's unit normal with its standard deviation, from directions that each show it with an error.
+"""Surfaces: an obstacle's normal by a hit, and the half-space that a vehicle keeps out of.
 
 The contact's impulse leans by friction, and by clipping of each axis by itself. The direction that the vehicle came
 from is free. The change of the velocity contains the whole contact, and is known when the vehicle's own estimate shows
@@ -6,10 +6,11 @@ the motion after it. The normal is their mean, weighted by the inverse of each v
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.vector import ZERO, unit
+from companion.motion.vector import ZERO, along, plus, unit
 from companion.reflex.config import (
     APPROACH_M_S,
     APPROACH_RAD,
@@ -17,6 +18,8 @@ from companion.reflex.config import (
     CHANGE_RAD,
     FROM_BEHIND,
     IMPULSE_RAD,
+    ROUNDS,
+    STEEP,
     UNKNOWN_RAD,
 )
 
@@ -51,3 +54,44 @@ def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3)
     n, e, d = (after - before for before, after in zip(before_ned_m_s, after_ned_m_s, strict=True))
     size_m_s = math.hypot(n, e, d)
     return normal.with_direction((n, e, d), math.hypot(CHANGE_RAD, CHANGE_M_S / max(size_m_s, 1e-6)))
+
+
+def away_from(normal_ned: Vector3) -> Vector3:
+    """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
+    n, e, d = normal_ned
+    return unit((n, e, d if abs(d) > STEEP * math.hypot(n, e, d) else 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """A keep-out half-space: the vehicle's centre when it touched, the unit normal out of it, the clearance."""
+
+    point_ned_m: Vector3
+    normal_ned: Vector3
+    distance_m: float
+
+    @property
+    def level_m(self) -> float:
+        """The least component of a clear place along the normal."""
+        return along(self.point_ned_m, self.normal_ned) + self.distance_m
+
+    def off_m(self, place_ned_m: Vector3) -> float:
+        """Distance of a position from touching, m; negative behind the surface."""
+        (n, e, d), (a, b, c), (x, y, z) = place_ned_m, self.normal_ned, self.point_ned_m
+        return (n - x) * a + (e - y) * b + (d - z) * c
+
+
+def projected(vector: Vector3, sides: Sequence[tuple[Vector3, float]]) -> Vector3:
+    """The vector, moved by as little as gives it so much along each unit normal at least.
+
+    Of places, velocities and accelerations alike. It converges in a few rounds, or between facing surfaces never.
+    """
+    for _ in range(ROUNDS):
+        before = vector
+        for normal, least in sides:
+            short = least - along(vector, normal)
+            if short > 0.0:
+                vector = plus(vector, short, normal)
+        if vector is before:
+            break
+    return vector
