@@ -8,8 +8,8 @@ momentum p = m v the known part is thrust and gravity, so with a gain K (1/s) th
 
 is the external force, low-passed. Per unit mass m cancels: v is the vehicle's velocity estimate and T / m comes from
 ATTITUDE_TARGET.thrust, with the gain learnt in flight (see `free_flight`). The sample's force must depart from its
-running mean (drag, and the model's error) by the threshold. Nothing of the accelerometer's short peaks is used: it is as late
-as the velocity and 1 / K.
+running mean (drag, and the model's error) by the threshold. Nothing of the accelerometer's short peaks is used: it
+is as late as the velocity and 1 / K.
 
 Checked: residual, signs and first-order law are those of the observer in LAAS-CNRS's phynt-genom3 (there of the angular
 momentum, the known forces being torques), read as program. The article's text was not at hand: whether its estimator
