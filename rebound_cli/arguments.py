@@ -4,13 +4,14 @@ import argparse
 import contextlib
 import gc
 import importlib
-import importlib.resources
 import math
 import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
+
+from rebound_cli.shipped import shipped_missions
 
 Parser: TypeAlias = argparse.ArgumentParser
 Group: TypeAlias = argparse._MutuallyExclusiveGroup
@@ -51,9 +52,7 @@ def mission_file(text: str) -> Path:
     """The file itself, or a mission of that name that ships with the program."""
     path = Path(text)
     if not path.exists() and path.name == text and not path.suffix:
-        with contextlib.suppress(ModuleNotFoundError):
-            shipped = Path(str(importlib.resources.files("rebound_missions"))) / f"{text}.yaml"
-            return shipped if shipped.exists() else path
+        return shipped_missions().get(text, path)
     return path
 
 
@@ -196,14 +195,15 @@ def add_guard(commands: Commands) -> None:
 def add_init(commands: Commands) -> None:
     text = "A copy, to be changed, of one of the missions that ship with the program; see docs/how-to/missions.md."
     init = _command(commands, "init", "beginning.init:run_init", "write a mission to begin with", text)
-    _option(init, "file", "the file to write, such as my-mission.yaml", "FILE")
+    _option(init, "file", "the file to write, such as my-mission.yaml", "FILE", nargs="?")
+    _flag(init, "--list", "show the names to begin from, and write nothing")
     _option(init, "--from", "which one (default: wall)", "MISSION", dest="model", default="wall")
 
 
 def add_sim(commands: Commands) -> None:
     text = "A simulated PX4 quadrotor for any MAVLink client."
     sim = _command(commands, "sim", "simulation.command:run_sim", "run the simulated vehicle alone", text)
-    _option(sim, "--mission", "mission file whose sim: part describes the world", "FILE")
+    _option(sim, "--mission", "mission whose sim: part describes the world", "MISSION", type=mission_file)
     _add_world_options(sim)
     text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/how-to/px4.md"
     _option(sim, "--autopilot", text, choices=SIMULATED_AUTOPILOTS, default="builtin")

@@ -12,6 +12,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from companion.errors import ConfigurationError
+from rebound_cli.shipped import shipped_missions
 
 DocumentPath = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
@@ -95,7 +96,8 @@ def load_document(path: Path) -> Document:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        match = nearest(path.name, [entry.name for entry in path.parent.glob("*.yaml")])
+        shipped = shipped_missions() if path.name == str(path) else {}
+        match = nearest(path.name, [*(entry.name for entry in path.parent.glob("*.yaml")), *shipped])
         question = f"; did you mean {path.with_name(match)}?" if match else "."
         raise DocumentError(f"{path}: no such file{question}") from None
     except (OSError, UnicodeDecodeError) as error:

@@ -1,6 +1,5 @@
 """`rebound init`: a copy of a mission that ships with the program, for somebody to change."""
 
-import importlib.resources
 import json
 import re
 import shlex
@@ -8,14 +7,19 @@ from argparse import Namespace
 
 from companion.errors import ConfigurationError
 from rebound_cli.documents import write_text
+from rebound_cli.shipped import shipped_missions
 
 
 def run_init(options: Namespace) -> int:
     """Raises ConfigurationError for a file that is there or a mission that is not."""
+    missions = shipped_missions()
+    if options.list:
+        print("\n".join(missions))
+        return 0
+    if options.file is None:
+        raise ConfigurationError("Which file? Such as: rebound init my-mission.yaml")
     if options.file.exists():
         raise ConfigurationError(f"{options.file} is there already: nothing was written.")
-    files = importlib.resources.files("rebound_missions").iterdir()
-    missions = dict(sorted((file.name[:-5], file) for file in files if file.name.endswith(".yaml")))
     if options.model not in missions:
         there = ", ".join(missions)
         raise ConfigurationError(f"No mission {options.model!r} ships with the program; there are {there}.")

@@ -27,6 +27,13 @@ def test_whatever_the_file_is_called(stem, tmp_path):
     assert mission_from(load_mission_document(file, (), None, None)).items
 
 
+def test_the_names_to_begin_from_are_listed_and_the_nearest_is_offered(capsys):
+    assert main(["init", "--list"]) == 0
+    assert {"wall", "square"} <= set(capsys.readouterr().out.split())
+    assert main(["init"]) == 1 and "Which file?" in capsys.readouterr().err
+    assert main(["sim", "--mission", "wal"]) == 1 and "did you mean wall?" in capsys.readouterr().err
+
+
 def test_nothing_is_written_over_and_a_model_that_is_not_is_named(tmp_path, capsys):
     file = tmp_path / "mine.yaml"
     assert main(["init", str(file), "--from", "walls"]) == 1
