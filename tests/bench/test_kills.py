@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from bench.studies import kills_between
 from bench.studies.kills import KILLED_S, SPEEDS_M_S, _killed, cases, kills_table, work_out
 from tests.bench.random_missions.made_up import hit
 
@@ -62,3 +63,29 @@ def test_the_table_counts_the_hard_contacts_by_the_instant_of_the_kill():
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in kills_table(kills).splitlines()]
     assert ["600 to 700 ms", "2", "1 (50.0 %)", "0.90", "0.90", "1.10"] in rows
     assert ["**before the touch**", "1", "1 (100.0 %)", "1.50", "–", "–"] in rows
+
+
+@pytest.mark.slow
+def test_a_guard_in_between_that_dies_in_a_recovery_leaves_the_vehicle_to_px4s_failsafe_which_lands():
+    case = replace(kills_between.cases(10, first_seed=1)[0], kills_s=(0.5,))
+    flight = kills_between.work_out(case)
+    (kill,) = flight["kills"]
+    assert kill["again_m_s"] == 0.0 and kill["mode"] == "POSCTL"
+    assert kill["ground_m_s"] == pytest.approx(0.7, abs=0.2), "MPC_LAND_SPEED"
+
+
+def test_the_table_of_the_guard_has_a_row_for_each_program_before_and_after_the_touch():
+    kills = pd.DataFrame(
+        {
+            "kill_s": [-0.1, 0.4, 0.6],
+            "again_m_s": [0.9, 0.2, 0.0],
+            "mode": ["POSCTL", "POSCTL", "AUTO.LOITER"],
+            "ground_m_s": [0.7, 1.1, None],
+            "program": ["sticks"] * 3,
+            "loss_s": [0.3] * 3,
+        }
+    )
+    lines = kills_between.kills_table(kills).splitlines()[2:]
+    before, after = ([cell.strip() for cell in line.split("|")[1:-1]] for line in lines)
+    assert before[3:] == ["1", "1", "POSCTL 1", "1", "0.70"]
+    assert after[3:] == ["2", "0", "POSCTL 1, AUTO.LOITER 1", "1", "1.10"]

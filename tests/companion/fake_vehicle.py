@@ -14,9 +14,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.virtual_time import INTERVAL_US
 from companion.companion import Companion
 from companion.mission.model import Mission
-from tests.flying import INTERVAL_US, Flight
+from tests.flying import Flight
 
 # A layout of bytes knows no copying, and is made anew.
 copyreg.pickle(struct.Struct, lambda layout: (struct.Struct, (layout.format,)))

@@ -5,8 +5,8 @@ import itertools
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.virtual_time import EPOCH_US
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
-from tests.flying import EPOCH_US
 
 SET_MESSAGE_INTERVAL = 511
 

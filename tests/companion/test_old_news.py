@@ -3,9 +3,10 @@
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.virtual_time import INTERVAL_US
 from tests.companion.fake_vehicle import LOITER, OFFBOARD, POSCTL, FakeVehicle, flight, flying_in
 from tests.companion.test_companion_authority import ON_SETPOINTS, assert_silent_from_now
-from tests.flying import INTERVAL_US, Flight
+from tests.flying import Flight
 
 SET_MODE = 176
 

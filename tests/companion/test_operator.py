@@ -5,12 +5,13 @@ import itertools
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.virtual_time import EPOCH_US
 from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
 from companion.report import Event
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight
-from tests.flying import EPOCH_US, Flight
+from tests.flying import Flight
 
 
 def decoded(packets) -> list:

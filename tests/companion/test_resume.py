@@ -2,9 +2,10 @@
 
 import pytest
 
+from bench.fly.virtual_time import EPOCH_US
 from companion.mission.model import steps_to_fly
 from tests.companion.fake_vehicle import FakeVehicle, flight, mission
-from tests.flying import EPOCH_US, Flight
+from tests.flying import Flight
 
 ITEMS = [
     {"takeoff": {"height_m": 1.5}},

@@ -5,12 +5,13 @@ import itertools
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.virtual_time import EPOCH_US
 from companion.link.round_trip import RoundTrip
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
 from companion.report import RoundTripReport
 from rebound_cli.live.console import state_fields
 from tests.companion.fake_vehicle import FakeVehicle, flight
-from tests.flying import EPOCH_US, Flight
+from tests.flying import Flight
 
 TICK_US = 4_000
 

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
 from companion.core import POLL_INTERVAL_US
 from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
@@ -20,7 +21,7 @@ from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.guard.flying import HOLD, REPEATED_EVERY_S, SET_MODE, AttachedFlight, fields_of, message_of
+from tests.guard.flying import AttachedFlight, fields_of, message_of
 
 RUN_CHECKS = 401
 STALL_S = 1.6  # more than the silence after which the guard lets go (link.silence_s)

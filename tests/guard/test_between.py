@@ -8,13 +8,7 @@ import pytest
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.guard.between import BURST_S, Between
-from companion.guard.config import GuardConfig
-from companion.guard.states import State
-from companion.mavlink.moves import SETPOINT_IDS, would_move
-from companion.mavlink.packet import message_id_of, packet_length
-from companion.mavlink.signing import Signing
-from tests.guard.flying import (
+from bench.fly.commanded import (
     ARM,
     FACE_NORTH_M,
     HOLD,
@@ -23,48 +17,22 @@ from tests.guard.flying import (
     OFFBOARD,
     REPEATED_EVERY_S,
     BetweenFlight,
+    by_attitudes,
+    by_places,
+    by_sticks,
     fly_a_mission,
+    sticks,
 )
+from companion.guard.between import BURST_S, Between
+from companion.guard.config import GuardConfig
+from companion.guard.states import State
+from companion.mavlink.moves import SETPOINT_IDS, would_move
+from companion.mavlink.packet import message_id_of, packet_length
+from companion.mavlink.signing import Signing
 
-ATTITUDE_ONLY = 0x07
 TOO_LATE_S = 0.15
 LINK_BYTES_S = 2_000_000
 MODES = (dialect.MAVLINK_MSG_ID_HEARTBEAT, dialect.MAVLINK_MSG_ID_CURRENT_MODE)
-
-
-def by_places(air: BetweenFlight) -> None:
-    """Along the first side of a square, which the wall crosses: the place moves on at 1 m/s and waits for nobody."""
-    began_s = air.time_s
-    air.every(REPEATED_EVERY_S, lambda: air.place(min(air.time_s - began_s, 5.0)))
-    air.run_for(0.3)
-    air.set_mode(OFFBOARD)
-
-
-def by_attitudes(air: BetweenFlight) -> None:
-    """Nose down by 3 degrees, the height held by the thrust."""
-    hover = air.others_last["ATTITUDE_TARGET"].thrust
-    nose_down = [math.cos(math.radians(1.5)), 0.0, -math.sin(math.radians(1.5)), 0.0]
-
-    def attitude() -> None:
-        position = air.others_last["LOCAL_POSITION_NED"]
-        thrust = hover + 0.1 * (position.z + 2.5) + 0.1 * position.vz
-        boot_ms = round(1e3 * air.time_s)
-        air.send(dialect.MAVLink_set_attitude_target_message(boot_ms, 1, 1, ATTITUDE_ONLY, nose_down, 0, 0, 0, thrust))
-
-    air.every(0.02, attitude)
-    air.run_for(0.3)
-    air.set_mode(OFFBOARD)
-
-
-def by_sticks(air: BetweenFlight) -> None:
-    sticks(air, 0.3)
-    air.run_for(0.2)
-    air.set_mode(MANUAL_POSITION)
-
-
-def sticks(air: BetweenFlight, forward: float) -> Callable[[], None]:
-    message = dialect.MAVLink_manual_control_message(1, round(1000 * forward), 0, 500, 0, 0)
-    return air.every(0.05, lambda: air.send(message, "pilot", (254, 190)))
 
 
 def hit(flies: Callable[[BetweenFlight], None], parameters: dict[str, float] | None = None, **changes) -> BetweenFlight:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from bench.fly.commanded import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, fly_a_mission
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.guard.watching import observe
@@ -13,7 +14,7 @@ from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND
 from companion.reflex.detector import Phase
-from tests.guard.flying import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, AttachedFlight, fly_a_mission
+from tests.guard.flying import AttachedFlight
 from tests.guard.flying import GuardedFlight as Air
 
 CLEAR_M = 0.3
