@@ -25,7 +25,7 @@ class MissionService:
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
-        self._transfer = MissionTransfer(board.autopilot.missions, link.send, board.autopilot.say)
+        self._transfer = MissionTransfer(board.autopilot.missions, link.send)
         self._report = ProgressReport(board.autopilot.missions)
         self.handlers: Mapping[int, Handler] = dict.fromkeys(MESSAGES, self._receive)
 
