@@ -196,10 +196,6 @@ def position_target_local_ned(state: Telemetry) -> Message | None:
     )
 
 
-def message_interval(message_id: int, interval_us: int) -> Message:
-    return dialect.MAVLink_message_interval_message(message_id & 0xFFFF, interval_us)
-
-
 def command_ack(ack: CommandAck) -> Message:
     return dialect.MAVLink_command_ack_message(ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
 

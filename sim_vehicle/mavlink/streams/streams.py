@@ -16,7 +16,6 @@ from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.outbox import Outbox
 from sim_vehicle.mavlink.streams import aiding, condition, navigation
-from sim_vehicle.mavlink.streams.on_request import ANSWERS
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.topics import NEVER_SENT, Topic, Topics
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -220,20 +219,8 @@ class Streams:
         self._run()
         return True
 
-    def announce_interval(self, message_id: int) -> None:
-        """MESSAGE_INTERVAL: what was asked for, not what is received; -1 where nothing is streamed."""
-        stream = self._by_id.get(message_id)
-        interval_us = NOT_STREAMED_US if stream is None else stream.interval_us
-        self._outbox.send(encode.message_interval(message_id, interval_us))
-
-    def send_now(self, message_id: int, index: int = 0) -> bool:
+    def send_now(self, message_id: int) -> bool:
         """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent, but the origin always."""
-        answer = ANSWERS.get(message_id)
-        if answer is not None:
-            messages = answer(index)
-            for message in messages:
-                self._outbox.send(message)
-            return bool(messages)
         stream = self._by_id.get(message_id)
         if stream is None:
             return False

@@ -102,7 +102,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
     [
         (wire_item(0, frame=1), MissionResult.UNSUPPORTED_FRAME),
         (wire_item(0, command=82), MissionResult.UNSUPPORTED),
-        (wire_item(0, commands.DO_JUMP), MissionResult.UNSUPPORTED),
+        (wire_item(0, commands.DO_CHANGE_SPEED), MissionResult.UNSUPPORTED),
         (wire_item(0, commands.WAYPOINT, frame=commands.FRAME_MISSION), MissionResult.UNSUPPORTED),
         (wire_item(0, commands.RALLY_POINT), MissionResult.ERROR),
         (wire_item(0, commands.FENCE_CIRCLE_INCLUSION), MissionResult.ERROR),
@@ -121,7 +121,7 @@ def test_items_that_px4_refuses(item, result):
         (wire_item(0, commands.LOITER_TIME, params=(5.0, 2.0, 3.0, 4.0)), (5.0, 1.0, 3.0, 1.0)),
         (wire_item(0, commands.LAND, params=(1.0, 0.0, 3.0, 10.0)), (0.0, 0.0, 0.0, 10.0)),
         (
-            wire_item(0, commands.DO_JUMP, frame=commands.FRAME_MISSION, params=(2.0, 3.0, 0.0, 0.0)),
+            wire_item(0, commands.DO_CHANGE_SPEED, frame=commands.FRAME_MISSION, params=(2.0, 3.0, 0.0, 0.0)),
             (2.0, 3.0, 0.0, 0.0),
         ),
     ],
