@@ -9,9 +9,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.mavlink.encode import Message
-from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.mission_transfer import MESSAGES, MissionTransfer
-from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 
 # MISSION_CURRENT is repeated once a second, and MISSION_ITEM_REACHED with it as often as this.
 CURRENT_PERIOD_US = 1_000_000
