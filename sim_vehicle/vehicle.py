@@ -12,7 +12,7 @@ from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.hil.slow_sensors import SlowSensors
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
 from sim_vehicle.mavlink.link import Link
-from sim_vehicle.mavlink.services.board import Board
+from sim_vehicle.mavlink.services.service import Board
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.topics import Topics

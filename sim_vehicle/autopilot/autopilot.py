@@ -70,7 +70,7 @@ class Autopilot:
         self.signal, self.battery = self.commander.signal, self.commander.battery
         self.wants_reboot = False
         """To be done by whoever switches the software on and off, once the answer is out."""
-        self._offboard = OffboardControl(self.signal, self.origin)
+        self._offboard = OffboardControl(self.signal)
         self.applied: Setpoint | None = None
         self.texts: list[StatusText] = []
         self._manual = ManualFlight(parameters, hover_thrust_fraction)
@@ -104,7 +104,7 @@ class Autopilot:
     def setpoint(self, target: PositionTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""
         is_flown, attitude = self.modes.flown is Mode.OFFBOARD, self._estimate.attitude_wxyz
-        refusal = self._offboard.take_position(target, self._now_us, is_flown, attitude, self.navigator.view.home_ned_m)
+        refusal = self._offboard.take_position(target, self._now_us, is_flown, attitude)
         if refusal is not None:
             self.texts.append(refusal)
 

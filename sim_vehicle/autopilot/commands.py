@@ -20,21 +20,17 @@ NAV_LAND = 21
 NAV_TAKEOFF = flight_commands.NAV_TAKEOFF
 DO_SET_MODE = 176
 COMPONENT_ARM_DISARM = 400
-GET_MESSAGE_INTERVAL = 510
 SET_MESSAGE_INTERVAL = 511
 REQUEST_MESSAGE = 512
-REQUEST_PROTOCOL_VERSION = 519
 REQUEST_AUTOPILOT_CAPABILITIES = 520
-ANY_COMPONENT = (REQUEST_PROTOCOL_VERSION, REQUEST_AUTOPILOT_CAPABILITIES)
-"""Answered whichever component they are for."""
+"""Answered whichever component it is for."""
 
 FORCE = 21196
 """Param 2 of COMPONENT_ARM_DISARM: disarms in the air, too. It arms nothing that could not be armed without it:
 Commander::handle_command runs the checks for every command from outside, as a SITL was seen to do."""
-# The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, PROTOCOL_VERSION, HOME_POSITION,
-# FLIGHT_INFORMATION, STORAGE_INFORMATION.
-REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, REQUEST_PROTOCOL_VERSION: 300, 410: 242, 528: 264, 525: 261}
-MESSAGE_INTERVAL_ID = 244
+# The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, HOME_POSITION, FLIGHT_INFORMATION,
+# STORAGE_INFORMATION.
+REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, 410: 242, 528: 264, 525: 261}
 
 NO_ID = -1
 """No message has it: stands for a parameter that is not a number."""
@@ -46,10 +42,7 @@ class StreamControl(Protocol):
     def set_interval(self, message_id: int, interval_us: float) -> bool:
         """Ask for an interval: negative stops, 0 restores the default; False where it cannot be."""
 
-    def announce_interval(self, message_id: int) -> None:
-        """Send MESSAGE_INTERVAL with what was asked for."""
-
-    def send_now(self, message_id: int, index: int = 0) -> bool:
+    def send_now(self, message_id: int) -> bool:
         """Send one message at once; False for an unknown one and for one that has nothing new."""
 
 
@@ -57,7 +50,7 @@ def is_for_us(command: Command, us: Identity) -> bool:
     """Whether PX4 takes the command: others are not answered, nor are its own echoes."""
     if (command.source_system, command.source_component) == us:
         return False
-    if command.command in ANY_COMPONENT:
+    if command.command == REQUEST_AUTOPILOT_CAPABILITIES:
         return command.target_system in (us.system, EVERY_ID)
     return us.is_addressed(command.target_system, command.target_component)
 
@@ -66,11 +59,8 @@ def receive(command: Command, streams: StreamControl) -> tuple[Result | None, bo
     """The receiver's part: its answer, if it has one, and whether the commander gets the command."""
     if command.command == SET_MESSAGE_INTERVAL:
         return _set_interval(command, streams), False
-    if command.command == GET_MESSAGE_INTERVAL:
-        streams.announce_interval(_whole(command.param1))
-        return Result.ACCEPTED, False
     if command.command == REQUEST_MESSAGE:
-        return _request_message(command, streams), False
+        return _sent(streams.send_now(_whole(command.param1))), False
     if command.command in REQUESTS:
         return _sent(streams.send_now(REQUESTS[command.command])), False
     if command.command == DO_SET_MODE:
@@ -97,14 +87,6 @@ def _set_interval(command: Command, streams: StreamControl) -> Result:
         return Result.FAILED
     done = streams.set_interval(_whole(command.param1), command.param2)
     return Result.ACCEPTED if done else Result.FAILED
-
-
-def _request_message(command: Command, streams: StreamControl) -> Result:
-    message_id = _whole(command.param1)
-    if message_id == MESSAGE_INTERVAL_ID:
-        streams.announce_interval(_whole(command.param2))
-        return Result.ACCEPTED
-    return _sent(streams.send_now(message_id, _whole(command.param2, unset=0)))
 
 
 def _sent(was_sent: bool) -> Result:

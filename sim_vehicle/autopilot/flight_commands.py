@@ -23,7 +23,6 @@ NAV_TAKEOFF = 22
 DO_ORBIT = 34
 DO_CHANGE_SPEED = 178
 DO_FLIGHTTERMINATION = 185
-DO_CHANGE_ALTITUDE = 186
 DO_REPOSITION = 192
 MISSION_START = 300
 
@@ -64,8 +63,8 @@ def _take_off(command: Command, flight: CommandedVehicle) -> Result:
 def _reposition(command: Command, flight: CommandedVehicle) -> Result:
     if int(_given(command.param2) or 0) != _SWITCH_MODE:
         return Result.UNSUPPORTED
-    if flight.commander.arming.armed:
-        _hold_at(_repositioned(command, flight), "Reposition", flight)
+    if flight.commander.arming.armed and not flight.navigator.hold_at(_repositioned(command, flight)):
+        flight.say(Severity.CRITICAL, "Reposition is outside geofence")
     return flight.request_mode(Mode.LOITER)
 
 
@@ -81,21 +80,6 @@ def _repositioned(command: Command, flight: CommandedVehicle) -> NavigatorTarget
     return NavigatorTarget(
         Kind.HOLD, (place[0], place[1], down_m), yaw_rad, speed_m_s if speed_m_s and speed_m_s > 0.0 else None
     )
-
-
-def _change_altitude(command: Command, flight: CommandedVehicle) -> Result:
-    altitude_m = _given(command.param1)
-    if flight.commander.arming.armed:
-        navigator = flight.navigator
-        north, east, _ = navigator.held_place_ned_m
-        down_m = navigator.view.position_ned_m[2] if altitude_m is None else flight.origin.place.altitude_m - altitude_m
-        _hold_at(NavigatorTarget(Kind.HOLD, (north, east, down_m)), "Altitude change", flight)
-    return flight.request_mode(Mode.LOITER)
-
-
-def _hold_at(target: NavigatorTarget, what: str, flight: CommandedVehicle) -> None:
-    if not flight.navigator.hold_at(target):
-        flight.say(Severity.CRITICAL, f"{what} is outside geofence")
 
 
 def _change_speed(command: Command, flight: CommandedVehicle) -> Result:
@@ -153,7 +137,6 @@ HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     DO_ORBIT: _orbit,
     DO_CHANGE_SPEED: _change_speed,
     DO_FLIGHTTERMINATION: _terminate,
-    DO_CHANGE_ALTITUDE: _change_altitude,
     DO_REPOSITION: _reposition,
     MISSION_START: _start_mission,
 }

@@ -1,4 +1,4 @@
-"""Commands about the vehicle itself: home, storage, reboot, checks, failures; and those that PX4 leaves unanswered.
+"""Commands about the vehicle itself: reboot, checks, failures; and those that PX4 leaves unanswered.
 
 Sources: Commander::handle_command and MavlinkReceiver::handle_message_command_both of PX4; the answers were compared
 with those of a running SITL.
@@ -9,13 +9,10 @@ from collections.abc import Callable
 
 from sim_vehicle.autopilot.flight_commands import CommandedVehicle
 from sim_vehicle.autopilot.messages import Command, Result
-from sim_vehicle.geography import Place
 
-DO_SET_HOME = 179
 DO_SET_ACTUATOR = 187
 # NAV_ROI and the kinds of DO_SET_ROI: PX4 takes every region of interest, and without a gimbal looks nowhere.
 REGIONS_OF_INTEREST = (80, 195, 196, 197, 201)
-PREFLIGHT_STORAGE = 245
 PREFLIGHT_REBOOT_SHUTDOWN = 246
 RUN_PREARM_CHECKS = 401
 INJECT_FAILURE = 420
@@ -32,33 +29,6 @@ UNANSWERED = frozenset(
 # FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.
 _GPS = 4
 _WELL, _OFF = 0, 1
-# PREFLIGHT_STORAGE: of its actions, those that go back to the defaults.
-_RESETS = (2, 3, 4)
-
-
-def _set_home(command: Command, flight: CommandedVehicle) -> Result:
-    """To where the vehicle is, or to a place; a heading that is not a number is north."""
-    if command.param1 > 0.5:
-        flight.navigator.set_home_here()
-        return Result.ACCEPTED
-    place = (command.param5, command.param6, command.param7)
-    if not all(math.isfinite(value) for value in place):
-        return Result.DENIED
-    yaw_rad = math.radians(command.param4) if math.isfinite(command.param4) else 0.0
-    flight.navigator.set_home(flight.origin.position_of(Place(*place)), yaw_rad)
-    return Result.ACCEPTED
-
-
-def _storage(command: Command, flight: CommandedVehicle) -> Result | None:
-    """Nothing is to be done to keep parameters, for they are always kept; or back to the defaults."""
-    action = _whole(command.param1)
-    if action not in range(5):
-        return None
-    if flight.commander.arming.armed:
-        return Result.TEMPORARILY_REJECTED
-    if action in _RESETS:
-        flight.parameters.reset()
-    return Result.ACCEPTED
 
 
 def _reboot(command: Command, flight: CommandedVehicle) -> Result:
@@ -92,8 +62,6 @@ def _leave_unanswered(command: Command, flight: CommandedVehicle) -> None:
 
 
 HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
-    DO_SET_HOME: _set_home,
-    PREFLIGHT_STORAGE: _storage,
     PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
     INJECT_FAILURE: _inject_failure,
     **dict.fromkeys((DO_SET_ACTUATOR, RUN_PREARM_CHECKS, *REGIONS_OF_INTEREST), _accept),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, TypeAlias
 
-from sim_vehicle.setpoint import FREE, Axis3, Quaternion, Vector3
+from sim_vehicle.setpoint import Axis3, Quaternion, Vector3
 
 EVERY_ID = 0
 """A target of 0 addresses every system, or every component."""
@@ -63,23 +63,19 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class PositionTarget:
-    """SET_POSITION_TARGET_LOCAL_NED or _GLOBAL_INT with the ignored and the NaN fields as None.
+    """SET_POSITION_TARGET_LOCAL_NED with the ignored and the NaN fields as None.
 
     In frame 8 all vectors are forward, right, down; in all others they are local NED.
     """
 
     frame: int
+    position_m: Axis3
     velocity_m_s: Axis3
     acceleration_m_s2: Axis3
     yaw_rad: float | None
     yaw_rate_rad_s: float | None
     is_force: bool
     """The mask's bit 9: the acceleration is meant as a force, which PX4 does not support."""
-    position_m: Axis3 = FREE
-    is_global: bool = False
-    """Its position is a place on the Earth."""
-    place: Vector3 | None = None
-    """Latitude and longitude in degrees, altitude in metres; None where any of the three is ignored."""
 
 
 @dataclass(frozen=True, slots=True)

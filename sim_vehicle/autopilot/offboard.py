@@ -1,15 +1,13 @@
 """Offboard setpoints: which are valid, when their stream counts as alive, and what they ask for.
 
-Sources: PX4's MavlinkReceiver (its handlers of SET_POSITION_TARGET_LOCAL_NED, _GLOBAL_INT and SET_ATTITUDE_TARGET),
-commander's offboardCheck.cpp and PositionControl::_inputValid; the delays are measured.
+Sources: PX4's MavlinkReceiver (its handlers of SET_POSITION_TARGET_LOCAL_NED and SET_ATTITUDE_TARGET), commander's
+offboardCheck.cpp and PositionControl::_inputValid; the delays are measured.
 """
 
 import math
-from dataclasses import replace
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, Severity, StatusText
 from sim_vehicle.estimator.estimate import yaw_of
-from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import (
     FREE,
@@ -19,12 +17,10 @@ from sim_vehicle.setpoint import (
     RatesSetpoint,
     Setpoint,
     TrajectorySetpoint,
-    Vector3,
 )
 
 FRAME_LOCAL_NED = 1
 FRAME_BODY_NED = 8
-FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT, FRAME_GLOBAL_TERRAIN_INT = 5, 6, 11
 
 # With COM_OF_LOSS_T = 1.0 s the mode changes 1.03 to 1.11 s after the last setpoint: the commander's
 # own cycle, and a check that runs only now and then. Here: 0.03 s later, looked at every 76 ms.
@@ -79,7 +75,7 @@ class OffboardSignal:
 
 
 def refusal(target: PositionTarget) -> StatusText | None:
-    """Why PX4 refuses a local setpoint, which then counts as none at all; None where it is valid."""
+    """Why PX4 refuses a setpoint, which then counts as none at all; None where it is valid."""
     if target.frame not in (FRAME_LOCAL_NED, FRAME_BODY_NED):
         return _refused(f"coordinate frame {target.frame} unsupported")
     position, velocity, acceleration = _controlled(target)
@@ -101,28 +97,6 @@ def trajectory_setpoint(target: PositionTarget, attitude_wxyz: Quaternion) -> Tr
     return TrajectorySetpoint(position, velocity, acceleration, target.yaw_rad, target.yaw_rate_rad_s)
 
 
-def local_target(target: PositionTarget, origin: Origin, home_ned_m: Vector3) -> PositionTarget | StatusText | None:
-    """A global one in local NED, or why it is refused; None where it counts as none without a word.
-
-    Between v1.15 and v1.17 PX4 takes the height above home for one below the sea in frame 6: `position[2] = home.alt -
-    alt - ref_alt`. This vehicle does what the frame means.
-    """
-    position: Axis3 = FREE
-    if target.place is not None:
-        if target.frame == FRAME_GLOBAL_TERRAIN_INT:
-            # There is no terrain that the vehicle would know.
-            return None
-        if target.frame not in (FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT):
-            return _refused(f"invalid coordinate frame {target.frame}", _GLOBAL)
-        north, east, down = origin.position_of(Place(*target.place))
-        position = (north, east, home_ned_m[2] - target.place[2] if target.frame == FRAME_GLOBAL_RELATIVE_INT else down)
-    if target.acceleration_m_s2 != FREE and target.is_force:
-        return _refused("force not supported", _GLOBAL)
-    if position == FREE and target.velocity_m_s == FREE and target.acceleration_m_s2 == FREE:
-        return None
-    return replace(target, frame=FRAME_LOCAL_NED, position_m=position, is_global=False)
-
-
 def attitude_setpoint(target: AttitudeTarget) -> AttitudeSetpoint | RatesSetpoint | None:
     """What a SET_ATTITUDE_TARGET asks for; None where neither attitude nor roll and pitch rates are given.
 
@@ -142,11 +116,8 @@ def attitude_setpoint(target: AttitudeTarget) -> AttitudeSetpoint | RatesSetpoin
     return RatesSetpoint((roll, pitch, yaw or 0.0), thrust)
 
 
-_LOCAL, _GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"
-
-
-def _refused(why: str, message: str = _LOCAL) -> StatusText:
-    return StatusText(Severity.CRITICAL, f"{message} {why}")
+def _refused(why: str) -> StatusText:
+    return StatusText(Severity.CRITICAL, f"SET_POSITION_TARGET_LOCAL_NED {why}")
 
 
 def _controlled(target: PositionTarget) -> tuple[Axis3, Axis3, Axis3]:
@@ -196,12 +167,11 @@ class OffboardControl:
     (Commander.cpp, updateControlMode): until then the last attitude is held.
     """
 
-    def __init__(self, signal: OffboardSignal, origin: Origin) -> None:
+    def __init__(self, signal: OffboardSignal) -> None:
         self.demand: Setpoint = STOP
         self._waiting: TrajectorySetpoint | None = None
         self._by_attitude = False
         self._signal = signal
-        self._origin = origin
 
     def begin(self, last_demand: Setpoint | None) -> None:
         """The mode was entered: until a setpoint arrives the last demand goes on, or the vehicle stops."""
@@ -215,20 +185,15 @@ class OffboardControl:
         self._by_attitude = not isinstance(self.demand, TrajectorySetpoint)
 
     def take_position(
-        self,
-        target: PositionTarget,
-        now_us: int,
-        is_flown: bool,
-        attitude_wxyz: Quaternion,
-        home_ned_m: Vector3,
+        self, target: PositionTarget, now_us: int, is_flown: bool, attitude_wxyz: Quaternion
     ) -> StatusText | None:
-        """Take a setpoint, valid or not, whatever the mode; why it was refused, where PX4 says so."""
-        local = local_target(target, self._origin, home_ned_m) if target.is_global else refusal(target) or target
-        if not isinstance(local, PositionTarget):
-            return local
-        self._signal.heard(now_us, needs_place=(local.position_m, local.velocity_m_s) != (FREE, FREE))
+        """Take a setpoint, valid or not, whatever the mode; why it was refused."""
+        refused = refusal(target)
+        if refused is not None:
+            return refused
+        self._signal.heard(now_us, needs_place=(target.position_m, target.velocity_m_s) != (FREE, FREE))
         if is_flown:
-            demand = trajectory_setpoint(local, attitude_wxyz)
+            demand = trajectory_setpoint(target, attitude_wxyz)
             if self._by_attitude:
                 self._waiting = demand
             else:

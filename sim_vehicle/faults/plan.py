@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.faults.body import Hands, Load, Motors, Pushes
+from sim_vehicle.faults.body import Hands, InertialSensor, Load, Motors, Pushes, Shaking
 from sim_vehicle.faults.estimate import Estimate
-from sim_vehicle.faults.sensor import InertialSensor, Shaking
 from sim_vehicle.faults.spec import (
     AidingLoss,
     BatterySag,

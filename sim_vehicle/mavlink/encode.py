@@ -31,10 +31,25 @@ _INERTIAL_FIELDS, _MAGNETIC_FIELDS, _AIR_FIELDS = 0x3F, 0x1C0, 0x1A00
 
 
 class Encoder:
-    """Packets of this vehicle in one sequence of numbers."""
+    """Packets of this vehicle in one sequence of numbers, and those that wait to be sent."""
 
     def __init__(self, us: Identity) -> None:
         self._link = dialect.MAVLink(None, srcSystem=us.system, srcComponent=us.component)
+        self._waiting: list[bytes] = []
+
+    def send(self, message: Message) -> None:
+        """Make a packet of the message, to be taken."""
+        self._waiting.append(self.packet(message))
+
+    def forward(self, packet: bytes) -> None:
+        """Send a packet as it is, somebody else's."""
+        self._waiting.append(packet)
+
+    def take(self) -> tuple[bytes, ...]:
+        """All packets since the last call, in order."""
+        packets = tuple(self._waiting)
+        self._waiting.clear()
+        return packets
 
     def packet(self, message: Message) -> bytes:
         """The message as a packet."""
@@ -194,10 +209,6 @@ def position_target_local_ned(state: Telemetry) -> Message | None:
         _or_nan(applied.yaw_rad),
         _or_nan(applied.yaw_rate_rad_s),
     )
-
-
-def message_interval(message_id: int, interval_us: int) -> Message:
-    return dialect.MAVLink_message_interval_message(message_id & 0xFFFF, interval_us)
 
 
 def command_ack(ack: CommandAck) -> Message:

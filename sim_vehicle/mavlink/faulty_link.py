@@ -7,7 +7,7 @@ from sim_vehicle.faults.wire import Wire, split
 from sim_vehicle.mavlink.decode import ForeignPacket
 from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.restamp import Restamper, message_number
-from sim_vehicle.mavlink.services.board import Board
+from sim_vehicle.mavlink.services.service import Board
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
 # HIGHRES_IMU, SCALED_IMU, RAW_IMU and the second and third sensor's SCALED_IMU2 and 3.

@@ -8,13 +8,11 @@ from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
-from sim_vehicle.mavlink.outbox import Outbox
-from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.command_service import CommandService
 from sim_vehicle.mavlink.services.file_service import FileService
 from sim_vehicle.mavlink.services.mission_service import MissionService
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
-from sim_vehicle.mavlink.services.service import BusyService, Channel, Handler, Service
+from sim_vehicle.mavlink.services.service import Board, BusyService, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
 from sim_vehicle.mavlink.services.texts import TextLink
 from sim_vehicle.mavlink.signing import OPTIONAL
@@ -47,8 +45,7 @@ class Link:
         self._board = board
         self._signing = board.signing.of_link()
         self._encoder = Encoder(board.identity)
-        self._outbox = Outbox(self._encoder)
-        self.streams = Streams(board.telemetry, board.topics, self._outbox, self.kind, self._seed)
+        self.streams = Streams(board.telemetry, board.topics, self._encoder, self.kind, self._seed)
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
         self._busy = tuple(service for service in self._services if isinstance(service, BusyService))
@@ -71,7 +68,7 @@ class Link:
 
     def take(self) -> tuple[bytes, ...]:
         """The packets to send, in order."""
-        return self._outbox.take()
+        return self._encoder.take()
 
     def discard(self) -> None:
         """Nobody is there to read what has arrived."""
@@ -81,7 +78,7 @@ class Link:
 
     def send(self, message: Message) -> None:
         """Send something that is no stream."""
-        self._outbox.send(message)
+        self._encoder.send(message)
 
     # --- what the vehicle's step calls, in this order ----------------------------------------------------
 
@@ -107,7 +104,7 @@ class Link:
         """Pass on what came over other links, if somebody here may want it."""
         for packet in packets:
             if self._has_heard(packet.target_system, packet.target_component):
-                self._outbox.forward(packet.raw)
+                self._encoder.forward(packet.raw)
 
     def update(self, now_us: int, texts: Sequence[StatusText]) -> None:
         """Send what is due at the end of the interval."""

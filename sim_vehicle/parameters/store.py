@@ -54,11 +54,6 @@ class Parameters(dict[str, float]):
         """The names whose stored value has changed since `sets` was that number."""
         return sorted(name for name, at in self._last_set.items() if at > sets)
 
-    def reset(self) -> None:
-        """Every parameter back to its default (PREFLIGHT_STORAGE)."""
-        for name, value in self.defaults.items():
-            self.set(name, value)
-
     def boot(self) -> None:
         """Let the values count that were waiting for a reboot."""
         for row in self._definitions.values():

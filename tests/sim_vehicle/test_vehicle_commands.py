@@ -10,7 +10,7 @@ from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_IN
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 NAN = math.nan
 PREARM_CHECK = 0x10000000
-SET_HOME, STORAGE, REBOOT, INJECT_FAILURE = 179, 245, 246, 420
+REBOOT, INJECT_FAILURE = 246, 420
 
 
 def results(client: Client, number: int, *params: float, target: tuple[int, int] = (1, 1)) -> list[int]:
@@ -41,18 +41,9 @@ def client() -> Client:
         (SET_INTERVAL, (105, 4_000, 1), [FAILED]),
         (SET_INTERVAL, (105, 4_000, 0, 0, 0, 0, 1), [FAILED]),
         (SET_INTERVAL, (105, NAN), [FAILED]),
-        (510, (26,), [ACCEPTED]),
         (REQUEST_MESSAGE, (27,), [DENIED]),
-        (REQUEST_MESSAGE, (244, 105), [ACCEPTED]),
-        (REQUEST_MESSAGE, (300,), [ACCEPTED]),
-        (519, (1,), [ACCEPTED]),
         (REQUEST_MESSAGE, (360,), [DENIED]),
-        (REQUEST_MESSAGE, (435, 99), [DENIED]),
         (REQUEST_MESSAGE, (65,), [DENIED]),
-        (SET_HOME, (1,), [ACCEPTED]),
-        (SET_HOME, (0, 0, 0, 0, 47.3977, 8.5456, 500), [ACCEPTED]),
-        (SET_HOME, (0, 0, 0, 0, NAN, 8.5456, 500), [DENIED]),
-        (STORAGE, (1,), [ACCEPTED]),
         (241, (1,), [UNSUPPORTED]),
         (REBOOT, (0,), [ACCEPTED]),
         (REBOOT, (2,), [DENIED]),
@@ -117,7 +108,6 @@ def test_a_reboot_is_silent_for_a_while_and_begins_anew(client):
 def test_no_reboot_while_armed(client):
     results(client, ARM_DISARM, 1)
     assert results(client, REBOOT, 1) == [DENIED]
-    assert results(client, STORAGE, 2) == [TEMPORARILY_REJECTED]
 
 
 def test_parameters_outlive_a_reboot_and_some_count_only_then(client):
@@ -151,13 +141,6 @@ def test_set_mode_the_message_is_answered_once(client):
     assert client.results(SET_MODE) == [ACCEPTED]
     client.run(1.0)
     assert client.last("HEARTBEAT").custom_mode == 0x06040000
-
-
-def test_defaults_come_back_by_command(client):
-    client.send(dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 9.0, 9))
-    client.run(0.05)
-    assert results(client, STORAGE, 2) == [ACCEPTED]
-    assert client.vehicle.parameters["MIS_TAKEOFF_ALT"] == 2.5
 
 
 def test_a_lost_gps_shows_and_comes_back(client):

@@ -17,7 +17,6 @@ class Reason(StrEnum):
 
     COMMAND = "external command"
     MISSION = "mission start"
-    FAILSAFE = "failsafe"
     LANDING = "landing"
     INACTION = "auto preflight disarming"
 

@@ -8,7 +8,7 @@ from enum import IntEnum
 from sim_vehicle.autopilot.commander.arming import Arming, Reason, preflight_problems
 from sim_vehicle.autopilot.commander.battery import Battery
 from sim_vehicle.autopilot.commander.failsafe import Failsafe
-from sim_vehicle.autopilot.commander.failsafe_table import Action, FailsafeSituation
+from sim_vehicle.autopilot.commander.failsafe_table import FailsafeSituation
 from sim_vehicle.autopilot.commander.manual_control import ManualInput
 from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning
 from sim_vehicle.autopilot.land_detector import LandDetector
@@ -107,14 +107,14 @@ class Commander:
             return "throttle above center" if sticks.throttle > _CENTRE_THROTTLE else None
         return "high throttle" if sticks.throttle > _LOW_THROTTLE else None
 
-    def disarm(self, forced: bool, reason: Reason = Reason.COMMAND) -> Result:
-        """Disarm as a command or a failsafe asks."""
+    def disarm(self, forced: bool) -> Result:
+        """Disarm as a command asks."""
         was_armed = self.arming.armed
         result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced)
         if result is not Result.ACCEPTED:
             self._say(Severity.CRITICAL, "Disarming denied: not landed")
         elif was_armed:
-            self._disarmed(reason)
+            self._disarmed(Reason.COMMAND)
         return result
 
     def _disarmed(self, reason: Reason) -> None:
@@ -190,9 +190,6 @@ class Commander:
             self._say(Severity.CRITICAL, text)
         if decision.intended is not self.modes.intended:
             self.modes.mean(decision.intended)
-        if decision.action is Action.DISARM and self.arming.armed:
-            self.disarm(True, Reason.FAILSAFE)
-            return
         if decision.flown is not self.modes.flown:
             self.modes.flown = decision.flown
             self._navigator.enter(decision.flown)

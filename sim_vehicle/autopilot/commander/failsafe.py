@@ -29,9 +29,8 @@ MODE_OF: dict[Action, Mode] = {
     Action.RETURN: Mode.RETURN,
     Action.LAND: Mode.LAND,
     Action.DESCEND: Mode.DESCEND,
-    Action.TERMINATE: Mode.TERMINATION,
 }
-# If its mode cannot run, an action gives way to the next; after the last comes termination.
+# If its mode cannot run, an action gives way to the next; the last needs nothing.
 _LADDER = (
     Action.FALL_BACK_TO_POSITION,
     Action.FALL_BACK_TO_ALTITUDE,
@@ -45,7 +44,7 @@ _LADDER = (
 _CAN_BE_TAKEN_OVER = (Action.HOLD, Action.RETURN, Action.LAND, Action.DESCEND)
 # A vehicle that lands or returns already does not begin a return.
 _ON_THE_WAY_DOWN = (Mode.LAND, Mode.RETURN)
-_NOT_DELAYED = (Action.NONE, Action.WARN, Action.DISARM, Action.TERMINATE, Action.HOLD)
+_NOT_DELAYED = (Action.NONE, Action.WARN, Action.HOLD)
 
 
 @dataclass(slots=True)
@@ -172,9 +171,7 @@ class Failsafe:
 
     def _select(self, now: FailsafeSituation, parameters: Parameters, changed: bool) -> tuple[Decision, Action, bool]:
         """The decision, the action that waits behind it, and whether the pilot has it."""
-        if self.action is Action.TERMINATE or now.intended is Mode.TERMINATION:
-            return Decision(Action.TERMINATE, now.intended), Action.NONE, False
-        if not now.armed:
+        if not now.armed or now.intended is Mode.TERMINATION:
             return Decision(Action.NONE, now.intended), Action.NONE, False
         action = max((active.response.action for active in self._active.values()), default=Action.NONE)
         takeover = max((active.takeover for active in self._active.values()), default=Takeover.ALWAYS)
@@ -202,7 +199,4 @@ class Failsafe:
 def _that_can_run(action: Action, now: FailsafeSituation) -> Action:
     if action not in _LADDER:
         return action
-    for step in _LADDER[_LADDER.index(action) :]:
-        if MODE_OF[step] not in now.cannot_run:
-            return step
-    return Action.TERMINATE
+    return next(step for step in _LADDER[_LADDER.index(action) :] if MODE_OF[step] not in now.cannot_run)

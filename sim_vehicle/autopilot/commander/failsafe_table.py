@@ -24,8 +24,6 @@ class Action(IntEnum):
     RETURN = 6
     LAND = 7
     DESCEND = 8
-    DISARM = 9
-    TERMINATE = 10
 
 
 class Clears(StrEnum):
@@ -33,7 +31,6 @@ class Clears(StrEnum):
 
     AT_ONCE = "with the trigger"
     MODE_CHANGE_OR_DISARM = "then mode change or disarm"
-    NEVER = "never"
 
 
 class Takeover(IntEnum):
@@ -43,7 +40,6 @@ class Takeover(IntEnum):
     BY_MODE_SWITCH = 1
     AFTER_DELAY = 2
     """Hold for COM_FAIL_ACT_T first, in which a mode switch takes over; then the action."""
-    NEVER = 3
 
 
 class FailsafeTrigger(StrEnum):
@@ -92,7 +88,7 @@ class FailsafeRow:
     """Its value chooses the response."""
     responses: Mapping[int, Response]
     otherwise: Response = Response(Action.NONE)
-    """For values that PX4 does not know."""
+    """For values that are not in the table, such as PX4's disarming and terminating."""
 
     def response(self, parameters: Parameters) -> Response:
         """What these parameters want."""
@@ -104,22 +100,18 @@ def _kept(action: Action, takeover: Takeover = Takeover.AFTER_DELAY) -> Response
 
 
 _NOTHING, _WARNING = Response(Action.NONE), Response(Action.WARN)
-_TERMINATION = Response(Action.TERMINATE, Clears.NEVER, Takeover.NEVER)
 
 _LINK_LOSS: dict[int, Response] = {
     0: _NOTHING,
     1: _kept(Action.HOLD),
     2: _kept(Action.RETURN),
     3: _kept(Action.LAND),
-    5: _TERMINATION,
-    6: Response(Action.DISARM, takeover=Takeover.NEVER),
 }
 _FENCE: dict[int, Response] = {
     0: _NOTHING,
     1: _WARNING,
     2: _kept(Action.HOLD, Takeover.BY_MODE_SWITCH),
     3: _kept(Action.RETURN),
-    4: _TERMINATION,
     5: _kept(Action.LAND),
 }
 
@@ -164,8 +156,6 @@ OFFBOARD_LOSS: dict[int, tuple[Action, Mode]] = {
     3: (Action.RETURN, Mode.RETURN),
     4: (Action.LAND, Mode.LAND),
     5: (Action.HOLD, Mode.LOITER),
-    6: (Action.TERMINATE, Mode.TERMINATION),
-    7: (Action.DISARM, Mode.OFFBOARD),
 }
 """COM_OBL_RC_ACT: what is done and which mode that means."""
 
@@ -181,8 +171,6 @@ def mode_fallback(now: FailsafeSituation, parameters: Parameters, intended: Mode
     action, mode = Action.NONE, intended
     if mode is Mode.OFFBOARD and now.offboard_lost:
         action, mode = OFFBOARD_LOSS.get(int(parameters["COM_OBL_RC_ACT"]), OFFBOARD_LOSS[0])
-        if action is Action.DISARM:
-            return action
     if mode is Mode.POSCTL and mode in now.cannot_run:
         action, mode = Action.FALL_BACK_TO_ALTITUDE, Mode.ALTCTL
     if mode is Mode.ALTCTL and mode in now.cannot_run:

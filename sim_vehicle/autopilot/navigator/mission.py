@@ -5,6 +5,7 @@ gimbals and other payload are passed at once: this vehicle has none.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
@@ -21,12 +22,10 @@ from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Vector3
-
-# A mission of jumps alone ends where it has jumped more often than it has items.
-_MOST_JUMPS_PER_ITEM = 1
 
 
 class Work(Enum):
@@ -55,8 +54,6 @@ class MissionFlight:
         self._arrival = Arrival()
         self._work = Work.ITEM
         self._climb_down_m: float | None = None
-        self._jumps_left: dict[int, int] = {}
-        self._entered_us = 0
         self._was_disarmed = False
         self._was_flown = False
         self.runs = False
@@ -73,7 +70,6 @@ class MissionFlight:
         store = self._store
         if self._was_disarmed and self._was_flown and store.current + 1 == len(store.mission.items):
             store.current = 0
-            self._jumps_left = {}
         self._was_disarmed, self._was_flown = False, True
         self._announce(view)
         self._replay_speed()
@@ -82,7 +78,6 @@ class MissionFlight:
 
     def changed(self, view: View) -> None:
         """Another mission, or another current item, while the mode flies."""
-        self._jumps_left = {}
         self._announce(view)
         self._set_item(view)
 
@@ -94,7 +89,7 @@ class MissionFlight:
 
     def forget(self) -> None:
         """Another mission was uploaded while the mode does not fly."""
-        self._was_flown, self._jumps_left = False, {}
+        self._was_flown = False
 
     def disarmed(self) -> None:
         """The vehicle was disarmed while another mode flew, or this one was over."""
@@ -159,8 +154,6 @@ class MissionFlight:
                 return view.landed
             if command == kinds.LOITER_UNLIMITED:
                 return False
-            if command == kinds.DELAY:
-                return view.now_us - self._entered_us >= 1e6 * max(item.params[0], 0.0)
             if command not in kinds.WITH_POSITION:
                 return True
         return self._arrival.is_reached(self.target, self._acceptance(item, view), view, self._parameters)
@@ -179,23 +172,11 @@ class MissionFlight:
         )
 
     def _advance(self) -> bool:
-        """The next item's number, jumps taken; False behind the last."""
-        items, number = self._store.mission.items, self._store.current + 1
-        for _ in range(_MOST_JUMPS_PER_ITEM * len(items) + 1):
-            if number >= len(items):
-                break
-            item = items[number]
-            if item.command != kinds.DO_JUMP:
-                self._store.current = number
-                return True
-            left = self._jumps_left.get(number, int(item.params[1]))
-            if left > 0 and 0 <= int(item.params[0]) < len(items):
-                self._jumps_left[number] = left - 1
-                number = int(item.params[0])
-            else:
-                number += 1
-        self._jumps_left = {}
-        return False
+        """On to the next item; False behind the last."""
+        if self._store.current + 1 >= len(self._store.mission.items):
+            return False
+        self._store.current += 1
+        return True
 
     def _finish(self, view: View) -> None:
         self.runs = False
@@ -211,16 +192,12 @@ class MissionFlight:
     # --- what an item means ------------------------------------------------------------------------------------
 
     def _set_item(self, view: View) -> None:
-        self._entered_us = view.now_us
         self._arrival.begin()
         if not self.runs:
             here = stop_point(view.position_ned_m, view.velocity_ned_m_s, self._parameters)
             self.target = NavigatorTarget(Kind.IDLE if view.landed else Kind.HOLD, here)
             return
         item = self._store.mission.items[self._store.current]
-        if item.command == kinds.DO_JUMP:
-            self._begin_with_jump(view)
-            return
         if item.command in kinds.WITH_POSITION:
             self._fly_to(item, view)
             return
@@ -230,14 +207,6 @@ class MissionFlight:
         elif view.landed:
             self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
         self._given.append(MissionCommand(item.command, item.params))
-
-    def _begin_with_jump(self, view: View) -> None:
-        self._store.current -= 1
-        if self._advance():
-            self._set_item(view)
-        else:
-            self._store.current += 1
-            self._finish(view)
 
     def _fly_to(self, item: StoredItem, view: View) -> None:
         place = self._place(item, view)
@@ -252,9 +221,8 @@ class MissionFlight:
             self._climb_down_m = None
         elif item.command == kinds.LAND:
             self._land_at(place, before, view)
-        elif item.command in (kinds.LOITER_UNLIMITED, kinds.LOITER_TIME, kinds.LOITER_TO_ALTITUDE):
-            yaw_rad = item.yaw_rad if item.command != kinds.LOITER_TO_ALTITUDE else None
-            self.target = NavigatorTarget(Kind.HOLD, place, yaw_rad)
+        elif item.command in (kinds.LOITER_UNLIMITED, kinds.LOITER_TIME):
+            self.target = NavigatorTarget(Kind.HOLD, place, item.yaw_rad)
         elif item.command == kinds.TAKEOFF:
             self.target = NavigatorTarget(Kind.TAKEOFF if view.landed else Kind.POSITION, place)
         else:
@@ -274,3 +242,22 @@ class MissionFlight:
 
     def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
         self.texts.append(StatusText(severity, text))
+
+
+def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, view: View) -> str | None:
+    """Why an uploaded mission may not be flown, in PX4's words; None where it may (FeasibilityChecker.cpp)."""
+    if items and items[0].command == kinds.LAND and view.landed:
+        return "Mission rejected: starts with landing"
+    home, has_place = view.home_ned_m, False
+    for number, item in enumerate(items, start=1):
+        if item.command not in kinds.WITH_POSITION:
+            continue
+        place = place_of(item, origin, home)
+        if item.command == kinds.TAKEOFF and place[2] >= home[2]:
+            return "Mission rejected: Takeoff altitude below home altitude!"
+        if item.command == kinds.TAKEOFF and has_place:
+            return "Mission rejected: takeoff not first waypoint item"
+        if not fence.allows(place, home):
+            return f"Geofence violation for waypoint {number}"
+        has_place = True
+    return None

@@ -19,8 +19,7 @@ from sim_vehicle.autopilot.messages import FollowTarget, Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import Geofence
-from sim_vehicle.autopilot.navigator.mission import MissionFlight
-from sim_vehicle.autopilot.navigator.mission_feasibility import problem_of
+from sim_vehicle.autopilot.navigator.mission import MissionFlight, problem_of
 from sim_vehicle.autopilot.navigator.rtl import Return
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters

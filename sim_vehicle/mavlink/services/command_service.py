@@ -9,8 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot import commands
 from sim_vehicle.autopilot.messages import EVERY_ID, Command
 from sim_vehicle.mavlink import encode
-from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 
 _GREATEST_INT32 = 2**31 - 1
 

@@ -9,8 +9,7 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 
 _HEADER = struct.Struct("<HBBBBBBI")
 PAYLOAD_BYTES = 251

@@ -9,9 +9,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.mavlink.encode import Message
-from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.mission_transfer import MESSAGES, MissionTransfer
-from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 
 # MISSION_CURRENT is repeated once a second, and MISSION_ITEM_REACHED with it as often as this.
 CURRENT_PERIOD_US = 1_000_000
@@ -25,7 +24,7 @@ class MissionService:
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
-        self._transfer = MissionTransfer(board.autopilot.missions, link.send, board.autopilot.say)
+        self._transfer = MissionTransfer(board.autopilot.missions, link.send)
         self._report = ProgressReport(board.autopilot.missions)
         self.handlers: Mapping[int, Handler] = dict.fromkeys(MESSAGES, self._receive)
 

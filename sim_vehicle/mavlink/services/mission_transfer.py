@@ -1,7 +1,7 @@
 """The mission protocol on one link: who may upload or download what, lost and repeated packets, time-outs.
 
-Source: PX4's mavlink/mavlink_mission.cpp. Partial lists (MISSION_WRITE_PARTIAL_LIST, MISSION_REQUEST_PARTIAL_LIST) have
-no handler there and none here: they are not answered.
+Source: PX4's mavlink/mavlink_mission.cpp, without the words in which it turns something down. Partial lists
+(MISSION_WRITE_PARTIAL_LIST, MISSION_REQUEST_PARTIAL_LIST) have no handler there and none here: they are not answered.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import Severity
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore, Plan
 from sim_vehicle.mavlink.encode import Message
@@ -22,12 +21,8 @@ RETRY_US = 250_000
 TIMEOUT_US = 5_000_000
 
 _NOBODY = (0, 0)
-_NO_CLEAR, _NO_CURRENT = "WPM: IGN CLEAR CMD: Busy", "WPM: IGN WP CURR CMD: Busy"
-_DOWNLOAD_RUNS = "Mission download request ignored, already active"
-
 
 Packet: TypeAlias = dialect.MAVLink_message
-
 
 # Message ids. Items and requests for them are those with whole numbers; the older kind is not answered.
 SET_CURRENT, REQUEST_LIST, COUNT, CLEAR_ALL, ACK, REQUEST_INT, ITEM_INT = MESSAGES = (41, 43, 44, 45, 47, 51, 73)
@@ -44,14 +39,12 @@ class TransferState(Enum):
 
 
 class MissionTransfer:
-    """Messages and the time in; answers and texts out. The lists themselves are the store's."""
+    """Messages and the time in; answers out. The lists themselves are the store's."""
 
-    def __init__(
-        self, store: MissionStore, send: Callable[[Message], None], say: Callable[[Severity, str], None]
-    ) -> None:
-        """``send`` takes the answers, ``say`` what ground stations are told."""
+    def __init__(self, store: MissionStore, send: Callable[[Message], None]) -> None:
+        """``send`` takes the answers."""
         self.state = TransferState.IDLE
-        self._store, self._send, self._tell = store, send, say
+        self._store, self._send = store, send
         self._now_us = 0
         self._peer = _NOBODY
         self._type: int = MissionType.MISSION
@@ -60,30 +53,27 @@ class MissionTransfer:
         self._items: list[StoredItem] = []
         self._marked: int | None = None
         self._checksum = 0
-        self._sent_us: int | None = None
-        self._heard_us: int | None = None
+        self._sent_us = 0
+        self._heard_us = 0
 
     def receive(self, message: Packet, now_us: int) -> None:
         """Take a message that is addressed to this vehicle."""
         self._now_us = now_us
-        _HANDLERS[message.id, self.state](self, message)
+        handler = _HANDLERS.get((message.id, self.state))
+        if handler is not None:
+            handler(self, message)
 
     def update(self, now_us: int) -> None:
         """Let time pass: repeats and time-outs."""
         self._now_us = now_us
         if self.state is TransferState.IDLE:
             return
-        is_quiet = self._sent_us is not None and now_us - self._sent_us > RETRY_US
-        if self.state is TransferState.RECEIVING and is_quiet and not self._is_over():
+        if now_us - self._heard_us > TIMEOUT_US:
+            self._end()
+        elif now_us - self._sent_us > RETRY_US and self.state is TransferState.RECEIVING:
             self._ask_for_next()
-        elif self.state is TransferState.SENDING and is_quiet and self._next == 0 and not self._is_over():
+        elif now_us - self._sent_us > RETRY_US and self._next == 0:
             self._send_count()
-        elif self._is_over():
-            self._say("Mission sync timeout")
-            self._end_upload()
-
-    def _is_over(self) -> bool:
-        return self._heard_us is not None and self._now_us - self._heard_us > TIMEOUT_US
 
     # --- download ----------------------------------------------------------------------------------------------
 
@@ -96,20 +86,15 @@ class MissionTransfer:
     def _begin_download_again(self, message: Packet) -> None:
         """A peer that has everything, or asks for the same once more, may begin again; others wait."""
         is_complete = self._next == len(self._store.plan(self._type).items)
-        if is_complete or (self._type == message.mission_type and _peer(message) == self._peer):
+        if is_complete or self._is_partners(message):
             self._begin_download(message)
-        else:
-            self._say(_DOWNLOAD_RUNS, Severity.INFO)
 
     def _send_count(self) -> None:
         self._sent_us = self._now_us
         self._send(dialect.MAVLink_mission_count_message(*self._peer, self._count, self._type))
 
     def _send_item(self, message: Packet) -> None:
-        if _peer(message) != self._peer:
-            self._say("WPM: REJ. CMD: partner id mismatch")
-            return
-        if message.mission_type != self._type:
+        if not self._is_partners(message):
             return
         self._heard_us = self._now_us
         number, items = message.seq, self._store.plan(self._type).items
@@ -123,20 +108,9 @@ class MissionTransfer:
             return
         self.state = TransferState.IDLE
         self._acknowledge(MissionResult.ERROR)
-        self._say("WPM: REJ. CMD: Req. WP was unexpected")
-
-    def _ignore_request(self, message: Packet) -> None:
-        if _peer(message) != self._peer:
-            self._say("WPM: REJ. CMD: partner id mismatch")
-
-    def _refuse_request(self, message: Packet) -> None:
-        self._say("WPM: REJ. CMD: " + ("Busy" if _peer(message) == self._peer else "partner id mismatch"))
 
     def _end_download(self, message: Packet) -> None:
-        if _peer(message) != self._peer:
-            self._say("REJ. WP CMD: partner id mismatch")
-        elif message.mission_type == self._type:
-            self._heard_us = self._now_us
+        if self._is_partners(message):
             self.state = TransferState.IDLE
 
     # --- upload ------------------------------------------------------------------------------------------------
@@ -144,7 +118,7 @@ class MissionTransfer:
     def _begin_upload(self, message: Packet) -> None:
         self._heard_us = self._now_us
         if self._store.uploading:
-            self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+            self._refuse(message)
             return
         self._peer, self._type, self._checksum = _peer(message), message.mission_type, 0
         self._store.progress.reached = -1
@@ -163,16 +137,13 @@ class MissionTransfer:
 
     def _repeat_request(self, message: Packet) -> None:
         self._heard_us = self._now_us
-        if _peer(message) != self._peer:
-            self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
-        elif self._next == 0:
+        if _peer(message) == self._peer and self._next == 0:
             self._ask_for_next()
         else:
-            self._say("WPM: REJ. CMD: Busy")
-            self._acknowledge(MissionResult.ERROR)
+            self._refuse(message)
 
-    def _refuse_upload(self, message: Packet) -> None:
-        self._say("WPM: IGN MISSION_COUNT: Busy")
+    def _refuse(self, message: Packet) -> None:
+        """A transfer goes on that this would disturb."""
         self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
 
     def _ask_for_next(self) -> None:
@@ -180,18 +151,20 @@ class MissionTransfer:
         self._send(dialect.MAVLink_mission_request_int_message(*self._peer, self._next, self._type))
 
     def _take_item(self, message: Packet) -> None:
-        if not self._is_from_partner(message):
+        if _peer(message) != self._peer:
+            return
+        if message.mission_type != self._type:
+            self._refuse(message)
             return
         self._heard_us = self._now_us
         if message.seq != self._next:
             return
         item = wire.parse(message)
         if isinstance(item, MissionResult):
-            self._say("IGN MISSION_ITEM: Invalid item")
-            self._refuse_list(item)
+            self._end(item)
             return
         if not wire.fits(item, self._type):
-            self._refuse_list(MissionResult.ERROR)
+            self._end(MissionResult.ERROR)
             return
         self._checksum = wire.checksum(message, self._checksum)
         self._items.append(item)
@@ -207,52 +180,29 @@ class MissionTransfer:
         if self._checksum != self._store.plan(self._type).checksum:
             plan = Plan(tuple(self._items), self._checksum)
             self._store.replace(MissionType(self._type), plan, self._marked)
-        self._end_upload()
-        self._acknowledge(MissionResult.ACCEPTED)
+        self._end(MissionResult.ACCEPTED)
 
     def _acknowledge_again(self, message: Packet) -> None:
         """After the last item: its sender may not have got our acknowledgement."""
-        if not self._is_from_partner(message):
-            return
-        if self._next == message.seq + 1:
-            self._acknowledge(MissionResult.ACCEPTED)
-        else:
-            self._say("IGN MISSION_ITEM: No transfer")
-            self._acknowledge(MissionResult.ERROR)
+        if _peer(message) == self._peer:
+            is_last = message.mission_type == self._type and self._next == message.seq + 1
+            self._acknowledge(MissionResult.ACCEPTED if is_last else MissionResult.ERROR)
 
-    def _refuse_item(self, message: Packet) -> None:
-        if self._is_from_partner(message):
-            self._say("IGN MISSION_ITEM: Busy")
-            self._acknowledge(MissionResult.ERROR)
+    def _give_up(self, message: Packet) -> None:
+        if _peer(message) == self._peer and message.type == MissionResult.CANCELLED:
+            self._end()
 
-    def _is_from_partner(self, message: Packet) -> bool:
-        if _peer(message) != self._peer:
-            self._say("REJ. MIS ITEM: partner id mismatch")
-            return False
-        if message.mission_type != self._type:
-            self._acknowledge(MissionResult.ERROR)
-            return False
-        return True
-
-    def _refuse_list(self, result: MissionResult) -> None:
-        self._acknowledge(result)
-        self._end_upload()
-
-    def _end_upload(self) -> None:
+    def _end(self, result: MissionResult | None = None) -> None:
+        """Of an upload the list is stored, or refused in whole; None: nobody is there to be told."""
         self._store.uploading = self._store.uploading and self.state is not TransferState.RECEIVING
         self.state = TransferState.IDLE
-
-    def _answer_upload(self, message: Packet) -> None:
-        """The peer gives up."""
-        if _peer(message) != self._peer:
-            self._say("REJ. WP CMD: partner id mismatch")
-        elif message.type == MissionResult.CANCELLED:
-            self._end_upload()
+        if result is not None:
+            self._acknowledge(result)
 
     # --- the rest ----------------------------------------------------------------------------------------------
 
     def _clear(self, message: Packet) -> None:
-        self._heard_us, self._type = self._now_us, message.mission_type
+        self._type = message.mission_type
         kinds = MOST_ITEMS if message.mission_type == MissionType.ALL else [message.mission_type]
         for kind in kinds:
             if kind in MOST_ITEMS:
@@ -260,50 +210,33 @@ class MissionTransfer:
         self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ACCEPTED, self._type))
 
     def _set_current(self, message: Packet) -> None:
-        if not self._store.choose(message.seq):
-            self._say("WPM: WP CURR CMD: Not in list")
-
-    def _ignore_ack(self, message: Packet) -> None:
-        if _peer(message) != self._peer:
-            self._say("REJ. WP CMD: partner id mismatch")
+        self._store.choose(message.seq)
 
     def _acknowledge(self, result: MissionResult) -> None:
         self._send(dialect.MAVLink_mission_ack_message(*self._peer, result, self._type))
 
-    def _say(self, text: str, severity: Severity = Severity.CRITICAL) -> None:
-        self._tell(severity, text)
+    def _is_partners(self, message: Packet) -> bool:
+        return message.mission_type == self._type and _peer(message) == self._peer
 
 
 def _peer(packet: Packet) -> tuple[int, int]:
     return packet.get_srcSystem(), packet.get_srcComponent()
 
 
-def _refused(text: str, severity: Severity = Severity.CRITICAL) -> Callable[[MissionTransfer, Any], None]:
-    return lambda transfer, message: transfer._say(text, severity)
-
-
-# The table: what a message means in each state.
+# The table: what a message means in each state; what is not in it is passed over.
 _M = MissionTransfer
 _HANDLERS: dict[tuple[int, TransferState], Callable[[Any, Any], None]] = {
     (REQUEST_LIST, TransferState.IDLE): _M._begin_download,
-    (REQUEST_LIST, TransferState.SENDING): _M._begin_download_again,
-    (REQUEST_LIST, TransferState.RECEIVING): _refused(_DOWNLOAD_RUNS, Severity.INFO),
-    (REQUEST_INT, TransferState.IDLE): _M._ignore_request,
-    (REQUEST_INT, TransferState.SENDING): _M._send_item,
-    (REQUEST_INT, TransferState.RECEIVING): _M._refuse_request,
     (COUNT, TransferState.IDLE): _M._begin_upload,
-    (COUNT, TransferState.SENDING): _M._refuse_upload,
-    (COUNT, TransferState.RECEIVING): _M._repeat_request,
     (ITEM_INT, TransferState.IDLE): _M._acknowledge_again,
-    (ITEM_INT, TransferState.SENDING): _M._refuse_item,
-    (ITEM_INT, TransferState.RECEIVING): _M._take_item,
-    (ACK, TransferState.IDLE): _M._ignore_ack,
-    (ACK, TransferState.SENDING): _M._end_download,
-    (ACK, TransferState.RECEIVING): _M._answer_upload,
     (CLEAR_ALL, TransferState.IDLE): _M._clear,
-    (CLEAR_ALL, TransferState.SENDING): _refused(_NO_CLEAR),
-    (CLEAR_ALL, TransferState.RECEIVING): _refused(_NO_CLEAR),
     (SET_CURRENT, TransferState.IDLE): _M._set_current,
-    (SET_CURRENT, TransferState.SENDING): _refused(_NO_CURRENT),
-    (SET_CURRENT, TransferState.RECEIVING): _refused(_NO_CURRENT),
+    (REQUEST_LIST, TransferState.SENDING): _M._begin_download_again,
+    (REQUEST_INT, TransferState.SENDING): _M._send_item,
+    (COUNT, TransferState.SENDING): _M._refuse,
+    (ITEM_INT, TransferState.SENDING): _M._refuse,
+    (ACK, TransferState.SENDING): _M._end_download,
+    (COUNT, TransferState.RECEIVING): _M._repeat_request,
+    (ITEM_INT, TransferState.RECEIVING): _M._take_item,
+    (ACK, TransferState.RECEIVING): _M._give_up,
 }

@@ -29,7 +29,6 @@ _KEPT: dict[int, str] = {
     kinds.LOITER_TIME: "kbkb",
     kinds.LAND: "-k-h",
     kinds.TAKEOFF: "---h",
-    kinds.LOITER_TO_ALTITUDE: "bk-b",
     kinds.DO_SET_ROI_LOCATION: "----",
     kinds.FENCE_RETURN_POINT: "----",
     kinds.FENCE_POLYGON_INCLUSION: "n---",

@@ -9,8 +9,7 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 from sim_vehicle.parameters.store import Parameters
 
 _FLOAT, _WHOLE = struct.Struct("<f"), struct.Struct("<i")

@@ -1,12 +1,35 @@
-"""What a link offers to whoever is at its other end: one object for each of MAVLink's protocols."""
+"""What a link offers to whoever is at its other end, one object for each of MAVLink's protocols; and from what."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
+from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.commands import StreamControl
+from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.signing import Signing
+from sim_vehicle.mavlink.streams.topics import Topics
+from sim_vehicle.mavlink.telemetry import Telemetry
+from sim_vehicle.parameters.store import Parameters
 
 Handler: TypeAlias = Callable[[Any], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """The vehicle's software, as all its links reach it."""
+
+    identity: Identity
+    autopilot: Autopilot
+    parameters: Parameters
+    telemetry: Telemetry
+    topics: Topics
+    signing: Signing
+    interval_us: int
+    """Of the inertial samples, and so of the vehicle's steps."""
+    booted_at_us: int = 0
+    """When its clock began, of the clock by which faults come and go."""
 
 
 class Channel(Protocol):

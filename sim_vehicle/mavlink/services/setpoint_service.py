@@ -2,13 +2,11 @@
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, FollowTarget, PositionTarget, StickInput
-from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 from sim_vehicle.setpoint import Axis3
 
 _FORCE_BIT, _YAW_IGNORED, _YAW_RATE_IGNORED = 0x200, 0x400, 0x800
@@ -18,26 +16,15 @@ _FULL_STICK = 1000
 
 
 def position_target(packet: dialect.MAVLink_set_position_target_local_ned_message) -> PositionTarget:
-    return _target(packet, position_m=_axes(packet.type_mask, packet.x, packet.y, packet.z))
-
-
-def global_target(packet: dialect.MAVLink_set_position_target_global_int_message) -> PositionTarget:
-    place = (packet.lat_int / 1e7, packet.lon_int / 1e7, packet.alt)
-    is_open = packet.type_mask & 0x7 or not isfinite(packet.alt)
-    return _target(packet, is_global=True, place=None if is_open else place)
-
-
-def _target(packet: Any, **where: Any) -> PositionTarget:
-    """What both kinds have in common."""
     mask = packet.type_mask
     return PositionTarget(
         frame=packet.coordinate_frame,
+        position_m=_axes(mask, packet.x, packet.y, packet.z),
         velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
         acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
         yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
         yaw_rate_rad_s=_value(mask & _YAW_RATE_IGNORED, packet.yaw_rate),
         is_force=bool(mask & _FORCE_BIT),
-        **where,
     )
 
 
@@ -91,7 +78,6 @@ class SetpointService:
             69: lambda packet: receive(stick_input(packet, source)),
             82: lambda packet: receive(attitude_target(packet)),
             84: lambda packet: receive(position_target(packet)),
-            86: lambda packet: receive(global_target(packet)),
             # One without a height is none.
             144: lambda packet: receive(follow_target(packet)) if isfinite(packet.alt) else None,
         }

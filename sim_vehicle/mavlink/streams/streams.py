@@ -13,10 +13,8 @@ from operator import ne
 import numpy as np
 
 from sim_vehicle.mavlink import encode
-from sim_vehicle.mavlink.encode import Message
-from sim_vehicle.mavlink.outbox import Outbox
+from sim_vehicle.mavlink.encode import Encoder, Message
 from sim_vehicle.mavlink.streams import aiding, condition, navigation
-from sim_vehicle.mavlink.streams.on_request import ANSWERS
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.topics import NEVER_SENT, Topic, Topics
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -164,11 +162,11 @@ class LateLoops:
 
 
 class Streams:
-    """All streams of one link; their messages go to its ``outbox``."""
+    """All streams of one link; their messages go to its ``encoder``."""
 
-    def __init__(self, state: Telemetry, topics: Topics, outbox: Outbox, link: LinkKind, seed: int) -> None:
+    def __init__(self, state: Telemetry, topics: Topics, encoder: Encoder, link: LinkKind, seed: int) -> None:
         self._state = state
-        self._outbox = outbox
+        self._encoder = encoder
         self._now_us = state.sample.time_boot_us
         rates_hz = {HEARTBEAT_ID: HEARTBEAT_HZ, **link.rates_hz}
         self._streams = [
@@ -188,7 +186,7 @@ class Streams:
         self._now_us = now_us = self._state.sample.time_boot_us
         if self._loops.misses_this_one():
             return
-        versions, outbox, state = self._versions, self._outbox, self._state
+        versions, encoder, state = self._versions, self._encoder, self._state
         for stream in self._running:
             if now_us <= stream.due_after_us or stream.seen == versions[stream.topic]:
                 continue
@@ -198,7 +196,7 @@ class Streams:
                 state.renewed = stream.renewed(versions)
             message = kind.build(state)
             if message is not None:
-                outbox.send(message)
+                encoder.send(message)
 
     # --- commands ----------------------------------------------------------------------------------------
 
@@ -220,20 +218,8 @@ class Streams:
         self._run()
         return True
 
-    def announce_interval(self, message_id: int) -> None:
-        """MESSAGE_INTERVAL: what was asked for, not what is received; -1 where nothing is streamed."""
-        stream = self._by_id.get(message_id)
-        interval_us = NOT_STREAMED_US if stream is None else stream.interval_us
-        self._outbox.send(encode.message_interval(message_id, interval_us))
-
-    def send_now(self, message_id: int, index: int = 0) -> bool:
+    def send_now(self, message_id: int) -> bool:
         """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent, but the origin always."""
-        answer = ANSWERS.get(message_id)
-        if answer is not None:
-            messages = answer(index)
-            for message in messages:
-                self._outbox.send(message)
-            return bool(messages)
         stream = self._by_id.get(message_id)
         if stream is None:
             return False
@@ -246,5 +232,5 @@ class Streams:
         message = stream.kind.build(self._state)
         if message is None:
             return False
-        self._outbox.send(message)
+        self._encoder.send(message)
         return True

@@ -1,11 +1,11 @@
-"""Commands that steer: takeoff to a height, reposition, altitude, speed, orbit, follow, return with its parameters."""
+"""Commands that steer: takeoff to a height, reposition, orbit, follow, return with its parameters."""
 
 import math
 
 import pytest
 
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
-from sim_vehicle.autopilot.flight_commands import DO_CHANGE_ALTITUDE, DO_ORBIT, DO_REPOSITION
+from sim_vehicle.autopilot.flight_commands import DO_ORBIT, DO_REPOSITION
 from sim_vehicle.autopilot.messages import FollowTarget, Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
@@ -70,13 +70,6 @@ def test_a_reposition_of_nothing_stops_the_vehicle():
 @pytest.mark.parametrize("flags", [0, 2, 3])
 def test_a_reposition_without_the_change_of_mode_is_not_supported(flags):
     assert hovering(5.0).ask(DO_REPOSITION, -1, flags, 0, NAN, NAN, NAN, NAN) is Result.UNSUPPORTED
-
-
-def test_another_altitude_over_the_same_place():
-    flight = hovering(5.0)
-    assert flight.ask(DO_CHANGE_ALTITUDE, SEA_LEVEL_HOME_M + 9.0, 0) is Result.ACCEPTED
-    flight.fly(8.0)
-    assert flight.height_m == pytest.approx(9.0, abs=0.05)
 
 
 @pytest.mark.parametrize("radius_m", [10.0, -10.0])

@@ -70,7 +70,6 @@ def test_a_polygon_that_is_cut_short_is_none():
         (1, Mode.OFFBOARD),
         (2, Mode.LOITER),
         (3, Mode.RETURN),
-        (4, Mode.TERMINATION),
         (5, Mode.LAND),
     ],
 )

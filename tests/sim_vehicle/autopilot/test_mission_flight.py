@@ -1,4 +1,4 @@
-"""Missions flown by the kinematic vehicle: items, jumps, pause, resume, changes in flight, what is refused."""
+"""Missions flown by the kinematic vehicle: items, pause, resume, changes in flight, what is refused."""
 
 import math
 
@@ -78,12 +78,11 @@ def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
 def test_times_radius_and_heading_are_kept_before_an_item_is_over():
     stays = item(kinds.WAYPOINT, 10.0, params=(4.0, 0.3, 0.0, 90.0))
     waits = item(kinds.LOITER_TIME, 10.0, params=(3.0, 0.0, 0.0, math.nan))
-    flight = begun(TAKEOFF, stays, waits, action(kinds.DELAY, 2.0), NORTH)
+    flight = begun(TAKEOFF, stays, waits, NORTH)
     flight.fly_until(lambda: math.dist(north_east(flight), (10.0, 0.0)) < 0.3, 60.0)
     assert 4.0 < reached(flight, 1) < 6.0
     assert math.degrees(yaw_of(flight.state.attitude_wxyz)) == pytest.approx(90.0, abs=12.0)
     assert reached(flight, 2) == pytest.approx(3.0, abs=0.15)
-    assert reached(flight, 3) == pytest.approx(2.0, abs=0.15)
 
 
 def test_speed_is_changed_for_what_follows():
@@ -95,16 +94,6 @@ def test_speed_is_changed_for_what_follows():
     flight.ask(DO_CHANGE_SPEED, 1, 4.0, -1)
     flight.fly(2.0)
     assert flight.state.velocity_ned_m_s[0] == pytest.approx(4.0, abs=0.1)
-
-
-def test_a_jump_repeats_as_often_as_it_says_then_goes_on():
-    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 8.0), item(kinds.WAYPOINT), action(kinds.DO_JUMP, 1, 2), LAND_AT_HOME)
-    visits = []
-    while flight.autopilot.arming.armed:
-        flight.step()
-        if not visits or visits[-1] != flight.autopilot.missions.current:
-            visits.append(flight.autopilot.missions.current)
-    assert visits == [0, 1, 2, 1, 2, 1, 2, 4]
 
 
 def test_return_as_an_item_returns():

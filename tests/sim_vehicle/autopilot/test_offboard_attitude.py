@@ -1,4 +1,4 @@
-"""Offboard by attitude, by rates and by geographic places."""
+"""Offboard by attitude and by rates."""
 
 import math
 from typing import Any
@@ -9,27 +9,21 @@ from sim_vehicle.airframe import load_built_in
 from sim_vehicle.autopilot import offboard
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.ground_commands import RUN_PREARM_CHECKS
-from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, Result, StatusText
+from sim_vehicle.autopilot.messages import AttitudeTarget, Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
-from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, place, set_mode
+from tests.sim_vehicle.autopilot.flying import hovering, set_mode
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Flight, target
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 NO_RATES = (None, None, None)
-HOME_M = ORIGIN.place.altitude_m
 
 
 def leaning(roll_deg: float) -> tuple[float, float, float, float]:
     half = math.radians(roll_deg) / 2
     return math.cos(half), math.sin(half), 0.0, 0.0
-
-
-def global_target(frame: int, north: float, east: float, altitude_m: float, **others: object) -> PositionTarget:
-    fields: dict[str, Any] = {"place": (*place(north, east), altitude_m), **others}
-    return target(frame=frame, is_global=True, **fields)
 
 
 def stream(flight: Flight, message: Any, seconds: float) -> None:
@@ -61,41 +55,7 @@ def test_what_an_attitude_target_asks_for(message, flown):
     assert offboard.attitude_setpoint(message) == flown
 
 
-@pytest.mark.parametrize(("frame", "altitude_m", "down_m"), [(5, HOME_M + 4.0, -4.0), (6, 4.0, -6.0)])
-def test_global_places_become_local_ones(frame, altitude_m, down_m):
-    # Given a home 2 m above the local origin
-    local = offboard.local_target(global_target(frame, 10.0, -5.0, altitude_m), ORIGIN, (0.0, 0.0, -2.0))
-    assert local.position_m == pytest.approx((10.0, -5.0, down_m), abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("message", "answer"),
-    [
-        (global_target(11, 0, 0, 4.0), None),
-        (global_target(1, 0, 0, 4.0), "SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame 1"),
-        (
-            global_target(5, 0, 0, 4.0, acceleration_m_s2=(0, 0, 1.0), is_force=True),
-            "SET_POSITION_TARGET_GLOBAL_INT force not supported",
-        ),
-        # Nothing at all asked for: PX4 is silent, and it counts as none
-        (global_target(5, 0, 0, 4.0, place=None), None),
-    ],
-)
-def test_which_global_setpoints_are_refused(message, answer):
-    local = offboard.local_target(message, ORIGIN, (0.0, 0.0, 0.0))
-    assert (local.text if isinstance(local, StatusText) else local) == answer
-
-
 # --- flown -------------------------------------------------------------------------------------------------------
-
-
-def test_global_setpoints_are_flown():
-    flight = hovering(5.0)
-    there = global_target(6, 8.0, 0.0, 7.0)
-    stream(flight, there, 0.2)
-    assert set_mode(flight, Mode.OFFBOARD) is Result.ACCEPTED
-    stream(flight, there, 8.0)
-    assert flight.state.position_ned_m == pytest.approx((8.0, 0.0, -7.0), abs=0.1)
 
 
 def test_an_attitude_alone_arms_and_takes_off_without_the_ramp():

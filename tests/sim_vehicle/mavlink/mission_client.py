@@ -90,8 +90,7 @@ class Exchange:
         self.there, self.back = (Wire(faults, seed) for seed in (self.seed, ~self.seed))
         self.asked: list[Any] = []
         self.answers: list[Any] = []
-        self.said: list[str] = []
-        self.transfer = MissionTransfer(self.store, self.answers.append, lambda _, text: self.said.append(text))
+        self.transfer = MissionTransfer(self.store, self.answers.append)
         self.now_us = 1_000_000
 
     def step(self) -> list[Any]:

@@ -32,10 +32,6 @@ def sending() -> Exchange:
     return exchange
 
 
-def said(exchange: Exchange) -> str:
-    return exchange.said[-1]
-
-
 def test_an_uploaded_list_comes_back_as_it_went():
     exchange = Exchange()
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
@@ -106,7 +102,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
     [
         (wire_item(0, frame=1), MissionResult.UNSUPPORTED_FRAME),
         (wire_item(0, command=82), MissionResult.UNSUPPORTED),
-        (wire_item(0, commands.DO_JUMP), MissionResult.UNSUPPORTED),
+        (wire_item(0, commands.DO_CHANGE_SPEED), MissionResult.UNSUPPORTED),
         (wire_item(0, commands.WAYPOINT, frame=commands.FRAME_MISSION), MissionResult.UNSUPPORTED),
         (wire_item(0, commands.RALLY_POINT), MissionResult.ERROR),
         (wire_item(0, commands.FENCE_CIRCLE_INCLUSION), MissionResult.ERROR),
@@ -125,7 +121,7 @@ def test_items_that_px4_refuses(item, result):
         (wire_item(0, commands.LOITER_TIME, params=(5.0, 2.0, 3.0, 4.0)), (5.0, 1.0, 3.0, 1.0)),
         (wire_item(0, commands.LAND, params=(1.0, 0.0, 3.0, 10.0)), (0.0, 0.0, 0.0, 10.0)),
         (
-            wire_item(0, commands.DO_JUMP, frame=commands.FRAME_MISSION, params=(2.0, 3.0, 0.0, 0.0)),
+            wire_item(0, commands.DO_CHANGE_SPEED, frame=commands.FRAME_MISSION, params=(2.0, 3.0, 0.0, 0.0)),
             (2.0, 3.0, 0.0, 0.0),
         ),
     ],
@@ -171,7 +167,6 @@ def test_silence_ends_a_transfer_after_five_seconds(begin):
     while exchange.transfer.state is not TransferState.IDLE:
         exchange.step()
     assert exchange.now_us - start_us == pytest.approx(TIMEOUT_US, abs=2 * STEP_US)
-    assert said(exchange) == "Mission sync timeout"
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
 
 
@@ -180,8 +175,8 @@ def test_the_last_acknowledgement_is_given_again():
     exchange.upload(SQUARE)
     acks = exchange.ask(sent(SQUARE[3]))
     assert MissionResult.ACCEPTED in [ack.type for ack in of_type(acks, "MISSION_ACK")]
-    exchange.ask(sent(SQUARE[1]))
-    assert said(exchange) == "IGN MISSION_ITEM: No transfer"
+    (ack,) = exchange.ask(sent(SQUARE[1]))
+    assert ack.type == MissionResult.ERROR
 
 
 def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
@@ -194,28 +189,24 @@ def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
 
 
 @pytest.mark.parametrize(
-    ("begin", "message", "text"),
+    ("begin", "message"),
     [
-        (receiving, client.request_list(MISSION), "Mission download request ignored, already active"),
-        (receiving, client.request_item(0, MISSION), "WPM: REJ. CMD: Busy"),
-        (receiving, client.request_item(0, MISSION, STRANGER), "WPM: REJ. CMD: partner id mismatch"),
-        (receiving, sent(wire_item(0), STRANGER), "REJ. MIS ITEM: partner id mismatch"),
-        (receiving, client.clear_all(MISSION), "WPM: IGN CLEAR CMD: Busy"),
-        (receiving, client.set_current(0), "WPM: IGN WP CURR CMD: Busy"),
-        (receiving, client.ack(0, MISSION, STRANGER), "REJ. WP CMD: partner id mismatch"),
-        (sending, client.count(2, MISSION), "WPM: IGN MISSION_COUNT: Busy"),
-        (sending, sent(SQUARE[0]), "IGN MISSION_ITEM: Busy"),
-        (sending, client.request_list(MISSION, STRANGER), "Mission download request ignored, already active"),
-        (sending, client.request_item(3, MISSION), "WPM: REJ. CMD: Req. WP was unexpected"),
-        (sending, client.clear_all(MISSION), "WPM: IGN CLEAR CMD: Busy"),
-        (sending, client.set_current(0), "WPM: IGN WP CURR CMD: Busy"),
-        (Exchange, client.set_current(9), "WPM: WP CURR CMD: Not in list"),
+        (receiving, client.clear_all(MISSION)),
+        (receiving, sent(wire_item(0), STRANGER)),
+        (receiving, client.ack(MissionResult.CANCELLED, MISSION, STRANGER)),
+        (sending, client.count(2, MISSION)),
+        (sending, client.request_list(MISSION, STRANGER)),
+        (sending, client.request_item(0, MISSION, STRANGER)),
+        (sending, client.ack(0, MISSION, STRANGER)),
+        (sending, client.clear_all(MISSION)),
     ],
 )
-def test_what_is_turned_down_and_in_which_words(begin, message, text):
+def test_a_transfer_is_not_disturbed(begin, message):
     exchange = begin()
+    state, items = exchange.transfer.state, exchange.store.mission.items
     exchange.ask(message)
-    assert said(exchange) == text
+    assert (exchange.transfer.state, exchange.store.mission.items) == (state, items)
+    assert exchange.transfer._next == 0
 
 
 def test_only_one_link_receives_at_a_time():

@@ -1,12 +1,10 @@
 """What a client is told unasked on each kind of link, and whether it fits together."""
 
 import math
-import struct
 from collections import Counter
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
-from pymavlink.generator.mavcrc import x25crc
 
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
@@ -173,39 +171,3 @@ def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiti
     assert math.hypot(vx, vy) == pytest.approx(2.0, abs=0.2) and r == pytest.approx(-1 / 3, abs=0.1)
     for stamp_us in (felt.time_usec, orbiting.last("ODOMETRY").time_usec, 1000 * told.time_boot_ms):
         assert orbiting.time_s - 1e-6 * stamp_us < 0.05
-
-
-def requested(client: Client, *params: float) -> None:
-    client.forget()
-    client.command(REQUEST_MESSAGE, *params)
-    client.run(0.02)
-    assert client.results(REQUEST_MESSAGE) == [0]
-
-
-def test_the_modes_that_there_are_can_be_asked_for_all_at_once_or_one_by_one():
-    client = Client(system=255, component=190)
-    requested(client, 435)
-    modes = client.all("AVAILABLE_MODES")
-    assert [mode.mode_index for mode in modes] == list(range(1, modes[0].number_modes + 1))
-    # Rows of a SITL's list: standard modes have no name
-    rows = {(mode.custom_mode, mode.standard_mode, mode.properties, mode.mode_name) for mode in modes}
-    assert {
-        (0x60000, 0, 1, "Offboard"),
-        (0x30000, 1, 0, ""),
-        (0x5040000, 5, 1, ""),
-        (0xA0000, 0, 3, "Termination"),
-    } <= rows
-    requested(client, 435, 3)
-    (one,) = client.all("AVAILABLE_MODES")
-    assert one.to_dict() == modes[2].to_dict()
-
-
-def test_the_version_of_the_protocol_is_told():
-    client = Client(system=255, component=190)
-    requested(client, 300)
-    (packet,) = [raw for raw in client.packets if raw[7:10] == (300).to_bytes(3, "little")]
-    assert struct.unpack("<HHH", packet[10:-2].ljust(6, b"\0")) == (200, 100, 200)
-    # Its checksum, with the seed that MAVLink's definition of PROTOCOL_VERSION yields
-    checksum = x25crc(packet[1:-2])
-    checksum.accumulate(bytes([217]))
-    assert checksum.crc.to_bytes(2, "little") == packet[-2:]

@@ -8,7 +8,6 @@ import pytest
 from sim_vehicle.mavlink.streams import streams as module
 from tests.sim_vehicle.vehicle_client import SET_INTERVAL, SET_MODE, Client
 
-GET_INTERVAL = 510
 NUMBERS = {"HIGHRES_IMU": 105, "ATTITUDE_QUATERNION": 31, "ODOMETRY": 331, "LOCAL_POSITION_NED": 32}
 ACCEPTED, FAILED = 0, 4
 
@@ -78,17 +77,6 @@ def test_minus_one_stops_and_zero_restores():
 @pytest.mark.parametrize("message_id", [0, 27, 9999, -1])
 def test_what_cannot_be_asked_for(message_id):
     assert asked(message_id, 4_000)[1] == [FAILED]
-
-
-@pytest.mark.parametrize(
-    ("asked_us", "announced_us"), [(4_000, 4_000), (5_000, 5_000), (-1, -1), (0, 20_000), (100_000, 100_000)]
-)
-def test_the_announced_interval_is_the_one_asked_for(asked_us, announced_us):
-    client, _ = asked(105, asked_us)
-    client.command(GET_INTERVAL, 105)
-    client.run(0.1)
-    announced = client.last("MESSAGE_INTERVAL")
-    assert (announced.message_id, announced.interval_us) == (105, announced_us)
 
 
 def test_current_mode_comes_on_a_change_and_twice_a_second_at_most_otherwise():

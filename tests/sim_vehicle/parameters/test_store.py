@@ -44,9 +44,6 @@ def test_an_airframe_brings_its_own_gains_in_place_of_px4s():
     gains = position_gains(parameters)
     assert gains["tilt_max_rad"] == pytest.approx(airframe.control.tilt_max_rad)
     assert gains["velocity_i"] == (airframe.control.velocity_i_per_s2,) * 3
-    parameters.set("MPC_XY_VEL_P_ACC", 2.0)
-    parameters.reset()
-    assert parameters["MPC_XY_VEL_P_ACC"] == airframe.control.velocity_p_per_s
 
 
 @pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
