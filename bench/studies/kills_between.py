@@ -80,14 +80,15 @@ def work_out(case: Case) -> Json:
 
 def killed(air: BetweenFlight, touch_s: float) -> Json:
     """What becomes of it: the guard dies now."""
-    since_s, hits_before, vehicle = air.time_s - touch_s, len(air.vehicle.truth.hits), air.vehicle
+    vehicle, since_s, killed_us = air.vehicle, air.time_s - touch_s, air.vehicle.time_boot_us
     air.be_restarted(RESTARTED_S)
     air.run_for(MET_S)
     mode, until_s = air.mode, air.time_s + WATCHED_S
     down_m = -load_built_in(AIRFRAMES[0]).geometry.foot_depth_m - STANDS_M
     while float(vehicle.state.body[2]) <= down_m and air.time_s < until_s:
         air.step()
-    later = [hit.closing_speed_m_s for hit in vehicle.truth.hits[hits_before:]]
+    # A hit is in the truth when it is over.
+    later = [hit.closing_speed_m_s for hit in vehicle.truth.hits if hit.contact_at_boot_us >= killed_us]
     is_down = float(vehicle.state.body[2]) > down_m
     ground_m_s = math.hypot(*vehicle.truth.series()["velocity_ned_m_s"][-1]) if is_down else None
     # The touch itself is no second one.
