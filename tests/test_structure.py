@@ -60,6 +60,19 @@ def test_companion_and_vehicle_never_import_each_other_nor_the_command_line() ->
     assert breaches(("sim_vehicle",), {"companion", "rebound_cli"}) == []
 
 
+def test_how_the_reflex_decides_and_believes_stays_behind_its_door() -> None:
+    # Values go through the door, and settings; to compare with other detectors the laboratory looks behind it.
+    behind = ("classify", "confirmation", "correction", "crash", "free_flight", "fused", "motion_estimator")
+    hidden = {f"companion.reflex.{name}" for name in (*behind, "sustained_force", "velocity_jump")}
+    found = [
+        f"{module} imports {name}"
+        for module, names in imports_of_all().items()
+        for name in names & hidden
+        if module.startswith("companion.") and not module.startswith("companion.reflex.")
+    ]
+    assert found == []
+
+
 def test_nothing_that_is_installed_needs_the_laboratory() -> None:
     assert breaches(("companion", "sim_vehicle", "rebound_cli"), {"bench"}) == []
 
