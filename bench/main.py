@@ -19,7 +19,7 @@ from rebound_cli.main import run
 GONE = {
     "campaign page": "`bench campaign` writes the page, and the rows beside it",
     "campaign recoveries": "`bench hits` and `bench ablation` measure recoveries",
-    "corpus": "`bench hits --verdicts` and `bench detectors` judge a version on the same seeds",
+    "corpus": "`bench hits` and `bench detectors` judge a version on the same seeds",
     "paper results": "`bench paper` has the flight tests by speed and airframe",
     "soak": "hours as a service are no study any more",
 }

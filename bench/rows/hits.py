@@ -5,7 +5,7 @@ from time import process_time
 import numpy as np
 
 from bench.fly.campaign import Json
-from bench.fly.guarded import FREE_S, MOST_RECOVERY_S, Approach, FlownHit, Verdict, approach_of, fly
+from bench.fly.guarded import MOST_RECOVERY_S, FlownHit, fly
 from bench.fly.wire import FOUND_WITHIN_US
 from bench.rows.contacts import tilts_deg
 from bench.rows.recovered import CAME_BACK_M
@@ -17,13 +17,11 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 
 def work_out_flown(case: FlownHit) -> Json:
-    """Its row by the simulator's truth, where it touched anything, and what it cost."""
+    """Its row by the simulator's truth, and what it cost."""
     began_s = process_time()
     vehicle, guard, rest_us = fly(case)
     processor_s = round(process_time() - began_s, 4)
-    row = judged(vehicle, guard.collisions(), rest_us)
-    hits = [row] if row.pop("touched") else []
-    return {"watched_s": row["seconds"], "false": row["false"], "processor_s": processor_s, "hits": hits}
+    return {"processor_s": processor_s, **judged(vehicle, guard.collisions(), rest_us)}
 
 
 def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:
@@ -69,26 +67,3 @@ def returns(truth: FlightTruth, normal: np.ndarray, until_s: float) -> int:
         between = off_m[(time_us >= hit.ended_at_boot_us) & (time_us <= touch.contact_at_boot_us)]
         returned += len(between) > 0 and float(between.max() - between[-1]) > CAME_BACK_M
     return returned
-
-
-def work_out_approach(case: FlownHit) -> Json:
-    """Its hits in the order flown."""
-    began_s = process_time()
-    approach = Approach(case)
-    flown = list(approach.hits())
-    cost_s = process_time() - began_s
-    touched = [(number, verdict) for number, (_, verdict) in enumerate(flown) if verdict.touched_us is not None]
-    return {
-        "watched_s": round(1e-6 * approach.flight.vehicle.time_boot_us - FREE_S, 3),
-        "false": approach.is_false or any(verdict.is_early for _, verdict in flown),
-        "hits": [_row(number, verdict) for number, verdict in touched if not verdict.is_early],
-        "processor_s": round(cost_s, 4),
-    }
-
-
-def _row(number: int, verdict: Verdict) -> Json:
-    """What was met, the speed into the surface, and after how many ms it was found."""
-    late_us = verdict.late_us
-    latency_ms = None if late_us is None else round(1e-3 * late_us, 1)
-    told = {"closing_m_s": round(verdict.closing_m_s, 3), "latency_ms": latency_ms, "found": late_us is not None}
-    return {"number": number, "approach": approach_of(number), **told}

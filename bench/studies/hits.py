@@ -1,16 +1,15 @@
-"""`bench hits`: hits alone, from just before each to rest, or only until the guard tells of them; which were missed."""
+"""`bench hits`: hits alone, from just before each to rest; which were missed."""
 
 import math
 from argparse import Namespace
-from collections.abc import Sequence
 from dataclasses import asdict
 
 import pandas as pd
 
-from bench.fly.campaign import Campaign, Json, Results, Workers, run_campaign
-from bench.fly.guarded import HITS_AN_APPROACH, MOST_RECOVERY_S, OVERTURNED_DEG, draw_flown
+from bench.fly.campaign import Campaign, Results, Workers, run_campaign
+from bench.fly.guarded import MOST_RECOVERY_S, OVERTURNED_DEG, draw_flown
 from bench.fly.lockstep import NOTICED_M_S
-from bench.rows.hits import work_out_approach, work_out_flown
+from bench.rows.hits import work_out_flown
 from bench.rows.tables import CONFIDENCE, Page, at_most_an_hour, at_most_of_groups, per_cent, table, text_of
 
 # Into the surface.
@@ -27,43 +26,41 @@ OF_FOUND = ("latency_ms", "again", "rest_s")
 def run_hits(options: Namespace) -> int:
     """0 when it is written, whatever it says; 1 when a hit failed to be flown."""
     page, is_drawn = Page(options.out, "hits"), options.vehicles == "drawn"
-    campaign = hits_campaign(options.hits, options.first_seed, is_drawn, options.verdicts)
+    seeds = range(options.first_seed, options.first_seed + options.hits)
+    # Not how many: a longer campaign goes on where a shorter one ended.
+    parameters = {"first_seed": options.first_seed, "is_drawn": is_drawn}
+    campaign = Campaign("flown-hits", parameters, [draw_flown(seed, is_drawn) for seed in seeds], work_out_flown)
     results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
-    rows, failed, flights = hit_rows(campaign, results), results.text(campaign), list(results.results.values())
-    page.write("Hits alone", options.typed, {"": lead(rows, flights), **parts(rows)}, rows=rows)
+    flights, failed = flight_rows(campaign, results), results.text(campaign)
+    hits = hit_rows(flights)
+    page.write("Hits alone", options.typed, {"": lead(hits, flights), **parts(hits)}, rows=hits)
     print(failed)
     return 1 if failed else 0
 
 
-def hits_campaign(hits: int, first_seed: int, is_drawn: bool, verdicts: bool = False) -> Campaign:
-    """Each hit flown to rest; or as many approaches as it takes for so many verdicts, if each obstacle is met."""
-    name, hits_a_case, work_out = "flown-hits", 1, work_out_flown
-    if verdicts:
-        name, hits_a_case, work_out = "verdicts", HITS_AN_APPROACH, work_out_approach
-    cases = [draw_flown(first_seed + number, is_drawn) for number in range(math.ceil(hits / hits_a_case))]
-    # Not how many: a longer campaign goes on where a shorter one ended.
-    return Campaign(name, {"first_seed": first_seed, "is_drawn": is_drawn}, cases, work_out)
+def flight_rows(campaign: Campaign, results: Results) -> pd.DataFrame:
+    """One a flight."""
+    cases = [campaign.cases[at] for at in results.results]
+    return pd.DataFrame([{**asdict(case.hit), "imu_hz": case.imu_hz} for case in cases]).join(
+        pd.DataFrame(results.results.values())
+    )
 
 
-def hit_rows(campaign: Campaign, results: Results) -> pd.DataFrame:
-    """One a hit that touched something, with a column for its band of speed."""
-    found = []
-    for at, one in results.results.items():
-        case = campaign.cases[at]
-        found += [{**asdict(case.hit), "imu_hz": case.imu_hz, **hit} for hit in one["hits"]]
-    frame = pd.DataFrame(found)
-    frame = frame.reindex(columns=[*frame.columns, *(name for name in OF_FOUND if name not in frame.columns)])
-    bands = pd.cut(frame["closing_m_s"], BANDS_M_S, right=False).astype(str)
-    return frame.astype({"found": bool}).assign(band=bands)
+def hit_rows(flights: pd.DataFrame) -> pd.DataFrame:
+    """Those in which something was touched, with a column for the band of speed."""
+    hits = flights[flights["touched"]].drop(columns=["touched", "processor_s"])
+    hits = hits.reindex(columns=[*hits.columns, *(name for name in OF_FOUND if name not in hits.columns)])
+    bands = pd.cut(hits["closing_m_s"], BANDS_M_S, right=False).astype(str)
+    return hits.astype({"found": bool}).assign(band=bands)
 
 
-def lead(hits: pd.DataFrame, flights: Sequence[Json]) -> str:
-    false, hours = sum(one["false"] for one in flights), sum(one["watched_s"] for one in flights) / 3600.0
+def lead(hits: pd.DataFrame, flights: pd.DataFrame) -> str:
+    false, hours = int(flights["false"].sum()), flights["seconds"].sum() / 3600.0
     return (
         f"{len(hits):,} hits, {(~hits['found']).sum():,} missed; {false} false alarms in {hours:.2f} h, at most "
         f"{at_most_an_hour(false, hours):.2f} an hour. Each vehicle begins in flight and is guarded over the wire, "
-        f"until it rests ({MOST_RECOVERY_S:g} s at most) or the guard tells of the hit. The truth judges.\n"
-        f"{TWO_CORES_S * len(hits) / sum(one['processor_s'] for one in flights):,.0f} an hour on two cores.\n"
+        f"until it rests ({MOST_RECOVERY_S:g} s at most). The truth judges.\n"
+        f"{TWO_CORES_S * len(hits) / flights['processor_s'].sum():,.0f} an hour on two cores.\n"
     )
 
 
@@ -90,30 +87,25 @@ def cell(hits: pd.DataFrame) -> dict[str, object]:
     by_vehicle = (~hits["found"]).groupby(hits["seed"]).agg(["sum", "size"])
     groups = [(int(missed), int(of)) for missed, of in by_vehicle.itertuples(index=False)]
     missed, latency = sum(some for some, _ in groups), hits["latency_ms"]
-    figures: dict[str, object] = {
+    found = hits[hits["found"]]
+    return {
         "hits": len(hits),
         "vehicles": len(groups),
         "missed": missed,
         "share [%]": per_cent(missed / len(hits) if len(hits) else math.nan, 3),
         "at most [%]": per_cent(at_most_of_groups(groups), 3),
         "found after, median / 95 % [ms]": f"{text_of(latency.quantile(0.5))} / {text_of(latency.quantile(0.95))}",
+        "false alarms": int((hits["false"] > 0).sum()),
+        "again": int((found["again"] > 0).sum()),
+        "not at rest": int(found["rest_s"].isna().sum()),
+        "over": int((hits["tilt_deg"] > OVERTURNED_DEG).sum()),
+        "tilt, 95 % [°]": text_of(hits["tilt_deg"].quantile(0.95), 0),
+        "lost, 95 % [m]": text_of(hits["lost_m"].quantile(0.95), 2),
+        "at rest after, median [s]": text_of(found["rest_s"].quantile(0.5), 2),
     }
-    if "tilt_deg" in hits:
-        found = hits[hits["found"]]
-        figures |= {
-            "false alarms": int((hits["false"] > 0).sum()),
-            "again": int((found["again"] > 0).sum()),
-            "not at rest": int(found["rest_s"].isna().sum()),
-            "over": int((hits["tilt_deg"] > OVERTURNED_DEG).sum()),
-            "tilt, 95 % [°]": text_of(hits["tilt_deg"].quantile(0.95), 0),
-            "lost, 95 % [m]": text_of(hits["lost_m"].quantile(0.95), 2),
-            "at rest after, median [s]": text_of(found["rest_s"].quantile(0.5), 2),
-        }
-    return figures
 
 
 def _seeds(hits: pd.DataFrame) -> str:
-    """Each with the number of the hit, of a vehicle that flew several, and what was met."""
-    names = [name for name in ("seed", "number", "approach") if name in hits]
-    named = ["/".join(map(str, row)) for row in hits[names].head(NAMED_SEEDS).to_numpy().tolist()]
+    """Each with what was met."""
+    named = [f"{seed}/{met}" for seed, met in hits[["seed", "approach"]].head(NAMED_SEEDS).to_numpy().tolist()]
     return ", ".join(named) + (", ..." if len(hits) > NAMED_SEEDS else "") or "none"
