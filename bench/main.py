@@ -11,14 +11,14 @@ from typing import Any
 
 import yaml
 
+from bench.studies.rules import RULES
 from rebound_cli.arguments import count, number, runs
 from rebound_cli.main import run
 
 # Studies that were, and what shows now what they showed.
 GONE = {
-    "ablation": "`bench campaign` judges the code with and without a rule on the same seeds",
     "campaign page": "`bench campaign` writes the page, and the rows beside it",
-    "campaign recoveries": "`bench hits` and `bench campaign` measure recoveries",
+    "campaign recoveries": "`bench hits` and `bench ablation` measure recoveries",
     "corpus": "`bench hits` and `bench detectors` judge a version on the same seeds",
     "hand": "`bench detectors` flies hard and healthy flights",
     "paper results": "`bench paper` has the flight tests by speed and airframe",
@@ -31,7 +31,7 @@ TYPES = {
     "number": float,
     "path": Path,
 }
-KNOWN_HERE = {"cores": os.cpu_count() or 1}
+KNOWN_HERE = {"cores": os.cpu_count() or 1, "rules": tuple(rule.name for rule in RULES)}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

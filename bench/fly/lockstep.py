@@ -65,10 +65,12 @@ def flown_in(folder: Path, mission: Mission, scene: Scene, airframe: Airframe) -
     return flown, tuple(recorder.events)
 
 
-def fly(mission: Mission, scene: Scene, airframe: Airframe) -> JudgedFlight:
-    """The same, for a judge."""
-    with tempfile.TemporaryDirectory() as folder:
-        flown, events = flown_in(Path(folder), mission, scene, airframe)
+def fly(mission: Mission, scene: Scene, airframe: Airframe, folder: Path | None = None) -> JudgedFlight:
+    """The same, for a judge. With copies of the process, which must not remove it, the folder is given."""
+    if folder is None:
+        with tempfile.TemporaryDirectory() as name:
+            return fly(mission, scene, airframe, Path(name))
+    flown, events = flown_in(folder, mission, scene, airframe)
     assert flown.truth is not None, "a lockstep flight has its truth"
     return judged_flight(mission, flown.report, events, flown.truth, scene, airframe)
 

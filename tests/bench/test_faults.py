@@ -16,7 +16,6 @@ from bench.faults.injectors import rewritten, setting, simulated
 from bench.faults.people import Taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.faulted import FaultedFlight
-from bench.fly.moments import Copies
 from bench.fly.packets import ARM, SET_MODE, made, number_of, outside
 from bench.rows.faulted import judged, work_out_fault, work_out_seed
 from companion.mavlink.encode import COMPONENT_ID
@@ -78,14 +77,6 @@ def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
     # Then the hit is found by the one that could, and the other is told as what it is
     assert results["calm"]["found"] and results["calm"]["complaints"] == []
     assert not results["blind"]["found"] and "hit not found" in results["blind"]["complaints"]
-
-
-def test_a_copy_that_breaks_off_is_told_and_the_first_process_goes_on() -> None:
-    copies = Copies()
-    for name, find in {"broken": lambda: {}[0], "whole": lambda: {"found": True}}.items():
-        if copies.fork(name):
-            copies.leave(find)
-    assert copies.found == {"broken": {"failure": "the copy died"}, "whole": {"found": True}}
 
 
 @pytest.fixture

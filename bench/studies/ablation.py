@@ -1,0 +1,133 @@
+"""`bench ablation`: what each special rule of the companion is worth, in drawn flights."""
+
+import math
+import statistics
+import tempfile
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bench.cases.missions import MissionCase, flyable, random_mission
+from bench.cases.vehicles import AIRFRAMES
+from bench.fly.campaign import Campaign, Json, Workers, run_campaign
+from bench.fly.lockstep import JudgedFlight, fly
+from bench.rows.contacts import JudgedContact, Role, contacts_of
+from bench.rows.heard import angle_deg
+from bench.rows.judge import failures
+from bench.rows.recovered import recoveries
+from bench.rows.tables import Page, table
+from bench.studies.rules import RULES, Rule, switched
+from sim_vehicle.truth import Hit
+
+# At rest: slower than what a hover wavers by, for longer than a vehicle turns round.
+RESTS_M_S, RESTS_S = 0.2, 0.4
+# How long a vehicle is waited for.
+LONGEST_S = 8.0
+# What a recovery must show: past its setpoint, height lost, time to rest.
+PAST_M, LOST_M, REST_S = 0.05, 0.10, 3.5
+# What is compared of each hit, in which unit, to how many digits.
+FIGURES: dict[str, tuple[str, float, int]] = {
+    "rest_s": ("rest [s]", 1.0, 2),
+    "past_m": ("past [cm]", 100.0, 1),
+    "lost_m": ("lost [cm]", 100.0, 1),
+    "normal_deg": ("normal [°]", 1.0, 1),
+    "v_c_m_s": ("v_c [cm/s]", 100.0, 1),
+}
+
+
+def run_ablation(options: Namespace) -> int:
+    """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
+    page = Page(options.out, "ablation")
+    names = tuple(options.rule or (rule.name for rule in RULES))
+    campaign = ablation_campaign(options.missions, options.first_seed, names)
+    results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
+    rules, failed = [rule for rule in RULES if rule.name in names], results.text(campaign)
+    parts = {"Flights": flights_table(rules, list(results.results.values()))}
+    page.write("What each special rule is worth: with it, less without", options.typed, parts)
+    print(failed)
+    return 1 if failed else 0
+
+
+def ablation_campaign(missions: int, first_seed: int, names: tuple[str, ...]) -> Campaign:
+    """`names`: of the rules that are looked at."""
+    seeds = range(first_seed, first_seed + missions)
+    cases = [(MissionCase(seed, kind, is_drawn=True), names) for seed in seeds for kind in AIRFRAMES]
+    parameters = {"missions": missions, "first_seed": first_seed, "rules": list(names)}
+    return Campaign("ablation", parameters, cases, work_out)
+
+
+def work_out(case: tuple[MissionCase, tuple[str, ...]]) -> Json:
+    """What became of the flight, and of its copies by rule."""
+    mission, names = case
+    drawn = random_mission(mission)
+    rules = [rule for rule in RULES if rule.name in names]
+    with tempfile.TemporaryDirectory() as folder, switched(rules) as copies:
+        flight: JudgedFlight | None = None
+        try:
+            flight = fly(*flyable(mission, drawn), Path(folder))
+        finally:
+            copies.leave(lambda: {"failure": "the companion failed"} if flight is None else verdict(flight))
+        return {"with": verdict(flight), "without": copies.found}
+
+
+def verdict(flight: JudgedFlight) -> Json:
+    """Of a flight as a whole, and of each recovery in it."""
+    contacts = contacts_of(flight)
+    hits = [contact for contact in contacts if contact.role is Role.HIT]
+    found = zip(recoveries(flight, contacts), hits, strict=True)
+    return {
+        "ends": not failures(flight),
+        "hits": [_of_one(flight, figures, contact) for figures, contact in found],
+    }
+
+
+def _of_one(flight: JudgedFlight, figures: Json, contact: JudgedContact) -> Json:
+    found = {name: figures.get(name) for name in ("past_m", "lost_m", "risen_m", "returned", "closing_m_s")}
+    rest_s = found["rest_s"] = _rests_after_s(flight, contact.hit)
+    found["recovered"] = False
+    # Of a hit that nobody answered there is no setpoint to be past.
+    if rest_s is not None and "past_m" in figures:
+        is_near = figures["past_m"] <= PAST_M and figures["lost_m"] <= LOST_M
+        found["recovered"] = is_near and rest_s <= REST_S and not figures["returned"]
+    if contact.collision is not None:
+        told, hit = flight.report.collisions[contact.collision], contact.hit
+        found["normal_deg"] = round(angle_deg(told.normal_ned, hit.normal_ned), 1)
+        found["v_c_m_s"] = round(math.dist(told.impact_velocity_ned_m_s, hit.impact_velocity_ned_m_s), 3)
+    return found
+
+
+def _rests_after_s(flight: JudgedFlight, hit: Hit) -> float | None:
+    """From the touch to the beginning of the first rest; None where there was none."""
+    series = flight.truth.series
+    since_s = 1e-6 * (series["time_boot_us"] - hit.contact_at_boot_us)
+    looked_at = (since_s >= 0.0) & (since_s <= LONGEST_S)
+    since_s = since_s[looked_at]
+    moves = np.linalg.norm(series["velocity_ned_m_s"][looked_at], axis=1) > RESTS_M_S
+    began_s = np.concatenate([[0.0], since_s[moves], since_s[-1:]])
+    long = np.flatnonzero(np.diff(began_s) >= RESTS_S)
+    return round(float(began_s[long[0]]), 3) if long.size else None
+
+
+def flights_table(rules: Sequence[Rule], flights: Sequence[Json]) -> str:
+    """Of each rule the flights in which it changed an answer: how they end, how hits recover, medians of changes."""
+    rows: list[dict[str, object]] = []
+    for rule in rules:
+        known = [(one["with"], one["without"][rule.name]) for one in flights if rule.name in one["without"]]
+        flown = [(kept, left) for kept, left in known if "hits" in left]
+        # A copy that died says nothing of its end.
+        ends = sum(kept.get("ends", False) - left.get("ends", False) for kept, left in known)
+        recovers = sum(hit["recovered"] for kept, _ in flown for hit in kept["hits"])
+        recovers -= sum(hit["recovered"] for _, left in flown for hit in left["hits"])
+        changes = {label: _change(flown, key, times, digits) for key, (label, times, digits) in FIGURES.items()}
+        counts = {"mattered": len(known), "ends": f"{ends:+d}", "recovers": f"{recovers:+d}"}
+        rows.append({"rule": rule.name, "what it does": rule.does, **counts, **changes})
+    return table(rows)
+
+
+def _change(pairs: Sequence[tuple[Json, Json]], name: str, times: float, digits: int) -> str:
+    same = [(kept["hits"], left["hits"]) for kept, left in pairs if len(kept["hits"]) == len(left["hits"])]
+    figures = [(a.get(name), b.get(name)) for kept, left in same for a, b in zip(kept, left, strict=True)]
+    changes = [times * (a - b) for a, b in figures if a is not None and b is not None]
+    return f"{statistics.median(changes):+.{digits}f}" if changes else "–"
