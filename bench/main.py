@@ -20,7 +20,6 @@ GONE = {
     "campaign page": "`bench campaign` writes the page, and the rows beside it",
     "campaign recoveries": "`bench hits` and `bench ablation` measure recoveries",
     "corpus": "`bench hits` and `bench detectors` judge a version on the same seeds",
-    "hand": "`bench detectors` flies hard and healthy flights",
     "paper results": "`bench paper` has the flight tests by speed and airframe",
     "soak": "hours as a service are no study any more",
 }

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from bench.fly.by_hand.watched import IMU_HZ, Row
+from bench.fly.by_hand.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
 from bench.fly.campaign import Campaign, Workers, rows_of
-from bench.fly.watched import IMU_HZ, Row
-from bench.fly.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
 from bench.rows.tables import Page, by_each
 
 CRASH, NO_COLLISION = "crash", ("landing", "contact")
@@ -40,7 +40,7 @@ def fly_to_the_ground(case: GroundCase) -> Row:
     """What was reported, and what it should have been."""
     flown = flown_to_the_ground(case)
     flight = flown.flight
-    reported = flight.reported
+    reported = flight.watchers[0].reported
     outcome, wrong = judged(case.is_fall, flight.touched_us, flight.hardest_us, reported)
     touched_us, hardest_us = flight.touched_us, flight.hardest_us
     return {

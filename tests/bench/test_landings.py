@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bench.fly.ways_down import FALLS, FALLS_FROM_M, LANDINGS, GroundCase
+from bench.fly.by_hand.ways_down import FALLS, FALLS_FROM_M, LANDINGS, GroundCase
 from bench.studies.landings import fly_to_the_ground, judged, text_of
 
 TOUCHED_S = 5.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
-from bench.fly.watched import Sticks, WatchedFlight
+from bench.fly.by_hand.watched import GuardedFlight, Sticks
 from companion.companion import Companion
 from companion.guard.config import DEFAULT_MODES, GuardConfig
 from companion.guard.guard import Guard
@@ -59,7 +59,7 @@ class GroundCase:
 class GroundFlight:
     """What became of a case: the flight at its end, the speed that was asked for, and the height's error."""
 
-    flight: WatchedFlight
+    flight: GuardedFlight
     airframe: str
     sink_m_s: float
     height_error_m: float
@@ -94,7 +94,7 @@ def on_ground(ground: str, airframe: Airframe, rng: np.random.Generator) -> Airf
 
 def begun(
     case: GroundCase, built: BenchVehicle, airframe: Airframe, sink_m_s: float, rng: np.random.Generator
-) -> tuple[WatchedFlight, float]:
+) -> tuple[GuardedFlight, float]:
     """In HOLD at a height, or on the ground before a mission; and how much too high it takes itself to be."""
     parameters = {"MPC_LAND_SPEED": sink_m_s, "MAN_DEADZONE": 0.0, "MAN_ARM_GESTURE": 0}
     parameters |= {"RTL_RETURN_ALT": 2.0, "RTL_DESCEND_ALT": 1.5, "MPC_LAND_ALT2": 10.0, "MPC_LAND_ALT1": 11.0}
@@ -111,7 +111,7 @@ def begun(
         data = {"name": "landing", "items": [{"takeoff": {"height_m": MISSION_M}}, {"land": {}}], "companion": settings}
         companion = Companion(Mission.model_validate(data))
         companion.confirm_plan()
-        return WatchedFlight(vehicle, companion), error_m
+        return GuardedFlight(vehicle, companion), error_m
     low_m, high_m = FALLS_FROM_M if case.is_fall else LANDS_FROM_M
     # The vehicle corrects what it takes for an error of its height before it falls.
     height_m = float(rng.uniform(low_m + max(error_m, 0.0), high_m + min(error_m, 0.0)))
@@ -119,7 +119,7 @@ def begun(
     place = (away_m * math.cos(side_rad), away_m * math.sin(side_rad), -height_m)
     vehicle.begin_in_flight(place, (0.0, 0.0, 0.0))
     config = GuardConfig.model_validate({"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings})
-    return WatchedFlight(vehicle, Guard(config)), error_m
+    return GuardedFlight(vehicle, Guard(config)), error_m
 
 
 def falling(way: str, at_s: float, rng: np.random.Generator) -> list[dict[str, Any]]:
@@ -131,25 +131,26 @@ def falling(way: str, at_s: float, rng: np.random.Generator) -> list[dict[str, A
     return [{"kind": "free_fall", "at_s": at_s}]
 
 
-def to_the_end(flight: WatchedFlight) -> None:
+def to_the_end(flight: GuardedFlight) -> None:
     """Until a while after the first touch of the ground; the one before take-off is none."""
     end_s = LONGEST_S
-    while flight.time_s < end_s and not flight.program.finished:
+    while flight.time_s < end_s and not flight.watchers[0].program.finished:
         flight.step()
-        flight.looks_for_ground |= flight.height_m > UP_M
+        if flight.height_m > UP_M and not flight.looks_for_ground:
+            flight.watch_for_ground()
         if flight.touched_us is not None:
             end_s = 1e-6 * flight.touched_us + LOOKED_AFTER_S
 
 
-def land(flight: WatchedFlight, way: str, airframe: Airframe, sink_m_s: float, rng: np.random.Generator) -> None:
+def land(flight: GuardedFlight, way: str, airframe: Airframe, sink_m_s: float, rng: np.random.Generator) -> None:
     """By the mode, or by a pilot who lowers the throttle when the touch is felt."""
-    flight.looks_for_ground = True
+    flight.watch_for_ground()
     end_s, asked_s = LONGEST_S, STICKS_FROM_S if way in BY_STICKS else BEGINS_S
     sticks = lowering(flight, airframe, sink_m_s, rng)
     while flight.time_s < end_s:
         if way in BY_STICKS:
             flight.fly_sticks(sticks)
-        if flight.time_s > asked_s and flight.touched_us is None and flight.mode != way:
+        if flight.time_s > asked_s and flight.touched_us is None and flight.status.vehicle_mode != way:
             flight.ask_mode(way)
             asked_s = flight.time_s + 0.5
         flight.step()
@@ -158,7 +159,7 @@ def land(flight: WatchedFlight, way: str, airframe: Airframe, sink_m_s: float, r
 
 
 def lowering(
-    flight: WatchedFlight, airframe: Airframe, sink_m_s: float, rng: np.random.Generator
+    flight: GuardedFlight, airframe: Airframe, sink_m_s: float, rng: np.random.Generator
 ) -> Callable[[], Sticks]:
     """Down at a speed, with some drift that the pilot does not see."""
     reaction_s, drift_m_s = float(rng.uniform(*REACTION_S)), float(rng.uniform(*DRIFT_M_S))
@@ -173,7 +174,7 @@ def lowering(
         # It began with its nose to the north.
         leans = (-DRIFT_P_S_M * east_m_s, DRIFT_P_S_M * (drift_m_s - north_m_s))
         is_lowered = flight.time_s > BEGINS_S
-        if flight.mode != "STABILIZED":
+        if flight.status.vehicle_mode != "STABILIZED":
             return Sticks(*leans, throttle=-down if is_lowered else 0.0)
         share = SINK_P_PER_S * (down_m_s - sink_m_s * is_lowered) / GRAVITY_M_S2
         # MPC_THR_CURVE has hovering in the middle.

@@ -1,0 +1,179 @@
+"""A vehicle, whoever watches it and a ground station on virtual time; impacts that are reported, beside the truth."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, made
+from bench.fly.stepped import Stepped
+from companion.companion import Companion, StepResult
+from companion.guard.guard import Guard
+from companion.motion.config import GRAVITY_M_S2
+from companion.reflex.detector import Impact, Phase
+from companion.report import Status
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.vehicle import SimulatedVehicle
+
+Row = dict[str, Any]
+
+IMU_HZ = (50, 100, 250)
+# Of PX4's modes, as DO_SET_MODE takes them: main and sub mode.
+MODES = {"ALTCTL": (2, 0), "POSCTL": (3, 0), "AUTO.RTL": (4, 5), "AUTO.LAND": (4, 6)}
+MODES |= {"STABILIZED": (7, 0)}
+# More than any drawn vehicle's thrust, with a hover at a third of it, and drag.
+STRONGEST_M_S2 = 45.0
+# A ground station's sticks come at 25 to 50 Hz, its heartbeat once a second.
+STICKS_S, BEAT_S = 0.02, 1.0
+# The middle of the throttle's way from 0 to 1000, and the other sticks' from -1000 to 1000.
+HALF_THROTTLE, FULL_STICK = 500, 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks:
+    """From -1 to 1: right, forward, up and clockwise are positive."""
+
+    roll: float = 0.0
+    pitch: float = 0.0
+    throttle: float = 0.0
+    yaw: float = 0.0
+
+
+@dataclass
+class Watcher:
+    """Who watches, and what was reported."""
+
+    program: Guard | Companion
+    reported: list[Row] = field(default_factory=list)
+    watched_s: float = 0.0
+    impact: Impact | None = None  # the newest
+
+
+class GuardedFlight(Stepped):
+    """With a ground station. The world is the level ground alone."""
+
+    def __init__(self, vehicle: SimulatedVehicle, *programs: Companion | Guard) -> None:
+        super().__init__(vehicle, *programs)
+        self.watchers = [Watcher(program) for program in programs]
+        self._station = vehicle.add_link(LinkKind.NORMAL)
+        for link in self.links:
+            link.introduce()
+        self._body, self._depth_m = vehicle.state.body, vehicle.state.depth_m
+        self._sent, self._sticks_s, self._beat_s = 0, 0.0, 0.0
+        self._before = np.zeros(3)
+        self.looks_for_ground = False
+        self.touched_us: int | None = None  # first touch of the ground since the latest `watch_for_ground`
+        self.last_touch_us: int | None = None
+        self.hardest_m_s2 = 0.0  # since that touch: the largest specific force, mean over an interval
+        self.hardest_us: int | None = None
+        self.tilt_at_touch_deg = self.sink_at_touch_m_s = 0.0
+
+    @property
+    def status(self) -> Status:
+        """As the first watcher sees it."""
+        return self.watchers[0].program.status()
+
+    @property
+    def height_m(self) -> float:
+        """Of the centre of mass above the ground, true."""
+        return -float(self._body[2])
+
+    @property
+    def velocity_ned_m_s(self) -> tuple[float, float, float]:
+        north, east, down = self._body[3:6].tolist()
+        return north, east, down
+
+    @property
+    def tilt_deg(self) -> float:
+        """Of the body's vertical axis from the world's, true."""
+        _, x, y, _ = self._body[6:10].tolist()
+        return math.degrees(math.acos(max(-1.0, 1.0 - 2.0 * (x * x + y * y))))
+
+    def watch_for_ground(self) -> None:
+        """From now on a touch of the ground counts: the vehicle is off it."""
+        self.looks_for_ground, self.touched_us = True, None
+
+    def ask(self, command: int, *params: float) -> None:
+        """By a ground station."""
+        fields = {f"param{place}": value for place, value in enumerate(params, start=1)}
+        self._push("COMMAND_LONG", target_system=1, target_component=1, command=command, **fields)
+
+    def ask_mode(self, mode: str) -> None:
+        self.ask(SET_MODE, 1.0, *MODES[mode])
+
+    def arm(self) -> None:
+        self.ask(ARM, 1.0)
+
+    def fly_sticks(self, sticks: Callable[[], Sticks]) -> None:
+        """Send the sticks where they are due."""
+        if self.time_s < self._sticks_s:
+            return
+        self._sticks_s, now = self._sticks_s + STICKS_S, sticks()
+        x, y, r = (round(FULL_STICK * limited(stick)) for stick in (now.pitch, now.roll, now.yaw))
+        self._push("MANUAL_CONTROL", target=1, x=x, y=y, z=round(HALF_THROTTLE * (1.0 + limited(now.throttle))), r=r)
+
+    def step(self) -> list[StepResult]:
+        if self.time_s >= self._beat_s:
+            self._beat_s = self.time_s + BEAT_S
+            self._push("HEARTBEAT", type=6, autopilot=8)
+        self._before[:] = self._body[3:6]
+        results = super().step()
+        self._station.take()
+        if self.looks_for_ground:
+            self._note_ground()
+        for watcher in self.watchers:
+            self._note_impact(watcher)
+        return results
+
+    def _note_ground(self) -> None:
+        """A contact with a stiff frame may begin and end within an interval: its force shows it then."""
+        now_us = self.vehicle.time_boot_us
+        change = (self._body[3:6] - self._before) / (1e-6 * self.vehicle.interval_us)
+        change[2] -= GRAVITY_M_S2
+        force_m_s2 = float(np.linalg.norm(change))
+        if float(self._depth_m.max()) > 0.0 or force_m_s2 > STRONGEST_M_S2:
+            self.last_touch_us = now_us
+            if self.touched_us is None:
+                self.touched_us, self.hardest_m_s2 = now_us, 0.0
+                self.tilt_at_touch_deg, self.sink_at_touch_m_s = self.tilt_deg, float(self._before[2])
+        if self.touched_us is not None and force_m_s2 > self.hardest_m_s2:
+            self.hardest_m_s2, self.hardest_us = force_m_s2, now_us
+
+    def _note_impact(self, watcher: Watcher) -> None:
+        core = watcher.program.core
+        if core is None:
+            return
+        monitor = core.reflex.monitor
+        if monitor.state.phase is not Phase.OFF:
+            watcher.watched_s += 1e-6 * self.vehicle.interval_us
+        estimate = monitor.estimator.estimate
+        if estimate is None or estimate.impact is watcher.impact:
+            return
+        watcher.impact = impact = estimate.impact
+        now_us = self.vehicle.time_boot_us
+        watcher.reported.append(
+            {
+                "kind": impact.kind.value,
+                "evidence": impact.evidence.value,
+                "sample_s": round(1e-6 * impact.sample_time_boot_us, 3),
+                "since_touch_s": None if self.last_touch_us is None else round(1e-6 * (now_us - self.last_touch_us), 3),
+                "tilt_deg": round(self.tilt_deg, 1),
+                "turning_rad_s": round(math.hypot(*self._body[10:13].tolist()), 2),
+                "speed_m_s": round(math.hypot(*self.velocity_ned_m_s[:2]), 2),
+                "down_m_s": round(self.velocity_ned_m_s[2], 2),
+                "height_m": round(self.height_m, 2),
+                "force_frd_m_s2": [round(value, 1) for value in impact.specific_force_frd_m_s2],
+                "threshold_m_s2": round(monitor.state.threshold_m_s2, 1),
+                "mode": self.status.vehicle_mode,
+            }
+        )
+
+    def _push(self, name: str, **fields: Any) -> None:
+        self._sent += 1
+        self._station.push(made(name, fields, GROUND_STATION, self._sent % 256))
+
+
+def limited(stick: float) -> float:
+    return min(max(stick, -1.0), 1.0)

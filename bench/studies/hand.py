@@ -1,0 +1,158 @@
+"""`bench hand`: drawn vehicles flown hard by sticks, with nothing to run into; every impact reported is false."""
+
+import math
+from argparse import Namespace
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bench.cases.mishaps import FAMILIES
+from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
+from bench.fly.by_hand.hand_pilot import Pilot, wishes
+from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row
+from bench.fly.campaign import Campaign, Workers, rows_of
+from bench.rows.tables import Page, at_most_an_hour, by_each
+from companion.guard.config import DEFAULT_MODES, GuardConfig
+from companion.guard.guard import Guard
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+
+HAND_MODES = ("POSCTL", "ALTCTL", "STABILIZED")
+AIR = ("calm", "gusts", "turbulence", "vibration")
+# Limits as a pilot of a racer sets them. PX4's own: 35 deg, 3 m/s^2, 8 m/s^3, 100 deg/s.
+TILT_DEG, JERK_M_S3, ACCELERATION_M_S2 = (30.0, 45.0), (30.0, 200.0), (6.0, 12.0)
+SPEED_M_S, CLIMB_M_S, SINK_M_S, YAW_DEG_S = (5.0, 12.0), (2.0, 5.0), (1.5, 4.0), (90.0, 200.0)
+# Half of the vehicles know where they are by a filter, the others with errors that are drawn.
+FILTER_SHARE = 0.5
+# Of the greatest thrust, at the steepest tilt: the rest turns the vehicle.
+THRUST_LEFT = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class HandCase:
+    """One flight; everything that is not here is drawn from the seed."""
+
+    seed: int
+    mode: str
+
+
+def run_hand(options: Namespace) -> int:
+    """0 when nothing was reported in the air, else 1."""
+    page = Page(options.out, "hand")
+    seeds = range(options.first_seed, options.first_seed + options.flights)
+    cases = [HandCase(seed, HAND_MODES[seed % len(HAND_MODES)]) for seed in seeds]
+    parameters = {"flights": options.flights, "first_seed": options.first_seed}
+    rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs))
+    watched = by_rate(rows)
+    text = text_of(watched)
+    page.write("Flown hard by hand", options.typed, {"": text}, rows=pd.DataFrame(rows))
+    print(text)
+    return 1 if any(_in_the_air(row) for row in watched) else 0
+
+
+# --- the vehicle
+
+
+def fly_by_hand(case: HandCase) -> Row:
+    """Take-off by hand, a minute of vigorous flight, and all that guards at every IMU rate reported in it."""
+    rng = np.random.default_rng([case.seed, 11])
+    built = vehicle_of(AIRFRAMES[case.seed // 4 % 2], case.seed)
+    airframe, parameters = agile(built.airframe, rng)
+    air = str(rng.choice(AIR))
+    scene = Scene.model_validate({"faults": FAMILIES[air](rng).faults})
+    vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
+    guards = [Guard(_config(built, imu_hz)) for imu_hz in IMU_HZ]
+    flight = GuardedFlight(vehicle, *guards)
+    tilts = Pilot(flight, airframe, parameters, wishes(rng), case.mode, guards).fly()
+    return {
+        "seed": case.seed,
+        "airframe": airframe.name,
+        "mode": case.mode,
+        "estimate": airframe.estimate.kind,
+        "air": air,
+        "flown_s": round(len(tilts) * STICKS_S, 1),
+        "tilt_deg": [round(float(np.percentile(tilts, at)), 1) for at in (50, 90, 100)] if tilts else [],
+        "touched": flight.touched_us is not None,
+        "watched": [
+            {"imu_hz": imu_hz, "watched_s": round(watcher.watched_s, 1), "reported": watcher.reported}
+            for imu_hz, watcher in zip(IMU_HZ, flight.watchers, strict=True)
+        ],
+    }
+
+
+def _config(built: BenchVehicle, imu_hz: int) -> GuardConfig:
+    settings = {**built.settings, "streams": {"highres_imu_hz": float(imu_hz)}}
+    return GuardConfig.model_validate({"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings})
+
+
+def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[str, float]]:
+    """The drawn vehicle with the limits of somebody who flies hard, and its parameters."""
+    steepest_deg = math.degrees(math.acos(min(airframe.hover_fraction / THRUST_LEFT, 1.0)))
+    tilt_deg = min(float(rng.uniform(*TILT_DEG)), steepest_deg)
+    climb, sink = float(rng.uniform(*CLIMB_M_S)), float(rng.uniform(*SINK_M_S))
+    control = {"tilt_max_rad": math.radians(tilt_deg), "climb_max_m_s": climb, "descent_max_m_s": sink}
+    parameters = {
+        "MPC_MAN_TILT_MAX": tilt_deg,
+        "MPC_MAN_Y_MAX": float(rng.uniform(*YAW_DEG_S)),
+        "MPC_VEL_MANUAL": float(rng.uniform(*SPEED_M_S)),
+        "MPC_ACC_HOR": float(rng.uniform(*ACCELERATION_M_S2)),
+        "MPC_JERK_MAX": float(rng.uniform(*JERK_M_S3)),
+        "MPC_ACC_UP_MAX": 10.0,
+        "MPC_ACC_DOWN_MAX": 10.0,
+    }
+    update = {"control": airframe.control.model_copy(update=control)}
+    return airframe.model_copy(update=update | (by_filter(airframe) if rng.random() < FILTER_SHARE else {})), parameters
+
+
+def by_filter(airframe: Airframe) -> dict[str, object]:
+    """The estimate of a filter that motion capture aids: optical flow does not see such flights."""
+    sensors = airframe.sensors
+    lost = {
+        name: getattr(sensors, name).model_copy(update={"fitted": False}) for name in ("optical_flow", "range_finder")
+    }
+    capture = sensors.motion_capture.model_copy(update={"fitted": True})
+    return {
+        "estimate": airframe.estimate.model_copy(update={"kind": "ekf"}),
+        "sensors": sensors.model_copy(update={**lost, "motion_capture": capture}),
+    }
+
+
+# --- the table
+
+
+def by_rate(rows: Sequence[Row]) -> list[Row]:
+    """A row for each of the guards of each flight."""
+    return [{**row, **watched} for row in rows for watched in row["watched"]]
+
+
+def text_of(rows: Sequence[Row]) -> str:
+    """By IMU rate, mode and air what was reported in the air, then every report. The bar: 0."""
+    frame = pd.DataFrame(rows).assign(false=[_in_the_air(row) for row in rows])
+    lines = by_each(frame[frame["watched_s"] > 0.0], ("imu_hz", "mode", "air"), _figures)
+    touched = frame[frame["touched"]]["seed"].nunique()
+    lines += f"{touched} flights touched the ground; reports from then on do not count. Bar: 0 reported.\n"
+    for row in frame.explode("false").dropna(subset="false").to_dict("records"):
+        where = f"seed {row['seed']}, {row['imu_hz']} Hz, {row['mode']}, {row['air']}"
+        lines += f"{where}: {row['false']}\n"
+    return lines
+
+
+def _figures(flights: pd.DataFrame) -> Row:
+    kinds = Counter(one["kind"] for false in flights["false"] for one in false)
+    hours, tilts = flights["watched_s"].sum() / 3600.0, [tilts[:2] for tilts in flights["tilt_deg"] if tilts]
+    return {
+        "flights": len(flights),
+        "watched, h": f"{hours:.2f}",
+        "reported": kinds.total(),
+        "an hour, at most": f"{at_most_an_hour(kinds.total(), hours):.2f}",
+        "tilt, median, 90 %": "/".join(f"{value:.0f}" for value in np.median(tilts, axis=0)) if tilts else "-",
+        "as": ", ".join(f"{kind} {number}" for kind, number in kinds.most_common()),
+    }
+
+
+def _in_the_air(row: Row) -> list[Row]:
+    return [one for one in row["reported"] if one["since_touch_s"] is None]
