@@ -78,7 +78,9 @@ def held_off(acceleration_ned_m_s2: Vector3, belief: Belief, surfaces: Sequence[
     """The acceleration whose speed towards each surface, after `held_s`, can still be braked in front of it."""
     sides = []
     for surface in surfaces:
+        # Of a speed away from it what is certain.
         speed_m_s = along(belief.velocity_ned_m_s, surface.normal_ned)
+        speed_m_s -= min(max(speed_m_s, 0.0), belief.spread_m_s)
         # The present speed's half of the way until then; the other half is that of the speed then.
         room_m = surface.off_m(belief.position_ned_m) - surface.distance_m + 0.5 * speed_m_s * held_s
         by_wind = along(belief.external_m_s2, surface.normal_ned)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, plus
-from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, tilted, wanted
+from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, held_off, tilted, wanted
 from companion.reflex.config import LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S
 from companion.reflex.surface import Surface
 
@@ -77,6 +77,18 @@ def test_near_a_surface_only_what_is_certain_of_the_speed_away_from_it_is_braked
     beside = Belief(HERE, (0.0, 1.0, 0.0))
     doubtful = wanted(replace(beside, spread_m_s=0.6), [WALL], HERE[2])
     assert doubtful == wanted(beside, [WALL], HERE[2])
+
+
+@pytest.mark.parametrize("spread_m_s", [0.0, 0.4, 2.0])
+def test_what_is_held_is_safe_by_what_is_certain_of_the_speed_away_from_a_surface(spread_m_s):
+    place, held_s = plus(HERE, 0.6, SOUTH), 0.5
+    belief = Belief(place, (-1.0, 0.0, 0.0), spread_m_s)
+    (north_m_s2, _, _) = held_off((9.0, 0.0, 0.0), belief, [WALL], held_s)
+    certain_m_s = max(0.0, 1.0 - spread_m_s)
+    ends_m_s = north_m_s2 * held_s - certain_m_s
+    # Braked with 3 m/s^2 from there it ends the clearance off the wall
+    way_m = 0.5 * (ends_m_s - certain_m_s) * held_s + ends_m_s**2 / 6.0
+    assert ends_m_s > 0.0 and way_m == pytest.approx(0.6 - WALL.distance_m, abs=0.01)
 
 
 def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():

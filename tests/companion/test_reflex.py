@@ -8,9 +8,9 @@ from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState,
 from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.vector import ZERO, plus
-from companion.reflex.attitude_law import tilted
-from companion.reflex.config import RecoveryConfig
+from companion.motion.vector import ZERO, limited, plus
+from companion.reflex.attitude_law import held_off, tilted
+from companion.reflex.config import BRAKES_M_S2, MOST_HELD_S, NOTICED_S, RecoveryConfig
 from companion.reflex.detector import Situation
 from companion.reflex.reflex import Reflex, start_reflex
 
@@ -45,6 +45,8 @@ class Air:
         self.now_us = 0
         self.touched_us: int | None = None
         self.told_us: int | None = None
+        self.is_alone = False
+        self.nearest_m = -math.inf  # since the rebound: the wall is at 0
 
     def step(self) -> None:
         self.now_us += TICK_US
@@ -60,14 +62,19 @@ class Air:
         self.up = plus(self.up, 1e-6 * TICK_US, self.turns)
         self.velocity = plus(self.velocity, 1e-6 * TICK_US, plus(force, GRAVITY_M_S2, DOWN))
         self.place = plus(self.place, 1e-6 * TICK_US, self.velocity)
-        self._react(self._samples(force))
+        if self.velocity[0] < 0.0 or self.is_alone:
+            self.nearest_m = max(self.nearest_m, self.place[0] - WALL_NORTH_M)
+        if not self.is_alone:
+            self._react(self._samples(force))
 
     def _samples(self, force):
         us, wxyz = self.now_us, tilted(self.up, 0.0)
-        samples = [ImuSample(us, ned_to_body(wxyz, force), ZERO)]
+        (a, b, c), (x, y, z) = self.up, self.turns
+        rates = ned_to_body(wxyz, (b * z - c * y, c * x - a * z, a * y - b * x))
+        samples = [ImuSample(us, ned_to_body(wxyz, force), rates)]
         if us % (5 * TICK_US) == 0:
             velocity = plus(self.velocity, 1e-3 * (us // (5 * TICK_US) % 2), DOWN)
-            samples += [Attitude(us, wxyz, ZERO), AttitudeTarget(us, self.thrust)]
+            samples += [Attitude(us, wxyz, rates), AttitudeTarget(us, self.thrust)]
             samples += [LocalPosition(us, self.place, velocity), Odometry(us, self.place, velocity, 0)]
         return samples
 
@@ -84,11 +91,23 @@ class Air:
         reflex.follow(samples, 2.0, LandedState.IN_AIR)
         if recovery is not None and recovery.leans:
             acceleration, lean = reflex.lean(0.0)
+            # As the envelope bounds it.
+            acceleration = held_off(acceleration, lean.belief, lean.surfaces, lean.held_s)
             setpoint = lean.setpoint(self.now_us, acceleration)
             self.asked, self.thrust = setpoint.attitude_wxyz, setpoint.thrust_fraction
 
     def fly(self, seconds: float) -> "Air":
         for _ in range(round(1e6 * seconds / TICK_US)):
+            self.step()
+        return self
+
+    def fly_alone(self, seconds: float) -> "Air":
+        """Nobody hears it: it flies what was asked for last until it notices that, and then brakes with 3 m/s^2."""
+        self.is_alone, until_us = True, self.now_us + 1e6 * (MOST_HELD_S + NOTICED_S)
+        for _ in range(round(1e6 * seconds / TICK_US)):
+            if self.now_us >= until_us:
+                brakes = limited(plus(ZERO, -10.0, (self.velocity[0], self.velocity[1], 0.0)), BRAKES_M_S2)
+                self.asked = tilted(plus(brakes, -GRAVITY_M_S2, DOWN), 0.0)
             self.step()
         return self
 
@@ -106,6 +125,18 @@ def test_a_hit_is_told_with_its_first_sample_and_flown_to_rest_clear_of_the_wall
     assert math.hypot(*air.velocity) < 0.3
     assert 0.3 < WALL_NORTH_M - air.place[0] < 0.8
     assert air.place[2] == pytest.approx(-2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("after_s", [0.2, 0.3, 0.4, 0.5, 0.6, 0.7])
+def test_an_attitude_that_is_held_and_then_turned_back_from_does_not_lead_to_the_wall_again(after_s):
+    # Given a companion that dies while the vehicle brakes its rebound, leaning towards the wall
+    air = Air().fly(3.0 + after_s)
+    left_m = air.nearest_m
+    air.fly_alone(2.0)
+    assert air.nearest_m <= max(left_m, -0.02), "before it touches again it is at rest"
+    # Its loops of 12 rad/s take two time constants to turn the thrust
+    _, lean = air.reflex.lean(0.0)
+    assert lean.held_s == pytest.approx(MOST_HELD_S + NOTICED_S + 2.0 / 12.0, abs=0.03)
 
 
 @pytest.mark.parametrize("loss_s", [None, 1.0])
