@@ -64,7 +64,9 @@ class Air:
 
     def _samples(self, force):
         us, wxyz = self.now_us, tilted(self.up, 0.0)
-        samples = [ImuSample(us, ned_to_body(wxyz, force), ZERO)]
+        (n, e, d), (by_n, by_e, by_d) = self.up, self.turns
+        rates_ned = (e * by_d - d * by_e, d * by_n - n * by_d, n * by_e - e * by_n)
+        samples = [ImuSample(us, ned_to_body(wxyz, force), ned_to_body(wxyz, rates_ned))]
         if us % (5 * TICK_US) == 0:
             velocity = plus(self.velocity, 1e-3 * (us // (5 * TICK_US) % 2), DOWN)
             samples += [Attitude(us, wxyz, ZERO), AttitudeTarget(us, self.thrust)]
