@@ -110,7 +110,7 @@ class MotionEstimator:
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
     tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
-    external_m_s2: Vector3 = ZERO  # external force per mass across the thrust, horizontal: wind and drag
+    external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
@@ -166,6 +166,15 @@ class MotionEstimator:
             self.external_m_s2 = plus(self.external_m_s2, share, plus((n, e, 0.0), -1.0, self.external_m_s2))
 
     @property
+    def wind_m_s2(self) -> Vector3:
+        """External force per mass across the thrust, horizontal: wind and drag.
+
+        Of a clipped hit PX4's estimator takes a part for the accelerometer's bias, and takes it off HIGHRES_IMU.
+        """
+        biased_m_s2 = 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2
+        return plus(self.external_m_s2, -1.0, limited(self.external_m_s2, biased_m_s2))
+
+    @property
     def belief(self) -> Belief:
         """What the attitude law goes by."""
         motion = self.motion
@@ -174,7 +183,7 @@ class MotionEstimator:
             motion.velocity_ned_m_s,
             self.spread_m_s,
             self.tilt_m_s2,
-            self.external_m_s2,
+            self.wind_m_s2,
             self.attitude_wxyz,
             self.yaw_rate_rad_s,
             self.level_m_s2,

@@ -94,6 +94,20 @@ def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into
     assert lost_s > 0.9
 
 
+@pytest.mark.parametrize(
+    ("is_fully_measured", "across_m_s2", "wind_m_s2"), [(True, -0.35, -0.35), (False, -0.35, 0.0), (False, 2.4, 2.0)]
+)
+def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(is_fully_measured, across_m_s2, wind_m_s2):
+    # Given a level vehicle after a hit, and a force across its thrust
+    found, strapdown = reckoned(), Strapdown()
+    found.note_contact(is_fully_measured, HIT_US)
+    for tick in range(1, 500):
+        strapdown.imu(HIT_US + 4_000 * tick, (across_m_s2, 0.0, -9.81), ZERO)
+        found.imu(strapdown)
+    # Then it counts as wind as far as PX4's estimator cannot have made it up
+    assert found.belief.external_m_s2 == pytest.approx((wind_m_s2, 0.0, 0.0), abs=0.01)
+
+
 @pytest.mark.parametrize("ahead_us", [1_000_000, 120_000, -70_000])
 @pytest.mark.parametrize("hides", [0.0, 1.0])
 def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(ahead_us, hides):
