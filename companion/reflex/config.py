@@ -227,6 +227,8 @@ DRIFT_M2_S3 = 0.03
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
 COMPARED_S = 0.5
+# PX4's EKF2_ABL_LIM: more than this its estimator takes for no bias of the accelerometer.
+MOST_BIAS_M_S2 = 0.4
 # The logistic function with this factor differs from the normal distribution's by less than 1 %.
 LOGISTIC = 1.702
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames

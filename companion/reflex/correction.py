@@ -44,6 +44,16 @@ def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
     return g, way_s - np.maximum(_LATE_S - since_s, 0.0), np.exp(-0.5 * _SWING * x)
 
 
+def tilt_response(errors: Floats, pushed_m_s2: Floats, elapsed_s: float) -> Floats:
+    """The errors of position and velocity (2, models, axes) a time later: p' = u - k p, u' = -b - h p.
+
+    b is the acceleration of a vehicle that is level by a wrong tilt: how the tilt came to be wrong does not matter.
+    """
+    p, u = errors
+    k, h = _SWING[:, None], _RAD_S[:, None] ** 2
+    return errors + elapsed_s * np.stack([u - k * p, -pushed_m_s2 - h * p])
+
+
 @dataclass(slots=True)
 class VelocityValidity:
     """Changed only by its methods. Times: vehicle's boot clock."""

@@ -24,7 +24,7 @@ from companion.motion.vector import ZERO, along, limited, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
-from companion.reflex.correction import MODELS, Floats, error_response
+from companion.reflex.correction import MODELS, Floats, error_response, tilt_response
 from companion.reflex.laws import Contact, MotionState
 
 
@@ -34,7 +34,7 @@ class FilterBank:
     Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
     """
 
-    __slots__ = ("covariance", "leaves", "log_likelihoods", "state")
+    __slots__ = ("covariance", "leaves", "log_likelihoods", "state", "tilted")
 
     def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
         """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
@@ -43,11 +43,18 @@ class FilterBank:
         self.state = np.tile(state, (models, 1, 1))
         self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
         self.log_likelihoods, self.leaves = np.zeros(models), np.ones(models)
+        self.tilted = np.zeros((2, models, 3))  # errors of what is reported by a tilt that is wrong across e
         self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
         self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
 
-    def predict(self, elapsed_s: float, faster_m_s: Vector3) -> None:
-        """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong."""
+    def predict(self, elapsed_s: float, faster_m_s: Vector3, level_m_s2: Vector3) -> None:
+        """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong.
+
+        `level_m_s2`: acceleration of a vehicle that is level by its own tilt. Along e the models contain it.
+        """
+        hidden, pushed = self.state[..., 2], np.array(level_m_s2)
+        along_e = hidden @ pushed / np.maximum((hidden**2).sum(axis=1), 1e-9)
+        self.tilted = tilt_response(self.tilted, pushed - along_e[:, None] * hidden, elapsed_s)
         leads, added = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array(faster_m_s)
         self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0]
         self.covariance = leads @ self.covariance @ leads.T
@@ -55,7 +62,7 @@ class FilterBank:
 
     def update(self, which: int, share: Floats, measured: Vector3, variance: float) -> None:
         """Take a reported position (0) or velocity (1), with each model's share of e in it."""
-        missed = np.array(measured) - self.state[..., which] - share[:, None] * self.state[..., 2]
+        missed = np.array(measured) - self.state[..., which] - share[:, None] * self.state[..., 2] - self.tilted[which]
         with_it = self.covariance[:, which] + share[:, None] * self.covariance[:, 2]
         size = with_it[:, which] + share * with_it[:, 2] + variance
         gain = with_it / size[:, None]
@@ -84,9 +91,9 @@ class FilterBank:
         left2 = share @ (left**2 * (3.0 * self.covariance[:, 2, 2] + (self.state[..., 2] ** 2).sum(axis=1)))
         return MotionState((x, y, z), (u, v, w)), math.sqrt(spread2), math.sqrt(left2)
 
-    def mean_error(self, each: Floats) -> Vector3:
-        """Mean of e, times each model's factor."""
-        n, e, d = np.einsum("w,wa->a", self._probabilities() * each, self.state[..., 2]).tolist()
+    def mean_error(self, which: int, share: Floats) -> Vector3:
+        """Mean error of the reported position (0) or velocity (1), with each model's share of e in it."""
+        n, e, d = (self._probabilities() @ (share[:, None] * self.state[..., 2] + self.tilted[which])).tolist()
         return (n, e, d)
 
     def _probabilities(self) -> Floats:
@@ -110,7 +117,7 @@ class MotionEstimator:
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
     tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
-    external_m_s2: Vector3 = ZERO  # external force per mass across the thrust, horizontal: wind and drag
+    external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
@@ -157,13 +164,25 @@ class MotionEstimator:
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
         self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
-        self.level_m_s2 = strapdown.level_acceleration_m_s2
+        if time_us - self.hit_boot_us < reflex.CORRECTED_US:
+            # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
+            self.level_m_s2 = strapdown.level_acceleration_m_s2
         self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
         if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
             n, e, _ = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
             share = elapsed_s / (reflex.SMOOTHING_S + elapsed_s)
             self.external_m_s2 = plus(self.external_m_s2, share, plus((n, e, 0.0), -1.0, self.external_m_s2))
+
+    @property
+    def _bias_m_s2(self) -> Vector3:
+        """Of a clipped hit PX4's estimator takes a part for the accelerometer's bias, and takes it off HIGHRES_IMU."""
+        return limited(self.external_m_s2, 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2)
+
+    @property
+    def wind_m_s2(self) -> Vector3:
+        """External force per mass across the thrust, horizontal: wind and drag."""
+        return plus(self.external_m_s2, -1.0, self._bias_m_s2)
 
     @property
     def belief(self) -> Belief:
@@ -174,7 +193,7 @@ class MotionEstimator:
             motion.velocity_ned_m_s,
             self.spread_m_s,
             self.tilt_m_s2,
-            self.external_m_s2,
+            self.wind_m_s2,
             self.attitude_wxyz,
             self.yaw_rate_rad_s,
             self.level_m_s2,
@@ -204,7 +223,9 @@ class MotionEstimator:
         # Clipping hides between none and all of the change of velocity.
         half = plus(ZERO, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
         bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
-        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s))
+        # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
+        level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
+        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
         self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
         g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
         # The report as of now.
@@ -222,7 +243,7 @@ class MotionEstimator:
         estimate, spread_m_s, left_m_s = bank.estimate(left)
         self.has_converged = self.has_converged or left_m_s <= SAME_M_S
         if self.has_converged:
-            self.position_error_m, self._hidden_error_m_s = bank.mean_error(way_s), bank.mean_error(g)
+            self.position_error_m, self._hidden_error_m_s = bank.mean_error(0, way_s), bank.mean_error(1, g)
             return
         self.motion = replace(estimate, acceleration_ned_m_s2=self.motion.acceleration_ned_m_s2)
         self.spread_m_s = spread_m_s

@@ -94,6 +94,54 @@ def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into
     assert lost_s > 0.9
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_a_velocity_that_a_wrong_tilt_makes_across_the_hit_is_no_motion(way):
+    # Given a hit at 3 m/s that turns the vehicle: from 0.3 s on its tilt is wrong across it, and so is its velocity
+    _, rad_s, damping = way
+    found, strapdown = reckoned((3.0, 0.0, 0.0), restitution=0.8), Strapdown()
+    lacks_m = lacks_m_s = 0.0
+    for tick in range(1, 350):
+        since_s = 0.004 * tick
+        level_m_s2 = -2.0 if since_s > 0.3 else 0.0
+        lacks_m_s += 0.004 * (-level_m_s2 - rad_s**2 * lacks_m)
+        lacks_m += 0.004 * (lacks_m_s - 2.0 * damping * rad_s * lacks_m)
+        strapdown.time_boot_us, strapdown.level_acceleration_m_s2 = HIT_US + 4_000 * tick, (0.0, level_m_s2, 0.0)
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            swing_m_s, swing_m = missing(since_s, *way)
+            velocity = (-2.4 + 5.4 * swing_m_s, lacks_m_s, 0.0)
+            found.update(
+                LocalPosition(strapdown.time_boot_us, (3.0 - 2.4 * since_s + 5.4 * swing_m, lacks_m, -2.0), velocity)
+            )
+            # Then no motion across is taken from it, and none goes with the positions
+            assert abs(found.motion.velocity_ned_m_s[1]) < 0.15
+            right = found.corrected(LocalPosition(0, (0.0, 0.0, 0.0), velocity))
+            assert not found.has_converged or abs(right.velocity_ned_m_s[1]) < 0.15
+
+
+def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_again():
+    found, strapdown = reckoned(), Strapdown()
+    for at_us, level_m_s2 in ((4_400_000, 0.9), (5_000_000, 0.0)):
+        for strapdown.time_boot_us in (HIT_US + at_us, HIT_US + at_us + 4_000):
+            strapdown.level_acceleration_m_s2 = (0.0, level_m_s2, 0.0)
+            found.imu(strapdown)
+        assert found.belief.level_m_s2 == (0.0, 0.9, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("is_fully_measured", "across_m_s2", "wind_m_s2"), [(True, -0.35, -0.35), (False, -0.35, 0.0), (False, 2.4, 2.0)]
+)
+def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(is_fully_measured, across_m_s2, wind_m_s2):
+    # Given a level vehicle after a hit, and a force across its thrust
+    found, strapdown = reckoned(), Strapdown()
+    found.note_contact(is_fully_measured, HIT_US)
+    for tick in range(1, 500):
+        strapdown.imu(HIT_US + 4_000 * tick, (across_m_s2, 0.0, -9.81), ZERO)
+        found.imu(strapdown)
+    # Then it counts as wind as far as PX4's estimator cannot have made it up
+    assert found.belief.external_m_s2 == pytest.approx((wind_m_s2, 0.0, 0.0), abs=0.01)
+
+
 @pytest.mark.parametrize("ahead_us", [1_000_000, 120_000, -70_000])
 @pytest.mark.parametrize("hides", [0.0, 1.0])
 def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(ahead_us, hides):
