@@ -127,6 +127,7 @@ def test_a_judge_names_each_kind_of_loss() -> None:
     for words, inject in bad.items():
         result = flown_with(Fault(words, "", inject, no_wall), 7)
         assert any(text.startswith(words) for text in result["complaints"]), (words, result)
+        assert not result["hit"], "there is no wall"
 
 
 @pytest.mark.slow
