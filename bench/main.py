@@ -27,7 +27,6 @@ GONE = {
 TYPES = {
     "count": count,
     "hours": number(float, math.ulp(0.0), 10_000, "a time: give hours, such as 0.5"),
-    "number": float,
     "path": Path,
 }
 KNOWN_HERE = {"cores": os.cpu_count() or 1, "rules": tuple(rule.name for rule in RULES)}

@@ -111,10 +111,6 @@ class Landing(BaseException):
     """The vehicle has been landing by itself for a second; the rest is its own affair."""
 
 
-class Branched(BaseException):
-    """Every fault has flown on from here."""
-
-
 @dataclass
 class Air:
     """One flight's wire, clock and vehicle."""
@@ -127,8 +123,7 @@ class Air:
     limit_s: float
     to_the_ground: bool = True
     """Whether the vehicle's own landing is waited for."""
-    branch: Callable[[], None] | None = None
-    """Called once, when the first item begins."""
+    at_first_item: Callable[[], None] | None = None
     since: dict[str, float] = field(default_factory=dict)
     """When the companion was first in a state; seconds of the vehicle's clock."""
     stall_s: float = 0.0
@@ -223,9 +218,9 @@ class Air:
         if self.now_s > self.limit_s:
             raise Hung
         state = self.state
-        if state == "mission" and self.branch is not None:
-            branch, self.branch = self.branch, None
-            branch()
+        if state == "mission" and self.at_first_item is not None:
+            begin, self.at_first_item = self.at_first_item, None
+            begin()
         self.has_left_offboard |= "mission" in self.since and self.vehicle.mode != "Offboard"
         began_s = self.since.setdefault(state, self.now_s)
         if state == "landing" and not self.to_the_ground and self.now_s - began_s > 1.0 and self.vehicle.mode == "Land":
@@ -324,4 +319,4 @@ class Fault:
     inject: Callable[[random.Random], Injector]
     expected: Expected = Expected()
     from_the_start: bool = False
-    """Whether the fault acts before the first item, so that every flight has to be flown from its take-off."""
+    """Whether the fault acts before the first item."""

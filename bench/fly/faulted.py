@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import io
 import math
-import os
 import random
-import shutil
-import tempfile
-import traceback
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from bench.cases.vehicles import AIRFRAMES
-from bench.fly.air import COMPLETED, KILLED, Air, Branched, Fault, Hung, Killed, Landing
-from bench.fly.campaign import Json
-from bench.fly.moments import Copies
+from bench.fly.air import COMPLETED, KILLED, Air, Fault, Hung, Injector, Killed, Landing
 from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.shell.tlog import may_be_logged
@@ -54,19 +47,6 @@ class Noting(FlightRecorder):
         self.counted += sum(map(may_be_logged, result.received_frames)) + len(result.sent_frames)
         super().record(now_us, result)
 
-    def move_to(self, folder: Path) -> None:
-        """Go on in a copy of the folder, as only a process that was forked may."""
-        shutil.copytree(self.folder, folder, dirs_exist_ok=True)
-        for file, name in (
-            (self._tlog._file, run_folder.TLOG_NAME),
-            (self._events_file, run_folder.EVENTS_NAME),
-            (self._inputs_file, run_folder.INPUTS_NAME),
-        ):
-            descriptor = os.open(folder / name, os.O_WRONLY | os.O_APPEND)
-            os.dup2(descriptor, file.fileno())
-            os.close(descriptor)
-        self.folder = self._folder = folder
-
 
 def mission_of(number: int) -> Mission:
     """Up, into a wall that nobody knows of, and down."""
@@ -102,9 +82,12 @@ class FaultedFlight:
         self.injector = fault.inject(self._chance())
         vehicle = ChangeableVehicle(self.airframe, self.scene, self.scene.seed, 0, {})
         self.interrupts, self.companion = Interrupts(), Companion(self.mission)
-        self.air = Air(vehicle, self.companion, self.interrupts, self.injector, self._chance(), LIMIT_S)
+        self.air = Air(vehicle, self.companion, self.interrupts, Injector(), self._chance(), LIMIT_S)
         self.air.to_the_ground = number < TO_THE_GROUND
-        self._begin()
+        if fault.from_the_start:
+            self._begin()
+        else:
+            self.air.at_first_item = self._begin
         self.fault_text, self.ended = "", ""
         """What the loop says of a fault inside the program; how the flight ended if not by its mission's rules."""
         self.killed_at_s = 0.0
@@ -129,49 +112,14 @@ class FaultedFlight:
             self.recorder._tlog._pending.clear()
         self.recorder.close()
 
-    def fly_branched(self, faults: Sequence[Fault], judge: Callable[[FaultedFlight], Json]) -> dict[str, Json]:
-        """To the first item, and from there on once with each fault, in a process each; what was judged, by name."""
-        copies = Copies()
-
-        def branch() -> None:
-            for fault in faults:
-                if copies.fork(fault.name):
-                    self._become(fault)
-                    return
-            raise Branched
-
-        def judged() -> Json:
-            try:
-                return judge(self)
-            finally:
-                shutil.rmtree(self.recorder.folder, ignore_errors=True)
-
-        self.air.branch = branch
-        try:
-            self.fly()
-        except Branched:
-            return copies.found
-        except BaseException:
-            text = traceback.format_exc()
-            copies.leave(lambda: {"complaints": [text], "outcome": "broken"})
-        copies.leave(judged)
-        raise AssertionError("only a copy flies on from its first item")
-
     def _chance(self) -> random.Random:
         return random.Random(f"{self.fault.name} {self.number}")
 
-    def _become(self, fault: Fault) -> None:
-        """From here on this is a flight with that fault."""
-        self.fault = fault
-        self.injector = self.air.injector = fault.inject(self._chance())
-        self.air.chance = self._chance()
-        self.recorder.move_to(Path(tempfile.mkdtemp()))
-        self._begin()
-
     def _begin(self) -> None:
-        vehicle = self.air.vehicle
+        """From here on this is a flight with that fault."""
         if not self.fault.expected.has_wall:
-            vehicle.remove(vehicle.obstacles)
+            self.air.vehicle.remove(self.air.vehicle.obstacles)
+        self.air.injector = self.injector
         self.injector.begin(self.air)
 
 

@@ -1,7 +1,6 @@
 """Whether a flight ended as its mission says, by what really happened, and made use of what it knew."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -29,33 +28,26 @@ LANDED_BESIDE_M = 1.0
 HELD_M = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
-    """`cause` is what failures are counted by."""
-
-    cause: str
-    details: str
-
-
-def failures(flight: JudgedFlight) -> list[Failure]:
-    """The gravest first; empty where the flight ended as the mission says."""
+def failures(flight: JudgedFlight) -> list[tuple[str, str]]:
+    """The cause that it is counted by, and details, the gravest first; empty where it ended as the mission says."""
     contacts = contacts_of(flight)
-    found = [Failure(cause, details) for cause, details in crashes(flight)]
-    found += _noticing(flight, contacts)
-    found += [Failure("not as the mission says", text) for text in disobediences(flight)]
-    found += [Failure("not where the mission says", text) for text in _places(flight, contacts)]
-    found += [Failure("flew into a known surface", text) for text in repeated(flight, contacts)]
-    found += [Failure("gave up a goal in the open", text) for text in given_up(flight)]
-    return found
+    others = {
+        "not as the mission says": disobediences(flight),
+        "not where the mission says": _places(flight, contacts),
+        "flew into a known surface": repeated(flight, contacts),
+        "gave up a goal in the open": given_up(flight),
+    }
+    found = [*crashes(flight), *_noticing(flight, contacts)]
+    return found + [(cause, text) for cause, texts in others.items() for text in texts]
 
 
-def _noticing(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[Failure]:
+def _noticing(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[tuple[str, str]]:
     for contact in contacts:
         if contact.role is Role.HIT and contact.collision is None and contact.closing_m_s >= NOTICED_M_S:
             text = f"{contact.hit.obstacle} at {contact.speed_m_s:.2f} m/s ({contact.closing_m_s:.2f} square to it)"
-            yield Failure("hit not noticed", f"{text} {flight.at(contact.hit.contact_at_boot_us)}")
+            yield "hit not noticed", f"{text} {flight.at(contact.hit.contact_at_boot_us)}"
     for collision in without_contact(flight):
-        yield Failure("answered a hit that was none", flight.at(collision.sample_time_boot_us))
+        yield "answered a hit that was none", flight.at(collision.sample_time_boot_us)
 
 
 def _places(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[str]:
@@ -133,7 +125,7 @@ def work_out_mission(case: MissionCase) -> Json:
         "items": [next(iter(item)) for item in drawn.data["items"]],
         "outcome": flight.report.outcome,
         "seconds": round(1e-6 * (flight.report.ended_at_us - flight.report.started_at_us), 3),
-        "failures": [[failure.cause, failure.details] for failure in failures(flight)],
+        "failures": failures(flight),
         "detours": sum(event.kind == "detour" for event in flight.events),
         "unreachable": sum(event.kind == "unreachable" for event in flight.events),
         "hits": recoveries(flight, contacts),

@@ -144,7 +144,7 @@ def run_only(case: MissionCase, out: Path | None) -> int:
     options = build_parser().parse_args(["fly", str(mission), "--lockstep", "--out", str(folder)])
     options.run(options)
     found = failures(fly(*flyable(case, drawn)))
-    print("\n".join(f"{failure.cause}: {failure.details}" for failure in found) or "It ended as it says.")
+    print("\n".join(": ".join(failure) for failure in found) or "It ended as it says.")
     return 1 if found else 0
 
 

@@ -2,42 +2,31 @@
 
 from argparse import Namespace
 from collections import Counter
+from dataclasses import asdict
 
 import pandas as pd
 
 from bench.faults.catalogue import FLOWN, GROUPS
 from bench.fly.air import ENDS
 from bench.fly.campaign import Campaign, Results, Workers, run_campaign
-from bench.rows.faulted import work_out_seed
+from bench.rows.faulted import FaultCase, work_out_fault
 from bench.rows.tables import Page, table
 from companion.errors import ConfigurationError
 
 GROUP_OF = {fault.name: group for group, faults in GROUPS.items() for fault in faults}
 _SHOWN = 3
-# Of a flight that broke off there are no such figures.
-COLUMNS: tuple[str, ...] = (
-    "seed",
-    "fault",
-    "complaints",
-    "outcome",
-    "hit",
-    "found",
-    "unseen",
-    "false",
-    "unconfirmed",
-    "tilt_deg",
-)
-COLUMNS += ("ground_m_s", "again_m_s", "after_told")
 
 
 def run_faults(options: Namespace) -> int:
     """0 when every row did what is expected of it."""
-    if options.only is not None:
-        return _only(options.only, options.seeds)
+    names = [*FLOWN] if options.only is None else [options.only]
+    if options.only not in (None, *FLOWN):
+        raise ConfigurationError(f"--only {options.only}: there is no such fault; there are {', '.join(FLOWN)}.")
     # Not how many: more seeds go on where fewer ended.
-    campaign = Campaign("faults", {}, [(number, tuple(FLOWN)) for number in range(options.seeds)], work_out_seed)
+    cases = [FaultCase(seed, name) for seed in range(options.seeds) for name in names]
+    campaign = Campaign("faults", {"only": options.only}, cases, work_out_fault)
     page, results = Page(options.out, "faults"), run_campaign(campaign, Workers(options.jobs))
-    rows = fault_rows(results)
+    rows = fault_rows(campaign, results)
     failing = list(rows[rows["complaints"].map(bool)]["fault"].unique())
     lead = f"{rows['fault'].nunique()} faults, {len(rows)} flights; {len(failing)} rows not as expected."
     parts = {"": f"{lead}\n\n{faults_table(rows)}", "What was not as expected": complaints(rows)}
@@ -46,10 +35,10 @@ def run_faults(options: Namespace) -> int:
     return 1 if failing or results.failures else 0
 
 
-def fault_rows(results: Results) -> pd.DataFrame:
+def fault_rows(campaign: Campaign, results: Results) -> pd.DataFrame:
     """One a flight; the faults in the table's order."""
-    found = [{"seed": at, "fault": name, **one[name]} for name in FLOWN for at, one in results.results.items()]
-    return pd.DataFrame(found, columns=list(COLUMNS))
+    frame = pd.DataFrame([{**asdict(campaign.cases[at]), **one} for at, one in results.results.items()])
+    return frame.sort_values("fault", key=lambda names: names.map([*FLOWN].index), kind="stable")
 
 
 def faults_table(rows: pd.DataFrame) -> str:
@@ -59,8 +48,8 @@ def faults_table(rows: pd.DataFrame) -> str:
 
 def _of_fault(name: str, flights: pd.DataFrame) -> dict[str, object]:
     bad = int(flights["complaints"].map(bool).sum())
-    hits = flights[flights["hit"].fillna(False).astype(bool)]
-    ends = flights["outcome"].map(ENDS).fillna("broken").value_counts(sort=False)
+    hits = flights[flights["hit"]]
+    ends = flights["outcome"].map(ENDS).value_counts(sort=False)
     happened = ", ".join(f"{end} {count}" for end, count in ends.items())
     happened += f"; hits found {hits['found'].sum()} of {len(hits)}"
     for column, words in (
@@ -95,12 +84,3 @@ def complaints(rows: pd.DataFrame) -> str:
         causes = Counter(text.strip().splitlines()[-1].partition(" at ")[0][:160] for text in texts)
         found += [{"fault": name, "times": count, "what": cause} for cause, count in causes.most_common(_SHOWN)]
     return table(found)
-
-
-def _only(name: str, seeds: int) -> int:
-    if name not in FLOWN:
-        raise ConfigurationError(f"--only {name}: there is no such fault; there are {', '.join(FLOWN)}.")
-    results = [work_out_seed((number, [name]))[name] for number in range(seeds)]
-    for number, result in enumerate(results):
-        print(f"{number}: {result}")
-    return 1 if any(result["complaints"] for result in results) else 0

@@ -131,7 +131,7 @@ def run_flights(options: Namespace) -> int:
         name = f"{path.parent.name}/{path.name}"
         config, listener = CompanionConfig(), Listener()
         try:
-            replay = replay_log(read_log(path), config, options.rate, listener.listen)
+            replay = replay_log(read_log(path), config, None, listener.listen)
         except LogError as error:
             refused.append(str(error))
             continue

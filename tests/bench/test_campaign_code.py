@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bench.fly.campaign import CODE
-from bench.rows.faulted import work_out_seed
+from bench.rows.faulted import work_out_fault
 from bench.rows.heard import work_out_hit
 from bench.rows.hits import work_out_flown
 from bench.rows.judge import work_out_mission
@@ -23,7 +23,7 @@ def imports():
 
 @pytest.mark.parametrize(
     "work_out",
-    [work_out_mission, work_out_hit, work_out_flown, work_out_seed, kills.work_out],
+    [work_out_mission, work_out_hit, work_out_flown, work_out_fault, kills.work_out],
     ids=lambda function: function.__module__,
 )
 def test_all_code_that_a_row_follows_from_is_in_its_version(work_out, imports):

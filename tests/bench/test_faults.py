@@ -3,11 +3,7 @@
 import math
 import random
 import re
-import tempfile
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,9 +11,8 @@ from bench.faults.catalogue import FLOWN, GROUPS
 from bench.faults.injectors import rewritten, setting, simulated
 from bench.faults.people import Taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
-from bench.fly.faulted import FaultedFlight
 from bench.fly.packets import ARM, SET_MODE, made, number_of, outside
-from bench.rows.faulted import judged, work_out_fault, work_out_seed
+from bench.rows.faulted import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
 from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in
@@ -54,29 +49,18 @@ def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
 
 
-def branched(number: int, faults: Sequence[Fault]) -> dict[str, Any]:
-    """What became of each fault's flight, by name; all from one take-off."""
-    with tempfile.TemporaryDirectory() as folder:
-        quiet = Fault("none", "", lambda _: Injector())
-        return FaultedFlight(number, quiet, Path(folder)).fly_branched(faults, judged)
-
-
 @pytest.mark.slow
-def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
+def test_each_flight_has_its_own_fault() -> None:
     # Given a sensor that says nothing true any more, and nothing at all
-    blind = Fault(
-        "blind",
-        "",
-        lambda _: rewritten(When("mission"), (number_of("HIGHRES_IMU"),), setting(xgyro=math.nan)),
-        Expected(),
-    )
-    calm = Fault("calm", "", lambda _: Injector(), Expected((COMPLETED,)))
-    # When both fly on from one take-off
+    change = setting(xgyro=math.nan)
+    blind = Fault("blind", "", lambda _: rewritten(When("mission"), (number_of("HIGHRES_IMU"),), change))
+    calm = Fault("calm", "", lambda _: Injector())
+    # When both are flown with one seed
     # (a wall that the blind one falls beside at once, and does not scratch along for half a minute)
-    results = branched(3, [blind, calm])
+    seeing, blinded = flown_with(calm, 3), flown_with(blind, 3)
     # Then the hit is found by the one that could, and the other is told as what it is
-    assert results["calm"]["found"] and results["calm"]["complaints"] == []
-    assert not results["blind"]["found"] and "hit not found" in results["blind"]["complaints"]
+    assert seeing["found"] and seeing["complaints"] == []
+    assert not blinded["found"] and "hit not found" in blinded["complaints"]
 
 
 @pytest.fixture
@@ -140,11 +124,10 @@ def test_a_judge_names_each_kind_of_loss() -> None:
             other("push", force_ned_n=(0.0, 12.0, 0.0), rise_s=0.01), When("mission", 0.3, 0.1)
         ),
     }
-    faults = [Fault(words, "", inject, no_wall) for words, inject in bad.items()]
-    results = branched(7, faults)
-    assert [*results] == [*bad]
-    for words, result in results.items():
+    for words, inject in bad.items():
+        result = flown_with(Fault(words, "", inject, no_wall), 7)
         assert any(text.startswith(words) for text in result["complaints"]), (words, result)
+        assert not result["hit"], "there is no wall"
 
 
 @pytest.mark.slow
@@ -152,17 +135,17 @@ def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_sa
     # Given an accelerometer that is off in the second of a hit
     hidden = FLOWN["accelerometer zero"]
     shown = replace(hidden, expected=replace(hidden.expected, blinds=False))
-    told, untold = (branched(42, [fault])[hidden.name] for fault in (hidden, shown))
+    told, untold = (flown_with(fault, 42) for fault in (hidden, shown))
     assert told["unseen"] and told["complaints"] == []
     assert not untold["unseen"] and any(text.startswith(("fell: ", "tumbled: ")) for text in untold["complaints"])
 
 
 @pytest.mark.slow
 def test_a_killed_companion_leaves_a_vehicle_that_lands_and_a_log() -> None:
-    (result,) = work_out_seed((8, ["SIGKILL in a recovery"])).values()
+    result = work_out_fault(FaultCase(8, "SIGKILL in a recovery"))
     assert result["outcome"] == "killed" and result["complaints"] == [] and result["ground_m_s"] < 1.2
 
 
 def test_a_pilot_who_takes_over_in_the_climb_is_left_alone() -> None:
-    result = work_out_fault(9, FLOWN["takes over in take-off"])
+    result = work_out_fault(FaultCase(9, "takes over in take-off"))
     assert result["outcome"] == "aborted" and result["complaints"] == [] and result["after_told"] == 0

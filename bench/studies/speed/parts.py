@@ -1,17 +1,14 @@
 """What each part of an interval costs: time, and calls of Python's and C's functions.
 
 The same flight is flown again and again, and of every part the least time is taken: what the machine does besides falls
-out. The number of calls is the same on any machine, busy or not: `calls.json` has what it is held to, and
-`python -m bench speed --calls` makes that anew.
+out. The number of calls is the same on any machine, busy or not.
 """
 
 import importlib
-import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter_ns
 from types import FrameType
 from typing import Any
@@ -125,15 +122,3 @@ def calls_an_interval(fly: Callable[[], object]) -> dict[str, float]:
     """Mean over all intervals of a flight, by part: what it calls itself, without the other parts."""
     cost = cost_of(fly, counts_calls=True)
     return {name: round(calls / cost.intervals, 2) for name, calls in cost.calls.items()}
-
-
-HELD_TO = Path(__file__).parent / "calls.json"
-
-
-def held_to() -> dict[str, float]:
-    found: dict[str, float] = json.loads(HELD_TO.read_text(encoding="utf-8"))
-    return found
-
-
-def hold_to(calls: dict[str, float]) -> None:
-    HELD_TO.write_text(json.dumps(calls, indent=2) + "\n", encoding="utf-8")

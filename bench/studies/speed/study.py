@@ -1,4 +1,4 @@
-"""`bench speed`: how many times real time, and the budget of an interval; or the calls, or the latency, alone."""
+"""`bench speed`: how many times real time, and the budget of an interval; or the latency alone."""
 
 import gc
 import os
@@ -14,7 +14,7 @@ from bench.fly.lockstep import flown_in
 from bench.rows.tables import Page, table
 from bench.stamps import FLOWN, ROOT
 from bench.studies.speed.latency import measured
-from bench.studies.speed.parts import calls_an_interval, hold_to, mean_us
+from bench.studies.speed.parts import calls_an_interval, mean_us
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 
 CODE = (*FLOWN, "rebound_cli")
@@ -53,12 +53,6 @@ def parse_us() -> float:
 
 def run_speed(options: Namespace) -> int:
     """0 when it is measured, whatever it says."""
-    if options.calls:
-        fly()  # what is imported or compiled at first counts for nothing
-        calls = calls_an_interval(fly)
-        hold_to(calls)
-        print(f"{sum(calls.values()):.1f} calls an interval: {calls}")
-        return 0
     page = Page(options.out, "speed")
     if options.latency:
         parts = {"From the hit to the setpoint": latency_table(options.latency)}

@@ -39,7 +39,7 @@ LAND, DETOUR = {"then": "land"}, {"then": "detour"}
 
 
 def causes(judged):
-    return [failure.cause for failure in failures(judged)]
+    return [cause for cause, _ in failures(judged)]
 
 
 def bounced(*after, policy=LAND, **settings):
