@@ -12,7 +12,7 @@ from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
-from sim_vehicle.mavlink.restamp import check_messages
+from sim_vehicle.mavlink.faulty_link import check_messages
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 
 if TYPE_CHECKING:

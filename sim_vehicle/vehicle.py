@@ -16,8 +16,7 @@ from sim_vehicle.mavlink.services.service import Board
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.topics import Topics
-from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.mavlink.vibration import VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.layout import PlantState

@@ -27,8 +27,7 @@ from sim_vehicle.faults.wire import Wire as FaultyWire
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.streams.streams import KINDS, LateLoops, Stream, interval_from_request
 from sim_vehicle.mavlink.streams.topics import Topic
-from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.mavlink.vibration import VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
 from sim_vehicle.physics.layout import HIT_IMPULSE, HIT_START_US
 from sim_vehicle.plant.plant import Plant
 

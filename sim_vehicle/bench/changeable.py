@@ -4,9 +4,8 @@ from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.mode_numbers import NUMBERS
 from sim_vehicle.errors import FaultError, SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
-from sim_vehicle.mavlink.faulty_link import FaultyLink
+from sim_vehicle.mavlink.faulty_link import FaultyLink, check_messages
 from sim_vehicle.mavlink.link import Link
-from sim_vehicle.mavlink.restamp import check_messages
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import Constants
 from sim_vehicle.scene import Scene

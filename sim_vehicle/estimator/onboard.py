@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.estimator.downward import DownwardSensors
 from sim_vehicle.estimator.filter import NavigationFilter
 from sim_vehicle.estimator.rest import STILL_SPEED_M_S, RestDetector
 from sim_vehicle.estimator.samples import (
@@ -19,7 +18,7 @@ from sim_vehicle.estimator.samples import (
     RangeSample,
     Sample,
 )
-from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor
+from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, DownwardSensors
 from sim_vehicle.estimator.strapdown import (
     D_ATTITUDE,
     D_POSITION,

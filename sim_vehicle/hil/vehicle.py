@@ -4,7 +4,7 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe, Imu
-from sim_vehicle.estimator.downward import DownwardSensors
+from sim_vehicle.estimator.sensors import DownwardSensors
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.earth import air_at
 from sim_vehicle.hil.messages import Air, HilSensor, HilState, Quadruple, ToPx4

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 TABLE = Path(__file__).parent / "px4.csv"
+_AT_REAL_TIME = {"COM_DL_LOSS_T": 10.0, "COM_RC_LOSS_T": 1.0, "COM_OF_LOSS_T": 0.3}
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,3 +57,14 @@ def _definition(row: dict[str, str]) -> Definition:
         most=number(row["max"]) if row["max"] else None,
         needs_reboot=row["needs_reboot"] == "yes",
     )
+
+
+def time_outs_at(speed: float) -> dict[str, float]:
+    """The parameters for a speed in simulated seconds a second; none at real time, or where there is no speed (0).
+
+    Clients go by the clock, so PX4's simulator start-up multiplies these time-outs by PX4_SIM_SPEED_FACTOR
+    (ROMFS/px4fmu_common/init.d-posix/rcS).
+    """
+    if speed in (0.0, 1.0):
+        return {}
+    return {name: definitions()[name].limited(speed * seconds) for name, seconds in _AT_REAL_TIME.items()}

@@ -15,7 +15,7 @@ from sim_vehicle.bench.timeline import TimelineEntry
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet, SimulationError, VehicleEnded
 from sim_vehicle.mavlink.streams.stream_rates import link_kind
-from sim_vehicle.parameters.pace import time_outs_at
+from sim_vehicle.parameters.definitions import time_outs_at
 from sim_vehicle.shell.addresses import open_port
 from sim_vehicle.shell.port import Port
 from sim_vehicle.shell.realtime import RealtimePace, serve_interval

@@ -36,7 +36,7 @@ def client() -> Client:
         (410, (), [ACCEPTED]),
         (528, (1,), [ACCEPTED]),
         (SET_INTERVAL, (26, 100_000), [ACCEPTED]),
-        (SET_INTERVAL, (27, 100_000), [FAILED]),
+        *((SET_INTERVAL, (unknown, 100_000), [FAILED]) for unknown in (0, 27, 9999, -1)),
         # Another link's interval, or an answer to somebody else, cannot be asked for
         (SET_INTERVAL, (105, 4_000, 1), [FAILED]),
         (SET_INTERVAL, (105, 4_000, 0, 0, 0, 0, 1), [FAILED]),

@@ -38,13 +38,6 @@ def flying(mode: Mode, **parameters: float) -> Flight:
 # --- whose sticks ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("mode", "counts"), [(0, False), (1, True), (2, True), (4, False)])
-def test_whether_links_count_is_com_rc_in_mode(mode, counts):
-    manual = ManualInput(Parameters({"COM_RC_IN_MODE": mode}))
-    manual.heard(StickInput(0, 0, 0, 0, FIRST), 0)
-    assert (manual.sticks is not None) is counts
-
-
 def test_the_first_that_comes_counts_until_it_is_lost():
     manual = ManualInput(Parameters({"COM_RC_LOSS_T": 0.5}))
     manual.heard(StickInput(0, 0, 0, 0, FIRST), 0)

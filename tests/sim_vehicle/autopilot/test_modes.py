@@ -40,15 +40,6 @@ def test_armed_a_mode_is_accepted_that_has_what_it_needs(mode):
         assert (without is not None) == (mode is Mode.LAND), need
 
 
-def test_armed_without_sticks_setpoints_and_mission_only_these_can_fly():
-    bare = armed(Need.STICKS, Need.SETPOINTS, Need.MISSION)
-    flown = {mode for mode in ASKED_FOR if find_transition(Mode.LOITER, ModeEvent.REQUEST, bare, mode)}
-    assert flown == {
-        *(Mode.LOITER, Mode.RETURN, Mode.TAKEOFF, Mode.LAND, Mode.PRECISION_LAND, Mode.FOLLOW_TARGET, Mode.ORBIT),
-        Mode.TERMINATION,
-    }
-
-
 @pytest.mark.parametrize("ends_in", [Mode.LAND, Mode.RETURN, Mode.TAKEOFF, Mode.ORBIT, Mode.FOLLOW_TARGET])
 def test_after_disarming_the_mode_before_is_meant(ends_in):
     # Given a flight in OFFBOARD that went on in a mode in which nobody can arm

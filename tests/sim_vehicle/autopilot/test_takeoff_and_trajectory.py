@@ -7,7 +7,7 @@ import pytest
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
 from sim_vehicle.autopilot.flight_tasks.auto_flight import land_speed_m_s
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
-from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
+from sim_vehicle.autopilot.flight_tasks.takeoff import wants_takeoff
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
 from sim_vehicle.parameters.store import Parameters
@@ -15,7 +15,6 @@ from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.flying import hovering
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
-SECOND = 1_000_000
 DEFAULTS = Parameters()
 
 
@@ -64,21 +63,6 @@ def test_armed_and_left_alone_it_stays_on_the_ground_and_disarms():
 )
 def test_what_counts_as_wanting_to_take_off(demand, wants):
     assert wants_takeoff(demand, down_m=0.0) is wants
-
-
-def test_after_a_landing_the_ramp_begins_again():
-    takeoff = Takeoff(Parameters())
-    takeoff.update(0, armed=True, landed=True, wants_takeoff=True)
-    takeoff.update(SECOND, armed=True, landed=True, wants_takeoff=True)
-    assert takeoff.state is TakeoffState.RAMP_UP
-    takeoff.update(4 * SECOND, armed=True, landed=False, wants_takeoff=True)
-    assert takeoff.state is TakeoffState.FLIGHT
-    takeoff.update(5 * SECOND, armed=True, landed=True, wants_takeoff=True)
-    assert takeoff.state is TakeoffState.READY
-    takeoff.update(6 * SECOND, armed=True, landed=True, wants_takeoff=True)
-    assert takeoff.state is TakeoffState.RAMP_UP
-    takeoff.update(7 * SECOND, armed=False, landed=True, wants_takeoff=True)
-    assert takeoff.state is TakeoffState.DISARMED
 
 
 def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground():

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.faults.spec import WireFault
 from sim_vehicle.faults.wire import Wire, message_number, split
-from sim_vehicle.mavlink.restamp import Restamper
+from sim_vehicle.mavlink.faulty_link import Restamper
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.vehicle_client import Client
 

@@ -22,13 +22,6 @@ def controls_packet(controls: list[float], mode: int, flags: int, time_us: int =
     return dialect.MAVLink_hil_actuator_controls_message(time_us, controls + [0.0] * 12, mode, flags).pack(link)
 
 
-def greeting() -> bytes:
-    """What PX4 sends on connecting: SET_MESSAGE_INTERVAL of its truth, and a heartbeat."""
-    link = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
-    asked = dialect.MAVLink_command_long_message(0, 0, 511, 0, 115, 5000, 0, 0, 0, 0, 0).pack(link)
-    return asked + dialect.MAVLink_heartbeat_message(0, 12, 0, 0, 0, 0).pack(link)
-
-
 def test_a_sample_with_everything_has_every_bit_of_every_group():
     air = Air(pressure_hpa=955.8, altitude_m=488.0, temperature_c=11.8)
     sent = on_the_wire(HilSensor(4_000, (0, 0, -9.81), (0, 0, 0), (0.21, 0.01, 0.43), air))
@@ -72,15 +65,6 @@ def test_answers_of_px4(packet, expected):
     (found,) = HilDecoder().push(packet)
     assert found.motor_fractions == pytest.approx(expected.motor_fractions)
     assert (found.time_us, found.armed, found.is_lockstep) == (expected.time_us, expected.armed, expected.is_lockstep)
-
-
-def test_a_stream_cut_anywhere_gives_the_same_answers():
-    stream = greeting() + b"".join(controls_packet([0.5] * 4, 0x81, 1, 4_000 * i) for i in range(1, 4))
-    for size in (1, 7, 50, len(stream)):
-        decoder = HilDecoder()
-        pieces = [stream[i : i + size] for i in range(0, len(stream), size)]
-        found = [controls for piece in pieces for controls in decoder.push(piece)]
-        assert [controls.time_us for controls in found] == [4_000, 8_000, 12_000]
 
 
 def test_optical_flow_as_px4_takes_it():

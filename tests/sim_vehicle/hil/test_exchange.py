@@ -5,7 +5,6 @@ import pytest
 from sim_vehicle.errors import NotInLockstep
 from sim_vehicle.hil.exchange import (
     ANSWER_TIMEOUT_US,
-    FIRST_ANSWER_WORDS,
     MOVES,
     STARTING_TIMEOUT_US,
     Exchange,
@@ -33,26 +32,6 @@ def in_lockstep() -> Exchange:
     exchange.sent(4_000, 1_000)
     exchange.received(answer(4_000))
     return exchange
-
-
-def test_the_first_answer_begins_lockstep_even_to_an_older_sample():
-    exchange = starting()
-    for number in range(1, 12):
-        exchange.sent(4_000 * number, 4_000 * number)
-    exchange.received(answer(4_000 * 10))
-    assert exchange.phase is ExchangePhase.READY
-    assert exchange.motor_fractions == HALF_THRUST
-    assert exchange.notices[0].startswith(FIRST_ANSWER_WORDS)
-
-
-def test_then_exactly_one_sample_an_answer():
-    exchange = in_lockstep()
-    for number in range(2, 50):
-        assert exchange.next_sample_at_us() is not None
-        exchange.sent(4_000 * number, number)
-        assert exchange.next_sample_at_us() is None
-        exchange.received(answer(4_000 * number))
-    assert exchange.overdue_answers == 0
 
 
 def test_an_answer_to_an_older_sample_gives_its_commands_but_not_the_turn():

@@ -10,8 +10,7 @@ from sim_vehicle.autopilot.messages import Identity, Severity, StatusText
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.services.texts import TextLink
-from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.mavlink.vibration import VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, STANDING, attitude_of_yaw

@@ -74,11 +74,6 @@ def test_minus_one_stops_and_zero_restores():
     assert client.rate_hz("AUTOPILOT_VERSION", 2.0) == 0
 
 
-@pytest.mark.parametrize("message_id", [0, 27, 9999, -1])
-def test_what_cannot_be_asked_for(message_id):
-    assert asked(message_id, 4_000)[1] == [FAILED]
-
-
 def test_current_mode_comes_on_a_change_and_twice_a_second_at_most_otherwise():
     # Given CURRENT_MODE asked for at 50 Hz
     client, _ = asked(436, 20_000)
