@@ -12,8 +12,8 @@ import pandas as pd
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import into_a_wall
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
+from bench.fly.copies import Copies
 from bench.fly.lockstep import STANDS_M
-from bench.fly.moments import Copies
 from bench.fly.stepped import Stepped
 from bench.rows.tables import Page, table
 from companion.companion import Companion

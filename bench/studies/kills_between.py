@@ -12,8 +12,8 @@ import pandas as pd
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Campaign, Json, Workers, run_campaign
 from bench.fly.commanded import BetweenFlight, by_places, by_sticks, fly_a_mission
+from bench.fly.copies import Copies
 from bench.fly.lockstep import STANDS_M
-from bench.fly.moments import Copies
 from bench.rows.tables import Page, table
 from bench.studies.kills import KILLED_S, KILLS_A_FLIGHT, SECOND_M_S
 from companion.guard.config import GuardConfig

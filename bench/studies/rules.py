@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from bench.fly.moments import Copies
+from bench.fly.copies import Copies
 from companion.motion.vector import ZERO
 
 Arguments = tuple[Any, ...]
