@@ -11,6 +11,7 @@ from bench.fly.guarded import MOST_RECOVERY_S, OVERTURNED_DEG, draw_flown
 from bench.fly.lockstep import NOTICED_M_S
 from bench.rows.hits import work_out_flown
 from bench.rows.tables import CONFIDENCE, Page, at_most_an_hour, at_most_of_groups, per_cent, table, text_of
+from companion.errors import ConfigurationError
 
 # Into the surface.
 BANDS_M_S = [0.0, NOTICED_M_S, 1.0, 2.0, 3.0, 5.0]
@@ -32,6 +33,8 @@ def run_hits(options: Namespace) -> int:
     campaign = Campaign("flown-hits", parameters, [draw_flown(seed, is_drawn) for seed in seeds], work_out_flown)
     results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
     flights, failed = flight_rows(campaign, results), results.text(campaign)
+    if not flights["touched"].any():
+        raise ConfigurationError("Nothing was touched: fly more hits (--hits).")
     hits = hit_rows(flights)
     page.write("Hits alone", options.typed, {"": lead(hits, flights), **parts(hits)}, rows=hits)
     print(failed)
