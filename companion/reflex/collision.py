@@ -85,7 +85,9 @@ class CollisionRecord:
         strapdown, estimate, self.fixes = source.strapdown, source.estimate, source.strapdown.fixes
         # In these phases the state still describes the contact.
         is_in_contact = state.phase in (Phase.CONTACT, Phase.ARMED)
-        is_seen_again = is_in_contact and state.last_loud_boot_us > self.sample_time_boot_us
+        # A velocity that shows it may have come before the sample of the same time.
+        is_larger = state.peak_specific_force_m_s2 > self.peak_specific_force_m_s2
+        is_seen_again = is_in_contact and (is_larger or state.last_loud_boot_us > self.sample_time_boot_us)
         if self.hypothesis is not None:
             self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
             self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis

@@ -8,6 +8,7 @@ from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState,
 from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
+from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO, limited, plus
 from companion.reflex.attitude_law import held_off, tilted
 from companion.reflex.config import BRAKES_M_S2, MOST_HELD_S, NOTICED_S, RecoveryConfig
@@ -146,6 +147,29 @@ def test_where_an_attitude_is_not_safe_to_hold_the_goal_is_eq_3_of_the_paper(los
     (hit,) = air.reflex.hits
     # x_d = x(t_c) - gamma v_c, gamma 0.5 s
     assert hit.setpoint_ned_m == pytest.approx((hit.contact.position_ned_m[0] - 1.0, 0.0, -2.0), abs=0.02)
+
+
+@pytest.mark.parametrize("force_m_s2", [0.0, 40.0])
+def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_order_they_come(force_m_s2):
+    # Given a vehicle whose estimator takes a jump back, as of a hit that clipping hides whole
+    air, rejected = Air(), []
+    for us in range(TICK_US, 3_600_000, TICK_US):
+        samples = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
+        if us % (5 * TICK_US) == 0:
+            place = (2e-6 * us, 0.0, -2.0)
+            velocity = (1.0 if us == 3_000_000 else 2.0, 0.0, 1e-3 * (us // (5 * TICK_US) % 2))
+            told = [Odometry(us, place, velocity, 0), Attitude(us, LEVEL, ZERO), LocalPosition(us, place, velocity)]
+            samples = [*told, AttitudeTarget(us, air.thrust), *samples]
+        air.now_us = us
+        for estimate in air.reflex.step(samples, IN_FLIGHT, us).collisions:
+            air.reflex.begin(estimate, FreeRoom(), us)
+        if air.reflex.recovery is not None:
+            shown = [air.reflex.recovery.take(sample) for sample in samples if isinstance(sample, LocalPosition)]
+            rejected += [progress for progress in shown if progress.is_rejected]
+        air.reflex.follow(samples, 2.0, LandedState.IN_AIR)
+    # Then the jump alone was none, and with a force of the same time it was a hit
+    assert len(air.reflex.hits) == 1
+    assert bool(rejected) is (force_m_s2 == 0.0)
 
 
 def test_a_hit_that_is_taken_back_leaves_nothing():
