@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
@@ -154,7 +154,7 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
     # Given a vehicle whose estimator takes a jump back, as of a hit that clipping hides whole
     air, rejected = Air(), []
     for us in range(TICK_US, 3_600_000, TICK_US):
-        samples = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
+        samples: list[Sample] = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
         if us % (5 * TICK_US) == 0:
             place = (2e-6 * us, 0.0, -2.0)
             velocity = (1.0 if us == 3_000_000 else 2.0, 0.0, 1e-3 * (us // (5 * TICK_US) % 2))
