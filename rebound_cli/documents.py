@@ -24,6 +24,7 @@ MOST_CHARACTERS = 1_000_000
 _MOST_ERRORS_SHOWN = 5
 
 _ITEM_NUMBER = re.compile(r"\bitem (\d+)\b")
+_WITH_COMMA = re.compile(r"[-+]?\d+,\d+")
 # pydantic speaks of the program's types, the person wrote YAML.
 _OF_THE_MODEL = re.compile(r"a valid (tuple|list|dictionary( or instance of \w+)?)")
 
@@ -257,8 +258,12 @@ def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
     message = message.replace("Input should be", "must be").rstrip(".")
     message = _OF_THE_MODEL.sub(lambda found: "a list" if "tuple" in found[0] else "a mapping", message)
     given = error.get("input")
+    if kind == "invalid_key":
+        return f"'{given}' is no key; a number is written with a point, such as 1.5"
     if kind != "value_error" and isinstance(given, str | int | float | None):
         message += f", not {given!r}" if given is not None else ", not empty"
+        if isinstance(given, str) and _WITH_COMMA.fullmatch(given):
+            message += f"; write {given.replace(',', '.')}"
     return message[:1].lower() + message[1:]
 
 

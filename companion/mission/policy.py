@@ -33,7 +33,7 @@ class AbortWhen(StrictModel):
     """Conditions that end the mission wherever it is; the vehicle is then handed over as `on_interrupt` says."""
 
     outside_fence_by_m: Positive | None = 1.0
-    """Of the vehicle itself, not its setpoint. A PX4 that flies by GPS wavers by half a metre around a setpoint."""
+    """Of the vehicle itself, not its setpoint. A PX4 that flies by GPS moves by half a metre about a setpoint."""
     battery_below_percent: Annotated[Positive, Field(le=100.0)] | None = None
     """As the vehicle tells it; looked at before the start, too."""
     flight_time_above_s: Positive | None = None

@@ -8,6 +8,7 @@ import errno
 import json
 import os
 import socket
+import tempfile
 import threading
 import time
 from argparse import Namespace
@@ -40,18 +41,18 @@ class StatusError(ReboundError):
     """Nobody answers, or not what a status is; or there is no socket to be had, and a flight does without."""
 
 
-def socket_of_this_program(environment: Mapping[str, str] = os.environ) -> Path | None:
-    """None where nobody gives programs a folder of their own, such as a login without a session."""
+def socket_of_this_program(environment: Mapping[str, str] = os.environ) -> Path:
+    """Where nobody gives programs a folder of their own, as a login without a session, it is below /tmp."""
     if folder := environment.get("RUNTIME_DIRECTORY"):
         # systemd separates several by colons.
         return Path(folder.split(":")[0]) / SERVICE_SOCKET.name
     if folder := environment.get("XDG_RUNTIME_DIR"):
         return Path(folder) / "rebound" / SERVICE_SOCKET.name
-    return None
+    return Path(tempfile.gettempdir()) / f"rebound-{os.getuid()}" / SERVICE_SOCKET.name
 
 
 def sockets_to_ask(environment: Mapping[str, str] = os.environ) -> list[Path]:
-    return list(dict.fromkeys([socket_of_this_program(environment) or SERVICE_SOCKET, SERVICE_SOCKET]))
+    return list(dict.fromkeys([socket_of_this_program(environment), SERVICE_SOCKET]))
 
 
 class StatusServer:
@@ -111,6 +112,8 @@ def _listener(path: Path) -> socket.socket:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if path.parent.stat().st_uid != os.getuid():
+            raise OSError(errno.EPERM, "the folder is another user's")
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
             if probe.connect_ex(str(path)) == 0:
                 raise OSError(errno.EADDRINUSE, "another program answers there")
@@ -127,10 +130,9 @@ def _listener(path: Path) -> socket.socket:
 
 
 def served(tell: Callable[[str], None], **about: Any) -> contextlib.AbstractContextManager[StatusServer | None]:
-    """None where the machine has no place for a socket, or the place is taken: `tell` is told of that."""
-    path = socket_of_this_program()
+    """None where the place for the socket is taken, or there is none: `tell` is told of that."""
     try:
-        return contextlib.nullcontext() if path is None else contextlib.closing(StatusServer(path, about))
+        return contextlib.closing(StatusServer(socket_of_this_program(), about))
     except StatusError as error:
         tell(str(error))
         return contextlib.nullcontext()

@@ -46,6 +46,12 @@ def test_aliases_that_multiply_are_refused_before_they_take_the_memory():
     ("old", "new", "said"),
     [
         ("speed_m_s: 1.0", "speed_m_s: -1", "6: items.1.go_to.speed_m_s: must be greater than 0, not -1."),
+        (
+            "speed_m_s: 1.0",
+            "speed_m_s: 1,5",
+            "6: items.1.go_to.speed_m_s: must be a valid number, not '1,5'; write 1.5.",
+        ),
+        ("{height_m: 1.5}", "{height_m: 1,5}", "3: items.0.takeoff.5: '5' is no key; a number is written with a point"),
         ("      position_ned_m: [1, 0, -1.5]\n", "", "4: items.1.go_to.position_ned_m: is missing; add it."),
         ("[1, 0, -1.5]", "[99, 0, -1.5]", "4: items: the position of item 2 (go_to) lies 99.00 m out"),
     ],

@@ -5,6 +5,7 @@ import json
 import os
 import socket
 import stat
+import tempfile
 import threading
 import time
 
@@ -125,18 +126,26 @@ def test_the_socket_of_a_program_that_runs_is_left_to_it(server, path, monkeypat
     assert len(told) == 1 and path.exists()
 
 
-def test_systemds_folder_comes_before_the_sessions_and_without_either_there_is_no_socket(tmp_path, monkeypatch):
+def test_systemds_folder_comes_before_the_sessions_and_without_either_it_is_a_temporary_one(tmp_path, monkeypatch):
     both = {"RUNTIME_DIRECTORY": "/run/rebound:/run/other", "XDG_RUNTIME_DIR": "/run/user/7"}
     assert str(socket_of_this_program(both)) == "/run/rebound/status.sock"
     assert [str(path) for path in sockets_to_ask(both)] == ["/run/rebound/status.sock"]
     session = {"XDG_RUNTIME_DIR": "/run/user/7"}
     asked = ["/run/user/7/rebound/status.sock", "/run/rebound/status.sock"]
     assert [str(path) for path in sockets_to_ask(session)] == asked
-    assert socket_of_this_program({}) is None
     for name in both:
         monkeypatch.delenv(name, raising=False)
-    with served(pytest.fail, command="fly", folder="-") as server:
-        assert server is None
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with served(pytest.fail, command="fly", folder="-"):
+        assert ask(None)["command"] == "fly"
+    assert stat.S_IMODE(socket_of_this_program({}).parent.stat().st_mode) == 0o700
+
+
+def test_in_another_users_folder_no_socket_is_made(path, monkeypatch):
+    user = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: user + 1)
+    with pytest.raises(StatusError, match="another user's"):
+        StatusServer(path, {"command": "fly", "folder": "-"})
 
 
 def test_a_person_reads_lines_and_a_program_json(server, path, capsys):
