@@ -12,6 +12,7 @@ from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
+from sim_vehicle.faults.spec import check_motor
 from sim_vehicle.mavlink.faulty_link import check_messages
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 
@@ -116,12 +117,16 @@ def read_obstacles(document: Document) -> None:
 def world_from(document: Document) -> SimulatedWorld:
     """The `sim:` part and its airframe. Raises DocumentError, also for a wall through the start position."""
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
-    for number, fault in enumerate(scene.faults):
-        try:
-            check_messages(fault)
-        except FaultError as error:
-            raise DocumentError(f"{document.place_of(('sim', 'faults', number, 'messages'))}: {error}") from error
     airframe = _load_airframe(scene.airframe, document)
+    for number, fault in enumerate(scene.faults):
+        for key, check_fault in (
+            ("messages", check_messages),
+            ("motor", lambda f: check_motor(f, airframe.rotor_count)),
+        ):
+            try:
+                check_fault(fault)
+            except FaultError as error:
+                raise DocumentError(f"{document.place_of(('sim', 'faults', number, key))}: {error}") from error
     for key, check in (("walls", check_start_is_free), ("wind_ned_m_s", check_wind_can_be_held)):
         try:
             check(scene, airframe)

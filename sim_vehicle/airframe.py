@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,8 +14,10 @@ from sim_vehicle.aiding import Estimator, Sensors
 from sim_vehicle.errors import AirframeError
 from sim_vehicle.written import NotNegative, Part, Positive
 
-# Arms, each with a motor and a guard, and all of one length. `physics/layout.py` has their directions.
-ARMS = 4
+# What the records of the kernels have room for, and an octorotor needs.
+MOST_ROTORS = 8
+# An airframe file gives places to a tenth of a millimetre.
+PLACED_M = 1e-3
 # Of all thrust, PX4's MPC_THR_MIN: with what a vehicle that is asked to fall still steers.
 THRUST_MIN = 0.12
 # Above this share of the way from MPC_THR_MIN to hover's thrust PX4 takes no vehicle for landed
@@ -52,6 +55,17 @@ class Geometry(Part):
     def reach_m(self) -> float:
         """The furthest any part is from the centre."""
         return self.motor_radius_m + self.guard_radius_m
+
+
+class Rotor(Part):
+    """One rotor with its arm, along the line from the centre, and its guard."""
+
+    place_frd_m: tuple[float, float]
+    """Of its axis: ahead of the centre of mass, and to the right."""
+    direction: Literal["ccw", "cw"]
+    """How it turns, seen from above."""
+    spring: bool = True
+    """Whether its arm folds as `arms` says."""
 
 
 class Bounce(Part):
@@ -199,7 +213,7 @@ class Control(Part):
 
 
 class Airframe(Part):
-    """One vehicle. Frames: body forward-right-down; arms in PX4's quad-x motor order."""
+    """One vehicle. Frames: body forward-right-down; arms in PX4's motor order."""
 
     name: str
     """Names the airframe in summaries."""
@@ -212,6 +226,8 @@ class Airframe(Part):
     drag_n_s_m: NotNegative
     """Linear drag of the whole vehicle, the same in every direction."""
     geometry: Geometry
+    rotors: Annotated[tuple[Rotor, ...], Field(exclude_if=lambda rotors: not rotors)] = ()
+    """4, 6 or 8, in the order of PX4's motor outputs. None: a quad-x of four equal arms."""
     arms: Arms
     motors: Motors
     surface: Surface
@@ -226,9 +242,18 @@ class Airframe(Part):
         return self.mass_kg * 9.81
 
     @property
+    def rotor_count(self) -> int:
+        return len(self.rotors) or 4
+
+    @property
+    def most_thrust_n(self) -> float:
+        """Of all motors."""
+        return self.rotor_count * self.motors.max_thrust_n
+
+    @property
     def hover_fraction(self) -> float:
         """Thrust to hover over the greatest thrust."""
-        return self.weight_n / (ARMS * self.motors.max_thrust_n)
+        return self.weight_n / self.most_thrust_n
 
     @model_validator(mode="after")
     def _can_navigate(self) -> "Airframe":
@@ -250,6 +275,35 @@ class Airframe(Part):
             raise ValueError(
                 f"motors that idle at {100 * self.motors.idle_fraction:.0f} % of their thrust keep PX4 from seeing a "
                 f"landing; lower motors.idle_fraction to {math.floor(100 * most_idle) / 100:g} or less"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_multicopter(self) -> "Airframe":
+        if not self.rotors:
+            return self
+        places_m = [rotor.place_frd_m for rotor in self.rotors]
+        if len(places_m) not in (4, 6, MOST_ROTORS):
+            raise ValueError(f"rotors: {len(places_m)} of them; give 4, 6 or {MOST_ROTORS}")
+        off_m = max(abs(sum(along)) / len(places_m) for along in zip(*places_m, strict=True))
+        if off_m > PLACED_M:
+            raise ValueError(
+                f"rotors: their middle is {off_m:.3f} m from the centre of mass; "
+                "without tilt the vehicle hovers only if they lie evenly around it"
+            )
+        if 2 * sum(rotor.direction == "cw" for rotor in self.rotors) != len(self.rotors):
+            raise ValueError("rotors: let half of them turn cw and half ccw, else the vehicle turns about itself")
+        furthest_m, said_m = max(math.hypot(*place) for place in places_m), self.geometry.motor_radius_m
+        if abs(furthest_m - said_m) > PLACED_M:
+            raise ValueError(
+                f"rotors: the furthest is {furthest_m:.3f} m from the centre, geometry.hub_radius_m and arm_length_m "
+                f"say {said_m:.3f} m; make them agree"
+            )
+        nearest_m = min(math.dist(one, other) for one, other in combinations(places_m, 2))
+        if nearest_m < 2 * self.geometry.guard_radius_m:
+            raise ValueError(
+                f"rotors: two are {nearest_m:.3f} m apart, their guards would overlap; "
+                f"make geometry.guard_radius_m {nearest_m / 2:.3f} or less"
             )
         return self
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from sim_vehicle.airframe import ARMS, Airframe
+from sim_vehicle.airframe import Airframe
 from sim_vehicle.errors import SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.obstacles import BoxSpec, Point, PoleSpec, WallSpec
@@ -93,7 +93,7 @@ def check_wind_can_be_held(scene: Scene, airframe: Airframe) -> None:
     """Raise SceneError if the steady wind is more than the vehicle can lean against."""
     north_m_s, east_m_s, down_m_s = scene.wind_ned_m_s
     across_n, down_n = airframe.drag_n_s_m * math.hypot(north_m_s, east_m_s), airframe.drag_n_s_m * down_m_s
-    carried_n, most_n = airframe.weight_n + down_n, ARMS * airframe.motors.max_thrust_n
+    carried_n, most_n = airframe.weight_n + down_n, airframe.most_thrust_n
     if across_n > carried_n * math.tan(airframe.control.tilt_max_rad) or math.hypot(across_n, carried_n) > most_n:
         raise SceneError(
             f"wind_ned_m_s pushes {airframe.name} with {math.hypot(across_n, down_n):.1f} N, more than it can lean "

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics import layout
 from sim_vehicle.world import Vector3, World
 
 Floats = npt.NDArray[np.float64]
 
-# Columns of one row of the path: time, position, velocity, attitude, folds, contact force.
-_ROW = 1 + 3 + 3 + 4 + 4 + 1
+# Columns of one row of the path: time, position, velocity, attitude, contact force, folds.
+_ROW = 1 + 3 + 3 + 4 + 1 + MOST_ROTORS
 _FIRST_ROWS = 4096
 
 
@@ -82,6 +83,7 @@ class TruthRecorder:
     """Grows with the flight; ``keeps_path`` off leaves only the hits, for flights without an end."""
 
     keeps_path: bool = True
+    rotors: int = 4
     hits: list[Hit] = field(default_factory=list)
     faults: list[FaultSpan] = field(default_factory=list)
     on_hit: Callable[[Hit], None] | None = None
@@ -90,7 +92,7 @@ class TruthRecorder:
     _used: int = 0
 
     def record(self, row: Floats) -> None:
-        """Add the true columns of a report (16,) to the path."""
+        """Add the true columns of a report to the path."""
         if not self.keeps_path:
             return
         if self._used == len(self._rows):
@@ -134,8 +136,8 @@ class TruthRecorder:
             "position_ned_m": rows[:, 1:4],
             "velocity_ned_m_s": rows[:, 4:7],
             "attitude_wxyz": rows[:, 7:11],
-            "arm_fold_m": rows[:, 11:15],
-            "peak_contact_force_n": rows[:, 15],
+            "arm_fold_m": rows[:, 12 : 12 + self.rotors],
+            "peak_contact_force_n": rows[:, 11],
         }
 
 

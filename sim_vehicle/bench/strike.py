@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.layout import FEET, Constants, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
-from sim_vehicle.physics.touching.meeting import deepest_point
+from sim_vehicle.physics.touching.meeting import deepest_point, is_absent
 from sim_vehicle.world import Motion, Wall
 
 Floats = npt.NDArray[np.float64]
@@ -59,6 +59,8 @@ def _extent_m(state: PlantState, constants: Constants, direction_ned: Floats) ->
     rotation, where, furthest_m = np.empty((3, 3)), np.empty(3), 0.0
     matrix_from_quaternion(state.body, rotation)
     for point in range(FEET):
+        if is_absent(point, constants):
+            continue
         _, further_m = deepest_point(point, -direction_ned, rotation, state.body, constants, where)
         furthest_m = max(furthest_m, float((where - state.body[0:3]) @ direction_ned) + further_m)
     return furthest_m

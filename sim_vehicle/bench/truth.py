@@ -22,8 +22,8 @@ class Truth:
     attitude_wxyz: Quadruple
     """Body to NED."""
     angular_velocity_frd_rad_s: Vector3
-    arm_fold_m: Quadruple
-    """Of each arm, inward; front right, rear left, front left, rear right."""
+    arm_fold_m: tuple[float, ...]
+    """Of each arm, inward, in motor order: of a quad-x front right, rear left, front left, rear right."""
     is_armed: bool
     may_arm: bool
     """Whether the vehicle's checks would let it be armed now, as a ground station shows `ready`."""
@@ -47,14 +47,13 @@ class Truth:
 def truth_of(vehicle: ChangeableVehicle) -> Truth:
     """The truth at the end of the last interval."""
     x, y, z, vx, vy, vz, w, qx, qy, qz, p, q, r = vehicle.state.body.tolist()
-    one, two, three, four = vehicle.state.fold_m.tolist()
     return Truth(
         time_boot_s=vehicle.time_boot_us / 1e6,
         position_ned_m=(x, y, z),
         velocity_ned_m_s=(vx, vy, vz),
         attitude_wxyz=(w, qx, qy, qz),
         angular_velocity_frd_rad_s=(p, q, r),
-        arm_fold_m=(one, two, three, four),
+        arm_fold_m=tuple(vehicle.state.fold_m[: vehicle.constants.rotors].tolist()),
         is_armed=vehicle.is_armed,
         may_arm=vehicle.may_arm,
         mode=vehicle.mode,

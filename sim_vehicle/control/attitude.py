@@ -1,14 +1,12 @@
 """Attitude tracking on SO(3), the paper's eqs. 4 and 5, run at 150 Hz, and the motor commands for it."""
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import ARMS
+from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics.inertia import times
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, Constants, Gains, PlantState
+from sim_vehicle.physics.layout import Constants, Gains, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 
 Floats = npt.NDArray[np.float64]
@@ -64,32 +62,33 @@ def _carried(state: PlantState, rates: Floats) -> Floats:
 @njit
 def take_thrust(state: PlantState, constants: Constants, thrust: float) -> None:
     """The collective thrust f as it is asked for, a fraction of all that the motors have."""
-    state.collective_n = thrust * ARMS * constants.motor_max_n
+    state.collective_n = thrust * constants.all_motors_max_n
 
 
 @njit
-def allocate_motors(state: PlantState, constants: Constants, motor_radius_m: float) -> None:
+def allocate_motors(state: PlantState, constants: Constants) -> None:
     """Share thrust and moment among the motors: roll and pitch first, then thrust, then yaw.
 
     A vehicle that cannot have everything must at least stay upright; yaw matters least.
     """
-    lever = ARMS * motor_radius_m / math.sqrt(2)
-    low, high = constants.motor_idle_n, constants.motor_max_n
-    tilt = np.empty(ARMS)
+    low, high, rotors, mix = constants.motor_idle_n, constants.motor_max_n, constants.rotors, constants.mix
+    tilt = np.empty(MOST_ROTORS)
     smallest, largest = 0.0, 0.0
-    for motor in range(ARMS):
-        roll = -math.copysign(1.0, ARM_DIRECTIONS_FRD[motor, 1]) * state.moment_frd_n_m[0]
-        pitch = math.copysign(1.0, ARM_DIRECTIONS_FRD[motor, 0]) * state.moment_frd_n_m[1]
-        tilt[motor] = (roll + pitch) / lever
+    for motor in range(rotors):
+        roll = mix[motor, 0] * state.moment_frd_n_m[0]
+        pitch = mix[motor, 1] * state.moment_frd_n_m[1]
+        tilt[motor] = (roll + pitch) / constants.roll_lever_m
         smallest = min(smallest, tilt[motor])
         largest = max(largest, tilt[motor])
     scale = min(1.0, (high - low) / max(largest - smallest, 1e-9))
-    each = min(max(state.collective_n / ARMS, low - scale * smallest), high - scale * largest)
+    each = min(max(state.collective_n / rotors, low - scale * smallest), high - scale * largest)
     room = high
-    for motor in range(ARMS):
+    for motor in range(rotors):
         thrust = each + scale * tilt[motor]
-        room = min(room, thrust - low, high - thrust)
-    yaw = state.moment_frd_n_m[2] / (ARMS * constants.moment_per_thrust_m)
+        # A motor on which yaw does not act leaves room enough.
+        share = max(abs(mix[motor, 2]), 1e-6)
+        room = min(room, (thrust - low) / share, (high - thrust) / share)
+    yaw = state.moment_frd_n_m[2] / constants.yaw_lever_m
     yaw = min(max(yaw, -max(room, 0.0)), max(room, 0.0))
-    for motor in range(ARMS):
-        state.motor_command_n[motor] = each + scale * tilt[motor] + ROTOR_YAW_SIGNS[motor] * yaw
+    for motor in range(rotors):
+        state.motor_command_n[motor] = each + scale * tilt[motor] + mix[motor, 2] * yaw

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import ARMS, THRUST_MIN
+from sim_vehicle.airframe import THRUST_MIN
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
@@ -25,7 +25,7 @@ ASK_POSITION, ASK_VELOCITY, ASK_ACCELERATION = range(3)
 
 
 @njit
-def position_control(state: PlantState, mass_kg: float, motor_max_n: float, asked: SetpointRows, gains: Gains) -> None:
+def position_control(state: PlantState, mass_kg: float, most_n: float, asked: SetpointRows, gains: Gains) -> None:
     """Set thrust f and attitude R_d of ``state`` from what is asked (NED, SI).
 
     The D acts on the measured slope only: the paper's d/dt e_v would kick at every new setpoint.
@@ -39,7 +39,7 @@ def position_control(state: PlantState, mass_kg: float, motor_max_n: float, aske
         state.yaw_setpoint_rad = asked.yaw[0]
     else:
         state.yaw_setpoint_rad += asked.yaw[2] * step_s
-    _thrust(acceleration, gains.tilt_max_rad, ARMS * motor_max_n / mass_kg)
+    _thrust(acceleration, gains.tilt_max_rad, most_n / mass_kg)
     state.collective_n = mass_kg * math.sqrt(acceleration @ acceleration)
     _attitude(state, acceleration)
 

@@ -25,7 +25,7 @@ class Estimate(NamedTuple):
     attitude_wxyz: Quaternion
     thrust_fraction: float
     """Commanded collective thrust over the greatest."""
-    motor_fractions: Quaternion
+    motor_fractions: tuple[float, ...]
     """Thrust commanded of each motor over its greatest, in motor order."""
     reset_counter: int = 0
     """How often the estimator has let its position or velocity jump."""

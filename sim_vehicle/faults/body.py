@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sim_vehicle.airframe import ARMS
+from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import (
     BatterySag,
@@ -31,7 +31,7 @@ class Motors(Group[MotorFailure | FreeFall | BatterySag]):
         self.voltage_share = 1.0
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
-        shares, self.voltage_share = [1.0] * ARMS, 1.0
+        shares, self.voltage_share = [1.0] * MOST_ROTORS, 1.0
         for fault in self._faults:
             start_s, end_s = fault.window_s
             if time_s < start_s:
@@ -45,7 +45,7 @@ class Motors(Group[MotorFailure | FreeFall | BatterySag]):
             elif time_s < end_s and isinstance(fault, MotorFailure):
                 shares[fault.motor] *= fault.thrust_share
             elif time_s < end_s:
-                shares = [0.0] * ARMS
+                shares = [0.0] * MOST_ROTORS
         disturbance.motor_share[:] = shares
 
 
@@ -96,24 +96,29 @@ class Hands(Group[HandCatch]):
 class Shaking(Group[Vibration]):
     """Vibration of the rotors, several sources of it adding as powers do."""
 
+    def __init__(self, rotors: int) -> None:
+        super().__init__()
+        self._rotors = rotors
+
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
-        squares = np.zeros((2, ARMS))
+        squares = np.zeros((2, MOST_ROTORS))
         for vibration in self._faults:
             start_s, end_s = vibration.window_s
             if not start_s <= time_s < end_s:
                 continue
             # Rotors of which none keeps step with another: their powers add.
-            motors, share = (slice(0, ARMS), 1.0 / ARMS) if vibration.motor is None else (vibration.motor, 1.0)
+            motors, share = (slice(0, self._rotors), 1.0 / self._rotors)
+            if vibration.motor is not None:
+                motors, share = slice(vibration.motor, vibration.motor + 1), 1.0
             squares[0, motors] += share * vibration.accelerometer_rms_m_s2**2
             squares[1, motors] += share * vibration.gyroscope_rms_rad_s**2
             disturbance.shake_hz = vibration.motor_hz
         disturbance.shake_m_s2[:], disturbance.shake_rad_s[:] = np.sqrt(squares)
         disturbance.shakes = int(squares.any())
 
-    @staticmethod
-    def scatter(state: PlantState, rng: np.random.Generator) -> None:
+    def scatter(self, state: PlantState, rng: np.random.Generator) -> None:
         """Let the rotors start at different places of their turn."""
-        state.rotor_phase[:] = rng.uniform(0.0, 2.0 * math.pi, ARMS)
+        state.rotor_phase[: self._rotors] = rng.uniform(0.0, 2.0 * math.pi, self._rotors)
 
 
 class InertialSensor(Group[ImuBias | ImuStuck]):

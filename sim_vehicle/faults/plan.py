@@ -27,6 +27,7 @@ from sim_vehicle.faults.spec import (
     Push,
     Turbulence,
     Vibration,
+    check_motor,
 )
 from sim_vehicle.faults.wind import Air
 from sim_vehicle.physics.layout import Disturbance, PlantState
@@ -44,8 +45,8 @@ class Faults:
         rng = np.random.default_rng((seed, _OWN_SEED))
         step_s = 1e-6 * airframe.imu.integration_interval_us
         raw = airframe.imu.integration_interval_us // airframe.imu.raw_interval_us
-        self._rng = rng
-        self._shaking, self._motors = Shaking(), Motors()
+        self._rng, self._rotors = rng, airframe.rotor_count
+        self._shaking, self._motors = Shaking(airframe.rotor_count), Motors()
         self._estimate = Estimate(airframe.estimate.kind == "markov", step_s, rng)
         # Which group takes which faults, in the order in which they write.
         self._groups: tuple[tuple[tuple[type[Any], ...], Any], ...] = (
@@ -68,7 +69,8 @@ class Faults:
             self.add(fault)
 
     def add(self, fault: Fault) -> None:
-        """Add a fault. It acts in its own window of the boot clock."""
+        """Add a fault. It acts in its own window of the boot clock. Raises FaultError for a motor that is not there."""
+        check_motor(fault, self._rotors)
         number, self._count = self._count, self._count + 1
         self._faults[number] = fault
         for time_s in _turns_s(fault):

@@ -5,11 +5,13 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from sim_vehicle.airframe import MOST_ROTORS
+from sim_vehicle.errors import FaultError
 from sim_vehicle.obstacles import Point
 from sim_vehicle.written import Finite, NotNegative, Part, Positive
 
 Share = Annotated[float, Field(ge=0, le=1)]
-Motor = Annotated[int, Field(ge=0, le=3)]
+Motor = Annotated[int, Field(ge=0, lt=MOST_ROTORS)]
 
 FOREVER_S = 1e9
 
@@ -86,7 +88,7 @@ class MotorFailure(Timed):
 
     kind: Literal["motor_failure"]
     motor: Motor
-    """PX4's order: 0 front right, 1 rear left, 2 front left, 3 rear right."""
+    """In the airframe's order: of a quad-x 0 front right, 1 rear left, 2 front left, 3 rear right."""
     thrust_share: Share = 0.0
     """Share of the commanded thrust that is left."""
 
@@ -122,7 +124,7 @@ class Vibration(Timed):
     gyroscope_rms_rad_s: NotNegative = 0.0
     """The same of the gyroscope."""
     motor: Motor | None = None
-    """The rotor that is bent; without it all four share it."""
+    """The rotor that is bent; without it all share it."""
     motor_hz: Annotated[float, Field(gt=0, le=1000)] = 180.0
     """Turns a second at hover thrust; goes with its root. A 6-inch propeller that lifts 280 g turns about so fast."""
 
@@ -280,6 +282,14 @@ Fault = Annotated[
     | ClockJump,
     Field(discriminator="kind"),
 ]
+
+
+def check_motor(fault: Fault, rotors: int) -> None:
+    """Raise FaultError for a motor that a vehicle of so many rotors does not have."""
+    motor = fault.motor if isinstance(fault, MotorFailure | Vibration) else None
+    if motor is not None and motor >= rotors:
+        raise FaultError(f"{fault.kind}: no motor {motor}; this vehicle's are 0 to {rotors - 1}.")
+
 
 # Only one of these can act at a time: the body has one place for it.
 _ALONE: dict[str, type[object]] = {"push": Push, "hand_catch": HandCatch}

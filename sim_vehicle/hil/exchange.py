@@ -9,7 +9,7 @@ AWAITING  a sample is out; time stands still on both sides until its answer come
 from enum import Enum, auto
 
 from sim_vehicle.errors import NotInLockstep
-from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Quadruple
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls
 
 # Real time between samples while PX4 boots: its modules start on threads of their own, and need some real
 # time, not simulated time, before the first motor command.
@@ -63,7 +63,7 @@ class Exchange:
         self._forget()
 
     def _forget(self) -> None:
-        self.motor_fractions: Quadruple = MOTORS_STOPPED
+        self.motor_fractions: tuple[float, ...] = MOTORS_STOPPED
         """PX4's last word, zero before its first and after it has gone."""
         self.overdue_answers = 0
         self._sent_time_us = 0

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.world import Vector3
 
 Quadruple = tuple[float, float, float, float]
 
-MOTORS_STOPPED: Quadruple = (0.0, 0.0, 0.0, 0.0)
+MOTORS_STOPPED = (0.0,) * MOST_ROTORS
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,5 +79,5 @@ class ActuatorControls:
     """The sample's, as PX4's clock stands still until the next one."""
     armed: bool
     is_lockstep: bool
-    motor_fractions: Quadruple
+    motor_fractions: tuple[float, ...]
     """Thrust asked of each motor over its greatest, in motor order."""

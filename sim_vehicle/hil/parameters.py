@@ -9,18 +9,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from sim_vehicle.airframe import ARMS, Airframe
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS
+import numpy as np
 
-# PX4 scales a quadrotor's roll and pitch columns so that a torque setpoint of 1 moves every motor by
-# 1/sqrt(2) of its range, and yaw's by the whole (ControlAllocationPseudoInverse.cpp).
-_ROLL_MOTOR_SHARE = 1 / math.sqrt(2)
-_YAW_MOTOR_SHARE = 1.0
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.physics.layout import allocation, arms_of
 
 # MAV_PARAM_TYPE, as a .params file writes it.
 _INT32, _REAL32 = 6, 9
 
 _FIRST_MOTOR_FUNCTION = 101
+# As PX4's airframe files name them.
+_PX4_TYPES = {4: "Quadrotor", 6: "Hexarotor", 8: "Octorotor"}
 
 # FILTER_UPDATE_PERIOD of PX4's EKF2: its noises are standard deviations over one such step.
 EKF_PERIOD_S = 0.01
@@ -53,10 +52,10 @@ def px4_parameters(airframe: Airframe, position: Position = "mocap") -> tuple[Pa
 
 
 def _allocation(airframe: Airframe) -> Iterable[Parameter]:
-    radius_m, moment_m = airframe.geometry.motor_radius_m, airframe.motors.moment_per_thrust_m
+    moment_m = airframe.motors.moment_per_thrust_m
     yield Parameter("CA_AIRFRAME", 0, "multirotor")
-    yield Parameter("CA_ROTOR_COUNT", ARMS, "quad-x, in PX4's order")
-    for rotor, (direction, sign) in enumerate(zip(ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, strict=True)):
+    yield Parameter("CA_ROTOR_COUNT", airframe.rotor_count, "in PX4's order")
+    for rotor, (direction, radius_m, sign) in enumerate(zip(*arms_of(airframe), strict=True)):
         yield Parameter(f"CA_ROTOR{rotor}_PX", float(radius_m * direction[0]), "motor, metres ahead of the centre")
         yield Parameter(f"CA_ROTOR{rotor}_PY", float(radius_m * direction[1]), "metres to the right")
         yield Parameter(f"CA_ROTOR{rotor}_KM", float(sign * moment_m), "reaction torque over thrust, metres")
@@ -65,15 +64,27 @@ def _allocation(airframe: Airframe) -> Iterable[Parameter]:
     yield Parameter("MC_AIRMODE", 1, "with little thrust, too, it can be turned level: roll and pitch before thrust")
 
 
+def _greatest_moments_n_m(airframe: Airframe) -> tuple[float, float]:
+    """What PX4 takes for a torque setpoint of 1, of roll and pitch, and of yaw.
+
+    It scales the columns of its pseudo-inverse: roll and pitch by the larger root of a column's sum of squares over
+    half of its entries that are not zero, yaw by its largest entry (ControlAllocationPseudoInverse.cpp).
+    """
+    mix, roll_lever_m, yaw_lever_m = allocation(airframe)
+    halves = np.maximum(np.count_nonzero(np.abs(mix[:, :2]) > 1e-6, axis=0), 1) / 2
+    roll_scale = float(np.sqrt((mix[:, :2] ** 2).sum(axis=0) / halves).max()) / roll_lever_m
+    yaw_scale = float(np.abs(mix[:, 2]).max()) / yaw_lever_m
+    return airframe.motors.max_thrust_n / roll_scale, airframe.motors.max_thrust_n / yaw_scale
+
+
 def _gains(airframe: Airframe) -> Iterable[Parameter]:
     """Attitude as a cascade: w^2 and 2 z w of the airframe's loop are P_angle * P_rate and P_rate."""
     control, motors = airframe.control, airframe.motors
-    all_n = ARMS * motors.max_thrust_n
-    arm_m = airframe.geometry.motor_radius_m / math.sqrt(2)
+    moments_n_m = _greatest_moments_n_m(airframe)
     jx, jy, jz = airframe.inertia_kg_m2
     rate_per_s = 2 * control.attitude_damping * control.attitude_frequency_rad_s
     for axis, inertia in (("ROLL", jx), ("PITCH", jy)):
-        per_unit = _ROLL_MOTOR_SHARE * all_n * arm_m / inertia
+        per_unit = moments_n_m[0] / inertia
         p = rate_per_s / per_unit
         yield Parameter(f"MC_{axis}RATE_P", p, f"rate loop of {rate_per_s:.0f} 1/s")
         yield Parameter(f"MC_{axis}RATE_I", p, "trim within a second")
@@ -84,7 +95,7 @@ def _gains(airframe: Airframe) -> Iterable[Parameter]:
     yield Parameter("MC_ROLLRATE_MAX", fastest_deg_s, "deg/s; 220 turns a tipped vehicle back too slowly")
     yield Parameter("MC_PITCHRATE_MAX", fastest_deg_s, "the same")
     yaw_rate_per_s = 2 * control.attitude_damping * control.yaw_frequency_rad_s
-    per_unit = _YAW_MOTOR_SHARE * all_n * motors.moment_per_thrust_m / jz
+    per_unit = moments_n_m[1] / jz
     yield Parameter("MC_YAWRATE_P", yaw_rate_per_s / per_unit, f"rate loop of {yaw_rate_per_s:.0f} 1/s")
     yield Parameter("MC_YAWRATE_I", yaw_rate_per_s / per_unit, "trim within a second")
     yield Parameter("MC_YAW_P", control.yaw_frequency_rad_s / (2 * control.attitude_damping), "1/s")
@@ -176,7 +187,14 @@ def as_params_file(airframe: Airframe, position: Position = "mocap") -> str:
 
 def as_airframe_file(airframe: Airframe, position: Position = "mocap") -> str:
     """A file for PX4's ROMFS/px4fmu_common/init.d-posix/airframes/."""
-    lines = ["#!/bin/sh", "#", f"# @name {airframe.name}: {airframe.description}", "#", "# @type Quadrotor x", "#"]
+    lines = [
+        "#!/bin/sh",
+        "#",
+        f"# @name {airframe.name}: {airframe.description}",
+        "#",
+        f"# @type {_PX4_TYPES[airframe.rotor_count]} x",
+        "#",
+    ]
     lines += ["", ". ${R}etc/init.d/rc.mc_defaults", ""]
     lines += [f"param set-default {p.name} {p.text}  # {p.reason}" for p in px4_parameters(airframe, position)]
     return "\n".join(lines)

@@ -70,7 +70,7 @@ class HilVehicle:
         """What really happened, never sent as anything but truth."""
         return self._plant.truth
 
-    def step(self, motor_fractions: Quadruple) -> tuple[ToPx4, ...]:
+    def step(self, motor_fractions: tuple[float, ...]) -> tuple[ToPx4, ...]:
         """Advance one sample; the inertial sensor's sample comes last, because it sets PX4's clock going."""
         output = self._plant.drive(motor_fractions)
         now_us = self.time_boot_us = output.time_boot_us

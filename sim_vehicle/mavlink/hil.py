@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.mavlink.encode import Encoder, Message, diagonal_covariance, units_of
@@ -140,10 +140,10 @@ _FILLED: dict[type[Any], Callable[[Any], Message]] = {
 
 
 def _answer(message: Message) -> ActuatorControls:
-    one, two, three, four = (value if math.isfinite(value) else 0.0 for value in message.controls[:4])
+    motors = message.controls[: len(MOTORS_STOPPED)]
     return ActuatorControls(
         time_us=message.time_usec,
         armed=bool(message.mode & _ARMED_FLAG),
         is_lockstep=bool(message.flags & _LOCKSTEP_FLAG),
-        motor_fractions=(one, two, three, four),
+        motor_fractions=tuple(value if math.isfinite(value) else 0.0 for value in motors),
     )

@@ -8,6 +8,8 @@ from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Vector3
 
 _MICROSECONDS = 1_000_000
+# Quadrotor, hexarotor, octorotor.
+MAV_TYPES = {4: 2, 6: 13, 8: 14}
 
 
 def defaults_from(airframe: Airframe) -> dict[str, float]:
@@ -16,6 +18,7 @@ def defaults_from(airframe: Airframe) -> dict[str, float]:
     return {
         "COM_OF_LOSS_T": 0.3,  # as `rebound airframe px4` sets it
         "IMU_INTEG_RATE": _MICROSECONDS // airframe.imu.integration_interval_us,
+        "MAV_TYPE": MAV_TYPES[airframe.rotor_count],
         "MPC_THR_HOVER": airframe.hover_fraction,
         "MPC_TILTMAX_AIR": math.degrees(control.tilt_max_rad),
         "MPC_XY_P": control.position_p_per_s,

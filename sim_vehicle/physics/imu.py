@@ -5,7 +5,6 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, PlantState, Scratch
 
@@ -64,8 +63,8 @@ def shake(state: PlantState, raw_s: float, constants: Constants, disturbance: Di
     rotors' axes, and twice a turn along them (two blades that do not track).
     """
     shaken[:] = 0.0
-    hover_n = constants.mass_kg * GRAVITY_M_S2 / ARMS
-    for motor in range(ARMS):
+    hover_n = constants.mass_kg * GRAVITY_M_S2 / constants.rotors
+    for motor in range(constants.rotors):
         strength = max(state.motor_thrust_n[motor], 0.0) / hover_n
         phase = state.rotor_phase[motor] + 2 * math.pi * disturbance.shake_hz * math.sqrt(strength) * raw_s
         state.rotor_phase[motor] = phase % (2 * math.pi)

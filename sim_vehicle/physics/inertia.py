@@ -8,9 +8,8 @@ arms folded fully move it by 2 mm.
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.jit import inlined, njit
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, Constants
+from sim_vehicle.physics.layout import Constants
 
 Floats = npt.NDArray[np.float64]
 
@@ -25,11 +24,14 @@ def inertia_of(fold_m: Floats, fold_rate_m_s: Floats, constants: Constants, iner
         inertia[entry] = constants.inertia_kg_m2[entry]
         rate[entry] = 0.0
     inertia[XY], rate[XY] = 0.0, 0.0
-    out = constants.motor_radius_m
-    for arm in range(ARMS):
+    for arm in range(constants.rotors):
         if fold_m[arm] == 0.0 and fold_rate_m_s[arm] == 0.0:
             continue
-        x, y = ARM_DIRECTIONS_FRD[arm, 0], ARM_DIRECTIONS_FRD[arm, 1]
+        out, x, y = (
+            constants.motor_radius_m[arm],
+            constants.arm_direction_frd[arm, 0],
+            constants.arm_direction_frd[arm, 1],
+        )
         radius = out - fold_m[arm]
         gained = constants.tip_mass_kg * (radius * radius - out * out)
         gaining = -2.0 * constants.tip_mass_kg * radius * fold_rate_m_s[arm]

@@ -15,8 +15,8 @@ from numba.np.arrayobj import make_array
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parent.parent
-# Where kernels are.
-_ROOMS = ("physics", "control", "estimator")
+# Where kernels are, and numbers that they are compiled with.
+_ROOMS = ("physics", "control", "estimator", "airframe.py", "world.py")
 
 
 def njit(function: Kernel) -> Kernel:
@@ -58,7 +58,7 @@ def _kernels_folder(parent: str) -> str:
     would go on running as it was.
     """
     digest = hashlib.sha256()
-    for path in sorted([*(path for room in _ROOMS for path in _PACKAGE.glob(f"{room}/*.py")), _PACKAGE / "world.py"]):
+    for path in sorted(path for path in _PACKAGE.rglob("*.py") if path.relative_to(_PACKAGE).parts[0] in _ROOMS):
         digest.update(path.read_bytes())
     return os.path.join(parent, f"kernels-{digest.hexdigest()[:12]}")
 

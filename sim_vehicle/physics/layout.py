@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from sim_vehicle.airframe import ARMS, Airframe, Bounce
+from sim_vehicle.airframe import MOST_ROTORS, Airframe, Bounce
 from sim_vehicle.physics.record import Floats, Matrix3, Vector3, Vector4, new_record
 
 GRAVITY_M_S2 = 9.81
@@ -13,26 +13,31 @@ GRAVITY_M_S2 = 9.81
 # Size of `PlantState.body`, the rigid body of the paper's eq. 1.
 BODY_SIZE = 13
 
-# Points that can touch something: a guard an arm (motor order), the hub, four feet.
-GUARDS = HUB = ARMS
+# Points that can touch something: a guard an arm (motor order, the first `ContactSprings.rotors` are there), the hub,
+# four feet.
+GUARDS = HUB = MOST_ROTORS
 FEET, POINTS = HUB + 1, HUB + 5
 
-# Unit vectors of the arms in the body frame, in PX4's quad-x motor order:
-# front right, rear left, front left, rear right.
-ARM_DIRECTIONS_FRD = np.array([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]) / math.sqrt(2)
+# Unit vectors in the body frame of a quad-x's arms, in PX4's motor order (front right, rear left, front left, rear
+# right), and of any vehicle's feet.
+QUAD_X_FRD = np.array([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]) / math.sqrt(2)
 # +1 for rotors that turn counter-clockwise seen from above: their reaction yaws the body right (+).
-ROTOR_YAW_SIGNS = np.array([1.0, 1.0, -1.0, -1.0])
-PerArm = Annotated[Floats, (ARMS,)]
+QUAD_X_YAW_SIGNS = np.array([1.0, 1.0, -1.0, -1.0])
+PerArm = Annotated[Floats, (MOST_ROTORS,)]
+PerPoint = Annotated[Floats, (POINTS,)]
 
 
 class ContactSprings:
     """Springs and dampers of everything that can touch, in newtons, metres and seconds."""
 
-    arm_stiffness: float
-    arm_damping: float
-    fold_max_m: float
-    hysteresis_m: float
-    least_in_plane: float  # share of a face's normal in the guard's plane that counts at least
+    rotors: int  # how many, each with an arm and a guard
+    arm_direction_frd: Annotated[Floats, (MOST_ROTORS, 3)]  # unit vectors out from the centre
+    motor_radius_m: PerArm
+    arm_stiffness: PerArm
+    arm_damping: PerArm
+    fold_max_m: PerArm
+    hysteresis_m: PerArm
+    least_in_plane: PerArm  # share of a face's normal in the guard's plane that counts at least
     tip_mass_kg: float  # at the end of each arm
     stop_stiffness: float
     stop_damping: float
@@ -42,7 +47,6 @@ class ContactSprings:
     foot_damping: float
     guard_friction: float
     ground_friction: float
-    motor_radius_m: float
     guard_radius_m: float
     guard_half_height_m: float
     hub_radius_m: float
@@ -97,7 +101,12 @@ class Constants(Gains, ContactSprings):
     mass_kg: float
     inertia_kg_m2: Vector3  # principal, body frame, arms out
     drag_n_s_m: float
+    yaw_sign: PerArm  # of the reaction on the body
+    mix: Annotated[Floats, (MOST_ROTORS, 3)]  # of each motor, in the moments about x, y and z: see `_mix`
+    roll_lever_m: float  # what divides the first two
+    yaw_lever_m: float  # the third
     motor_max_n: float
+    all_motors_max_n: float
     motor_idle_n: float
     motor_time_constant_s: float
     moment_per_thrust_m: float
@@ -134,10 +143,10 @@ class PlantState:
     motor_command_n: PerArm
     fold_m: PerArm  # of each arm, inward positive
     fold_rate_m_s: PerArm
-    pressed: Annotated[Floats, (ARMS,), int]  # 1 for the arms that a face presses
+    pressed: Annotated[Floats, (MOST_ROTORS,), int]  # 1 for the arms that a face presses
     was_near: int  # 1 while the next two may be other than zero
-    depth_m: Annotated[Floats, (9,)]  # of each point, in whatever it is deepest in
-    share: Annotated[Floats, (9,)]  # of a round's normal in the guard's plane when it touched; 0 where none does
+    depth_m: PerPoint  # of each point, in whatever it is deepest in
+    share: PerPoint  # of a round's normal in the guard's plane when it touched; 0 where none does
     inertia: Vector4  # J at these folds: xx, yy, zz, xy
     inertia_rate: Vector4
     estimate: Annotated[Floats, (10,)]  # position NED, velocity NED, attitude: what the vehicle itself knows
@@ -176,8 +185,8 @@ class Scratch:
     normal: Vector3
     on_line: Vector3
     centre: Vector3
-    share: Annotated[Floats, (9,)]  # as in the state, at the step's start
-    deepest_m: Annotated[Floats, (9,)]  # no point can be deeper at a step's end than this
+    share: PerPoint  # as in the state, at the step's start
+    deepest_m: PerPoint  # no point can be deeper at a step's end than this
     lever: Vector3
     speed: Vector3
     rates_ned: Vector3
@@ -230,18 +239,72 @@ def _ratio_for(restitution: float) -> float:
 LEAST_IN_PLANE = 0.2
 
 
-def _contact_values(airframe: Airframe) -> dict[str, float]:
+def arms_of(airframe: Airframe) -> tuple[Floats, Floats, Floats]:
+    """Of each arm in motor order: the direction from the centre (n, 3), its motor's distance (m) and yaw sign."""
+    if not airframe.rotors:
+        return QUAD_X_FRD, np.full(len(QUAD_X_FRD), airframe.geometry.motor_radius_m), QUAD_X_YAW_SIGNS
+    places_m = np.array([(*rotor.place_frd_m, 0.0) for rotor in airframe.rotors])
+    radii_m = np.linalg.norm(places_m, axis=1)
+    signs = np.array([1.0 if rotor.direction == "ccw" else -1.0 for rotor in airframe.rotors])
+    return places_m / radii_m[:, None], radii_m, signs
+
+
+def allocation(airframe: Airframe) -> tuple[Floats, float, float]:
+    """How moments (FRD, N m) become thrusts: (n, 3) without unit, and the lengths (m) by which the moments about x and
+    y, and about z, are divided first.
+
+    It is the pseudo-inverse of what thrusts make, as PX4's. It leaves the sum of thrusts alone, because the rotors lie
+    evenly around the centre. A quad-x's are ones, in the sixteenth digit too: hence the rounding.
+    """
+    directions, radii_m, signs = arms_of(airframe)
+    arm_m = airframe.geometry.motor_radius_m / math.sqrt(2)
+    places = radii_m[:, None] * directions / arm_m
+    made = np.array([-places[:, 1], places[:, 0], signs, np.ones(len(signs))])
+    count = len(signs)
+    mix = np.round(count * np.linalg.pinv(made)[:, :3], 12)
+    lever_m = count * airframe.geometry.motor_radius_m / math.sqrt(2)
+    return mix, lever_m, count * airframe.motors.moment_per_thrust_m
+
+
+def _per_arm(values: Floats) -> Floats:
+    """With zeros for the arms that an octorotor would have more."""
+    return np.concatenate([values, np.zeros((MOST_ROTORS - len(values), *values.shape[1:]))])
+
+
+def _motor_values(airframe: Airframe) -> dict[str, float | Floats]:
+    mix, roll_lever_m, yaw_lever_m = allocation(airframe)
+    motors = airframe.motors
+    return {
+        "yaw_sign": _per_arm(arms_of(airframe)[2]),
+        "mix": _per_arm(mix),
+        "roll_lever_m": roll_lever_m,
+        "yaw_lever_m": yaw_lever_m,
+        "motor_max_n": motors.max_thrust_n,
+        "all_motors_max_n": airframe.most_thrust_n,
+        "motor_idle_n": motors.idle_fraction * motors.max_thrust_n,
+        "motor_time_constant_s": motors.time_constant_s,
+        "moment_per_thrust_m": motors.moment_per_thrust_m,
+    }
+
+
+def _contact_values(airframe: Airframe) -> dict[str, float | Floats]:
     """Contact constants. Two guards share a head-on hit, so each arm carries half of eq. 2's mass."""
     mass_kg, arms, geometry = airframe.mass_kg, airframe.arms, airframe.geometry
+    directions, radii_m, _ = arms_of(airframe)
+    folds = np.array([rotor.spring for rotor in airframe.rotors] or [True] * len(radii_m)) & (arms.fold_max_m > 0.0)
+    springy = _per_arm(folds.astype(float))
     stop_stiffness, stop_damping = spring_and_damper(arms.stop, mass_kg / 2)
     hub_stiffness, hub_damping = spring_and_damper(arms.stop, mass_kg)
     foot_stiffness, foot_damping = spring_and_damper(airframe.surface.foot, mass_kg / 4)
     return {
-        "arm_stiffness": arms.stiffness_per_s2 * mass_kg / 2,
-        "arm_damping": arms.damping_per_s * mass_kg / 2,
-        "fold_max_m": arms.fold_max_m,
-        "hysteresis_m": arms.hysteresis_m,
-        "least_in_plane": LEAST_IN_PLANE if arms.fold_max_m > 0.0 else 1.0,
+        "rotors": airframe.rotor_count,
+        "arm_direction_frd": _per_arm(directions),
+        "motor_radius_m": _per_arm(radii_m),
+        "arm_stiffness": springy * (arms.stiffness_per_s2 * mass_kg / 2),
+        "arm_damping": springy * (arms.damping_per_s * mass_kg / 2),
+        "fold_max_m": springy * arms.fold_max_m,
+        "hysteresis_m": springy * arms.hysteresis_m,
+        "least_in_plane": np.where(springy > 0.0, LEAST_IN_PLANE, 1.0),
         "tip_mass_kg": arms.tip_mass_kg,
         "stop_stiffness": stop_stiffness,
         "stop_damping": stop_damping,
@@ -251,7 +314,6 @@ def _contact_values(airframe: Airframe) -> dict[str, float]:
         "foot_damping": foot_damping,
         "guard_friction": airframe.surface.guard_friction,
         "ground_friction": airframe.surface.ground_friction,
-        "motor_radius_m": geometry.motor_radius_m,
         "guard_radius_m": geometry.guard_radius_m,
         "guard_half_height_m": geometry.guard_height_m / 2,
         "hub_radius_m": geometry.hub_solid_radius_m,
@@ -282,19 +344,16 @@ def _gain_values(airframe: Airframe) -> dict[str, float | Floats]:
 
 def constants_from(airframe: Airframe, rng: np.random.Generator) -> Constants:
     """Constants of one flight; the sensor biases are drawn from ``rng``."""
-    imu, motors = airframe.imu, airframe.motors
+    imu = airframe.imu
     raw_per_interval = imu.integration_interval_us // imu.raw_interval_us
     return new_record(
         Constants,
         **_contact_values(airframe),
         **_gain_values(airframe),
+        **_motor_values(airframe),
         mass_kg=airframe.mass_kg,
         inertia_kg_m2=np.array(airframe.inertia_kg_m2),
         drag_n_s_m=airframe.drag_n_s_m,
-        motor_max_n=motors.max_thrust_n,
-        motor_idle_n=motors.idle_fraction * motors.max_thrust_n,
-        motor_time_constant_s=motors.time_constant_s,
-        moment_per_thrust_m=motors.moment_per_thrust_m,
         raw_interval_us=imu.raw_interval_us,
         raw_per_interval=raw_per_interval,
         accelerometer_range_m_s2=imu.accelerometer_range_m_s2,
@@ -307,7 +366,7 @@ def constants_from(airframe: Airframe, rng: np.random.Generator) -> Constants:
 
 def calm(wind_ned_m_s: tuple[float, float, float]) -> Disturbance:
     """Nothing but a steady wind."""
-    return new_record(Disturbance, wind_ned_m_s=np.array(wind_ned_m_s), motor_share=np.ones(ARMS))
+    return new_record(Disturbance, wind_ned_m_s=np.array(wind_ned_m_s), motor_share=np.ones(MOST_ROTORS))
 
 
 def initial_state(position_ned_m: tuple[float, float, float], yaw_rad: float) -> PlantState:

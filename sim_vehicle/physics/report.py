@@ -1,17 +1,20 @@
 """One row of numbers out of the kernels at the end of an interval: reading a record in Python is slow."""
 
+from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import Constants, PlantState
 from sim_vehicle.physics.record import Floats
 
-# What really is: time (us), position, velocity, attitude, folds, contact force. `truth.py` keeps these.
-TRUTH = slice(0, 16)
+# What really is: time (us), position, velocity, attitude, contact force, folds. `truth.py` keeps these.
+_FOLDS, TRUTH = 12, slice(0, 12 + MOST_ROTORS)
 # What the vehicle's own software may know: mean specific force, mean rates and clip counts; after them its estimate of
-# position, velocity, attitude and acceleration, and the motors' commands.
-SENSED, KNOWN = slice(16, 25), slice(16, 42)
+# position, velocity, attitude and acceleration, the share of all thrust that is commanded, and that of each motor.
+_SENSED = 12 + MOST_ROTORS
+_ESTIMATE, _ACCELERATION, _COMMANDS = _SENSED + 9, _SENSED + 19, _SENSED + 22
+SENSED, KNOWN = slice(_SENSED, _ESTIMATE), slice(_SENSED, _COMMANDS + 1 + MOST_ROTORS)
 # How many hits ended in the interval.
-HITS_ENDED = 42
-REPORT_COLUMNS = 43
+HITS_ENDED = _COMMANDS + 1 + MOST_ROTORS
+REPORT_COLUMNS = HITS_ENDED + 1
 
 
 @njit
@@ -20,17 +23,20 @@ def write_report(state: PlantState, constants: Constants, row: Floats) -> None:
     row[0] = state.time_us
     for i in range(10):
         row[1 + i] = state.body[i]
-        row[25 + i] = state.estimate[i]
-    for i in range(4):
-        row[11 + i] = state.fold_m[i]
-        row[38 + i] = state.motor_command_n[i] / constants.motor_max_n
-    row[15] = state.peak_force_n
+        row[_ESTIMATE + i] = state.estimate[i]
+    row[_FOLDS - 1] = state.peak_force_n
+    commanded = 0.0
+    for i in range(constants.rotors):
+        row[_FOLDS + i] = state.fold_m[i]
+        row[_COMMANDS + 1 + i] = state.motor_command_n[i] / constants.motor_max_n
+        commanded += row[_COMMANDS + 1 + i]
+    row[_COMMANDS] = commanded / constants.rotors
     row[HITS_ENDED] = state.finished_count
     for i in range(3):
-        row[16 + i] = state.specific_force_sum[i] / constants.raw_per_interval
-        row[19 + i] = state.rate_sum[i] / constants.raw_per_interval
-        row[22 + i] = state.clip_counts[i]
-        row[35 + i] = state.acceleration_ned_m_s2[i]
+        row[_SENSED + i] = state.specific_force_sum[i] / constants.raw_per_interval
+        row[_SENSED + 3 + i] = state.rate_sum[i] / constants.raw_per_interval
+        row[_SENSED + 6 + i] = state.clip_counts[i]
+        row[_ACCELERATION + i] = state.acceleration_ned_m_s2[i]
 
 
 @njit
@@ -42,6 +48,6 @@ def report_estimate(
     """
     for i in range(3):
         frame_offset_ned_m[i] = estimate[i] - body[i]
-        row[35 + i] = acceleration[i]
+        row[_ACCELERATION + i] = acceleration[i]
     for i in range(10):
-        row[25 + i] = estimate[i]
+        row[_ESTIMATE + i] = estimate[i]

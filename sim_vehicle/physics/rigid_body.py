@@ -3,14 +3,11 @@
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of, times
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import (
-    ARM_DIRECTIONS_FRD,
     BODY_SIZE,
     GRAVITY_M_S2,
-    ROTOR_YAW_SIGNS,
     Constants,
     ContactSprings,
     Disturbance,
@@ -85,11 +82,11 @@ def derivative(
 def thrusts_moment(thrusts_n: Floats, constants: Constants, moment: Floats) -> None:
     """Write the moment (FRD, N m) of the motors' thrusts and of their drag."""
     moment[:] = 0.0
-    for motor in range(ARMS):
+    for motor in range(constants.rotors):
         thrust = thrusts_n[motor]
-        moment[0] -= constants.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 1] * thrust
-        moment[1] += constants.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 0] * thrust
-        moment[2] += ROTOR_YAW_SIGNS[motor] * constants.moment_per_thrust_m * thrust
+        moment[0] -= constants.motor_radius_m[motor] * constants.arm_direction_frd[motor, 1] * thrust
+        moment[1] += constants.motor_radius_m[motor] * constants.arm_direction_frd[motor, 0] * thrust
+        moment[2] += constants.yaw_sign[motor] * constants.moment_per_thrust_m * thrust
 
 
 @njit
@@ -146,7 +143,9 @@ def runge_kutta_step(
     body, thrusts_n, inertia, inertia_rate = state.body, state.motor_thrust_n, state.inertia, state.inertia_rate
     inertia_of(state.fold_m, state.fold_rate_m_s, constants, inertia, inertia_rate)
     thrusts_moment(thrusts_n, constants, scratch.thrusts_moment_frd)
-    thrust_n = thrusts_n[0] + thrusts_n[1] + thrusts_n[2] + thrusts_n[3]
+    thrust_n = 0.0
+    for motor in range(constants.rotors):
+        thrust_n += thrusts_n[motor]
     mass_kg = constants.mass_kg + disturbance.carried_kg
     k, trial = scratch.slopes, scratch.trial
     for stage in range(4):

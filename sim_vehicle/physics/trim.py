@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.estimate import EstimateErrors
 from sim_vehicle.physics.layout import BODY_SIZE, GRAVITY_M_S2, Constants, Disturbance, PlantState
 from sim_vehicle.physics.record import Floats
@@ -35,7 +34,7 @@ def trim(
     state.attitude_setpoint[:] = rotation
     state.yaw_setpoint_rad = yaw_rad
     state.collective_n = constants.mass_kg * float(np.linalg.norm(upheld))
-    state.motor_command_n[:] = state.motor_thrust_n[:] = state.collective_n / ARMS
+    state.motor_command_n[:] = state.motor_thrust_n[:] = state.collective_n / constants.rotors
     _remember(state, *remembered, 1e-6 * constants.raw_interval_us * constants.raw_per_interval)
 
 

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import ARMS
 from sim_vehicle.control.attitude import (
     ATTITUDE_LOOP_HZ,
     allocate_motors,
@@ -125,7 +124,7 @@ def run_loops(state: PlantState, asked: SetpointRows, constants: Constants) -> N
         rest_loops(state)
     elif time_us * POSITION_LOOP_HZ >= state.position_loops * 1_000_000:
         state.position_loops = time_us * POSITION_LOOP_HZ // 1_000_000 + 1
-        position_control(state, constants.mass_kg, constants.motor_max_n, asked, constants)
+        position_control(state, constants.mass_kg, constants.all_motors_max_n, asked, constants)
     if time_us * ATTITUDE_LOOP_HZ >= state.attitude_loops * 1_000_000:
         state.attitude_loops = time_us * ATTITUDE_LOOP_HZ // 1_000_000 + 1
         if asked.level != ASKED_TRAJECTORY:
@@ -136,7 +135,7 @@ def run_loops(state: PlantState, asked: SetpointRows, constants: Constants) -> N
             rate_control(state, constants, asked.rates_frd_rad_s, constants)
         else:
             attitude_control(state, constants, asked.yaw[2], constants)
-        allocate_motors(state, constants, constants.motor_radius_m)
+        allocate_motors(state, constants)
 
 
 @njit
@@ -149,7 +148,7 @@ def rest_loops(state: PlantState) -> None:
 @inlined
 def spin_motors(state: PlantState, share: float, constants: Constants, disturbance: Disturbance) -> None:
     """First-order lag of each motor's thrust: in a raw interval by ``share`` nearer to what it gives of its command."""
-    for motor in range(ARMS):
+    for motor in range(constants.rotors):
         command = min(max(state.motor_command_n[motor], 0.0), constants.motor_max_n)
         given = disturbance.motor_share[motor] * command
         state.motor_thrust_n[motor] += share * (given - state.motor_thrust_n[motor])

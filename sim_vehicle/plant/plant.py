@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.estimator.estimate import Estimate, Quaternion
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.faults.plan import Faults
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.physics.asked import AskedSetpoint
@@ -78,14 +78,14 @@ class Plant:
         self._true_columns, self._sensed_columns = self._report[TRUTH], self._report[SENSED]
         self._asked = AskedSetpoint()
         self._motor_command_n = self.state.motor_command_n
-        self._motor_max_n = airframe.motors.max_thrust_n
+        self._rotors, self._motor_max_n = airframe.rotor_count, airframe.motors.max_thrust_n
         self._finished_hits = self.state.finished_hits
         self._state_box = boxed(self.state)
         self._constants_box, self._disturbance_box = boxed(self._constants), boxed(self.disturbance)
         self._scratch_box = boxed(new_record(Scratch))
         self.booted_at_us = 0
         """Of the body's clock: where that of the samples begins."""
-        self.truth = TruthRecorder(keeps_path)
+        self.truth = TruthRecorder(keeps_path, airframe.rotor_count)
         self.faults: Faults | None = None
         self._new_faults = partial(Faults, airframe=airframe, wind_ned_m_s=scene.wind_ned_m_s, seed=seed)
         if scene.faults:
@@ -175,9 +175,9 @@ class Plant:
             self._asked.take(setpoint)
         return self._advance(motors)
 
-    def drive(self, motor_fractions: Quaternion) -> Estimate:
+    def drive(self, motor_fractions: Sequence[float]) -> Estimate:
         """Advance one interval under an autopilot from outside: thrust asked of each motor over its greatest."""
-        self._motor_command_n[:] = motor_fractions
+        self._motor_command_n[: self._rotors] = motor_fractions[: self._rotors]
         self._motor_command_n *= self._motor_max_n
         return self._advance(MOTORS_DRIVEN)
 
@@ -225,7 +225,7 @@ class Plant:
     def _output(self) -> Estimate:
         onboard, faults, report = self.onboard, self.faults, self._report.tolist()
         fx, fy, fz, p, q, r, clip_x, clip_y, clip_z, px, py, pz, vx, vy, vz, *others = report[KNOWN]
-        qw, qx, qy, qz, ax, ay, az, m1, m2, m3, m4 = others
+        qw, qx, qy, qz, ax, ay, az, thrust, *motors = others
         resets = 0 if onboard is None else onboard.reset_counter
         return Estimate(
             int(report[0]) - self.booted_at_us,
@@ -236,7 +236,7 @@ class Plant:
             (vx, vy, vz),
             (ax, ay, az),
             (qw, qx, qy, qz),
-            (m1 + m2 + m3 + m4) / 4,
-            (m1, m2, m3, m4),
+            thrust,
+            tuple(motors[: self._rotors]),
             resets if faults is None else resets + faults.reset_counter,
         )

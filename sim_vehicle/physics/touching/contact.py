@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GUARDS, HUB, ContactSprings, PlantState, Scratch
 from sim_vehicle.physics.rotation import matrix_from_quaternion
-from sim_vehicle.physics.touching.meeting import meet
+from sim_vehicle.physics.touching.meeting import is_absent, meet
 from sim_vehicle.physics.touching.proximity import IN_FRONT, INSIDE, NEAR, points_at
 from sim_vehicle.world import FACE_RADIUS, FACE_VELOCITY
 
@@ -20,10 +20,10 @@ FRICTION_SPEED_M_S = 0.02
 
 
 @inlined
-def arm_force(fold_m: float, fold_speed_m_s: float, contact: ContactSprings) -> float:
+def arm_force(arm: int, fold_m: float, fold_speed_m_s: float, contact: ContactSprings) -> float:
     """Force along an arm at this fold and folding speed, newtons, never negative (eq. 2, then the stop)."""
-    force = contact.arm_stiffness * fold_m + contact.arm_damping * fold_speed_m_s
-    beyond = fold_m - contact.fold_max_m
+    force: float = contact.arm_stiffness[arm] * fold_m + contact.arm_damping[arm] * fold_speed_m_s
+    beyond = fold_m - contact.fold_max_m[arm]
     if beyond > 0.0:
         force += max(0.0, contact.stop_stiffness * beyond + contact.stop_damping * fold_speed_m_s)
     return max(0.0, force)
@@ -40,11 +40,11 @@ def point_force(
     the force.
     """
     if point < GUARDS:
-        lever = max(share, contact.least_in_plane)
+        lever: float = max(share, contact.least_in_plane[point])
         fold = depth / lever
         if fold < relaxed_m:
             return 0.0
-        return arm_force(fold, speed_in / lever, contact) / lever
+        return arm_force(point, fold, speed_in / lever, contact) / lever
     if depth <= 0.0:
         return 0.0
     if point == HUB:
@@ -74,7 +74,7 @@ def contact_wrench(
             continue
         normal_forces[:, face] = 0.0
         for point in range(*points_at(face, near, faces)):
-            if behind[point, face] != IN_FRONT:
+            if is_absent(point, contact) or behind[point, face] != IN_FRONT:
                 continue
             depth, share = meet(point, face, rotation, body, contact, faces, scratch)
             if depth <= 0.0 or (face != 0 and depth > scratch.deepest_m[point]):
@@ -132,18 +132,19 @@ def relax_arms(state: PlantState, step_s: float, contact: ContactSprings, relaxe
     the stop): eq. 2 ends there. A free arm has its end's mass to move as well (implicit Euler: its fastest time,
     3 ms, is far above any step). The hysteresis holds it where eq. 2 would take it back to zero.
     """
-    for arm in range(GUARDS):
+    for arm in range(contact.rotors):
         fold = state.fold_m[arm]
         if fold == 0.0 and state.fold_rate_m_s[arm] == 0.0:
             relaxed_m[arm] = 0.0
             continue
-        held = min(fold, contact.hysteresis_m)
-        if contact.arm_damping <= 0.0:
+        held = min(fold, contact.hysteresis_m[arm])
+        if contact.arm_damping[arm] <= 0.0:
             relaxed_m[arm] = held
         elif state.pressed[arm] == 1 or contact.tip_mass_kg <= 0.0:
-            relaxed_m[arm] = max(fold - step_s * _returning_m_s(fold, contact), held)
+            relaxed_m[arm] = max(fold - step_s * _returning_m_s(arm, fold, contact), held)
         else:
-            damping, stiffness = contact.arm_damping / contact.tip_mass_kg, contact.arm_stiffness / contact.tip_mass_kg
+            damping = contact.arm_damping[arm] / contact.tip_mass_kg
+            stiffness = contact.arm_stiffness[arm] / contact.tip_mass_kg
             rate = (state.fold_rate_m_s[arm] - step_s * stiffness * fold) / (
                 1.0 + step_s * damping + step_s * step_s * stiffness
             )
@@ -151,13 +152,13 @@ def relax_arms(state: PlantState, step_s: float, contact: ContactSprings, relaxe
 
 
 @njit
-def _returning_m_s(fold_m: float, contact: ContactSprings) -> float:
+def _returning_m_s(arm: int, fold_m: float, contact: ContactSprings) -> float:
     """How fast an arm without mass goes out."""
-    returning: float = contact.arm_stiffness * fold_m / contact.arm_damping
-    beyond = fold_m - contact.fold_max_m
+    returning: float = contact.arm_stiffness[arm] * fold_m / contact.arm_damping[arm]
+    beyond = fold_m - contact.fold_max_m[arm]
     if beyond > 0.0:
-        push_n = contact.arm_stiffness * fold_m + contact.stop_stiffness * beyond
-        returning = max(returning, push_n / (contact.arm_damping + contact.stop_damping))
+        push_n = contact.arm_stiffness[arm] * fold_m + contact.stop_stiffness * beyond
+        returning = max(returning, push_n / (contact.arm_damping[arm] + contact.stop_damping))
     return returning
 
 
@@ -173,7 +174,7 @@ def settle_arms(
     scratch: Scratch,
 ) -> None:
     """After a step: how far each arm is folded and how fast it moves."""
-    for arm in range(GUARDS):
+    for arm in range(contact.rotors):
         scratch.fold_before_m[arm] = state.fold_m[arm]
         state.fold_m[arm] = scratch.relaxed_m[arm]
         state.pressed[arm] = 0
@@ -183,7 +184,7 @@ def settle_arms(
         state.depth_m[:] = 0.0
         state.share[:] = 0.0
     state.was_near = 1 if touches else 0
-    for arm in range(GUARDS):
+    for arm in range(contact.rotors):
         folded_m = state.fold_m[arm] - scratch.fold_before_m[arm]
         state.fold_rate_m_s[arm] = folded_m / step_s if folded_m != 0.0 else 0.0
 
@@ -199,6 +200,8 @@ def settle_contacts(
     state.share[:] = 0.0
     for face in range(near.shape[0]):
         for point in range(*points_at(face, near, faces)):
+            if is_absent(point, contact):
+                continue
             depth, share = meet(point, face, scratch.turned, state.body, contact, faces, scratch)
             if depth <= 0.0 and behind[point, face] == INSIDE:
                 behind[point, face] = IN_FRONT
@@ -213,7 +216,7 @@ def settle_contacts(
                 share = state.share[point] = scratch.share[point] if scratch.share[point] > 0.0 else share
             if point >= GUARDS:
                 continue
-            fold = depth / max(share, contact.least_in_plane)
+            fold = depth / max(share, contact.least_in_plane[point])
             if depth > 0.0 and fold >= state.fold_m[point]:
                 state.fold_m[point] = fold
                 state.pressed[point] = 1

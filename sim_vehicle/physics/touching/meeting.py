@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import inlined, njit
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, ContactSprings, Scratch
+from sim_vehicle.physics.layout import FEET, GUARDS, HUB, QUAD_X_FRD, ContactSprings, Scratch
 from sim_vehicle.world import (
     FACE_ACROSS,
     FACE_ALONG,
@@ -35,18 +35,23 @@ NOWHERE = -1e9
 
 
 @inlined
+def is_absent(point: int, contact: ContactSprings) -> bool:
+    """Whether it is a guard that only vehicles with more rotors have."""
+    return bool(contact.rotors <= point < GUARDS)
+
+
+@inlined
 def part_centre(point: int, rotation: Floats, position: Floats, contact: ContactSprings, out: Floats) -> None:
     """Write the middle (NED, m) of a guard or the hub, or where a foot is, into ``out``."""
-    along_arm, below = 0.0, 0.0
-    arm = point
+    along_arm, below, ahead, aside = 0.0, 0.0, 0.0, 0.0
     if point < GUARDS:
-        along_arm = contact.motor_radius_m
+        along_arm = contact.motor_radius_m[point]
+        ahead, aside = contact.arm_direction_frd[point, 0], contact.arm_direction_frd[point, 1]
     elif point > HUB:
-        arm, along_arm, below = point - FEET, contact.foot_radius_m, contact.foot_depth_m
-    else:
-        arm = 0
+        along_arm, below = contact.foot_radius_m, contact.foot_depth_m
+        ahead, aside = QUAD_X_FRD[point - FEET, 0], QUAD_X_FRD[point - FEET, 1]
     for i in range(3):
-        direction = rotation[i, 0] * ARM_DIRECTIONS_FRD[arm, 0] + rotation[i, 1] * ARM_DIRECTIONS_FRD[arm, 1]
+        direction = rotation[i, 0] * ahead + rotation[i, 1] * aside
         out[i] = position[i] + along_arm * direction + below * rotation[i, 2]
 
 

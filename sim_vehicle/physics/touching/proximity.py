@@ -7,7 +7,15 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import FEET, POINTS, ContactSprings, Scratch
-from sim_vehicle.physics.touching.meeting import deepest_point, depth_in, meet, nearest_on_line, part_centre, within
+from sim_vehicle.physics.touching.meeting import (
+    deepest_point,
+    depth_in,
+    is_absent,
+    meet,
+    nearest_on_line,
+    part_centre,
+    within,
+)
 from sim_vehicle.world import FACE_MEETS_FEET, FACE_NORMAL, FACE_POINT, FACE_RADIUS, FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]
@@ -82,6 +90,8 @@ def find_close(
             continue
         flat = faces[face, FACE_RADIUS] == 0.0
         for point in range(POINTS if faces[face, FACE_MEETS_FEET] == 1.0 else FEET):
+            if is_absent(point, contact):
+                continue
             if flat and face != 0:
                 note_passing(point, face, body, behind, contact, faces, scratch)
             if point >= FEET or behind[point, face] != IN_FRONT:

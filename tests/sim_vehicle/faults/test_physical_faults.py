@@ -238,7 +238,7 @@ def test_faults_repeat_for_a_seed_and_leave_the_rest_of_the_noise_alone() -> Non
         ({"kind": "free_fall"}, "give at_s"),
         ({"kind": "free_fall", "at_s": 1, "between_s": [1, 2]}, "not both"),
         ({"kind": "push", "between_s": [2, 1], "force_ned_n": [1, 0, 0]}, "ends before it begins"),
-        ({"kind": "motor_failure", "motor": 4, "at_s": 0}, "less than or equal to 3"),
+        ({"kind": "motor_failure", "motor": 8, "at_s": 0}, "less than 8"),
         ({"kind": "wire", "at_s": 0}, "at least one of loss"),
         ({"kind": "unlucky", "at_s": 0}, "does not match any of the expected tags"),
     ],
