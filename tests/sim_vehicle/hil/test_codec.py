@@ -19,7 +19,9 @@ def on_the_wire(message) -> dialect.MAVLink_message:
 
 def controls_packet(controls: list[float], mode: int, flags: int, time_us: int = 4_000) -> bytes:
     link = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
-    return dialect.MAVLink_hil_actuator_controls_message(time_us, controls + [0.0] * 12, mode, flags).pack(link)
+    return dialect.MAVLink_hil_actuator_controls_message(
+        time_us, controls + [0.0] * (16 - len(controls)), mode, flags
+    ).pack(link)
 
 
 def test_a_sample_with_everything_has_every_bit_of_every_group():
@@ -54,10 +56,13 @@ def test_motion_capture_is_an_odometry_in_local_ned_that_ekf2_reads():
 @pytest.mark.parametrize(
     ("packet", "expected"),
     [
-        (controls_packet([0.1, 0.2, 0.3, 0.4], 0x81, 1), ActuatorControls(4_000, True, True, (0.1, 0.2, 0.3, 0.4))),
-        (controls_packet([0.0] * 4, 0x01, 1), ActuatorControls(4_000, False, True, (0.0,) * 4)),
-        (controls_packet([0.5] * 4, 0x81, 0), ActuatorControls(4_000, True, False, (0.5,) * 4)),
-        (controls_packet([math.nan, 0.5, 0.5, 0.5], 0x81, 1), ActuatorControls(4_000, True, True, (0, 0.5, 0.5, 0.5))),
+        (
+            controls_packet([0.1, 0.2, 0.3, 0.4] * 2, 0x81, 1),
+            ActuatorControls(4_000, True, True, (0.1, 0.2, 0.3, 0.4) * 2),
+        ),
+        (controls_packet([0.0] * 8, 0x01, 1), ActuatorControls(4_000, False, True, (0.0,) * 8)),
+        (controls_packet([0.5] * 8, 0x81, 0), ActuatorControls(4_000, True, False, (0.5,) * 8)),
+        (controls_packet([math.nan, 0.5] * 4, 0x81, 1), ActuatorControls(4_000, True, True, (0, 0.5) * 4)),
     ],
     ids=["armed", "disarmed", "without lockstep", "a motor that is off"],
 )

@@ -77,7 +77,7 @@ def test_arms_that_unfold_slow_a_spin_as_a_skaters_do() -> None:
     plant = Plant(airframe, Scene(), seed=1)
     plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
     plant.state.body[12] = 10.0
-    plant.state.fold_m[:] = 0.03
+    plant.state.fold_m[:4] = 0.03
     plant.step(None, armed=False)
     momentum, spin = plant.state.inertia[ZZ] * plant.state.body[12], plant.state.body[12]
     for _ in range(100):
@@ -96,7 +96,7 @@ def test_the_integrator_is_of_fourth_order() -> None:
     def tumbled(steps: int) -> np.ndarray:
         state = initial_state((0.0, 0.0, -50.0), 0.3)
         state.body[3:6], state.body[10:13] = [3.0, -1.0, 0.5], [6.0, -4.0, 5.0]
-        state.motor_thrust_n[:] = [2.0, 3.0, 2.5, 2.2]
+        state.motor_thrust_n[:4] = [2.0, 3.0, 2.5, 2.2]
         count = len(world.faces)
         behind, near = np.zeros((POINTS, count), np.int64), np.zeros(count, np.int64)
         forces = np.zeros((2, POINTS, count))
