@@ -171,9 +171,9 @@ class Sticks(Sample):
 
 @dataclass(frozen=True, slots=True)
 class MotorOutputs(Sample):
-    """SERVO_OUTPUT_RAW of the main outputs: the first four, microseconds of PWM or a driver's own units."""
+    """SERVO_OUTPUT_RAW of the main outputs: four to eight, microseconds of PWM or a driver's own units."""
 
-    outputs: tuple[float, float, float, float]
+    outputs: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)

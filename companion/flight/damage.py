@@ -7,6 +7,9 @@ from companion.flight.states import Trigger
 from companion.messages import LandedState, MotorOutputs, Sample
 from companion.motion.motors import MotorWatch
 
+# Vehicles whose motors SERVO_OUTPUT_RAW shows, and how many they have.
+ROTORS = {"quadrotor": 4, "hexarotor": 6, "octorotor": 8}
+
 
 def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> None:
     """What the motors are asked for, before the first hit and after each recovery."""
@@ -14,7 +17,8 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
     if not vehicle.armed:
         flight.motors = MotorWatch(len(flight.collisions))
         return
-    if vehicle.identity is None or vehicle.identity.vehicle_type != "quadrotor":
+    rotors = 0 if vehicle.identity is None else ROTORS.get(vehicle.identity.vehicle_type, 0)
+    if not rotors:
         return
     hits = len(flight.collisions) - flight.motors.earlier_hits
     flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
@@ -22,8 +26,8 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
     rests = hits == 0 or flight.collisions[-1].settled_after_s is not None
     was_hit = hits > 0 if flies and rests else None
     for sample in samples:
-        if isinstance(sample, MotorOutputs):
-            damage = flight.motors.take(sample.outputs, was_hit, now_us)
+        if isinstance(sample, MotorOutputs) and len(sample.outputs) >= rotors:
+            damage = flight.motors.take(sample.outputs[:rotors], was_hit, now_us)
             if damage is not None:
                 data = {"motor": damage.motor, "harder": round(damage.harder, 3), "confidence": damage.confidence}
                 wanted = flight.mission.on_damage

@@ -160,8 +160,25 @@ def _vibration(
     return messages.Vibration(time_usec, vibration_y, vibration_z, (clipping_0, clipping_1, clipping_2))
 
 
-def _motor_outputs(port: int, servo1_raw: int, servo2_raw: int, servo3_raw: int, servo4_raw: int) -> Sample | None:
-    return messages.MotorOutputs((servo1_raw, servo2_raw, servo3_raw, servo4_raw)) if port == 0 else None
+# What PX4 shows of an output that drives nothing: no value, or that of a disarmed PWM output.
+_UNUSED_OUTPUTS = (0, 900)
+
+
+def _motor_outputs(
+    port: int,
+    servo1_raw: int,
+    servo2_raw: int,
+    servo3_raw: int,
+    servo4_raw: int,
+    servo5_raw: int,
+    servo6_raw: int,
+    servo7_raw: int,
+    servo8_raw: int,
+) -> Sample | None:
+    outputs = [servo1_raw, servo2_raw, servo3_raw, servo4_raw, servo5_raw, servo6_raw, servo7_raw, servo8_raw]
+    while len(outputs) > 4 and outputs[-1] in _UNUSED_OUTPUTS:
+        outputs.pop()
+    return messages.MotorOutputs(tuple(outputs)) if port == 0 else None
 
 
 def _battery(battery_remaining: int) -> Sample | None:

@@ -1,12 +1,13 @@
-"""Detect a motor or propeller damaged by a hit: its output is higher than before, relative to the other three.
+"""Detect a motor or propeller damaged by a hit: its output is higher than before, relative to the others.
 
-PX4's rate control commands the lift that a damaged propeller or motor lacks from that motor alone: in steady flight
-lift and drag torque of all four stay the same. A shifted load, or a force on the vehicle, loads two motors more, or one
-as much as it relieves the opposite one.
+PX4's rate control commands the lift that a damaged propeller or motor of a quadrotor lacks from that motor alone: in
+steady flight lift and drag torque of all four stay the same. A shifted load, or a force on the vehicle, loads two
+motors more, or one as much as it relieves the opposite one. Of six or eight, PX4's pseudo-inverse relieves the opposite
+motors for either, but a shifted load also loads the neighbours more.
 
-No model of the vehicle is needed. Each half second of the flight before the hit shows how the four outputs differ, with
+No model of the vehicle is needed. Each half second of the flight before the hit shows how the outputs differ, with
 trim, wind and manoeuvres. A motor is damaged if after the recovery its relative output exceeds all of these. For
-windows in random order the probability that the m last exceed all n first is 1 / C(n + m, m); four motors have four
+windows in random order the probability that the m last exceed all n first is 1 / C(n + m, m); n motors have n
 chances.
 """
 
@@ -28,15 +29,18 @@ LEAST_HARDER = 0.04
 # Largest difference among the other three motors, in increases of the first. A weight that shifts towards one motor
 # relieves the opposite one: the other three then differ by 0.5. For one damaged motor they do not differ. Half way.
 MOST_UNLIKE = 0.25
+# Largest increase of any other of six or eight motors, in increases of the first. By the pseudo-inverse of an even ring
+# it is 0 of six and 0.33 of eight for one damaged motor, 0.5 and 0.71 for a weight that shifts towards one. Half way.
+MOST_SHARED = {6: 0.25, 8: 0.52}
 # The least that PX4 lets a PWM output be (PWM_MAIN_MINn). Outputs of DShot and CAN begin at zero, those of PWM at 1 ms.
 LEAST_PWM, PWM_ZERO = 800.0, 1000.0
 
-Outputs: TypeAlias = tuple[float, float, float, float]
+Outputs: TypeAlias = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """`motor` counts from 1, as PX4's outputs. `harder`: beside the other three, in shares of their mean."""
+    """`motor` counts from 1, as PX4's outputs. `harder`: beside the others, in shares of their mean."""
 
     motor: int
     harder: float
@@ -51,7 +55,7 @@ class Damage:
 
 @dataclass(slots=True)
 class MotorWatch:
-    """Of one flight of a quadrotor whose motors are outputs 1 to 4."""
+    """Of one flight of a vehicle whose motors are outputs 1 to 4, 6 or 8."""
 
     earlier_hits: int = 0  # of flights before this one
     damage: Damage | None = None
@@ -87,12 +91,13 @@ class MotorWatch:
 
     def _judged(self) -> Damage | None:
         count = len(self._after)
-        confidence = 1.0 - 4.0 / math.comb(len(self._before) + count, count)
+        motors = len(self._after[0])
+        confidence = 1.0 - motors / math.comb(len(self._before) + count, count)
         if confidence < LEAST_CONFIDENCE:
             return None
         before, after = (list(zip(*windows, strict=True)) for windows in (self._before, self._after))
         changes = [median(now) - median(was) for now, was in zip(after, before, strict=True)]
-        motor = max(range(4), key=changes.__getitem__)
+        motor = max(range(motors), key=changes.__getitem__)
         others = [change for number, change in enumerate(changes) if number != motor]
         harder = changes[motor] - fmean(others)
         if harder < LEAST_HARDER or min(after[motor]) <= max(before[motor]):
@@ -101,12 +106,15 @@ class MotorWatch:
         shown = [outputs[motor] for outputs in self._samples_after]
         is_at_limit = median(shown) == self._most
         unlike = max(abs(change - fmean(others)) for change in others)
-        is_alone = is_at_limit or unlike < MOST_UNLIKE * harder
-        return Damage(motor + 1, harder, confidence, is_at_limit) if is_alone else None
+        if motors in MOST_SHARED:
+            is_alone = max(others) < MOST_SHARED[motors] * changes[motor]
+        else:
+            is_alone = unlike < MOST_UNLIKE * harder
+        return Damage(motor + 1, harder, confidence, is_at_limit) if is_alone or is_at_limit else None
 
 
 def _shares(window: Sequence[Outputs], zero: float) -> list[float]:
-    """Each motor's mean output beyond `zero`, as a share of the four's mean.
+    """Each motor's mean output beyond `zero`, as a share of the mean of all.
 
     One microsecond is what PWM can tell apart: of less nothing is a share.
     """

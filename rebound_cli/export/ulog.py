@@ -103,7 +103,12 @@ _TOPICS: Sequence[tuple[type, str, str, Any]] = (
         "float pitch;float roll;float throttle;float yaw;float aux1;float aux2",
         lambda s: (*s.deflections, math.nan, math.nan),
     ),
-    (messages.MotorOutputs, "actuator_outputs", "uint32_t noutputs;float[4] output", lambda s: (4, *s.outputs)),
+    (
+        messages.MotorOutputs,
+        "actuator_outputs",
+        "uint32_t noutputs;float[8] output",
+        lambda s: (len(s.outputs), *s.outputs, *[0.0] * (8 - len(s.outputs))),
+    ),
     (
         messages.Battery,
         "battery_status",

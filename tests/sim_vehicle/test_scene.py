@@ -44,13 +44,13 @@ def test_a_small_wall_beside_the_start_is_allowed() -> None:
 
 
 def test_every_built_in_airframe_loads_and_is_named_as_its_file() -> None:
-    assert built_in_airframes() == ("foldable", "rigid")
+    assert built_in_airframes() == ("foldable", "hexa", "octo", "racer", "rigid")
     for name in built_in_airframes():
         assert load_built_in(name).name == name
 
 
 def test_an_unknown_airframe_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(AirframeError, match="use one of foldable, rigid"):
+    with pytest.raises(AirframeError, match="use one of foldable, hexa, octo, racer, rigid"):
         load_built_in("folding")
 
 

@@ -131,7 +131,7 @@ def test_an_estimate_is_reset_and_says_so() -> None:
     ("request_", "for_s", "words"),
     [
         (faults.packet_loss(2.0), None, "wire, loss: Input should be less than or equal to 1"),
-        (faults.motor_failure(7), None, "motor_failure, motor: Input should be less than or equal to 3"),
+        (faults.motor_failure(7), None, "motor_failure: no motor 7; this vehicle's are 0 to 3."),
         (faults.packet_loss(0.1, messages=("HIGHRES",)), None, "no MAVLink message is called 'HIGHRES'"),
         (faults.other("gust", velocity_ned_m_s=(1, 0, 0)), None, "gust has to end"),
         (faults.other("payload_drop", mass_kg=0.1), 2.0, "payload_drop cannot be undone"),
