@@ -119,7 +119,7 @@ def _flag(parser: Parser, name: str, text: str) -> None:
 
 
 def _add_world_options(parser: Parser) -> None:
-    _option(parser, "--airframe", "foldable, rigid or an airframe file", "NAME|FILE")
+    _option(parser, "--airframe", "foldable, rigid, hexa, octo, racer or an airframe file", "NAME|FILE")
     _option(parser, "--seed", "seed of every random number of the simulated vehicle", type=int)
     _add_set(parser, _SET_MISSION)
 
@@ -201,7 +201,7 @@ def add_init(commands: Commands) -> None:
 
 
 def add_sim(commands: Commands) -> None:
-    text = "A simulated PX4 quadrotor for any MAVLink client."
+    text = "A simulated PX4 multicopter for any MAVLink client."
     sim = _command(commands, "sim", "simulation.command:run_sim", "run the simulated vehicle alone", text)
     _option(sim, "--mission", "mission whose sim: part describes the world", "MISSION", type=mission_file)
     _add_world_options(sim)

@@ -7,6 +7,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import yaml
 from pydantic import Field, model_validator
 
@@ -20,6 +21,8 @@ MOST_ROTORS = 8
 PLACED_M = 1e-3
 # Of all thrust, PX4's MPC_THR_MIN: with what a vehicle that is asked to fall still steers.
 THRUST_MIN = 0.12
+# Of all thrust, what hovering takes at least: a fifth of the weight is left to sink and to brake a climb with.
+LEAST_HOVER = 1.25 * THRUST_MIN
 # Above this share of the way from MPC_THR_MIN to hover's thrust PX4 takes no vehicle for landed
 # (MulticopterLandDetector.cpp).
 NO_THRUST_SHARE = 0.1
@@ -264,21 +267,6 @@ class Airframe(Part):
         return self
 
     @model_validator(mode="after")
-    def _can_fly(self) -> "Airframe":
-        if self.hover_fraction > 0.9:
-            raise ValueError(
-                f"hovering would take {100 * self.hover_fraction:.0f} % of the greatest thrust; "
-                "raise motors.max_thrust_n or lower mass_kg so that it takes at most 90 %"
-            )
-        most_idle = THRUST_MIN + NO_THRUST_SHARE * max(0.0, self.hover_fraction - THRUST_MIN)
-        if self.motors.idle_fraction > most_idle:
-            raise ValueError(
-                f"motors that idle at {100 * self.motors.idle_fraction:.0f} % of their thrust keep PX4 from seeing a "
-                f"landing; lower motors.idle_fraction to {math.floor(100 * most_idle) / 100:g} or less"
-            )
-        return self
-
-    @model_validator(mode="after")
     def _is_a_multicopter(self) -> "Airframe":
         if not self.rotors:
             return self
@@ -293,6 +281,12 @@ class Airframe(Part):
             )
         if 2 * sum(rotor.direction == "cw" for rotor in self.rotors) != len(self.rotors):
             raise ValueError("rotors: let half of them turn cw and half ccw, else the vehicle turns about itself")
+        made = [
+            (x, y, 1.0 if rotor.direction == "ccw" else -1.0)
+            for (x, y), rotor in zip(places_m, self.rotors, strict=True)
+        ]
+        if np.linalg.matrix_rank(np.array(made), tol=PLACED_M) < 3:
+            raise ValueError("rotors: placed and turning so, they cannot roll, pitch and yaw the vehicle one by one")
         furthest_m, said_m = max(math.hypot(*place) for place in places_m), self.geometry.motor_radius_m
         if abs(furthest_m - said_m) > PLACED_M:
             raise ValueError(
@@ -304,6 +298,27 @@ class Airframe(Part):
             raise ValueError(
                 f"rotors: two are {nearest_m:.3f} m apart, their guards would overlap; "
                 f"make geometry.guard_radius_m {nearest_m / 2:.3f} or less"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _can_fly(self) -> "Airframe":
+        if self.hover_fraction > 0.9:
+            raise ValueError(
+                f"hovering would take {100 * self.hover_fraction:.0f} % of the greatest thrust; "
+                "raise motors.max_thrust_n or lower mass_kg so that it takes at most 90 %"
+            )
+        if self.hover_fraction < LEAST_HOVER:
+            raise ValueError(
+                f"hovering would take {100 * self.hover_fraction:.0f} % of the greatest thrust, and PX4 asks for no "
+                f"less than {100 * THRUST_MIN:.0f} %: the vehicle could not sink; "
+                f"lower motors.max_thrust_n so that it takes at least {100 * LEAST_HOVER:.0f} %"
+            )
+        most_idle = THRUST_MIN + NO_THRUST_SHARE * max(0.0, self.hover_fraction - THRUST_MIN)
+        if self.motors.idle_fraction > most_idle:
+            raise ValueError(
+                f"motors that idle at {100 * self.motors.idle_fraction:.0f} % of their thrust keep PX4 from seeing a "
+                f"landing; lower motors.idle_fraction to {math.floor(100 * most_idle) / 100:g} or less"
             )
         return self
 
