@@ -32,7 +32,7 @@ class Scene(Part):
     """Everything about the simulated world that a mission file may state."""
 
     airframe: str = "foldable"
-    """foldable, rigid, or the path of an airframe file."""
+    """foldable, rigid, hexa, octo, racer, or the path of an airframe file."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Of every random number of the simulated vehicle."""
     start: Start = Start()

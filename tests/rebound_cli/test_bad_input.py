@@ -54,7 +54,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (("fly", WALL, "--lockstep", "--airframe", "foldible"), ("foldible", "foldable, rigid")),
+        (("fly", WALL, "--lockstep", "--airframe", "foldible"), ("foldible", "foldable, hexa, octo")),
         (("airframe", "px4", "--airframe", "none"), ("foldable", "rigid")),
         (("fly", "--sim", "no-such-mission.yaml"), ("no-such-mission.yaml",)),
         ((*CONNECTED, "serial:///dev/ttyNONE:921600"), ("/dev/ttyNONE does not exist",)),
