@@ -5,10 +5,7 @@ from collections.abc import Sequence
 from companion.flight.context import FlightContext, Transition
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MotorOutputs, Sample
-from companion.motion.motors import MotorWatch
-
-# Vehicles whose motors SERVO_OUTPUT_RAW shows, and how many they have.
-ROTORS = {"quadrotor": 4, "hexarotor": 6, "octorotor": 8}
+from companion.motion.motors import ROTORS, MotorWatch
 
 
 def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> None:

@@ -29,6 +29,8 @@ LEAST_HARDER = 0.04
 # Largest difference among the other three motors, in increases of the first. A weight that shifts towards one motor
 # relieves the opposite one: the other three then differ by 0.5. For one damaged motor they do not differ. Half way.
 MOST_UNLIKE = 0.25
+# How many of SERVO_OUTPUT_RAW are motors, by the vehicle's type.
+ROTORS = {"quadrotor": 4, "hexarotor": 6, "octorotor": 8}
 # Largest increase of any other of six or eight motors, in increases of the first. By the pseudo-inverse of an even ring
 # it is 0 of six and 0.33 of eight for one damaged motor, 0.5 and 0.71 for a weight that shifts towards one. Half way.
 MOST_SHARED = {6: 0.25, 8: 0.52}

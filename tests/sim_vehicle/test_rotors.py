@@ -18,7 +18,7 @@ from tests.simulated import simulated
 
 # Vehicles, each flown in a thirtieth of a second.
 DRAWN = 40
-LEFT_AND_RIGHT = ("cw", "cw", "ccw", "ccw")
+SIDES = ("cw", "cw", "ccw", "ccw")
 
 
 def ring(count: int, radius_m: float, stretch: float = 1.0) -> list[dict[str, Any]]:
@@ -39,7 +39,7 @@ def ring(count: int, radius_m: float, stretch: float = 1.0) -> list[dict[str, An
         ({"rotors": ring(6, 0.3)}, r"0\.300 m from the centre, geometry\.hub_radius_m and arm_length_m say 0\.145 m"),
         ({"rotors": ring(8, 0.145)}, r"guards would overlap; make geometry\.guard_radius_m 0\.055 or less"),
         # Left ccw, right cw: what rolls also yaws
-        ({"rotors": [rotor | {"direction": LEFT_AND_RIGHT[at]} for at, rotor in enumerate(ring(4, 0.145))]}, "one by one"),
+        ({"rotors": [rotor | {"direction": SIDES[at]} for at, rotor in enumerate(ring(4, 0.145))]}, "one by one"),
     ],
 )  # fmt: skip
 def test_rotors_that_cannot_fly_are_refused(part: dict[str, Any], words: str) -> None:
