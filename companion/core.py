@@ -34,7 +34,6 @@ from companion.messages import (
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
 from companion.motion.vector import ZERO, plus
-from companion.px4_mode import mode_name
 from companion.reflex.collision import CollisionReport
 from companion.reflex.config import HELD_S, NOTICED_S
 from companion.reflex.detector import Situation
@@ -261,7 +260,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         latest = vehicle.history.latest()
         return Status(
             state=self.machine.state.value,
-            vehicle_mode="" if vehicle.custom_mode is None else mode_name(vehicle.custom_mode),
+            vehicle_mode=vehicle.mode_name,
             armed=vehicle.armed is True,
             position_ned_m=None if latest is None else latest.position_ned_m,
             speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),

@@ -252,10 +252,13 @@ class AutopilotVersion(Sample):
 
 @dataclass(frozen=True, slots=True)
 class SetMode:
-    """MAV_CMD_DO_SET_MODE; `custom_mode` in PX4's packing (main << 16 | sub << 24)."""
+    """MAV_CMD_DO_SET_MODE; how it names the mode differs between autopilots (see interface.Autopilot)."""
 
     command_id: ClassVar[int] = 176
     custom_mode: int
+    name: str
+    parameters: tuple[int, int]
+    """The second and the third of the command."""
 
 
 @dataclass(frozen=True, slots=True)

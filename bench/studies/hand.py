@@ -15,7 +15,8 @@ from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row
 from bench.fly.campaign import Campaign, Workers, rows_of
 from bench.rows.tables import Page, at_most_an_hour, by_each
-from companion.guard.config import DEFAULT_MODES, GuardConfig
+from companion.autopilot.known import GUARDED_MODES
+from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
@@ -86,7 +87,7 @@ def fly_by_hand(case: HandCase) -> Row:
 
 def _config(built: BenchVehicle, imu_hz: int) -> GuardConfig:
     settings = {**built.settings, "streams": {"highres_imu_hz": float(imu_hz)}}
-    return GuardConfig.model_validate({"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings})
+    return GuardConfig.model_validate({"modes": (*GUARDED_MODES, "STABILIZED"), "companion": settings})
 
 
 def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[str, float]]:

@@ -266,6 +266,9 @@ class FlightContext:
         is_over = silent_us >= OLD_NEWS_US or waited_s >= self.mission.companion.link.silence_s
         return is_over or (self.vehicle.mode_received_us == now_us and self.vehicle.is_mode_known)
 
+    def ask_for_mode(self, custom_mode: int) -> None:
+        self.command_client.begin(self.vehicle.autopilot.set_mode(custom_mode))
+
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
         """Advance the command client; report a failure."""
         send, outcome = self.command_client.step(inputs.acks, seen, now_us, self.may_command(now_us))

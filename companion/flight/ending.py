@@ -7,8 +7,7 @@ from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target, 
 from companion.flight.states import State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
 from companion.link.vehicle import ModeReport
-from companion.messages import LandedState, SetArmed, SetMode, Vector3
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, mode_name
+from companion.messages import LandedState, SetArmed, Vector3
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
 ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
@@ -52,7 +51,7 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
         return None
     if state is State.LANDING and _may_be_down(flight, now_us):
         return None
-    mode = mode_name(vehicle.mode.custom_mode)
+    mode = vehicle.mode_name
     if holder is Holder.FAILSAFE:
         return Transition(Trigger.CONTROL_LOST, f"a failsafe of the vehicle took over in {mode}; setpoints stopped")
     return Transition(Trigger.CONTROL_LOST, f"the pilot took over in {mode}; setpoints stopped")
@@ -64,7 +63,7 @@ def _may_be_down(flight: FlightContext, now_us: int) -> bool:
     Nothing is sent meanwhile: the setpoints ended when the land mode was confirmed.
     """
     vehicle = flight.vehicle
-    if flight.expected_mode != AUTO_LAND:
+    if flight.expected_mode != vehicle.autopilot.land:
         return False
     if vehicle.armed is False or vehicle.landed is LandedState.ON_GROUND:
         return True
@@ -90,7 +89,7 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition
     if text is None:
         return None
     # A vehicle that has been told to land is already doing what is safe.
-    landing = state is State.LANDING and flight.expected_mode == AUTO_LAND
+    landing = state is State.LANDING and flight.expected_mode == flight.vehicle.autopilot.land
     flight.report(now_us, "link", text, silent_s=round(silent_s, 3))
     return Transition(Trigger.INTERRUPTED, text, hand_over=not landing)
 
@@ -190,7 +189,8 @@ class HandOver:
         self.finished = False
         self._target = None if flight.target is None else flight.target.at_rest()
         self._previous_mode = flight.expected_mode
-        self._mode = AUTO_LAND if flight.mission.on_interrupt == "land" else AUTO_LOITER
+        self._autopilot = flight.vehicle.autopilot
+        self._mode = self._autopilot.land if flight.mission.on_interrupt == "land" else self._autopilot.hold
         # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
         self._disarming = flight.arming_requested and flight.armed_at_us is None
         flight.command_client.cancel()
@@ -216,17 +216,17 @@ class HandOver:
             if not flight.is_time_to_give_away(self._began_us, now_us):
                 return None
             self._is_asked = True
-            flight.command_client.begin(SetMode(self._mode))
+            flight.ask_for_mode(self._mode)
         outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == self._mode, now_us)
         if outcome is None:
             return None
         if outcome.succeeded:
-            flight.report(now_us, "mode", f"handed over to {mode_name(self._mode)}")
-        elif outcome.refused and self._mode == AUTO_LOITER:
+            flight.report(now_us, "mode", f"handed over to {self._autopilot.mode_name(self._mode)}")
+        elif outcome.refused and self._mode == self._autopilot.hold:
             # PX4 holds only with a global position; without one (motion capture alone) it still lands.
-            self._mode = AUTO_LAND
+            self._mode = self._autopilot.land
             flight.report(now_us, "mode", "the vehicle does not hold: asking it to land")
-            flight.command_client.begin(SetMode(self._mode))
+            flight.ask_for_mode(self._mode)
             return None
         self._finish(flight)
         return None
@@ -238,7 +238,7 @@ class HandOver:
         holder = who_decided(report, self._previous_mode, self._mode)
         if holder is Holder.COMPANION:
             return False
-        flight.report(now_us, "mode", f"{holder.value} took over in {mode_name(report.custom_mode)}")
+        flight.report(now_us, "mode", f"{holder.value} took over in {self._autopilot.mode_name(report.custom_mode)}")
         return True
 
     def _finish(self, flight: FlightContext) -> None:

@@ -18,7 +18,6 @@ from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 from companion.flight.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.mission.items import TakeoffItem
-from companion.px4_mode import OFFBOARD
 
 
 class StateMachine(ABC):
@@ -157,7 +156,8 @@ class Machine(StateMachine):
             case State.RECOVERING:
                 assert flight.reflex.recovery is not None, "a collision begins one"
                 recovery = Recover(flight, flight.reflex.recovery)
-                return recovery if flight.expected_mode == OFFBOARD else TakeBack(flight, recovery, now_us)
+                flies = flight.expected_mode == flight.vehicle.autopilot.setpoints
+                return recovery if flies else TakeBack(flight, recovery, now_us)
             case State.HOLDING:
                 return HoldAfterRecovery(flight, now_us)
             case State.RETURNING:

@@ -4,11 +4,10 @@ import math
 
 from companion.flight.context import FlightContext, Inputs, StateHandler, Target, Transition, as_text
 from companion.flight.states import Trigger
-from companion.messages import SetArmed, SetMode, Vector3
+from companion.messages import SetArmed, Vector3
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
 from companion.motion.rotation import yaw_rad
-from companion.px4_mode import AUTO_LAND, OFFBOARD
 
 # The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.
 ORIGIN_MEAN_US = 1_000_000
@@ -53,17 +52,17 @@ class TakeOff:
         if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
             self._now = self._switch
             flight.expected_mode = flight.vehicle.custom_mode
-            flight.command_client.begin(SetMode(OFFBOARD))
+            flight.ask_for_mode(flight.vehicle.autopilot.setpoints)
             return self._switch(flight, Inputs(), now_us)
         return None
 
     def _switch(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
+        outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
         if outcome is None:
             return None
         if not outcome.succeeded:
             return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
-        flight.expected_mode = OFFBOARD
+        flight.expected_mode = flight.vehicle.autopilot.setpoints
         self._now = self._arm
         flight.arming_requested = True
         flight.command_client.begin(SetArmed(True))
@@ -143,7 +142,7 @@ class Land:
         self._target = flight.target
         self._landing = False
         flight.is_landing = True
-        flight.command_client.begin(SetMode(AUTO_LAND))
+        flight.ask_for_mode(flight.vehicle.autopilot.land)
 
     def target(self, now_us: int) -> Target | None:
         return None if self._landing else self._target
@@ -152,13 +151,14 @@ class Land:
         if flight.vehicle.armed is False:
             return Transition(Trigger.DISARMED)
         if not self._landing:
-            outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == AUTO_LAND, now_us)
+            vehicle = flight.vehicle
+            outcome = flight.command_outcome(inputs, vehicle.custom_mode == vehicle.autopilot.land, now_us)
             if outcome is None:
                 return None
             if not outcome.succeeded:
                 return Transition(Trigger.INTERRUPTED, f"no landing: {outcome.text}", hand_over=True)
             self._landing = True
-            flight.expected_mode = AUTO_LAND
+            flight.expected_mode = flight.vehicle.autopilot.land
             flight.report(now_us, "landing", "landing here")
         if now_us - self._started_us > LANDING_TIMEOUT_US:
             seconds = LANDING_TIMEOUT_US // 1_000_000
@@ -180,7 +180,7 @@ class TakeBack:
         self._recovery = recovery
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.
-        self._is_asked = flight.command_client.requested_mode == OFFBOARD
+        self._is_asked = flight.command_client.requested_mode == flight.vehicle.autopilot.setpoints
         self._ask_us = now_us + (0 if self._is_asked else LEAD_US)
         if not self._is_asked:
             flight.command_client.cancel()
@@ -192,10 +192,10 @@ class TakeBack:
         if not self._is_taken and now_us >= self._ask_us:
             if not self._is_asked:
                 self._is_asked = True
-                flight.command_client.begin(SetMode(OFFBOARD))
-            outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
+                flight.ask_for_mode(flight.vehicle.autopilot.setpoints)
+            outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
             if outcome is not None and not outcome.succeeded:
                 return Transition(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
             if outcome is not None:
-                self._is_taken, flight.expected_mode = True, OFFBOARD
+                self._is_taken, flight.expected_mode = True, flight.vehicle.autopilot.setpoints
         return self._recovery.step(flight, inputs, now_us)

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 from companion import messages
+from companion.autopilot.interface import Pilot
 from companion.flight.context import FlightContext
 from companion.flight.envelope import LOSS_PARAMETER, longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
 from companion.messages import MessageId, Sample
-from companion.px4_mode import is_by_hand, mode_name
 from companion.reflex.config import HELD_S
 from companion.reflex.detector import NO_POSITION, Situation
 
@@ -53,7 +53,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
     if vehicle.conflicts > conflicts:
         _report_conflict(flight, now_us)
     if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
-        flight.report(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
+        flight.report(now_us, "mode", f"mode {vehicle.mode_name}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.report(now_us, "disarmed", "disarmed")
     if was_known and not vehicle.is_mode_known:
@@ -128,7 +128,7 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool) 
         landed_state=flight.vehicle.landed,
         height_m=height_m,
         descent_commanded=goes_down,
-        flown_by_hand=is_by_hand(flight.vehicle.custom_mode or 0),
+        flown_by_hand=flight.vehicle.pilot in (Pilot.STICKS, Pilot.HAND),
         has_climbed=flight.has_climbed,
         has_position=flight.has_position,
         is_wreck=flight.is_wreck,

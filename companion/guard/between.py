@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from companion.autopilot.known import ASSUMED
 from companion.mavlink.decode import Decoder, checksum_holds
 from companion.mavlink.moves import SETPOINT_IDS, asked_by, interval_asked, would_move
 from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, has_signature, message_id_of, payload_of, source_of
@@ -53,6 +54,7 @@ class Between:
         """`bytes_per_s`: what the link to the vehicle carries. `signs`: the guard has the vehicle's key."""
         self.is_closed = True  # until the guard has met the vehicle
         self.awaits_choice = False  # setpoints are kept out until somebody asks for a mode
+        self.autopilot = ASSUMED  # whose modes are told apart
         self.kept_out = 0  # packets
         self.intervals: list[SetMessageInterval] = []  # asked for by clients, and not yet told to the guard
         self._setpoint: Asked | None = None
@@ -147,7 +149,7 @@ class Between:
 
     def _lets_pass(self, packet: bytes) -> bool:
         self._setpoint = asked_by(packet) or self._setpoint
-        if (self.is_closed or self.awaits_choice) and would_move(packet):
+        if (self.is_closed or self.awaits_choice) and would_move(packet, self.autopilot):
             if self.is_closed or message_id_of(packet) in SETPOINT_IDS:
                 self.kept_out += 1
                 return False

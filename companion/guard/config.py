@@ -4,20 +4,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
+from companion.autopilot.known import GUARDED_MODES, MODE_NAMES, NAMES
 from companion.fence import Fence
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from companion.mission.policy import OnCrash, SetpointLimits
-from companion.px4_mode import MODE_NAMES
 from companion.reflex.config import RecoveryConfig
 from companion.strict_model import Positive, StrictModel
-
-# Modes in which PX4 itself holds a position or a height. Not AUTO.LAND: its end is a hit on the ground. Not the modes
-# that a pilot flies by attitude: there the stick is the only brake, and it is not to be taken away unasked.
-DEFAULT_MODES = (
-    *("POSCTL", "ALTCTL", "OFFBOARD"),
-    *("AUTO.TAKEOFF", "AUTO.LOITER", "AUTO.MISSION", "AUTO.RTL", "AUTO.FOLLOW"),
-)
 
 
 class GuardConfig(StrictModel):
@@ -25,7 +18,7 @@ class GuardConfig(StrictModel):
 
     retired = frozenset({"beside_program"})
 
-    modes: Annotated[tuple[str, ...], Field(min_length=1)] = DEFAULT_MODES
+    modes: Annotated[tuple[str, ...], Field(min_length=1)] = GUARDED_MODES
     """PX4's modes that the guard may take over."""
     then: Literal["previous", "hold"] = "hold"
     """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
@@ -58,7 +51,7 @@ class GuardConfig(StrictModel):
     def _known_modes(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
         for mode in modes:
             if mode not in MODE_NAMES:
-                raise ValueError(f"{mode!r} is no mode of PX4: choose from {', '.join(sorted(MODE_NAMES))}")
+                raise ValueError(f"{mode!r} is no mode of {NAMES}: choose from {', '.join(sorted(MODE_NAMES))}")
         return modes
 
     def as_mission(self) -> Mission:

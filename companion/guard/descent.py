@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from companion.autopilot.interface import Pilot
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.messages import LandedState, PositionTarget, Sample, Sticks
 from companion.motion.config import SAME_M_S
-from companion.px4_mode import AUTO_LAND, AUTO_PRECLAND, by_hand_alone, by_sticks
 
 # Stick deflection around the middle that asks for no climb: PX4's MPC_HOLD_DZ.
 STICK_DEADZONE = 0.1
@@ -33,10 +33,10 @@ class Descent:
 
         So it is where the sticks ask for velocities, and nothing has ever told which.
         """
-        mode = vehicle.custom_mode or 0
-        if vehicle.landed is LandedState.LANDING or mode in (AUTO_LAND, AUTO_PRECLAND) or by_hand_alone(mode):
+        if vehicle.landed is LandedState.LANDING or vehicle.descends or vehicle.pilot is Pilot.HAND:
             return True
-        if by_sticks(mode) and (self.setpoint_us is None if self.throttle is None else self.throttle < -STICK_DEADZONE):
+        sinks = self.setpoint_us is None if self.throttle is None else self.throttle < -STICK_DEADZONE
+        if vehicle.pilot is Pilot.STICKS and sinks:
             return True
         is_current = self.setpoint_us is not None and now_us - self.setpoint_us < OLD_NEWS_US
         return is_current and self.velocity_down_m_s > SAME_M_S

@@ -38,6 +38,7 @@ class Guard(Stepped[GuardCore]):
         if self._core is not None:
             between.is_closed = self.holds
             handler, vehicle = self._core.machine.handler, self._core.flight.vehicle
+            between.autopilot = vehicle.autopilot
             begins = isinstance(handler, GuardConnect) and handler.begins
             if vehicle.armed is False:
                 between.awaits_choice = False

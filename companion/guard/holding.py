@@ -2,6 +2,7 @@
 
 import math
 
+from companion.autopilot.interface import Pilot
 from companion.flight.context import Inputs, NoSetpoint, Target
 from companion.flight.crash import Crashed
 from companion.flight.ending import silent_position
@@ -10,8 +11,7 @@ from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
 from companion.guard.watching import OTHERS_STOPPED_US
-from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand, SetMode
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, is_auto, mode_name
+from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand
 
 # The vehicle reports its setpoint. Further than this from all that was sent, it is somebody else's: at 12 m/s a moving
 # setpoint advances 0.24 m from one to the next.
@@ -32,18 +32,18 @@ class TakeOver:
     def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
         self.recover = recover
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
-        if guard.vehicle.custom_mode != OFFBOARD:
-            guard.command_client.begin(SetMode(OFFBOARD))
+        if not guard.vehicle.flies_setpoints:
+            guard.ask_for_mode(guard.vehicle.autopilot.setpoints)
 
     def target(self, now_us: int) -> Target | None:
         return self.recover.target(now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        is_seen = guard.vehicle.custom_mode == OFFBOARD
+        is_seen = guard.vehicle.flies_setpoints
         outcome = guard.command_outcome(inputs, is_seen, now_us)
         took_ms = (now_us - self._began_us) / 1e3
         if is_seen:
-            guard.expected_mode = OFFBOARD
+            guard.expected_mode = guard.vehicle.autopilot.setpoints
             text = "OFFBOARD already, the program's setpoints kept out" if outcome is None else "OFFBOARD confirmed"
             guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return GuardTransition(Trigger.CONFIRMED)
@@ -93,7 +93,7 @@ class Recovering:
         setpoints PX4 leaves OFFBOARD, and flies to its own places until they come again.
         """
         late_us = now_us - guard.trajectory_us
-        if late_us != self._late_us or guard.vehicle.custom_mode != OFFBOARD:
+        if late_us != self._late_us or not guard.vehicle.flies_setpoints:
             self._late_us, self._since_us = late_us, now_us
             self._foreign, self._asked_us = 0, None
 
@@ -132,7 +132,7 @@ class GiveBack:
         self._wishes: list[int] = []
         if guard.config.then == "previous" and not guard.then_hold and previous is not None:
             self._wishes.append(previous)
-        self._wishes += [AUTO_LOITER, AUTO_LAND]
+        self._wishes += [guard.vehicle.autopilot.hold, guard.vehicle.autopilot.land]
         self._target = guard.target.at_rest() if guard.target and not is_crossed else None
         self._began_us = now_us
         self._is_asked = self._is_told = False
@@ -150,9 +150,11 @@ class GiveBack:
         if not self._is_told:
             self._is_told = True
             guard.report(now_us, "not_back", f"not given back: {reason}")
-        heard_us = guard.others_setpoint_us if self.wish == OFFBOARD else guard.sticks_us
+        autopilot = guard.vehicle.autopilot
+        heard_us = guard.others_setpoint_us if self.wish == autopilot.setpoints else guard.sticks_us
         streams = heard_us is not None and now_us - heard_us < OTHERS_STOPPED_US
-        if not is_auto(self.wish) and streams and inputs.stop_reason is None and silent_position(guard) is None:
+        may_wait = autopilot.pilot(self.wish) is not Pilot.AUTOPILOT and inputs.stop_reason is None
+        if may_wait and streams and silent_position(guard) is None:
             return True
         self._wishes.pop(0)
         self._began_us, self._is_doubted = now_us, False
@@ -164,7 +166,7 @@ class GiveBack:
 
     def _ask(self, guard: GuardContext) -> None:
         if guard.vehicle.custom_mode != self.wish:
-            guard.command_client.begin(SetMode(self.wish))
+            guard.ask_for_mode(self.wish)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         if self._waits(guard, inputs, now_us):
@@ -178,8 +180,9 @@ class GiveBack:
         outcome = guard.command_outcome(inputs, is_seen, now_us)
         if is_seen:
             took_ms = (now_us - self._began_us) / 1e3
-            text = f"given back to {mode_name(self.wish)} after {took_ms:.0f} ms"
-            guard.report(now_us, "given_back", text, mode=mode_name(self.wish), after_ms=took_ms)
+            name = guard.vehicle.mode_name
+            text = f"given back to {name} after {took_ms:.0f} ms"
+            guard.report(now_us, "given_back", text, mode=name, after_ms=took_ms)
             return GuardTransition(Trigger.GIVEN_BACK)
         if outcome is None:
             return None
@@ -200,9 +203,9 @@ class StandDown:
     def __init__(self, guard: GuardContext, for_sticks: bool, now_us: int) -> None:
         self._until_us = now_us + HAND_OVER_US
         self._target: Target | None = None
-        if for_sticks and guard.vehicle.custom_mode == OFFBOARD and guard.target is not None:
+        if for_sticks and guard.vehicle.flies_setpoints and guard.target is not None:
             self._target = guard.target.at_rest()
-            guard.command_client.begin(SetMode(POSCTL))
+            guard.ask_for_mode(guard.vehicle.autopilot.sticks)
 
     @property
     def hands_over(self) -> bool:
@@ -214,7 +217,7 @@ class StandDown:
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         if self._target is not None:
-            is_seen = guard.vehicle.custom_mode != OFFBOARD
+            is_seen = not guard.vehicle.flies_setpoints
             outcome = guard.command_outcome(inputs, is_seen, now_us)
             if outcome is not None or now_us > self._until_us:
                 self._target = None

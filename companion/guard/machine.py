@@ -18,7 +18,6 @@ from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import GuardConnect, StandBy, Watching
 from companion.messages import Asked, Sticks
 from companion.motion.rotation import yaw_rad
-from companion.px4_mode import OFFBOARD, mode_name
 from companion.reflex.detector import ImpactKind
 
 # What is told of a move that has a story.
@@ -109,13 +108,13 @@ class GuardMachine(StateMachine):
     def _is_beside_program(self) -> bool:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
         guard, is_watching = self.flight, self.state is State.WATCHING
-        flies = is_watching and guard.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out
+        flies = is_watching and guard.vehicle.flies_setpoints and not guard.keeps_others_out
         return flies or (guard.program_elsewhere and (is_watching or self.state is State.GIVING_BACK))
 
     def _led_back(self) -> GuardTransition | None:
         """A program that was given back to, and would hit the same again."""
         guard, asked = self.flight, self.flight.asked
-        was_given = guard.config.then == "previous" and guard.hits and guard.vehicle.custom_mode == OFFBOARD
+        was_given = guard.config.then == "previous" and guard.hits and guard.vehicle.flies_setpoints
         if self.state is not State.WATCHING or not was_given or asked is None or asked is self.judged:
             return None
         self.judged = asked
@@ -163,9 +162,10 @@ class GuardMachine(StateMachine):
             return STICKS
         if report is None or expected is None:
             return None
-        if self.state is State.GIVING_BACK and report.custom_mode == OFFBOARD:
+        offboard = guard.vehicle.autopilot.setpoints
+        if self.state is State.GIVING_BACK and report.custom_mode == offboard:
             # Late: it was asked for, and given up.
-            guard.expected_mode = expected = OFFBOARD
+            guard.expected_mode = expected = offboard
         requested = guard.command_client.requested_mode
         if isinstance(self.handler, GiveBack):
             requested = self.handler.wish
@@ -173,14 +173,14 @@ class GuardMachine(StateMachine):
         if holder is Holder.COMPANION:
             guard.foreign_mode_since_us = None
             return None
-        is_late = OFFBOARD in (expected, requested) and report.intended_custom_mode in (None, OFFBOARD)
+        is_late = offboard in (expected, requested) and report.intended_custom_mode in (None, offboard)
         if holder is Holder.FAILSAFE and is_late:
             if guard.foreign_mode_since_us is None:
                 guard.foreign_mode_since_us = guard.trajectory_us
             if guard.trajectory_us - guard.foreign_mode_since_us < RETURNS_US:
                 return None
         who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot or a program"
-        return f"{who} took over in {mode_name(report.custom_mode)}"
+        return f"{who} took over in {guard.vehicle.mode_name}"
 
     def _link_restored(self, now_us: int) -> GuardTransition | None:
         """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
@@ -216,7 +216,7 @@ class GuardMachine(StateMachine):
             case State.WATCHING:
                 return Watching(guard, now_us)
             case State.TAKING_OVER:
-                mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
+                mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode_name(guard.previous_mode)
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
                 guard.command_client.cancel()
                 return TakeOver(guard, self._recover(), now_us)

@@ -2,6 +2,7 @@
 
 import math
 
+from companion.autopilot.interface import Pilot
 from companion.flight.context import Target
 from companion.flight.obstacle_map import all_known
 from companion.guard.context import GuardContext
@@ -12,7 +13,6 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Asked, Vector3
 from companion.motion.rotation import yaw_rad
 from companion.motion.vector import ZERO, along
-from companion.px4_mode import AUTO_LOITER, OFFBOARD, is_auto, mode_name
 
 # PX4 brakes by this where MPC_ACC_HOR is what docs/how-to/guard.md has it set to. With PX4's default it needs less room
 # (reflex.config.BRAKES_M_S2).
@@ -26,17 +26,19 @@ CERTAIN = 2.0
 
 def leads_into(guard: GuardContext, mode: int) -> str | None:
     """Why the mode would hit again; None where it would not."""
-    if mode == OFFBOARD:
+    autopilot = guard.vehicle.autopilot
+    if mode == autopilot.setpoints:
         return _setpoints_lead_into(guard)
-    if mode == AUTO_LOITER or not guard.collisions:
+    if mode == autopilot.hold or not guard.collisions:
         return None
     contact = guard.collisions[-1].contact
-    if not is_auto(mode):
+    if autopilot.pilot(mode) is not Pilot.AUTOPILOT:
         pushed = -along(_sticks_ned(guard), contact.normal_ned) > STICK_DEADZONE
         return "the sticks push on into what was hit: release them" if pushed else None
     if -along(contact.velocity_ned_m_s, contact.normal_ned) < LEAST_SPEED_M_S:
         return None
-    return f"{mode_name(mode)} goes on into what was hit: change it and choose it again, or choose another mode"
+    name = autopilot.mode_name(mode)
+    return f"{name} goes on into what was hit: change it and choose it again, or choose another mode"
 
 
 def _sticks_ned(guard: GuardContext) -> Vector3:

@@ -9,7 +9,6 @@ from companion.flight.vehicle_update import update_vehicle
 from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, Sample, SetMessageInterval, VehicleCommand
-from companion.px4_mode import OFFBOARD, mode_name
 from companion.reflex.detector import NO_POSITION, ON_THE_GROUND
 
 # Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
@@ -63,7 +62,7 @@ def why_not(guard: GuardContext) -> str | None:
         return reason
     if guard.vehicle.failsafe:
         return "a failsafe flies"
-    name = mode_name(guard.vehicle.custom_mode or 0)
+    name = guard.vehicle.mode_name
     return None if name in guard.config.modes else f"{name} is not among the modes that may be taken over"
 
 
@@ -114,7 +113,7 @@ class StandBy(NoSetpoint):
             reason = "the round trip to the vehicle takes too long"
         if reason is None:
             assert vehicle.custom_mode is not None
-            return GuardTransition(Trigger.WORTH_GUARDING, f"watching {mode_name(vehicle.custom_mode)}")
+            return GuardTransition(Trigger.WORTH_GUARDING, f"watching {vehicle.mode_name}")
         if reason != self._told:
             self._told = reason
             guard.report(now_us, "standing_by", f"standing by: {reason}", reason=reason)
@@ -134,12 +133,12 @@ class Watching:
         seen_us = guard.others_setpoint_us
         streams_elsewhere = seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US
         streams_elsewhere = streams_elsewhere or guard.program_elsewhere
-        if latest is None or vehicle.custom_mode == OFFBOARD or streams_elsewhere:
+        if latest is None or vehicle.flies_setpoints or streams_elsewhere:
             return None
         return Target(latest.position_ned_m, None)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        if guard.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out:
+        if guard.vehicle.flies_setpoints and not guard.keeps_others_out:
             guard.program_elsewhere = True
         reason = why_not(guard)
         return None if reason is None else GuardTransition(Trigger.NOT_TO_GUARD, reason)

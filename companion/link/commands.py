@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from companion import messages
 from companion.messages import CommandResult
-from companion.px4_mode import mode_name
 
 # PX4 answers in 2 to 10 ms on UDP; a telemetry radio's round trip stays below half a second.
 ACK_TIMEOUT_US = 500_000
@@ -43,8 +42,8 @@ class CommandOutcome:
 
 def describe(command: messages.VehicleCommand) -> str:
     match command:
-        case messages.SetMode(custom_mode):
-            return f"mode {mode_name(custom_mode)}"
+        case messages.SetMode():
+            return f"mode {command.name}"
         case messages.SetArmed(armed):
             return "arm" if armed else "disarm"
         case messages.SetMessageInterval(message_id, interval_us):

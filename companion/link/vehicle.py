@@ -3,11 +3,12 @@
 from dataclasses import dataclass, field
 
 from companion import messages
+from companion.autopilot.interface import Autopilot, Pilot
+from companion.autopilot.known import ASSUMED, AUTOPILOTS, NAMES
 from companion.motion.history import MotionHistory
 
 # MAV_COMP_ID_AUTOPILOT1: gimbals, cameras and ground stations on the same link have other numbers.
 AUTOPILOT_COMPONENT_ID = 1
-MAV_AUTOPILOT_PX4 = 12
 
 # MAV_TYPE: hover, sideways force and land detection are the same for all of these.
 MULTICOPTERS = {2: "quadrotor", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 29: "dodecarotor", 35: "decarotor"}
@@ -29,6 +30,7 @@ class Identity:
     system_id: int
     component_id: int
     vehicle_type: str
+    autopilot: Autopilot
 
 
 def is_autopilot(heartbeat: messages.Heartbeat) -> bool:
@@ -37,14 +39,15 @@ def is_autopilot(heartbeat: messages.Heartbeat) -> bool:
 
 def identify(heartbeat: messages.Heartbeat) -> Identity | str:
     """The vehicle's identity, or one sentence why it cannot be flown."""
-    if heartbeat.autopilot != MAV_AUTOPILOT_PX4:
+    autopilot = AUTOPILOTS.get(heartbeat.autopilot)
+    if autopilot is None:
         name = OTHER_AUTOPILOTS.get(heartbeat.autopilot, "unknown autopilot")
-        return f"the vehicle's autopilot is not PX4 but {name} (MAV_AUTOPILOT {heartbeat.autopilot})"
+        return f"the vehicle's autopilot is not {NAMES} but {name} (MAV_AUTOPILOT {heartbeat.autopilot})"
     vehicle_type = MULTICOPTERS.get(heartbeat.vehicle_type)
     if vehicle_type is None:
         name = OTHER_TYPES.get(heartbeat.vehicle_type, "unknown type")
         return f"the vehicle is not a multicopter but: {name} (MAV_TYPE {heartbeat.vehicle_type})"
-    return Identity(heartbeat.system_id, heartbeat.component_id, vehicle_type)
+    return Identity(heartbeat.system_id, heartbeat.component_id, vehicle_type, autopilot)
 
 
 # MAV_STATE_CRITICAL and above: PX4 says so while a failsafe acts.
@@ -162,11 +165,34 @@ class Vehicle:
         self.armed, self.is_disarm_unconfirmed, self.is_disarm_unexplained = armed, False, False
 
     @property
+    def autopilot(self) -> Autopilot:
+        return ASSUMED if self.identity is None else self.identity.autopilot
+
+    @property
     def custom_mode(self) -> int | None:
         return self.mode.custom_mode if self.mode is not None else None
+
+    @property
+    def mode_name(self) -> str:
+        return "" if self.mode is None else self.autopilot.mode_name(self.mode.custom_mode)
+
+    @property
+    def pilot(self) -> Pilot | None:
+        """Who moves it, where the mode says so."""
+        return None if self.mode is None else self.autopilot.pilot(self.mode.custom_mode)
+
+    @property
+    def descends(self) -> bool:
+        """Whether its mode ends on the ground."""
+        return self.custom_mode in self.autopilot.descents
+
+    @property
+    def flies_setpoints(self) -> bool:
+        return self.custom_mode == self.autopilot.setpoints
 
     def autopilot_text(self) -> str:
         """For people and the report, for example "PX4 1.15.0"; empty before there is a vehicle."""
         if self.identity is None:
             return ""
-        return "PX4" if self.version is None else "PX4 " + ".".join(str(part) for part in self.version)
+        name = self.autopilot.name
+        return name if self.version is None else f"{name} " + ".".join(str(part) for part in self.version)

@@ -231,10 +231,8 @@ def _as_float(value: int | float) -> tuple[float, int]:
 def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
     """COMMAND_LONG's seven parameters; those without a meaning are 0, as PX4 wants them."""
     match command:
-        case messages.SetMode(custom_mode):
-            # param1 says that param2 and param3 hold PX4's main and sub mode
-            main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
-            used: tuple[float, ...] = (dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
+        case messages.SetMode():
+            used: tuple[float, ...] = (dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *command.parameters)
         case messages.SetArmed(armed, is_forced):
             used = (1.0 if armed else 0.0, _FORCE if is_forced else 0.0)
         case messages.SetMessageInterval(message_id, interval_us):

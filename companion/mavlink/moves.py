@@ -10,56 +10,55 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
+from companion.autopilot.interface import Autopilot, Pilot
 from companion.mavlink.packet import opened
 from companion.messages import Asked, SetMessageInterval, Vector3
-from companion.px4_mode import OFFBOARD
 
 Source: TypeAlias = tuple[int, int]
-Test: TypeAlias = Callable[[bytes, Source], bool]
+Test: TypeAlias = Callable[[bytes, Source, Autopilot], bool]
 
 # Both commands' packets begin with four parameters and have a place of three values and the command's number then. In
 # one the place has floats, in the other two whole numbers first.
 _LONG, _INT = struct.Struct("<7fH"), struct.Struct("<4f2ifH")
 _NO_PLACE_INT = 0x7FFF_FFFF
 _COMMAND_SIZE = 33
-# SET_MODE: the custom mode, whose third byte is PX4's main mode.
-_MODE = struct.Struct("<2xB")
+# SET_MODE: the custom mode.
+_MODE = struct.Struct("<I")
 # POSITION_TARGET_TYPEMASK: any of the three that is to be ignored.
 _NO_PLACE, _NO_VELOCITY = 0x007, 0x038
-_MAIN_OFFBOARD = OFFBOARD >> 16 & 0xFF
 # Companion computers, planners and cameras that fly (MAV_COMP_ID_ONBOARD_COMPUTER to VISUAL_INERTIAL_ODOMETRY). A hand
 # has its sticks on a ground station, which has any other number.
 _ON_BOARD = range(dialect.MAV_COMP_ID_ONBOARD_COMPUTER, dialect.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY + 1)
 
 
-def _always(payload: bytes, source: Source) -> bool:
+def _always(payload: bytes, source: Source, autopilot: Autopilot) -> bool:
     return True
 
 
-def _on_board(payload: bytes, source: Source) -> bool:
+def _on_board(payload: bytes, source: Source, autopilot: Autopilot) -> bool:
     return source[1] in _ON_BOARD
 
 
-def _mode_is_offboard(payload: bytes, source: Source) -> bool:
-    (main,) = _MODE.unpack_from(payload.ljust(_MODE.size, b"\0"))
-    return bool(main == _MAIN_OFFBOARD)
+def _mode_flies_setpoints(payload: bytes, source: Source, autopilot: Autopilot) -> bool:
+    (custom_mode,) = _MODE.unpack_from(payload.ljust(_MODE.size, b"\0"))
+    return autopilot.pilot(custom_mode) is Pilot.SETPOINTS
 
 
-def _long_moves(payload: bytes, source: Source) -> bool:
+def _long_moves(payload: bytes, source: Source, autopilot: Autopilot) -> bool:
     *parameters, command = _LONG.unpack_from(payload.ljust(_COMMAND_SIZE, b"\0"))
-    return _moves(command, parameters[:4], any(map(math.isfinite, parameters[4:])))
+    return _moves(autopilot, command, parameters[:4], any(map(math.isfinite, parameters[4:])))
 
 
-def _int_moves(payload: bytes, source: Source) -> bool:
+def _int_moves(payload: bytes, source: Source, autopilot: Autopilot) -> bool:
     *parameters, x, y, z, command = _INT.unpack_from(payload.ljust(_COMMAND_SIZE, b"\0"))
-    return _moves(command, parameters, {x, y} != {_NO_PLACE_INT} or math.isfinite(z))
+    return _moves(autopilot, command, parameters, {x, y} != {_NO_PLACE_INT} or math.isfinite(z))
 
 
-def _moves(command: int, parameters: list[float], has_place: bool) -> bool:
+def _moves(autopilot: Autopilot, command: int, parameters: list[float], has_place: bool) -> bool:
     """A reposition to no place is how QGroundControl stops the vehicle."""
     match command:
         case dialect.MAV_CMD_DO_SET_MODE:
-            return parameters[1] == _MAIN_OFFBOARD
+            return parameters[1] == autopilot.set_mode(autopilot.setpoints).parameters[0]
         case dialect.MAV_CMD_NAV_GUIDED_ENABLE:
             return parameters[0] > 0.0
         case dialect.MAV_CMD_DO_REPOSITION | dialect.MAV_CMD_DO_CHANGE_ALTITUDE:
@@ -77,7 +76,7 @@ KEPT_OUT: Mapping[int, tuple[Test, str]] = {
     dialect.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: (_always, _SETPOINT),
     dialect.MAVLINK_MSG_ID_MANUAL_CONTROL: (_on_board, _STICKS),
     dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: (_on_board, _STICKS),
-    dialect.MAVLINK_MSG_ID_SET_MODE: (_mode_is_offboard, _COMMAND),
+    dialect.MAVLINK_MSG_ID_SET_MODE: (_mode_flies_setpoints, _COMMAND),
     dialect.MAVLINK_MSG_ID_COMMAND_LONG: (_long_moves, _COMMAND),
     dialect.MAVLINK_MSG_ID_COMMAND_INT: (_int_moves, _COMMAND),
 }
@@ -112,11 +111,11 @@ def _vector(values: list[float | None]) -> Vector3 | None:
     return (north, east, down)
 
 
-def would_move(packet: bytes) -> bool:
+def would_move(packet: bytes, autopilot: Autopilot) -> bool:
     """Whether a whole packet, on its way to a vehicle that is being recovered, is to be kept out."""
     message_id, source, payload = opened(packet)
     test, _ = KEPT_OUT.get(message_id, (None, ""))
-    return test is not None and test(payload, source)
+    return test is not None and test(payload, source, autopilot)
 
 
 def interval_asked(packet: bytes) -> SetMessageInterval | None:

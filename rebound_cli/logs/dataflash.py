@@ -21,7 +21,7 @@ from pymavlink.DFReader import DFReader_binary, DFReader_text
 from pymavlink.mavutil import mode_mapping_acm
 
 from companion import messages
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
+from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
 from rebound_cli.logs.log import (
     QUADROTOR,
     Demand,

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Self, TypeAlias
 
 from companion import messages
+from companion.autopilot.px4.firmware import PX4
 from companion.errors import ReboundError
-from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, Identity, identify
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, Identity, identify
 from companion.messages import Heartbeat, ImuSample, MessageId, Sample, Vector3
 
 # Without these a detector loses something.
@@ -119,7 +120,7 @@ def in_order(heard: Iterable[LoggedSample], middle_us: float) -> tuple[LoggedSam
 def heartbeat(vehicle_type: int, armed: bool, custom_mode: int = 0, is_failing: bool = False) -> Heartbeat:
     """As a PX4 of that MAV_TYPE would send it."""
     status = _CRITICAL if is_failing else _ACTIVE if armed else _STANDBY
-    return Heartbeat(1, AUTOPILOT_COMPONENT_ID, vehicle_type, MAV_AUTOPILOT_PX4, armed, custom_mode, status)
+    return Heartbeat(1, AUTOPILOT_COMPONENT_ID, vehicle_type, PX4.mav_autopilot, armed, custom_mode, status)
 
 
 def multicopter(path: Path, vehicle_type: int) -> Identity:

@@ -367,8 +367,8 @@ def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
 @pytest.mark.parametrize(
     ("command", "number", "parameters"),
     [
-        (SetMode(6 << 16), 176, (1, 6, 0)),
-        (SetMode(4 << 16 | 6 << 24), 176, (1, 4, 6)),
+        (SetMode(6 << 16, "OFFBOARD", (6, 0)), 176, (1, 6, 0)),
+        (SetMode(4 << 16 | 6 << 24, "AUTO.LAND", (4, 6)), 176, (1, 4, 6)),
         (SetArmed(True), 400, (1, 0, 0)),
         (SetArmed(False), 400, (0, 0, 0)),
         (SetArmed(False, True), 400, (0, 21196, 0)),

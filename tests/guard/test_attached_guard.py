@@ -7,6 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
+from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.core import POLL_INTERVAL_US
 from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
@@ -15,7 +16,6 @@ from companion.guard.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.readers import GUARD_READERS, sample_from
 from companion.messages import PositionTarget, Refused
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
 from sim_vehicle.airframe import load_built_in

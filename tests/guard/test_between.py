@@ -23,6 +23,7 @@ from bench.fly.commanded import (
     fly_a_mission,
     sticks,
 )
+from companion.autopilot.px4.firmware import PX4
 from companion.guard.between import BURST_S, Between
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
@@ -295,7 +296,7 @@ ANY_STICKS = dialect.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0)
     ],
 )
 def test_of_commands_sticks_and_modes_only_what_would_move_the_vehicle_is_kept_out(packet, is_kept_out):
-    assert would_move(packet) is is_kept_out
+    assert would_move(packet, PX4) is is_kept_out
 
 
 # --- bytes

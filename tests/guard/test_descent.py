@@ -2,11 +2,11 @@
 
 import pytest
 
+from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
 from companion.guard.descent import STICK_DEADZONE, Descent
 from companion.link.vehicle import ModeReport, Vehicle
 from companion.messages import LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
 
 SECOND = 1_000_000
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16

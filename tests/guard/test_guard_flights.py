@@ -6,13 +6,13 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.commanded import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, fly_a_mission
+from companion.autopilot.px4.modes import AUTO_LAND
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.guard.watching import observe
 from companion.link.streams import StreamMonitor
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
-from companion.px4_mode import AUTO_LAND
 from companion.reflex.detector import Phase
 from tests.guard.flying import AttachedFlight
 from tests.guard.flying import GuardedFlight as Air

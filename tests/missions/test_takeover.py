@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, POSCTL
+from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, POSCTL
 from tests.flying import Flight, in_a_child
 from tests.missions.test_confirming import ITEMS
 from tests.simulated import simulated, wall

@@ -9,8 +9,9 @@ import numpy as np
 
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.fly.by_hand.watched import GuardedFlight, Sticks
+from companion.autopilot.known import GUARDED_MODES
 from companion.companion import Companion
-from companion.guard.config import DEFAULT_MODES, GuardConfig
+from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mission.model import Mission
 from companion.motion.config import GRAVITY_M_S2
@@ -118,7 +119,7 @@ def begun(
     away_m, side_rad = RTL_AWAY_M * (case.way == "AUTO.RTL"), rng.uniform(-math.pi, math.pi)
     place = (away_m * math.cos(side_rad), away_m * math.sin(side_rad), -height_m)
     vehicle.begin_in_flight(place, (0.0, 0.0, 0.0))
-    config = GuardConfig.model_validate({"modes": (*DEFAULT_MODES, "STABILIZED"), "companion": settings})
+    config = GuardConfig.model_validate({"modes": (*GUARDED_MODES, "STABILIZED"), "companion": settings})
     return GuardedFlight(vehicle, Guard(config)), error_m
 
 

@@ -12,10 +12,10 @@ from unittest.mock import Mock
 
 import pytest
 
+from companion.autopilot.px4.modes import AUTO_LOITER, OFFBOARD
 from companion.companion import StepResult
 from companion.mavlink.packet import message_id_of
 from companion.messages import ComputerStatus
-from companion.px4_mode import AUTO_LOITER, OFFBOARD
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from companion.shell.tlog import read_tlog
 from rebound_cli import background

@@ -5,6 +5,7 @@ import math
 import pytest
 from scipy.signal import butter, lfilter
 
+from companion.autopilot.px4.modes import mode_name
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -17,7 +18,6 @@ from companion.messages import (
     Vibration,
 )
 from companion.motion.rotation import body_to_ned
-from companion.px4_mode import mode_name
 from rebound_cli.logs.log import Demand, LogError
 from rebound_cli.logs.reader import read_log
 from tests.rebound_cli.logs.dataflash_file import NEW, OLD, dataflash, new_imu, old_imu, text

@@ -4,6 +4,7 @@ import struct
 
 import pytest
 
+from companion.autopilot.px4.modes import AUTO_LAND, OFFBOARD
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -15,7 +16,6 @@ from companion.messages import (
     Odometry,
     Vibration,
 )
-from companion.px4_mode import AUTO_LAND, OFFBOARD
 from rebound_cli.logs.log import Demand, LogError
 from rebound_cli.logs.reader import read_log
 from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog

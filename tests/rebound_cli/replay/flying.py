@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.detectors.config import BaselineConfig
+from companion.autopilot.px4.modes import OFFBOARD
 from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState, LocalPosition
-from companion.px4_mode import OFFBOARD
 from rebound_cli.logs.log import Log, LoggedSample
 
 LATERAL = BaselineConfig(detector="lateral")

@@ -1,0 +1,10 @@
+"""The autopilots that can be flown."""
+
+from companion.autopilot.px4.firmware import PX4
+
+AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4,)}
+# Of a vehicle that has not announced itself yet.
+ASSUMED = PX4
+NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values())
+MODE_NAMES = frozenset(name for autopilot in AUTOPILOTS.values() for name in autopilot.mode_names)
+GUARDED_MODES = tuple(mode for autopilot in AUTOPILOTS.values() for mode in autopilot.guarded_modes)
