@@ -4,11 +4,12 @@ Good, doubtful or bad, and the exact remedy. Bytes and the time in, bytes out.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 
 from companion import messages
+from companion.autopilot.known import NAMES
+from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, judged
 from companion.link.round_trip import MOST_US as MOST_TRIP_US
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
@@ -18,7 +19,6 @@ from companion.mavlink.delivery import Delivery
 from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
-from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.config import EXCESS, MOST_HELD_S
 
 # The streams need a second to settle at their new rates; what comes then counts.
@@ -29,17 +29,6 @@ HEARTBEAT_INTERVAL_US = 1_000_000
 # A lost question is asked again; PX4 answers a parameter within 50 ms.
 ASK_AGAIN_US = 500_000
 
-# PX4's parameters in bits and values (their descriptions in PX4's commander module).
-RCL_EXCEPT_OFFBOARD = 4
-RC_DISABLED = 4
-FLIGHTTERM_OFF = 121212
-# COM_OBL_RC_ACT: 0 position, 1 altitude, 2 stabilised, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
-LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
-LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
-# The least that PX4 documents: a lean of 11 degrees; beyond 10 a hit at 3 m/s tips a vehicle onto what it hits.
-LEAST_ACC_HOR_M_S2 = 2.0
-# Below PX4's default of 200 a sample is a mean over so long that short contacts vanish in it.
-LEAST_INTEG_HZ = 200
 # A contact of a stiff frame (the paper's accelerometer shows 0.001 s), for the share of them that samples see.
 STIFF_CONTACT_S = 0.001
 # Eq. 2 of the paper: a foldable arm's push begins with b_s v_c, b_s = 30 /s.
@@ -50,35 +39,13 @@ MOST_WANDER_M, DOUBTFUL_WANDER_M = 0.5, 0.1
 DOUBTFUL_RATIO, BAD_RATIO = 0.5, 1.0
 # A round trip of so long is five IMU samples; beyond round_trip.MOST_US no flight begins.
 DOUBTFUL_TRIP_US = 20_000
-# PX4's BAT_LOW_THR is 15 %; a flight needs something above it.
+# Autopilots warn at 15 %; a flight needs something above it.
 DOUBTFUL_BATTERY, BAD_BATTERY = 50, 20
 # A vehicle that stands still does not clip; a sensor that does shakes in its mount.
 STANDS_M_S2 = 1.0
 # A converter of FTDI's holds bytes back for up to 16 ms by default (FTDI's AN232B-04). Delays that differ by half of
 # that are no wire's.
 UNEVEN_US = 8_000
-# PX4's names and numbers of serial ports (Tools/serial/generate_config.py), which MAV_n_CONFIG has, and its instances.
-PORTS, INSTANCES = {101: "TEL1", 102: "TEL2", 103: "TEL3", 104: "TEL4"}, range(3)
-# MAV_n_MODE, and the rate that PX4's guide to companion computers recommends.
-ONBOARD, COMPANION_BAUD = 2, 921_600
-# CBRK_USB_CHK with which PX4 arms while a cable is in its USB port.
-USB_ALLOWED = 197_848
-ROTORS = ("CA_ROTOR_COUNT", *(f"CA_ROTOR{number}_P{axis}" for number in range(4) for axis in "XY"))
-# Asked of a vehicle on a serial line, and of one on its USB port.
-OF_A_LINE = (
-    *(f"MAV_{number}_{what}" for number in INSTANCES for what in ("CONFIG", "MODE", "RATE", "FORWARD")),
-    *(f"SER_{port}_BAUD" for port in PORTS.values()),
-)
-OF_USB = ("CBRK_USB_CHK",)
-
-
-@dataclass(frozen=True, slots=True)
-class SerialLine:
-    """What the link goes through. `baud` None: the vehicle's own USB port, which has none."""
-
-    baud: int | None
-    latency_timer_ms: int | None = None
-    """Of the converter's driver, where it has one."""
 
 
 @dataclass(slots=True)
@@ -107,9 +74,20 @@ class Survey:
     @property
     def asked(self) -> tuple[str, ...]:
         """The parameters to be read."""
-        if self.line is None:
-            return PARAMETERS
-        return (*PARAMETERS, *(OF_USB if self.line.baud is None else OF_A_LINE))
+        return self.vehicle.autopilot.asked(self.line)
+
+    @property
+    def setup(self) -> Setup:
+        identity, estimate = self.vehicle.identity, self.config.estimate
+        return Setup(
+            parameters=self.parameters,
+            line=self.line,
+            vehicle_type="" if identity is None else identity.vehicle_type,
+            guard_centre_m=estimate.guards.centre_m,
+            guard_radius_m=estimate.guards.radius_m,
+            imu_averaging_interval_s=estimate.imu_averaging_interval_s,
+            most_held_s=MOST_HELD_S,
+        )
 
     @property
     def flies(self) -> bool:
@@ -139,7 +117,7 @@ def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[mess
     if survey.heard_since_us is None:
         wait_s = survey.config.link.heartbeat_wait_s
         if survey.refusal is None and now_us - survey.started_us > wait_s * 1e6:
-            survey.refusal = f"no PX4 was heard within {wait_s:g} s; check the address, the cable and the baud rate"
+            survey.refusal = f"no {NAMES} was heard within {wait_s:g} s; check the address, the cable and the baud rate"
         return outgoing
     _ask(survey, outgoing)
     if survey.listening_since_us is None and now_us - survey.heard_since_us >= SETTLING_US:
@@ -201,111 +179,12 @@ def spread(vectors: Sequence[Vector3]) -> float:
     return math.sqrt(sum((vector[axis] - mean[axis]) ** 2 for vector in vectors for axis in range(3)) / count)
 
 
-class Verdict(Enum):
-    GOOD = "ok"
-    DOUBTFUL = "look"
-    BAD = "no"
-
-
-DOUBTFUL, BAD = Verdict.DOUBTFUL, Verdict.BAD
-
-
-@dataclass(frozen=True, slots=True)
-class PreflightItem:
-    """`fix` is a parameter and the value that mends it; None where only a person can."""
-
-    item: str
-    verdict: Verdict
-    found: str
-    remedy: str = ""
-    fix: tuple[str, int | float] | None = None
-
-
-def _judged(
-    item: str, found: str, *cases: tuple[bool, Verdict, str], mended: float | None = None, beyond: str = ""
-) -> PreflightItem:
-    """The first case that holds, with its remedy; good where none does. `mended`: the parameter's value that mends it.
-
-    `beyond` is added to what was found where it is not good.
-    """
-    for holds, verdict, remedy in cases:
-        if holds:
-            return PreflightItem(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
-    return PreflightItem(item, Verdict.GOOD, found)
-
-
 def findings(survey: Survey) -> list[PreflightItem]:
     """All items, in the order in which they would be mended."""
-    found = [*_rotors(survey), *_port(survey), *_delivery(survey), *_streams(survey)]
-    for name, judge in _SETTINGS.items():
-        value = survey.parameters.get(name)
-        unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
-        found.append(unread if value is None else judge(name, value, survey))
+    autopilot, setup = survey.vehicle.autopilot, survey.setup
+    found = [*autopilot.judge_vehicle(setup), *_delivery(survey), *_streams(survey)]
+    found += autopilot.judge_parameters(setup)
     return [*found, *_estimate(survey), *_vibration(survey), _time(survey), _battery(survey), *_sight(survey)]
-
-
-def _rotors(survey: Survey) -> Iterator[PreflightItem]:
-    """Where PX4's control allocation has them; before 1.13 it had no such parameters."""
-    told, guards = survey.parameters, survey.config.estimate.guards
-    if not all(name in told for name in ROTORS):
-        return
-    count, *places = (float(told[name]) for name in ROTORS)
-    rotors = list(zip(places[::2], places[1::2], strict=True))
-    kind = "" if survey.vehicle.identity is None else survey.vehicle.identity.vehicle_type
-    if kind != "quadrotor" or count != len(rotors):
-        others = f"MAV_TYPE says {kind}, CA_ROTOR_COUNT {count:g}"
-        yield _judged("rotors", others, (kind == "quadrotor", DOUBTFUL, "choose the airframe in QGroundControl"))
-        return
-    along_m = guards.centre_m / math.sqrt(2)
-    off_m = max(math.dist((abs(x), abs(y)), (along_m, along_m)) for x, y in rotors)
-    middle_m = sum(math.hypot(*rotor) for rotor in rotors) / count
-    remedy = "measure; then correct CA_ROTORn_PX, _PY or companion.estimate.guards.centre_m"
-    # Further off than a guard is wide, surfaces are remembered where they are not.
-    yield _judged(
-        "rotors",
-        f"{middle_m:.2f} m from the middle by PX4, {guards.centre_m:g} m by companion.estimate.guards",
-        (off_m > guards.radius_m, DOUBTFUL, remedy),
-        beyond=f"; one is {off_m:.2f} m from where that has it",
-    )
-
-
-def _port(survey: Survey) -> Iterator[PreflightItem]:
-    """The port of PX4's that this line is plugged into, by its baud rate."""
-    told, line = survey.parameters, survey.line
-    if line is None:
-        return
-    if line.baud is None:
-        remedy = f"a wire to TELEM2; or CBRK_USB_CHK = {USB_ALLOWED}, then reboot"
-        is_refused = told.get("CBRK_USB_CHK") != USB_ALLOWED
-        yield _judged(
-            "port", "PX4's USB port", (is_refused, DOUBTFUL, remedy), beyond=": with a cable in it PX4 may not arm"
-        )
-        return
-    ports = {number: PORTS.get(int(told.get(f"MAV_{number}_CONFIG", 0)), "") for number in INSTANCES}
-    fitting = [number for number, port in ports.items() if port and told.get(f"SER_{port}_BAUD") == line.baud]
-    if not fitting:
-        remedy = "MAV_1_CONFIG = 102 (TELEM2), SER_TEL2_BAUD as in --connect, MAV_1_MODE = 2; then reboot"
-        yield PreflightItem("port", DOUBTFUL, f"none of PX4's TELEM ports is told to have {line.baud} baud", remedy)
-        return
-    # Of two with the same rate the one that was meant for this.
-    number = next((number for number in fitting if told.get(f"MAV_{number}_MODE") == ONBOARD), fitting[-1])
-    port, prefix = ports[number], f"MAV_{number}"
-    yield _judged(
-        "port",
-        f"{prefix} on {port}, {line.baud} baud",
-        (line.baud < COMPANION_BAUD, DOUBTFUL, f"SER_{port}_BAUD = {COMPANION_BAUD}, reboot, the same in --connect"),
-    )
-    wanted = {
-        "MODE": (ONBOARD, "not the onboard streams"),
-        "RATE": (0, "bytes a second at most; 0 is half of the line"),
-        "FORWARD": (1, "texts for the ground station end here"),
-    }
-    for what, (wish, why) in wanted.items():
-        name, value = f"{prefix}_{what}", told.get(f"{prefix}_{what}")
-        is_less = value is not None and (value != wish if what != "RATE" else 0 < value < line.baud / 20)
-        found = "the vehicle did not tell it" if value is None else f"{value:g}"
-        cases = (value is None, DOUBTFUL, "ask again"), (is_less, DOUBTFUL, f"{name} = {wish}, then reboot")
-        yield _judged(name, found, *cases, mended=wish, beyond=f": {why}" if is_less else "")
 
 
 def _delivery(survey: Survey) -> Iterator[PreflightItem]:
@@ -314,7 +193,7 @@ def _delivery(survey: Survey) -> Iterator[PreflightItem]:
         lost, bad, sent = delivery.lost, delivery.unreadable_bytes, delivery.received + delivery.lost
         remedy = "a wire loses nothing: ground beside it, short, the same baud rate at both ends"
         found = f"{lost} of {sent} packets lost ({100.0 * lost / sent:.1f} %), {bad} unreadable bytes"
-        yield _judged("packets", found, (lost > 0 or bad > 0, DOUBTFUL, remedy))
+        yield judged("packets", found, (lost > 0 or bad > 0, DOUBTFUL, remedy))
     if delivery.signed and not survey.parameters:
         # With a key, packets come here without their signatures.
         found = "the vehicle signs its packets and answers nothing that has no signature"
@@ -327,94 +206,21 @@ def _delivery(survey: Survey) -> Iterator[PreflightItem]:
         remedy = f"{held}; 1 ms is best (`rebound service install` sets it); a busy computer does the same"
         is_held = timer_ms is not None and timer_ms > 1
         found = f"delays of samples differ by {jitter_us / 1e3:.1f} ms"
-        yield _judged("arrival", found, (is_held or jitter_us > UNEVEN_US, DOUBTFUL, remedy))
+        yield judged("arrival", found, (is_held or jitter_us > UNEVEN_US, DOUBTFUL, remedy))
 
 
 def _streams(survey: Survey) -> Iterator[PreflightItem]:
     rates = survey.streams.rates_hz()
-    serial = "serial: baud rate 921600 (SER_TEL2_BAUD), MAV_1_MODE 2 (Onboard), MAV_1_RATE 0; then ask again"
-    full = "the link is full: baud rate 921600 and MAV_1_RATE 0 give HIGHRES_IMU about 200 Hz"
+    remedies = survey.vehicle.autopilot.remedies
     for stream in survey.streams.streams:
         if stream.min_hz:
             rate_hz = rates.get(stream.message_id.name, 0.0)
-            yield _judged(
+            yield judged(
                 stream.message_id.name,
                 f"{rate_hz:.0f} Hz of {stream.asked_hz:g} asked for",
-                (rate_hz < stream.min_hz, BAD, f"at least {stream.min_hz:g} Hz are needed; {serial}"),
-                (rate_hz < 0.4 * stream.asked_hz, DOUBTFUL, full),
+                (rate_hz < stream.min_hz, BAD, f"at least {stream.min_hz:g} Hz are needed; {remedies.slow_streams}"),
+                (rate_hz < 0.4 * stream.asked_hz, DOUBTFUL, remedies.full_link),
             )
-
-
-def _integration(name: str, rate_hz: float, survey: Survey) -> PreflightItem:
-    found = f"{rate_hz:g} Hz: each sample is a mean over {1e3 / rate_hz:.1f} ms"
-    if rate_hz < LEAST_INTEG_HZ:
-        remedy = f"{name} = {LEAST_INTEG_HZ}, then reboot"
-        return _judged(name, found, (True, DOUBTFUL, remedy), mended=LEAST_INTEG_HZ)
-    is_long = 1.0 / rate_hz > survey.config.estimate.imu_averaging_interval_s
-    remedy = f"companion.estimate.imu_averaging_interval_s: {1.0 / rate_hz:.4f} in the mission"
-    return _judged(name, found, (is_long, DOUBTFUL, remedy))
-
-
-def _offboard_loss_time(name: str, loss_s: float, survey: Survey) -> PreflightItem:
-    found = f"{loss_s:g} s until PX4 acts when the companion has died"
-    slow = "a program that streams at less than 4 Hz then loses OFFBOARD"
-    remedy = f"{name} = {MOST_HELD_S:g}, or recoveries are flown by position alone; {slow}"
-    case = (round(loss_s, 3) > MOST_HELD_S, DOUBTFUL, remedy)
-    return _judged(name, found, case, mended=MOST_HELD_S, beyond=f"; an attitude is safe to hold {MOST_HELD_S:g} s")
-
-
-def _offboard_loss(name: str, action: float, survey: Survey) -> PreflightItem:
-    number = int(action)
-    called = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
-    remedy, drops, found = f"{name} = {LOSS_LAND} (land)", number in LOSS_DROPS, f"{number} ({called})"
-    return _judged(
-        name,
-        f"{found} when setpoints stop",
-        (drops, BAD, remedy),
-        (number in LOSS_NEEDS_STICKS, DOUBTFUL, remedy),
-        mended=LOSS_LAND,
-        beyond=": the vehicle would fall" if drops else "; without sticks PX4 sinks and lands, or returns",
-    )
-
-
-def _radio(name: str, bits: float, survey: Survey) -> PreflightItem:
-    if survey.parameters.get("COM_RC_IN_MODE") == RC_DISABLED:
-        return PreflightItem(name, Verdict.GOOD, "no radio is expected (COM_RC_IN_MODE 4)")
-    if int(bits) & RCL_EXCEPT_OFFBOARD:
-        return PreflightItem(name, Verdict.GOOD, "a lost radio does not end OFFBOARD")
-    value = int(bits) | RCL_EXCEPT_OFFBOARD
-    found = f"{int(bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
-    return PreflightItem(
-        name, DOUBTFUL, found, f"{name} = {value}, if the flight may go on without a radio", (name, value)
-    )
-
-
-def _termination(name: str, breaker: float, survey: Survey) -> PreflightItem:
-    if breaker == FLIGHTTERM_OFF:
-        return PreflightItem(name, Verdict.GOOD, "a hit that tips the vehicle does not stop its motors")
-    found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
-    remedy = f"{name} = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
-    return PreflightItem(name, DOUBTFUL, found, remedy, (name, FLIGHTTERM_OFF))
-
-
-def _speeding_up(name: str, most_m_s2: float, survey: Survey) -> PreflightItem:
-    """Of PX4's own modes, as `rebound guard` watches them; the companion's setpoints have their own limit."""
-    lean_deg = math.degrees(math.atan(most_m_s2 / GRAVITY_M_S2))
-    found = f"{most_m_s2:g} m/s^2: PX4's own modes lean by {lean_deg:.0f} degrees as they speed up"
-    remedy = f"{name} = {LEAST_ACC_HOR_M_S2:g} for `rebound guard`: a vehicle that leans in tips where it hits"
-    return _judged(name, found, (most_m_s2 > LEAST_ACC_HOR_M_S2, DOUBTFUL, remedy), mended=LEAST_ACC_HOR_M_S2)
-
-
-# What decides whether a collision is survived.
-_SETTINGS: dict[str, Callable[[str, float, Survey], PreflightItem]] = {
-    "IMU_INTEG_RATE": _integration,
-    "COM_OF_LOSS_T": _offboard_loss_time,
-    "COM_OBL_RC_ACT": _offboard_loss,
-    "COM_RCL_EXCEPT": _radio,
-    "CBRK_FLIGHTTERM": _termination,
-    "MPC_ACC_HOR": _speeding_up,
-}
-PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE", *ROTORS)
 
 
 def _estimate(survey: Survey) -> Iterator[PreflightItem]:
@@ -427,21 +233,22 @@ def _estimate(survey: Survey) -> Iterator[PreflightItem]:
         noise_m_s = spread([sample.velocity_ned_m_s for sample in survey.positions])
         seconds = LISTENING_US / 1e6
         remedy = "better position: RTK, flow with a range sensor, motion capture; or a larger recovery distance"
-        yield _judged(
+        yield judged(
             "position",
             f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)",
             (wander_m > MOST_WANDER_M, BAD, remedy),
             (wander_m > DOUBTFUL_WANDER_M, DOUBTFUL, remedy),
         )
+    remedies = survey.vehicle.autopilot.remedies
     worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
     if worst is None:
-        yield PreflightItem("estimator", DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
+        yield PreflightItem("estimator", DOUBTFUL, "no ESTIMATOR_STATUS", remedies.no_estimator)
     elif not survey.estimator[-1].horizontal_velocity_is_good:
         remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
         yield PreflightItem("estimator", BAD, "no horizontal velocity", remedy)
     else:
         is_bad = worst >= BAD_RATIO or any(status.accelerometer_is_faulty for status in survey.estimator)
-        yield _judged(
+        yield judged(
             "estimator",
             f"largest innovation test ratio {worst:.2f}",
             (is_bad, BAD, "the estimator turns its sensors down: calibrate, check mounts"),
@@ -454,7 +261,7 @@ def _vibration(survey: Survey) -> Iterator[PreflightItem]:
     if survey.vibration:
         clipped = sum(survey.vibration[-1].clipping_counts) - sum(survey.vibration[0].clipping_counts)
         remedy = "fasten the flight controller; check the accelerometer"
-        yield _judged("clipping", f"{clipped} clipped samples while {doing}", (clipped != 0, BAD, remedy))
+        yield judged("clipping", f"{clipped} clipped samples while {doing}", (clipped != 0, BAD, remedy))
     forces = [sample.specific_force_frd_m_s2 for sample in survey.imu]
     threshold_m_s2 = survey.config.fused.side_threshold_m_s2
     if forces and survey.flies:
@@ -463,19 +270,19 @@ def _vibration(survey: Survey) -> Iterator[PreflightItem]:
         found = (
             f"{spread(forces):.2f} m/s^2 (RMS) hovering; sideways {most_m_s2:.1f} of {threshold_m_s2:g} that tell a hit"
         )
-        yield _judged("vibration", found, (most_m_s2 >= threshold_m_s2, DOUBTFUL, remedy))
+        yield judged("vibration", found, (most_m_s2 >= threshold_m_s2, DOUBTFUL, remedy))
     elif forces:
         shakes_m_s2 = spread(forces)
         remedy = "let the vehicle stand still, motors off, and ask again"
         found = f"{shakes_m_s2:.2f} m/s^2 (RMS) while standing"
-        yield _judged("shaking", found, (shakes_m_s2 > STANDS_M_S2, DOUBTFUL, remedy))
+        yield judged("shaking", found, (shakes_m_s2 > STANDS_M_S2, DOUBTFUL, remedy))
 
 
 def _time(survey: Survey) -> PreflightItem:
     median_us, worst_us = survey.round_trip.median_us, survey.round_trip.worst_us
     if median_us is None or worst_us is None:
-        return PreflightItem("time", DOUBTFUL, "TIMESYNC is not answered", "MAVLink 2 on the link (MAV_PROTO_VER 2)")
-    return _judged(
+        return PreflightItem("time", DOUBTFUL, "TIMESYNC is not answered", survey.vehicle.autopilot.remedies.no_time)
+    return judged(
         "time",
         f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst",
         (median_us > MOST_TRIP_US, BAD, "a wire or a direct link instead of this one"),
@@ -486,9 +293,9 @@ def _time(survey: Survey) -> PreflightItem:
 def _battery(survey: Survey) -> PreflightItem:
     percent = survey.vehicle.battery_percent
     if percent is None:
-        return PreflightItem("battery", DOUBTFUL, "unknown", "set up the power module (BAT1_SOURCE)")
+        return PreflightItem("battery", DOUBTFUL, "unknown", survey.vehicle.autopilot.remedies.no_battery)
     cases = ((percent < BAD_BATTERY, BAD, "charge it"), (percent < DOUBTFUL_BATTERY, DOUBTFUL, "charge it"))
-    return _judged("battery", f"{percent} %", *cases)
+    return judged("battery", f"{percent} %", *cases)
 
 
 def _sight(survey: Survey) -> Iterator[PreflightItem]:
@@ -496,7 +303,8 @@ def _sight(survey: Survey) -> Iterator[PreflightItem]:
     rate_hz = survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
     if not rate_hz:
         return
-    integ_hz = float(survey.parameters.get("IMU_INTEG_RATE", 1.0 / survey.config.estimate.imu_averaging_interval_s))
+    told_hz = survey.parameters.get(survey.vehicle.autopilot.integration_parameter)
+    integ_hz = told_hz or 1.0 / survey.config.estimate.imu_averaging_interval_s
     threshold_m_s2 = survey.config.fused.side_threshold_m_s2
     seen = min(1.0, rate_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
     folding = f"arms that fold: from {threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
@@ -504,7 +312,7 @@ def _sight(survey: Survey) -> Iterator[PreflightItem]:
     remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
     per_h = 3600.0 * rate_hz * math.exp(-0.5 * (EXCESS * survey.config.fused.noise_factor) ** 2)
     noise = f"at most {per_h:.2g} false alarms an hour by Gaussian vibration"
-    yield _judged("smallest hit", f"{folding}; {stiff}; {noise}", (seen <= 0.9, DOUBTFUL, remedy))
+    yield judged("smallest hit", f"{folding}; {stiff}; {noise}", (seen <= 0.9, DOUBTFUL, remedy))
 
 
 class Preflight:

@@ -1,9 +1,10 @@
 """What the companion needs to know of an autopilot. A mode is HEARTBEAT's custom_mode, a number of the autopilot's."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from companion.autopilot.setup import PreflightItem, SerialLine, Setup
 from companion.messages import SetMode
 
 
@@ -14,6 +15,17 @@ class Pilot(Enum):
     SETPOINTS = "a program's setpoints"
     STICKS = "sticks that ask for velocities"
     HAND = "sticks that ask for an attitude or for rates, and for the thrust"
+
+
+@dataclass(frozen=True, slots=True)
+class Remedies:
+    """Of what preflight finds by listening, for people."""
+
+    slow_streams: str
+    full_link: str
+    no_time: str
+    no_battery: str
+    no_estimator: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,3 +51,14 @@ class Autopilot:
     pilot: Callable[[int], Pilot | None]
     """None of a mode that is not known."""
     set_mode: Callable[[int], SetMode]
+    loss_parameter: str
+    """For so many seconds the last setpoint is flown on."""
+    integration_parameter: str
+    """With so many Hz samples of the IMU are integrated."""
+    asked: Callable[[SerialLine | None], tuple[str, ...]]
+    """Parameters that preflight reads."""
+    judge_vehicle: Callable[[Setup], Iterable[PreflightItem]]
+    judge_parameters: Callable[[Setup], Iterable[PreflightItem]]
+    remedies: Remedies
+    loss_text: Callable[[Mapping[str, int | float]], str]
+    """What the vehicle does when setpoints stop, for people."""

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from companion.autopilot.interface import Autopilot
 from companion.fence import Fence
 from companion.flight.context import Target
 from companion.memory.patch import Patch
@@ -20,8 +21,6 @@ from companion.motion.vector import ZERO, along, plus
 from companion.reflex.attitude_law import brakable_m_s, held_off
 from companion.reflex.config import BEHIND_M, BRAKES_M_S2, HELD_S, NOTICED_S
 from companion.reflex.surface import Surface, projected
-
-LOSS_PARAMETER = "COM_OF_LOSS_T"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,20 +47,22 @@ class KnownSurface:
         return patch.faces((n, e, d), self.reach_m)
 
 
-def unattended_text(speed_m_s: float) -> str:
+def unattended_text(autopilot: Autopilot, speed_m_s: float) -> str:
     """What happens when the companion dies, for people."""
     return (
-        f"if the companion dies, PX4 flies its last setpoint on for COM_OF_LOSS_T, made safe for {HELD_S:g} s; "
+        f"{_flown_on(autopilot)} for {autopilot.loss_parameter}, made safe for {HELD_S:g} s; "
         f"every second more is {speed_m_s:g} m unattended at {speed_m_s:g} m/s"
     )
 
 
-def longer_loss_text(loss_s: float) -> str:
+def longer_loss_text(autopilot: Autopilot, loss_s: float) -> str:
     """One that is longer than a setpoint is safe, for people."""
-    return (
-        f"COM_OF_LOSS_T is {loss_s:g} s: if the companion dies, PX4 flies its last setpoint on for "
-        f"{loss_s - HELD_S:g} s more than it is made safe for"
-    )
+    flown_on, more_s = _flown_on(autopilot), loss_s - HELD_S
+    return f"{autopilot.loss_parameter} is {loss_s:g} s: {flown_on} for {more_s:g} s more than it is made safe for"
+
+
+def _flown_on(autopilot: Autopilot) -> str:
+    return f"if the companion dies, {autopilot.name} flies its last setpoint on"
 
 
 def touched(place_ned_m: Vector3, normal_ned: Vector3) -> Surface:

@@ -2,6 +2,7 @@
 
 import math
 
+from companion.autopilot.known import ASSUMED
 from companion.fence import Fence
 from companion.flight.context import FlightContext, as_text
 from companion.flight.envelope import unattended_text
@@ -128,7 +129,7 @@ def mission_lines(mission: Mission) -> list[str]:
         *_obstacle_lines(mission.obstacles),
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
-        f"Unattended {unattended_text(_fastest_m_s(mission))}",
+        f"Unattended {unattended_text(ASSUMED, _fastest_m_s(mission))}",
     ]
     if mission.recovery.law != "adaptive" and max(mission.recovery.gamma_per_axis) > LARGE_GAMMA_S:
         lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from companion import messages
 from companion.autopilot.interface import Pilot
 from companion.flight.context import FlightContext
-from companion.flight.envelope import LOSS_PARAMETER, longer_loss_text
+from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
 from companion.messages import MessageId, Sample
@@ -39,9 +39,10 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             if text is not None:
                 flight.report(now_us, "implausible", text, message=sample.message)
             continue
-        elif isinstance(sample, messages.Parameter) and sample.name == LOSS_PARAMETER:
+        elif isinstance(sample, messages.Parameter) and sample.name == vehicle.autopilot.loss_parameter:
             if flight.reflex.loss_s is None and sample.value > HELD_S:
-                flight.report(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
+                text = longer_loss_text(vehicle.autopilot, sample.value)
+                flight.report(now_us, "unattended", text, loss_s=sample.value)
             flight.reflex.loss_s = round(sample.value, 3)  # single precision on the wire
         elif isinstance(sample, messages.TimeSyncRequest):
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
@@ -85,7 +86,7 @@ def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
         return
     flight.outbox.append(asked)
     if flight.reflex.loss_s is None:
-        flight.outbox.append(messages.ReadParameter(LOSS_PARAMETER))
+        flight.outbox.append(messages.ReadParameter(flight.vehicle.autopilot.loss_parameter))
     text = flight.round_trip.alarm() if flight.vehicle.armed else None
     if text is not None:
         flight.report(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)

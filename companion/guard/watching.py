@@ -93,7 +93,9 @@ class GuardConnect(Meet[GuardTransition]):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
             return None
         self._report_streams(flight, now_us)
-        flight.report(now_us, "unattended", unattended_text(flight.mission.limits.max_speed_m_s))
+        flight.report(
+            now_us, "unattended", unattended_text(flight.vehicle.autopilot, flight.mission.limits.max_speed_m_s)
+        )
         return GuardTransition(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
 
 

@@ -3,8 +3,8 @@
 import textwrap
 from collections.abc import Sequence
 
-from companion.flight.envelope import LOSS_PARAMETER
-from companion.preflight import LOSS_NAMES, PreflightItem, Survey, Verdict
+from companion.autopilot.setup import PreflightItem, Verdict
+from companion.preflight import Survey
 
 _WIDTH = 100
 _CARD = """FIRST FLIGHT WITH REBOUND
@@ -54,16 +54,9 @@ def card(survey: Survey, found: Sequence[PreflightItem], connect: str) -> str:
         vehicle=f"{vehicle.autopilot_text()}, {kind}, battery {battery}",
         connect=connect,
         items="\n".join(items) or "none",
-        dies=_when_it_dies(survey),
+        dies=vehicle.autopilot.loss_text(survey.parameters),
     )
     return "".join(_wrapped(line) for line in text.splitlines())
-
-
-def _when_it_dies(survey: Survey) -> str:
-    loss_s, action = (survey.parameters.get(name) for name in (LOSS_PARAMETER, "COM_OBL_RC_ACT"))
-    if loss_s is None or action is None or not 0 <= int(action) < len(LOSS_NAMES):
-        return "Unknown: read COM_OF_LOSS_T and COM_OBL_RC_ACT before you fly."
-    return f"PX4 acts {loss_s:g} s later ({LOSS_PARAMETER}): {LOSS_NAMES[int(action)]} (COM_OBL_RC_ACT)."
 
 
 def _wrapped(line: str) -> str:

@@ -8,8 +8,9 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from companion.autopilot.setup import PreflightItem, SerialLine, Verdict
 from companion.errors import ConfigurationError
-from companion.preflight import Preflight, PreflightItem, SerialLine, Verdict, findings
+from companion.preflight import Preflight, findings
 from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TypeAlias
 
+from companion.autopilot.setup import PreflightItem, Verdict
 from companion.errors import ConfigurationError
-from companion.preflight import PreflightItem, Verdict
 from rebound_cli.preflight.command import show_findings
 from rebound_cli.service.files import UNIT, UNIT_NAME, USER, PlannedFile, ServiceSettings
 from rebound_cli.service.system import System, answer, hidden_program

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.autopilot.px4.firmware import PX4
 from companion.core import Limiter
 from companion.fence import Fence
 from companion.flight.context import Target
@@ -111,7 +112,7 @@ def test_a_flights_setpoints_keep_off_what_it_has_just_hit_and_off_what_it_remem
 
 
 def test_what_a_longer_loss_costs_is_told_in_metres():
-    text = unattended_text(2.5)
+    text = unattended_text(PX4, 2.5)
     assert "COM_OF_LOSS_T" in text and "1 s" in text and "2.5 m" in text
     # in the plan by the fastest item
     items = [

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from companion.autopilot.setup import SerialLine, Verdict
 from companion.messages import (
     Attitude,
     Battery,
@@ -21,7 +22,7 @@ from companion.messages import (
     Vibration,
 )
 from companion.mission.config import CompanionConfig
-from companion.preflight import SerialLine, Survey, Verdict, advance, findings, start_survey
+from companion.preflight import Survey, advance, findings, start_survey
 
 PX4 = Heartbeat(1, 1, 2, 12, False, 0, 3)
 HEALTHY = {

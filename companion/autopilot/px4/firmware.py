@@ -1,7 +1,7 @@
 """PX4 behind the interface of autopilots."""
 
-from companion.autopilot.interface import Autopilot
-from companion.autopilot.px4 import modes
+from companion.autopilot.interface import Autopilot, Remedies
+from companion.autopilot.px4 import modes, setup
 
 PX4 = Autopilot(
     name="PX4",
@@ -16,4 +16,17 @@ PX4 = Autopilot(
     mode_name=modes.mode_name,
     pilot=modes.pilot,
     set_mode=modes.set_mode,
+    loss_parameter=setup.LOSS,
+    integration_parameter=setup.INTEGRATION,
+    asked=setup.asked,
+    judge_vehicle=setup.judge_vehicle,
+    judge_parameters=setup.judge_parameters,
+    remedies=Remedies(
+        slow_streams="serial: baud rate 921600 (SER_TEL2_BAUD), MAV_1_MODE 2 (Onboard), MAV_1_RATE 0; then ask again",
+        full_link="the link is full: baud rate 921600 and MAV_1_RATE 0 give HIGHRES_IMU about 200 Hz",
+        no_time="MAVLink 2 on the link (MAV_PROTO_VER 2)",
+        no_battery="set up the power module (BAT1_SOURCE)",
+        no_estimator="look at EKF2 in QGroundControl",
+    ),
+    loss_text=setup.loss_text,
 )

@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 import pytest
 
+from companion.autopilot.setup import SerialLine, Verdict
 from companion.mission.config import CompanionConfig
-from companion.preflight import Preflight, SerialLine, Verdict, findings
+from companion.preflight import Preflight, findings
 from rebound_cli.preflight.card import card
 from rebound_cli.preflight.command import serial_line
 from sim_vehicle.airframe import load_built_in

@@ -1,0 +1,210 @@
+"""How PX4's parameters have to be for collisions to be survived; each bound with its reason."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, Verdict, judged
+from companion.motion.config import GRAVITY_M_S2
+
+# For so long PX4 flies the last setpoint on.
+LOSS = "COM_OF_LOSS_T"
+LOSS_ACTION = "COM_OBL_RC_ACT"
+INTEGRATION = "IMU_INTEG_RATE"
+# PX4's parameters in bits and values (their descriptions in PX4's commander module).
+RCL_EXCEPT_OFFBOARD = 4
+RC_DISABLED = 4
+FLIGHTTERM_OFF = 121212
+# COM_OBL_RC_ACT: 0 position, 1 altitude, 2 stabilised, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
+LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
+LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
+# The least that PX4 documents: a lean of 11 degrees; beyond 10 a hit at 3 m/s tips a vehicle onto what it hits.
+LEAST_ACC_HOR_M_S2 = 2.0
+# Below PX4's default of 200 a sample is a mean over so long that short contacts vanish in it.
+LEAST_INTEG_HZ = 200
+# PX4's names and numbers of serial ports (Tools/serial/generate_config.py), which MAV_n_CONFIG has, and its instances.
+PORTS, INSTANCES = {101: "TEL1", 102: "TEL2", 103: "TEL3", 104: "TEL4"}, range(3)
+# MAV_n_MODE, and the rate that PX4's guide to companion computers recommends.
+ONBOARD, COMPANION_BAUD = 2, 921_600
+# CBRK_USB_CHK with which PX4 arms while a cable is in its USB port.
+USB_ALLOWED = 197_848
+ROTORS = ("CA_ROTOR_COUNT", *(f"CA_ROTOR{number}_P{axis}" for number in range(4) for axis in "XY"))
+# Asked of a vehicle on a serial line, and of one on its USB port.
+OF_A_LINE = (
+    *(f"MAV_{number}_{what}" for number in INSTANCES for what in ("CONFIG", "MODE", "RATE", "FORWARD")),
+    *(f"SER_{port}_BAUD" for port in PORTS.values()),
+)
+OF_USB = ("CBRK_USB_CHK",)
+
+
+def _rotors(setup: Setup) -> Iterator[PreflightItem]:
+    """Where PX4's control allocation has them; before 1.13 it had no such parameters."""
+    told = setup.parameters
+    if not all(name in told for name in ROTORS):
+        return
+    count, *places = (float(told[name]) for name in ROTORS)
+    rotors = list(zip(places[::2], places[1::2], strict=True))
+    kind = setup.vehicle_type
+    if kind != "quadrotor" or count != len(rotors):
+        others = f"MAV_TYPE says {kind}, CA_ROTOR_COUNT {count:g}"
+        yield judged("rotors", others, (kind == "quadrotor", DOUBTFUL, "choose the airframe in QGroundControl"))
+        return
+    along_m = setup.guard_centre_m / math.sqrt(2)
+    off_m = max(math.dist((abs(x), abs(y)), (along_m, along_m)) for x, y in rotors)
+    middle_m = sum(math.hypot(*rotor) for rotor in rotors) / count
+    remedy = "measure; then correct CA_ROTORn_PX, _PY or companion.estimate.guards.centre_m"
+    # Further off than a guard is wide, surfaces are remembered where they are not.
+    yield judged(
+        "rotors",
+        f"{middle_m:.2f} m from the middle by PX4, {setup.guard_centre_m:g} m by companion.estimate.guards",
+        (off_m > setup.guard_radius_m, DOUBTFUL, remedy),
+        beyond=f"; one is {off_m:.2f} m from where that has it",
+    )
+
+
+def _port(setup: Setup) -> Iterator[PreflightItem]:
+    """The port of PX4's that this line is plugged into, by its baud rate."""
+    told, line = setup.parameters, setup.line
+    if line is None:
+        return
+    if line.baud is None:
+        remedy = f"a wire to TELEM2; or CBRK_USB_CHK = {USB_ALLOWED}, then reboot"
+        is_refused = told.get("CBRK_USB_CHK") != USB_ALLOWED
+        yield judged(
+            "port",
+            "PX4's USB port",
+            (is_refused, DOUBTFUL, remedy),
+            beyond=": with a cable in it PX4 may not arm",
+        )
+        return
+    ports = {number: PORTS.get(int(told.get(f"MAV_{number}_CONFIG", 0)), "") for number in INSTANCES}
+    fitting = [number for number, port in ports.items() if port and told.get(f"SER_{port}_BAUD") == line.baud]
+    if not fitting:
+        remedy = "MAV_1_CONFIG = 102 (TELEM2), SER_TEL2_BAUD as in --connect, MAV_1_MODE = 2; then reboot"
+        yield PreflightItem("port", DOUBTFUL, f"none of PX4's TELEM ports is told to have {line.baud} baud", remedy)
+        return
+    # Of two with the same rate the one that was meant for this.
+    number = next((number for number in fitting if told.get(f"MAV_{number}_MODE") == ONBOARD), fitting[-1])
+    port, prefix = ports[number], f"MAV_{number}"
+    yield judged(
+        "port",
+        f"{prefix} on {port}, {line.baud} baud",
+        (
+            line.baud < COMPANION_BAUD,
+            DOUBTFUL,
+            f"SER_{port}_BAUD = {COMPANION_BAUD}, reboot, the same in --connect",
+        ),
+    )
+    wanted = {
+        "MODE": (ONBOARD, "not the onboard streams"),
+        "RATE": (0, "bytes a second at most; 0 is half of the line"),
+        "FORWARD": (1, "texts for the ground station end here"),
+    }
+    for what, (wish, why) in wanted.items():
+        name, value = f"{prefix}_{what}", told.get(f"{prefix}_{what}")
+        is_less = value is not None and (value != wish if what != "RATE" else 0 < value < line.baud / 20)
+        found = "the vehicle did not tell it" if value is None else f"{value:g}"
+        cases = (
+            (value is None, DOUBTFUL, "ask again"),
+            (is_less, DOUBTFUL, f"{name} = {wish}, then reboot"),
+        )
+        yield judged(name, found, *cases, mended=wish, beyond=f": {why}" if is_less else "")
+
+
+def _integration(name: str, rate_hz: float, setup: Setup) -> PreflightItem:
+    found = f"{rate_hz:g} Hz: each sample is a mean over {1e3 / rate_hz:.1f} ms"
+    if rate_hz < LEAST_INTEG_HZ:
+        remedy = f"{name} = {LEAST_INTEG_HZ}, then reboot"
+        return judged(name, found, (True, DOUBTFUL, remedy), mended=LEAST_INTEG_HZ)
+    is_long = 1.0 / rate_hz > setup.imu_averaging_interval_s
+    remedy = f"companion.estimate.imu_averaging_interval_s: {1.0 / rate_hz:.4f} in the mission"
+    return judged(name, found, (is_long, DOUBTFUL, remedy))
+
+
+def _offboard_loss_time(name: str, loss_s: float, setup: Setup) -> PreflightItem:
+    found = f"{loss_s:g} s until PX4 acts when the companion has died"
+    held_s = setup.most_held_s
+    slow = "a program that streams at less than 4 Hz then loses OFFBOARD"
+    remedy = f"{name} = {held_s:g}, or recoveries are flown by position alone; {slow}"
+    case = (round(loss_s, 3) > held_s, DOUBTFUL, remedy)
+    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {setup.most_held_s:g} s")
+
+
+def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
+    number = int(action)
+    called = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
+    remedy, drops, found = f"{name} = {LOSS_LAND} (land)", number in LOSS_DROPS, f"{number} ({called})"
+    return judged(
+        name,
+        f"{found} when setpoints stop",
+        (drops, BAD, remedy),
+        (number in LOSS_NEEDS_STICKS, DOUBTFUL, remedy),
+        mended=LOSS_LAND,
+        beyond=": the vehicle would fall" if drops else "; without sticks PX4 sinks and lands, or returns",
+    )
+
+
+def _radio(name: str, bits: float, setup: Setup) -> PreflightItem:
+    if setup.parameters.get("COM_RC_IN_MODE") == RC_DISABLED:
+        return PreflightItem(name, Verdict.GOOD, "no radio is expected (COM_RC_IN_MODE 4)")
+    if int(bits) & RCL_EXCEPT_OFFBOARD:
+        return PreflightItem(name, Verdict.GOOD, "a lost radio does not end OFFBOARD")
+    value = int(bits) | RCL_EXCEPT_OFFBOARD
+    found = f"{int(bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
+    return PreflightItem(
+        name, DOUBTFUL, found, f"{name} = {value}, if the flight may go on without a radio", (name, value)
+    )
+
+
+def _termination(name: str, breaker: float, setup: Setup) -> PreflightItem:
+    if breaker == FLIGHTTERM_OFF:
+        return PreflightItem(name, Verdict.GOOD, "a hit that tips the vehicle does not stop its motors")
+    found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
+    remedy = f"{name} = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
+    return PreflightItem(name, DOUBTFUL, found, remedy, (name, FLIGHTTERM_OFF))
+
+
+def _speeding_up(name: str, most_m_s2: float, setup: Setup) -> PreflightItem:
+    """Of PX4's own modes, as `rebound guard` watches them; the companion's setpoints have their own limit."""
+    lean_deg = math.degrees(math.atan(most_m_s2 / GRAVITY_M_S2))
+    found = f"{most_m_s2:g} m/s^2: PX4's own modes lean by {lean_deg:.0f} degrees as they speed up"
+    remedy = f"{name} = {LEAST_ACC_HOR_M_S2:g} for `rebound guard`: a vehicle that leans in tips where it hits"
+    return judged(name, found, (most_m_s2 > LEAST_ACC_HOR_M_S2, DOUBTFUL, remedy), mended=LEAST_ACC_HOR_M_S2)
+
+
+# What decides whether a collision is survived.
+_SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
+    INTEGRATION: _integration,
+    LOSS: _offboard_loss_time,
+    LOSS_ACTION: _offboard_loss,
+    "COM_RCL_EXCEPT": _radio,
+    "CBRK_FLIGHTTERM": _termination,
+    "MPC_ACC_HOR": _speeding_up,
+}
+PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE", *ROTORS)
+
+
+def asked(line: SerialLine | None) -> tuple[str, ...]:
+    """The parameters to be read."""
+    if line is None:
+        return PARAMETERS
+    return (*PARAMETERS, *(OF_USB if line.baud is None else OF_A_LINE))
+
+
+def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
+    yield from _rotors(setup)
+    yield from _port(setup)
+
+
+def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
+    for name, judge in _SETTINGS.items():
+        value = setup.parameters.get(name)
+        unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
+        yield unread if value is None else judge(name, value, setup)
+
+
+def loss_text(parameters: Mapping[str, int | float]) -> str:
+    """What PX4 does when setpoints stop, for people."""
+    loss_s, action = parameters.get(LOSS), parameters.get(LOSS_ACTION)
+    if loss_s is None or action is None or not 0 <= int(action) < len(LOSS_NAMES):
+        return f"Unknown: read {LOSS} and {LOSS_ACTION} before you fly."
+    return f"PX4 acts {loss_s:g} s later ({LOSS}): {LOSS_NAMES[int(action)]} ({LOSS_ACTION})."

@@ -1,0 +1,61 @@
+"""How an autopilot is set up, and what is said of it: an item, good, doubtful or bad, and its remedy."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+
+@dataclass(frozen=True, slots=True)
+class SerialLine:
+    """What the link goes through. `baud` None: the vehicle's own USB port, which has none."""
+
+    baud: int | None
+    latency_timer_ms: int | None = None
+    """Of the converter's driver, where it has one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What an autopilot's parameters are judged by."""
+
+    parameters: Mapping[str, int | float]
+    line: SerialLine | None
+    vehicle_type: str
+    guard_centre_m: float
+    guard_radius_m: float
+    imu_averaging_interval_s: float
+    most_held_s: float
+    """For so long an attitude is safe to hold, if the companion dies."""
+
+
+class Verdict(Enum):
+    GOOD = "ok"
+    DOUBTFUL = "look"
+    BAD = "no"
+
+
+DOUBTFUL, BAD = Verdict.DOUBTFUL, Verdict.BAD
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightItem:
+    """`fix` is a parameter and the value that mends it; None where only a person can."""
+
+    item: str
+    verdict: Verdict
+    found: str
+    remedy: str = ""
+    fix: tuple[str, int | float] | None = None
+
+
+def judged(
+    item: str, found: str, *cases: tuple[bool, Verdict, str], mended: float | None = None, beyond: str = ""
+) -> PreflightItem:
+    """The first case that holds, with its remedy; good where none does. `mended`: the parameter's value that mends it.
+
+    `beyond` is added to what was found where it is not good.
+    """
+    for holds, verdict, remedy in cases:
+        if holds:
+            return PreflightItem(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
+    return PreflightItem(item, Verdict.GOOD, found)
