@@ -129,6 +129,38 @@ def test_what_a_text_in_the_code_refers_to_is_there() -> None:
     assert missing == []
 
 
+# Prefixes of PX4's parameters; numbers as px4_custom_mode.h packs them.
+OF_PX4 = (
+    re.compile(r"\b(?:BAT\d?|CA|CBRK|COM|CP|EKF2|FD|GF|IMU|MC|MIS|MPC|NAV|RTL|SENS|SER|SYS)_[A-Z][A-Z0-9_]+\b"),
+    re.compile(r"\bMAV_(?:[0-9nx]_[A-Z]+|PROTO_VER)\b"),
+    re.compile(r"\b\d+ << (?:16|24)\b"),
+)
+# MAVLink's message; reasons of the numbers of motion are still where the numbers are.
+NO_PARAMETER = {"SYS_STATUS"}
+ROOMS_OF_NUMBERS = ("companion/autopilot/px4/", "companion/reflex/", "companion/motion/")
+
+
+def test_one_folder_names_what_is_px4s() -> None:
+    found = [
+        f"{name(path)}: {word}"
+        for path in sources("companion")
+        for pattern in OF_PX4
+        for word in pattern.findall(path.read_text())
+        if word not in NO_PARAMETER and not name(path).startswith(ROOMS_OF_NUMBERS)
+    ]
+    assert found == []
+
+
+def test_an_autopilots_folder_is_known_to_the_table_of_autopilots_alone() -> None:
+    assert [
+        module
+        for module, names in imports_of_all().items()
+        if module.startswith("companion.")
+        and not module.startswith("companion.autopilot.")
+        and any(name.startswith("companion.autopilot.px4") for name in names)
+    ] == []
+
+
 def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):

@@ -29,6 +29,25 @@ class Remedies:
 
 
 @dataclass(frozen=True, slots=True)
+class Defaults:
+    """How it flies unless a person has changed it: limits and patience of the companion follow from these."""
+
+    loss_us: int
+    """For so long the last setpoint is flown on."""
+    position_gain_per_s: float
+    """From a distance to the setpoint to the speed towards it."""
+    max_speed_m_s: float
+    max_yaw_rate_deg_s: float
+    turning_deg_s: float
+    """With which its own modes turn."""
+    landing_m_s: float
+    stick_deadzone: float
+    """Deflection around the middle that asks for no climb."""
+    stick_override: float
+    """Change of a deflection by which a pilot takes over."""
+
+
+@dataclass(frozen=True, slots=True)
 class Autopilot:
     """Tables and functions of one autopilot; nothing else of the companion names its modes and parameters."""
 
@@ -53,6 +72,8 @@ class Autopilot:
     set_mode: Callable[[int], SetMode]
     loss_parameter: str
     """For so many seconds the last setpoint is flown on."""
+    rate_parameter: str
+    """Of a link's share for streams, for people."""
     integration_parameter: str
     """With so many Hz samples of the IMU are integrated."""
     asked: Callable[[SerialLine | None], tuple[str, ...]]
@@ -62,3 +83,4 @@ class Autopilot:
     remedies: Remedies
     loss_text: Callable[[Mapping[str, int | float]], str]
     """What the vehicle does when setpoints stop, for people."""
+    defaults: Defaults

@@ -91,7 +91,7 @@ class Connect(Meet[Transition]):
         return Transition(Trigger.REFUSED, text)
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
-        too_slow = flight.streams.too_slow()
+        too_slow = flight.streams.too_slow(flight.vehicle.autopilot)
         if too_slow is not None and flight.mission.companion.link.wait:
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None

@@ -1,7 +1,7 @@
 """What an operator at a ground station reads and plots: short texts for the flight's events, numbers of the detector.
 
 STATUSTEXT, NAMED_VALUE_FLOAT and DEBUG_VECT reach QGroundControl through PX4, which forwards what a companion sends
-on links with MAV_x_FORWARD, or over the ground station's own link to the companion.
+on links that it is told to, or over the ground station's own link to the companion.
 """
 
 import math

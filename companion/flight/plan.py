@@ -14,8 +14,8 @@ from companion.mission.model import Mission
 from companion.mission.policy import AbortWhen, OnCollision, OnDamage
 from companion.reflex.config import RecoveryConfig
 
-# MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
-LARGE_GAMMA_S = 1.05
+# The position gain asks for gamma * v_c of it backwards: above this gamma, for more than the impact speed.
+LARGE_GAMMA_S = round(1.0 / ASSUMED.defaults.position_gain_per_s, 2)
 
 
 def describe_item(action: items.Action) -> str:

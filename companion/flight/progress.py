@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
+from companion.autopilot.known import ASSUMED
 from companion.flight import expectations
 from companion.flight.context import FlightContext, Inputs, StepTally, Target, Transition
 from companion.flight.damage import after_damage
@@ -228,8 +229,8 @@ class HoldAfterRecovery:
         return Transition(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
 
 
-# Below PX4's MC_YAWRATE_MAX (200 deg/s) and its MPC_YAWRAUTO_MAX (45 deg/s): the vehicle can follow.
-YAW_RATE_RAD_S = math.radians(45.0)
+# As the autopilot's own modes turn: the vehicle can follow.
+YAW_RATE_RAD_S = math.radians(ASSUMED.defaults.turning_deg_s)
 # Slower, or nearer, than this there is no direction that noise in the last digits could not have made.
 _LEAST_SPEED_M_S = 0.05
 _LEAST_DISTANCE_M = 0.05

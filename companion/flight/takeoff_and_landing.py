@@ -129,7 +129,7 @@ def mean_position(flight: FlightContext) -> Vector3:
     return (n, e, d)
 
 
-# From 12 m at PX4's MPC_LAND_SPEED of 0.7 m/s it takes under 30 s with detection and disarming. This allows for its
+# From 12 m at PX4's 0.7 m/s it takes under 30 s with detection and disarming. This allows for its
 # lowest value, 0.6 m/s, from 60 m.
 LANDING_TIMEOUT_US = 120_000_000
 

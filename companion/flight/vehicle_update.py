@@ -58,7 +58,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
     if vehicle.armed is False and armed:
         flight.report(now_us, "disarmed", "disarmed")
     if was_known and not vehicle.is_mode_known:
-        # PX4 answers within milliseconds; its next report by itself may take half a second, longer than COM_OF_LOSS_T.
+        # PX4 answers within milliseconds; its next report by itself may take half a second.
         flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
     if vehicle.identity is not None:
         _measure_round_trip(flight, now_us)
@@ -78,8 +78,8 @@ def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
 
 
 def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
-    """On the ground a long round trip is a reason not to begin; in the air it is reported. COM_OF_LOSS_T is read with
-    it until it is answered.
+    """On the ground a long round trip is a reason not to begin; in the air it is reported. For how long the
+    last setpoint is flown on is asked with it until it is answered.
     """
     asked = flight.round_trip.ask(now_us)
     if asked is None:

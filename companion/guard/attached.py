@@ -17,7 +17,7 @@ from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk
 from companion.report import Event
 
 # Own setpoints that are remembered until they pass the gate: one for each IMU sample of a second, in which PX4 holds
-# the last (COM_OF_LOSS_T).
+# the last.
 _MOST_ON_THE_WAY = 250
 
 Mark: TypeAlias = tuple[object, ...]

@@ -4,14 +4,15 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from companion.autopilot.known import ASSUMED
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.guard.config import GuardConfig
 from companion.guard.descent import Descent
 from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks, Vector3
 
-# PX4 takes setpoints for lost when there is none for so long (COM_OF_LOSS_T).
-LONGEST_BETWEEN_S = 1.0
+# Setpoints are lost when there is none for so long.
+LONGEST_BETWEEN_S = ASSUMED.defaults.loss_us * 1e-6
 
 
 @dataclass(frozen=True, slots=True)

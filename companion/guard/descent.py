@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.autopilot.interface import Pilot
+from companion.autopilot.known import ASSUMED
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.messages import LandedState, PositionTarget, Sample, Sticks
 from companion.motion.config import SAME_M_S
 
-# Stick deflection around the middle that asks for no climb: PX4's MPC_HOLD_DZ.
-STICK_DEADZONE = 0.1
+STICK_DEADZONE = ASSUMED.defaults.stick_deadzone
 THROTTLE = 2
 
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from companion.autopilot.known import ASSUMED
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
 from companion.flight.crash import crashed
@@ -35,9 +36,8 @@ _KINDS = {
     Trigger.REFUSED: "ended",
 }
 STICKS = "the pilot moved the sticks"
-# PX4's COM_RC_STICK_OV, 30 %.
-MOVED = 0.3
-# Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD (COM_OF_LOSS_T) and takes it again by itself 0.09 s
+MOVED = ASSUMED.defaults.stick_override
+# Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD and takes it again by itself 0.09 s
 # after the next one. Its mode is reported every 0.1 s. A failsafe that lasts for twice all that is for another reason.
 RETURNS_US = 400_000
 # After these the vehicle is given back to hold whatever is configured.
@@ -245,7 +245,7 @@ class GuardMachine(StateMachine):
 
 
 def has_moved(before: Sticks, now: Sticks) -> bool:
-    """Have the pilot's sticks been moved? By PX4's default (COM_RC_OVERRIDE = 1) that ends AUTO modes and not OFFBOARD.
+    """Have the pilot's sticks been moved? By PX4's default that ends AUTO modes and not OFFBOARD.
 
     A stick pushed to a new place counts; one let go does not: a pilot startled by a hit opens the hand. The throttle's
     middle is PX4's too; one that has no spring lies anywhere, and only its way from there counts.

@@ -14,7 +14,7 @@ from companion.messages import Asked, Vector3
 from companion.motion.rotation import yaw_rad
 from companion.motion.vector import ZERO, along
 
-# PX4 brakes by this where MPC_ACC_HOR is what docs/how-to/guard.md has it set to. With PX4's default it needs less room
+# PX4 brakes by this where it is set up as docs/how-to/guard.md has it. With PX4's default it needs less room
 # (reflex.config.BRAKES_M_S2).
 BRAKES_M_S2 = 2.0
 # A velocity that is asked for leads somewhere: as far as in the time in which PX4 takes its setpoint for lost.

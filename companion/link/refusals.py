@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass, field
 
+from companion.autopilot.known import ASSUMED
 from companion.messages import Refused
 
-# One broken packet is a matter for the count. PX4 needs as long to leave OFFBOARD by default (COM_OF_LOSS_T).
-LASTING_US = 1_000_000
+# One broken packet is a matter for the count. For as long the last setpoint is flown on.
+LASTING_US = ASSUMED.defaults.loss_us
 
 
 @dataclass(slots=True)

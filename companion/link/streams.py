@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from companion import messages
+from companion.autopilot.interface import Autopilot
 from companion.messages import LocalPosition, MessageId
 from companion.mission.config import StreamsConfig
 
@@ -71,7 +72,7 @@ class StreamMonitor:
         seconds = (self._until_us - self._started_us) * 1e-6
         return {s.message_id.name: round(self._counts[s.sample_type] / seconds, 2) for s in self.streams}
 
-    def too_slow(self) -> str | None:
+    def too_slow(self, autopilot: Autopilot) -> str | None:
         """One sentence on the first stream that is below its least rate, or None."""
         rates = self.rates_hz()
         for stream in self.streams:
@@ -79,6 +80,7 @@ class StreamMonitor:
             if rate_hz < stream.min_hz:
                 return (
                     f"{stream.message_id.name} arrives at {rate_hz:.1f} Hz and at least {stream.min_hz:g} Hz are "
-                    "needed; give the link more bandwidth (baud rate, MAV_x_RATE) or check the vehicle's estimate"
+                    f"needed; give the link more bandwidth (baud rate, {autopilot.rate_parameter}) or check the "
+                    "vehicle's estimate"
                 )
         return None

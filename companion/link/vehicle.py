@@ -63,9 +63,9 @@ class ModeReport:
     failsafe: bool
 
 
-# After this silence the last reported mode is old. PX4 leaves OFFBOARD after the same time without a setpoint
-# (COM_OF_LOSS_T). A later setpoint would take the vehicle away from whoever has it then.
-OLD_NEWS_US = 1_000_000
+# After this silence the last reported mode is old: without setpoints the vehicle has left the mode that flies them. A
+# later setpoint would take the vehicle away from whoever has it then.
+OLD_NEWS_US = ASSUMED.defaults.loss_us
 
 
 @dataclass(slots=True)

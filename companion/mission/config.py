@@ -69,7 +69,7 @@ class FlightConfig(StrictModel):
     setpoint_lead_s: Annotated[Positive, Field(ge=1.0)] = 1.0
     """PX4 wants to see the stream before the switch; its documentation asks for more than a second of it."""
     takeoff_speed_m_s: Annotated[Positive, Field(le=3.0)] = 1.0
-    """Below PX4's MPC_Z_VEL_MAX_UP of 3 m/s and near its MPC_TKO_SPEED of 1.5 m/s."""
+    """Below PX4's limit of 3 m/s and near its own take-offs' 1.5 m/s."""
     takeoff_acceleration_m_s2: Annotated[Positive, Field(le=5.0)] = 1.0
     """Of the beginning and the end of the climb."""
     cruise_speed_m_s: Annotated[Positive, Field(le=12.0)] = 1.0

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import ConfigDict, Field, model_validator
 
+from companion.autopilot.known import ASSUMED
 from companion.mission.policy import OnCollision, OnTimeout
 from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel, with_bare_keys
 
@@ -141,12 +142,11 @@ class ExpectItem(StrictModel):
         return check
 
 
-# PX4 flies no faster than MPC_XY_VEL_MAX, 12 m/s by default: a larger wish is a slip of the pen.
-MAX_SPEED_M_S = 12.0
-# One g sideways is a tilt of 45 degrees, PX4's default limit MPC_TILTMAX_AIR.
+# PX4 flies no faster: a larger wish is a slip of the pen.
+MAX_SPEED_M_S = ASSUMED.defaults.max_speed_m_s
+# One g sideways is a tilt of 45 degrees, PX4's default limit.
 MAX_ACCELERATION_M_S2 = 9.81
-# MC_YAWRATE_MAX, 200 deg/s by default.
-MAX_YAW_RATE_DEG_S = 200.0
+MAX_YAW_RATE_DEG_S = ASSUMED.defaults.max_yaw_rate_deg_s
 
 Speed = Annotated[Positive, Field(le=MAX_SPEED_M_S)]
 Acceleration = Annotated[Positive, Field(le=MAX_ACCELERATION_M_S2)]
@@ -279,7 +279,7 @@ class SetYawItem(StrictModel):
     yaw_deg: Yaw
     """Heading, clockwise from north."""
     rate_deg_s: Annotated[Positive, Field(le=MAX_YAW_RATE_DEG_S)] = 45.0
-    """PX4's own limit is MC_YAWRATE_MAX."""
+    """No faster than PX4 turns."""
 
 
 class ReturnItem(StrictModel):

@@ -10,6 +10,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from companion.autopilot.known import ASSUMED
 from companion.fence import Fence
 from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
@@ -96,8 +97,8 @@ _LOOK_EVERY_S = 0.02
 _MOST_LOOKS = 20_000
 # A point on the boundary, computed, may lie outside by a rounding error.
 _ROUNDING_M = 1e-6
-# PX4's MPC_LAND_SPEED, and the second and two it takes to be sure and to disarm.
-LANDING_SPEED_M_S = 0.7
+# The second and two that it takes to be sure and to disarm come on top.
+LANDING_SPEED_M_S = ASSUMED.defaults.landing_m_s
 LANDING_EXTRA_S = 3.0
 
 

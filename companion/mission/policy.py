@@ -52,12 +52,12 @@ class SetpointLimits(StrictModel):
     """What no setpoint exceeds, whatever asks for it; see also the fence."""
 
     max_speed_m_s: Annotated[Positive, Field(le=20.0)] = 12.0
-    """Of a setpoint's velocity, and of how fast it moves on: PX4's own MPC_XY_VEL_MAX."""
+    """Of a setpoint's velocity, and of how fast it moves on: PX4's own limit."""
     max_step_m: Annotated[Positive, Field(ge=0.5)] = 5.0
-    """From the vehicle to a setpoint. PX4 answers one that lies d ahead with MPC_XY_P * d = 0.95/s * d: 5 m are 4.75
+    """From the vehicle to a setpoint. PX4 answers one that lies d ahead with 0.95/s * d: 5 m are 4.75
     m/s. Recoveries ask for up to 3 m; a setpoint further off is an estimate that jumped or a mistake."""
     max_tilt_deg: Annotated[Positive, Field(le=60.0)] = 45.0
-    """Of what a setpoint's acceleration asks for sideways: PX4's own MPC_TILTMAX_AIR."""
+    """Of what a setpoint's acceleration asks for sideways: PX4's own limit."""
 
 
 class Resume(StrictModel):

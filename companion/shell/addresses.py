@@ -82,7 +82,7 @@ def _meant(text: str) -> str | None:
     """What other programs' habits stand for: pymavlink's `udp:HOST:PORT`, a device, a host and port, a port alone."""
     scheme, _, rest = text.partition(":")
     if text.startswith("/dev/"):
-        # PX4's TELEM2 for a companion, SER_TEL2_BAUD.
+        # PX4's TELEM2 for a companion.
         device, _, baud = text.replace(",", ":").partition(":")
         return f"serial://{device}:{baud or 921600}"
     host_port = _HOST_PORT.match(rest) or _HOST_PORT.match(text)

@@ -17,18 +17,19 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
+from companion.autopilot.known import ASSUMED
 from companion.errors import ConnectionSetupError
 from companion.mavlink.packet import packet_length
 from companion.shell.connection import READ_SIZE, LinkCounts, bound_socket, plain, readable
 
 # A local server answers within milliseconds and a radio link within a second; longer means nobody is there.
 TCP_CONNECT_TIMEOUT_S = 5.0
-# PX4 leaves OFFBOARD after one second without setpoints (COM_OF_LOSS_T): a link that is back has five attempts in it.
+# The last setpoint is flown on for a second: a link that is back has five attempts in it.
 RETRY_S = 0.2
 # The round trip of a telemetry radio stays below half a second; a SYN without an answer by then was lost.
 ATTEMPT_S = 0.5
-# What no host has acknowledged within COM_OF_LOSS_T is old: the other end has gone without a word.
-UNACKNOWLEDGED_MS = 1000
+# What no host has acknowledged while the last setpoint is flown on is old: the other end has gone without a word.
+UNACKNOWLEDGED_MS = ASSUMED.defaults.loss_us // 1000
 # A send that blocks longer than this would stall the setpoints, 20 to 50 a second; the packet is dropped instead.
 SEND_TIMEOUT_S = 0.02
 # Where udev names serial devices by maker, model and serial number.

@@ -1,6 +1,6 @@
 """PX4 behind the interface of autopilots."""
 
-from companion.autopilot.interface import Autopilot, Remedies
+from companion.autopilot.interface import Autopilot, Defaults, Remedies
 from companion.autopilot.px4 import modes, setup
 
 PX4 = Autopilot(
@@ -17,6 +17,7 @@ PX4 = Autopilot(
     pilot=modes.pilot,
     set_mode=modes.set_mode,
     loss_parameter=setup.LOSS,
+    rate_parameter="MAV_x_RATE",
     integration_parameter=setup.INTEGRATION,
     asked=setup.asked,
     judge_vehicle=setup.judge_vehicle,
@@ -29,4 +30,14 @@ PX4 = Autopilot(
         no_estimator="look at EKF2 in QGroundControl",
     ),
     loss_text=setup.loss_text,
+    defaults=Defaults(
+        loss_us=1_000_000,  # COM_OF_LOSS_T
+        position_gain_per_s=0.95,  # MPC_XY_P
+        max_speed_m_s=12.0,  # MPC_XY_VEL_MAX
+        max_yaw_rate_deg_s=200.0,  # MC_YAWRATE_MAX
+        turning_deg_s=45.0,  # MPC_YAWRAUTO_MAX
+        landing_m_s=0.7,  # MPC_LAND_SPEED
+        stick_deadzone=0.1,  # MPC_HOLD_DZ
+        stick_override=0.3,  # COM_RC_STICK_OV
+    ),
 )
