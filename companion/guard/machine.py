@@ -36,6 +36,7 @@ _KINDS = {
     Trigger.REFUSED: "ended",
 }
 STICKS = "the pilot moved the sticks"
+# Of a deflection, by which the autopilot itself takes a pilot to have taken over.
 MOVED = ASSUMED.defaults.stick_override
 # Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD and takes it again by itself 0.09 s
 # after the next one. Its mode is reported every 0.1 s. A failsafe that lasts for twice all that is for another reason.

@@ -146,6 +146,7 @@ class ExpectItem(StrictModel):
 MAX_SPEED_M_S = ASSUMED.defaults.max_speed_m_s
 # One g sideways is a tilt of 45 degrees, PX4's default limit.
 MAX_ACCELERATION_M_S2 = 9.81
+# Nor does it turn faster.
 MAX_YAW_RATE_DEG_S = ASSUMED.defaults.max_yaw_rate_deg_s
 
 Speed = Annotated[Positive, Field(le=MAX_SPEED_M_S)]

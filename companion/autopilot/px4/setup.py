@@ -69,12 +69,8 @@ def _port(setup: Setup) -> Iterator[PreflightItem]:
     if line.baud is None:
         remedy = f"a wire to TELEM2; or CBRK_USB_CHK = {USB_ALLOWED}, then reboot"
         is_refused = told.get("CBRK_USB_CHK") != USB_ALLOWED
-        yield judged(
-            "port",
-            "PX4's USB port",
-            (is_refused, DOUBTFUL, remedy),
-            beyond=": with a cable in it PX4 may not arm",
-        )
+        beyond = ": with a cable in it PX4 may not arm"
+        yield judged("port", "PX4's USB port", (is_refused, DOUBTFUL, remedy), beyond=beyond)
         return
     ports = {number: PORTS.get(int(told.get(f"MAV_{number}_CONFIG", 0)), "") for number in INSTANCES}
     fitting = [number for number, port in ports.items() if port and told.get(f"SER_{port}_BAUD") == line.baud]
@@ -85,15 +81,8 @@ def _port(setup: Setup) -> Iterator[PreflightItem]:
     # Of two with the same rate the one that was meant for this.
     number = next((number for number in fitting if told.get(f"MAV_{number}_MODE") == ONBOARD), fitting[-1])
     port, prefix = ports[number], f"MAV_{number}"
-    yield judged(
-        "port",
-        f"{prefix} on {port}, {line.baud} baud",
-        (
-            line.baud < COMPANION_BAUD,
-            DOUBTFUL,
-            f"SER_{port}_BAUD = {COMPANION_BAUD}, reboot, the same in --connect",
-        ),
-    )
+    remedy = f"SER_{port}_BAUD = {COMPANION_BAUD}, reboot, the same in --connect"
+    yield judged("port", f"{prefix} on {port}, {line.baud} baud", (line.baud < COMPANION_BAUD, DOUBTFUL, remedy))
     wanted = {
         "MODE": (ONBOARD, "not the onboard streams"),
         "RATE": (0, "bytes a second at most; 0 is half of the line"),
@@ -103,10 +92,7 @@ def _port(setup: Setup) -> Iterator[PreflightItem]:
         name, value = f"{prefix}_{what}", told.get(f"{prefix}_{what}")
         is_less = value is not None and (value != wish if what != "RATE" else 0 < value < line.baud / 20)
         found = "the vehicle did not tell it" if value is None else f"{value:g}"
-        cases = (
-            (value is None, DOUBTFUL, "ask again"),
-            (is_less, DOUBTFUL, f"{name} = {wish}, then reboot"),
-        )
+        cases = (value is None, DOUBTFUL, "ask again"), (is_less, DOUBTFUL, f"{name} = {wish}, then reboot")
         yield judged(name, found, *cases, mended=wish, beyond=f": {why}" if is_less else "")
 
 
@@ -126,7 +112,7 @@ def _offboard_loss_time(name: str, loss_s: float, setup: Setup) -> PreflightItem
     slow = "a program that streams at less than 4 Hz then loses OFFBOARD"
     remedy = f"{name} = {held_s:g}, or recoveries are flown by position alone; {slow}"
     case = (round(loss_s, 3) > held_s, DOUBTFUL, remedy)
-    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {setup.most_held_s:g} s")
+    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {held_s:g} s")
 
 
 def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
