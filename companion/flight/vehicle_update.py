@@ -27,7 +27,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 identity = identify(sample)
                 if isinstance(identity, str):
                     return identity
-                vehicle.identity = identity
+                vehicle.identity, vehicle.autopilot = identity, identity.autopilot
             if sample.system_id != vehicle.identity.system_id:
                 continue
             if identify(sample) != vehicle.identity:

@@ -77,6 +77,7 @@ class Vehicle:
     """
 
     identity: Identity | None = None
+    autopilot: Autopilot = ASSUMED  # the identity's, once there is one
     version: tuple[int, int, int] | None = None
     armed: bool | None = None
     mode: ModeReport | None = None
@@ -163,10 +164,6 @@ class Vehicle:
 
     def _accept_armed(self, armed: bool) -> None:
         self.armed, self.is_disarm_unconfirmed, self.is_disarm_unexplained = armed, False, False
-
-    @property
-    def autopilot(self) -> Autopilot:
-        return ASSUMED if self.identity is None else self.identity.autopilot
 
     @property
     def custom_mode(self) -> int | None:

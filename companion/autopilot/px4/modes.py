@@ -43,7 +43,7 @@ def _parts(custom_mode: int) -> tuple[int, int]:
 
 
 def pilot(custom_mode: int) -> Pilot | None:
-    return _PILOTS.get(_parts(custom_mode)[0])
+    return _PILOTS.get(custom_mode >> 16 & 0xFF)
 
 
 def mode_name(custom_mode: int) -> str:
