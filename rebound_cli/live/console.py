@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 LIVE_INTERVAL_S = 0.1
 PLAIN_INTERVAL_S = 5.0
 LAST_WAIT_S = 1.0
-# In a pipe progress is a line at each tenth of the whole.
-PLAIN_STEPS = 10
 # The events that a person waits for: a hit as the companion sees it, and as the simulator knows it.
 STANDING_OUT = ("detection", "hit")
 
@@ -29,7 +27,6 @@ class Plain:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._tenths = -1
         # The state is no line of a service's journal: the service manager shows the present one.
         self._is_journal = "NOTIFY_SOCKET" in os.environ
 
@@ -43,12 +40,6 @@ class Plain:
         (_, time_text), *others = fields
         if not self._is_journal:
             self.print("  ".join([f"{time_text:>11}", *(f"{name} {text}" for name, text in others)]))
-
-    def progress(self, what: str, done: int, total: int) -> None:
-        tenths = PLAIN_STEPS * done // total
-        if tenths != self._tenths:
-            self._tenths = tenths
-            self.print(f"{what}: {done} of {total}")
 
     def ask(self, question: str) -> None:
         self._stream.write(question)
@@ -91,10 +82,6 @@ class Console:
 
     def event(self, time_s: float, kind: str, text: str) -> None:
         self._do(self._display.event, time_s, kind, text, kind in STANDING_OUT)
-
-    def progress(self, what: str, done: int, total: int) -> None:
-        """Something that takes its time, by how much of it is done."""
-        self._do(self._display.progress, what, done, total)
 
     def print(self, text: str = "") -> None:
         self._do(self._display.print, text)

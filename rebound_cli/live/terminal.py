@@ -5,13 +5,10 @@ from contextlib import contextmanager
 from typing import TextIO
 
 from rich.console import Console as RichConsole
-from rich.console import Group, RenderableType
+from rich.console import RenderableType
 from rich.live import Live
-from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
-
-_BAR_WIDTH = 40
 
 
 class _Rich(RichConsole):
@@ -48,11 +45,6 @@ class Terminal:
         for name, text in fields:
             rows.add_row(Text(f"  {name}", "dim"), text)
         self._show(rows)
-
-    def progress(self, what: str, done: int, total: int) -> None:
-        row = Table.grid(padding=(0, 1))
-        row.add_row(f"{done} of {total}", ProgressBar(total, done, width=_BAR_WIDTH))
-        self._show(Group(what, row))
 
     def ask(self, question: str) -> None:
         self.close()

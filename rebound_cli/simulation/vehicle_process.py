@@ -1,6 +1,5 @@
 """The simulated vehicle as a process of its own, which never outlives the flight."""
 
-import re
 import subprocess
 import sys
 import time
@@ -12,7 +11,7 @@ from companion.errors import ReboundError
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.run_folder import RESOLVED_NAME, TRUTH_NAME, VEHICLE_LOG_NAME
-from rebound_cli.simulation.compiling import COMPILED
+from rebound_cli.simulation.compiling import COMPILED, COMPILING
 
 # Writing the truth of a long flight takes well under a second; a process that takes longer is stuck.
 STOP_TIMEOUT_S = 5.0
@@ -21,8 +20,6 @@ STOP_TIMEOUT_S = 5.0
 READY_WORDS = "Simulated vehicle"
 
 _READY_POLL_S = 0.02
-# What it prints before, of its compiling: how far it is, and that it cannot be kept.
-_PROGRESS = re.compile(r"(Compiling .+): (\d+) of (\d+)")
 
 
 class VehicleProcessError(ReboundError):
@@ -58,9 +55,7 @@ class VehicleProcess:
             for line in self._said()[told:]:
                 told += 1
                 is_ready |= line.startswith(self._ready_words)
-                if (progress := _PROGRESS.fullmatch(line)) is not None:
-                    console.progress(progress[1], int(progress[2]), int(progress[3]))
-                elif line.startswith(COMPILED):
+                if line.startswith((COMPILING, COMPILED)):
                     console.print(line)
             if not is_ready:
                 time.sleep(_READY_POLL_S)

@@ -11,7 +11,7 @@ from companion.report import Event, Status
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.timing import LinkRate
-from rebound_cli.simulation.compiling import compiling_shown
+from rebound_cli.simulation.compiling import compiling_told
 from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
 from tests.rebound_cli.command import ROOT
 
@@ -75,16 +75,7 @@ def test_a_terminal_that_is_gone_is_written_to_once_and_keeps_nothing_for_later(
     assert screen.tries == 1
 
 
-def test_progress_in_a_pipe_is_a_line_a_tenth():
-    stream = io.StringIO()
-    with Console(stream) as console:
-        for done in range(101):
-            console.progress("Compiling", done, 100)
-    lines = stream.getvalue().splitlines()
-    assert len(lines) == 11 and (lines[0], lines[-1]) == ("Compiling: 0 of 100", "Compiling: 100 of 100")
-
-
-def test_only_what_is_compiled_has_a_progress():
+def test_what_is_compiled_is_told_once_and_only_of_ours():
     numba = pytest.importorskip("numba")
 
     def kernel(value):
@@ -94,13 +85,14 @@ def test_only_what_is_compiled_has_a_progress():
     kernel = numba.njit(kernel)
     stream = io.StringIO()
     console = Console(stream)
-    with compiling_shown(console, "Compiling"):
+    with compiling_told(console, "Compiling"):
         kernel(1)
-    assert stream.getvalue().splitlines()[-1].startswith("Compiling: ")
-    # When it is called again, or one is compiled that is not ours, then nothing is shown
+        kernel(1.0)
+    assert stream.getvalue() == "Compiling\n"
+    # When it is called again, or one is compiled that is not ours, then nothing is told
     stream.truncate(0)
     stream.seek(0)
-    with compiling_shown(console, "Compiling"):
+    with compiling_told(console, "Compiling"):
         kernel(2)
         numba.njit(lambda value: value - 1)(2)
     assert stream.getvalue() == ""
@@ -119,9 +111,9 @@ def test_kernels_are_kept_in_the_users_cache_and_without_a_place_there_is_a_reas
         assert done.stdout.startswith(said) and done.stdout.splitlines()[1] == value, done.stderr
 
 
-def test_the_vehicles_progress_is_shown_by_who_waits_for_it_and_ctrl_c_ends_that(tmp_path, monkeypatch):
+def test_what_a_vehicle_compiles_is_told_by_who_waits_for_it_and_ctrl_c_ends_that(tmp_path, monkeypatch):
     # Given a vehicle that compiles, and then is ready
-    said = "Compiling physics: 1 of 3\nCompiled code is not kept.\nCompiling physics: 3 of 3\nSimulated vehicle x\n"
+    said = "Compiling physics\nCompiled code is not kept.\nSimulated vehicle x\n"
     code = f"import sys; print({said!r}, end='', flush=True); sys.stdin.read()"
     script = tmp_path / "vehicle"
     script.write_text(f'#!/bin/sh\nexec {sys.executable} -c "$CODE"\n')
@@ -129,7 +121,7 @@ def test_the_vehicles_progress_is_shown_by_who_waits_for_it_and_ctrl_c_ends_that
     monkeypatch.setenv("CODE", code)
     monkeypatch.setattr(sys, "executable", str(script))
     stream = io.StringIO()
-    # When somebody waits for it, then the progress is seen
+    # When somebody waits for it, then that is told
     with VehicleProcess(tmp_path, []) as vehicle:
         vehicle.wait_until_ready(Interrupts(), Console(stream))
     assert stream.getvalue() == said.rpartition("Simulated")[0]
