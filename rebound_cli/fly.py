@@ -16,7 +16,7 @@ from companion.shell.files import write_whole
 from rebound_cli import inputs
 from rebound_cli.background import Background
 from rebound_cli.figure.showing import offer_page, show_flight, show_later
-from rebound_cli.flights.kept import make_room_for_next, room_for
+from rebound_cli.flights.kept import folder_with_room
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
@@ -79,12 +79,12 @@ def run_fly(options: Namespace) -> int:
         connection = None if is_simulated else open_signed(options, mission.companion.link.wait)
         if is_simulated and options.sim == "px4":
             connection = udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance)
-        if not is_simulated:
-            make_room_for_next(options.out, mission.companion.disk)
-        folder = run_folder.create_run_folder(options.out, mission.name)
+        if is_simulated:
+            folder, ring = run_folder.create_run_folder(options.out, mission.name), None
+        else:
+            folder, ring = folder_with_room(options.out, mission.name, mission.companion.disk)
         _write_inputs(folder, options.mission, mission, world)
         # In lockstep the vehicle waits for the disk as for everything else.
-        ring = None if is_simulated else room_for(folder, options.out, mission.companion.disk)
         recorder = FlightRecorder(
             folder, None if options.lockstep else Background("log"), ring.make_room if ring else None
         )

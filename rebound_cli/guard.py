@@ -17,7 +17,7 @@ from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.documents import Document, apply_overrides, load_document, validated
 from rebound_cli.figure.showing import offer_page
-from rebound_cli.flights.kept import make_room_for_next, room_for
+from rebound_cli.flights.kept import folder_with_room
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop, watched
@@ -60,11 +60,9 @@ def _recorded(
     between: Between | None,
 ) -> str:
     """One folder: until the end, which is returned, or, then empty, until it is long and the vehicle disarmed."""
-    make_room_for_next(out, config.companion.disk)
-    folder = run_folder.create_run_folder(out, "guard")
+    folder, ring = folder_with_room(out, "guard", config.companion.disk)
     run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
-    ring = room_for(folder, out, config.companion.disk)
     recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
     guard = Guard(config)
     try:

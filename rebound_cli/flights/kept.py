@@ -190,13 +190,14 @@ class Ring:
         self.is_long = self._has_room and present_bytes > max(limits.max_use // _FLIGHTS_A_BUDGET, LAST_BYTES)
 
 
-def make_room_for_next(out: Path | None, config: DiskConfig) -> None:
-    """Before a flight's folder is made: on a disk that others have filled the oldest flights go for it."""
-    if out is None:
-        with suppress(OSError):
-            Ring(run_folder.RUNS_FOLDER / "next", config).make_room(LOOK_EVERY_US)
+def folder_with_room(out: Path | None, name: str, config: DiskConfig) -> tuple[Path, Ring | None]:
+    """A flight's folder, and whose `make_room` a recorder asks before packets: None where a person has named it.
 
-
-def room_for(folder: Path, out: Path | None, config: DiskConfig) -> Ring | None:
-    """Whose `make_room` a recorder asks before packets; None where a person has named the folder, and keeps it."""
-    return Ring(folder, config) if out is None else None
+    On a disk that others have filled the oldest flights go before it is made. Raises RunFolderError, OSError.
+    """
+    if out is not None:
+        return run_folder.create_run_folder(out, name), None
+    with suppress(OSError):
+        Ring(run_folder.RUNS_FOLDER / "next", config).make_room(LOOK_EVERY_US)
+    folder = run_folder.create_run_folder(None, name)
+    return folder, Ring(folder, config)

@@ -4,9 +4,7 @@ import json
 import re
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -27,34 +25,16 @@ def run_import(options: Namespace) -> int:
         data, notes = mission_of_plan(plan, name)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from error
-    text = mission_yaml(data, f"From {path.name}, a plan of QGroundControl.")
+    # Lists and maps of plain values stand on a line.
+    written = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True)
+    text = f"# From {path.name}, a plan of QGroundControl.\n{written}"
     # What is written can be flown: a plan that leaves its own fence is refused here and not at the field.
     mission_from(parse_document(text, f"the mission from {path}"))
-    _write(options.out, text, notes)
-    return 0
-
-
-def mission_yaml(data: dict[str, Any], comment: str) -> str:
-    """A mission file as a person would write it: an item a line."""
-    lines = [f"# {comment}"]
-    for key, value in data.items():
-        if key == "items":
-            lines += ["", "items:", *[f"  - {_flow(item)}" for item in value], ""]
-        else:
-            lines.append(f"{key}: {_flow(value)}")
-    return "\n".join(lines) + "\n"
-
-
-def _flow(value: Any) -> str:
-    text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=1_000_000, allow_unicode=True)
-    return text.removesuffix("\n").removesuffix("\n...")
-
-
-def _write(out: Path | None, text: str, notes: Sequence[str]) -> None:
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
-    if out is None:
+    if options.out is None:
         print(text, end="")
-        return
-    write_text(out, text)
-    print(f"written to {out}", file=sys.stderr)
+    else:
+        write_text(options.out, text)
+        print(f"written to {options.out}", file=sys.stderr)
+    return 0

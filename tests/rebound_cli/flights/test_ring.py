@@ -15,9 +15,9 @@ from rebound_cli.flights.kept import (
     LOOK_EVERY_US,
     DiskLimits,
     Ring,
+    folder_with_room,
     kept_flights,
     limits_of,
-    make_room_for_next,
 )
 from rebound_cli.results.run_folder import EVENTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
@@ -230,8 +230,12 @@ def test_room_is_made_before_a_flight_has_a_folder(tmp_path, disk, monkeypatch):
     for day in (1, 2):
         pretend(tmp_path, f"2026010{day}T000000Z-guard", MB)
     disk(tmp_path, 49 * MB)
-    make_room_for_next(None, DiskConfig.model_validate({"keep_free_mb": 50}))
-    assert names(tmp_path) == ["20260102T000000Z-guard"]
+    folder, kept = folder_with_room(None, "guard", DiskConfig.model_validate({"keep_free_mb": 50}))
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["20260102T000000Z-guard", folder.name]
+    assert kept is not None
     # And where nothing was flown yet there is nothing to do
     monkeypatch.setattr(ring.run_folder, "RUNS_FOLDER", tmp_path / "none")
-    make_room_for_next(None, DiskConfig())
+    folder, _ = folder_with_room(None, "guard", DiskConfig())
+    assert folder.is_dir()
+    # And in a folder that a person has named nothing is removed
+    assert folder_with_room(tmp_path / "mine", "guard", DiskConfig()) == (tmp_path / "mine", None)
