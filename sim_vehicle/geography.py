@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from sim_vehicle.world import Vector3
+from sim_vehicle.quantities import Vector3
 
 # The sphere of PX4's projection between geographic and local coordinates (lib/geo).
 EARTH_RADIUS_M = 6_371_000.0

@@ -6,7 +6,8 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from sim_vehicle.world import Box, Motion, Pole, Vector3, Wall
+from sim_vehicle.quantities import Vector3
+from sim_vehicle.world import Box, Motion, Pole, Wall
 from sim_vehicle.written import Finite, NotNegative, Part
 
 Point = tuple[Finite, Finite, Finite]

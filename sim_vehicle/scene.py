@@ -9,7 +9,8 @@ from sim_vehicle.airframe import Airframe
 from sim_vehicle.errors import SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.obstacles import BoxSpec, Point, PoleSpec, WallSpec
-from sim_vehicle.world import Obstacle, Vector3, Wall, World, build_world
+from sim_vehicle.quantities import Vector3
+from sim_vehicle.world import Obstacle, Wall, World, build_world
 from sim_vehicle.written import Finite, Part
 
 

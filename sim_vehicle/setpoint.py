@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-Axis3 = tuple[float | None, float | None, float | None]
+from sim_vehicle.quantities import Axis3, Quaternion, Vector3
 
 FREE: Axis3 = (None, None, None)
 

@@ -5,13 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics import layout
-from sim_vehicle.world import Vector3, World
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats, Vector3
+from sim_vehicle.world import World
 
 # Columns of one row of the path: time, position, velocity, attitude, contact force, folds.
 _ROW = 1 + 3 + 3 + 4 + 1 + MOST_ROTORS

@@ -21,10 +21,10 @@ from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.layout import PlantState
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.world import Vector3
 
 # A signature has one byte for the link.
 _LINK_NUMBERS = 256

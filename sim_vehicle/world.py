@@ -9,11 +9,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-Vector3 = tuple[float, float, float]
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from sim_vehicle.quantities import Floats, Ints, Vector3
 
 GROUND = "ground"
 

@@ -10,8 +10,9 @@ import numpy.typing as npt
 from companion.mission.model import Leg, Mission, itinerary
 from rebound_cli.inputs import SimulatedWorld
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene
-from sim_vehicle.world import Obstacle, Vector3
+from sim_vehicle.world import Obstacle
 
 Floats = npt.NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from sim_vehicle.autopilot.navigator.mission import MissionCommand
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Vector3
+from sim_vehicle.quantities import Vector3
 
 NAV_TAKEOFF = 22
 DO_ORBIT = 34

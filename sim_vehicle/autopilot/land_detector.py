@@ -8,7 +8,7 @@ import math
 
 from sim_vehicle.airframe import NO_THRUST_SHARE
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Vector3
+from sim_vehicle.quantities import Vector3
 
 # On the ground the thresholds widen, so that idling motors do not look like a takeoff.
 WIDER_WHEN_LANDED = 2.5

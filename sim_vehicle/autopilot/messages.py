@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, TypeAlias
 
-from sim_vehicle.setpoint import Axis3, Quaternion, Vector3
+from sim_vehicle.quantities import Axis3, Quaternion, Vector3
 
 EVERY_ID = 0
 """A target of 0 addresses every system, or every component."""

@@ -8,9 +8,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from sim_vehicle.errors import FaultError
 from sim_vehicle.faults.spec import ClockJump, EstimatorReset, Fault
+from sim_vehicle.quantities import Vector3
 
 Direction = Literal["to_companion", "to_vehicle", "both"]
-Vector3 = tuple[float, float, float]
 
 _FAULT: TypeAdapter[Fault] = TypeAdapter(Fault)
 

@@ -3,14 +3,12 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.physics.layout import FEET, Constants, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 from sim_vehicle.physics.touching.meeting import deepest_point, is_absent
+from sim_vehicle.quantities import Floats
 from sim_vehicle.world import Motion, Wall
-
-Floats = npt.NDArray[np.float64]
 
 # From appearing to touching: short, so that a vehicle that brakes by 7 m/s2 is met within 0.15 m/s of the speed.
 LEAD_S = 0.02

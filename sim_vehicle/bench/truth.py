@@ -4,10 +4,8 @@ import math
 from dataclasses import dataclass
 
 from sim_vehicle.bench.changeable import ChangeableVehicle
+from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.truth import FaultSpan, Hit
-from sim_vehicle.world import Vector3
-
-Quadruple = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +17,7 @@ class Truth:
     position_ned_m: Vector3
     """Of the centre of mass, in the world."""
     velocity_ned_m_s: Vector3
-    attitude_wxyz: Quadruple
+    attitude_wxyz: Quaternion
     """Body to NED."""
     angular_velocity_frd_rad_s: Vector3
     arm_fold_m: tuple[float, ...]

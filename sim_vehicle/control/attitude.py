@@ -1,15 +1,13 @@
 """Attitude tracking on SO(3), the paper's eqs. 4 and 5, run at 150 Hz, and the motor commands for it."""
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics.inertia import times
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import Constants, Gains, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 ATTITUDE_LOOP_HZ = 150
 

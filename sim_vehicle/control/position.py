@@ -3,14 +3,12 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.airframe import THRUST_MIN
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 POSITION_LOOP_HZ = 100
 # An off-centre hit spins the vehicle by more than a right angle. Past that e_R of eq. 4 no longer tells tilt

@@ -3,8 +3,7 @@
 import math
 from typing import NamedTuple
 
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from sim_vehicle.quantities import Quaternion, Vector3
 
 
 class Estimate(NamedTuple):

@@ -6,7 +6,6 @@ an attitude stays one.
 """
 
 import numpy as np
-import numpy.typing as npt
 from filterpy.kalman import ExtendedKalmanFilter
 
 from sim_vehicle.airframe import Airframe
@@ -30,9 +29,7 @@ from sim_vehicle.estimator.strapdown import (
     down_range,
     heading,
 )
-from sim_vehicle.world import Vector3
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats, Vector3
 
 # A vehicle on its feet on flat ground stands level to about two degrees, heels and gravel included.
 FIRST_TILT_RAD = 0.03

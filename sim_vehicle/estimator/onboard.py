@@ -6,7 +6,6 @@ from collections import deque
 from enum import Enum, auto
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.estimator.filter import NavigationFilter
@@ -32,8 +31,7 @@ from sim_vehicle.estimator.strapdown import (
 )
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
 from sim_vehicle.physics.layout import GRAVITY_M_S2
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 # So that the sensors' noise does not change with what the rest of the simulation draws.
 _OWN_SEED = 0xF10

@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.quantities import Floats
 from sim_vehicle.world import FACE_ACROSS, FACE_ALONG, FACE_HALF_HEIGHT, FACE_HALF_WIDTH, FACE_NORMAL, FACE_POINT
-
-Floats = npt.NDArray[np.float64]
 
 # Rows of what the camera holds: flow and turns integrated since its last sample, then how it moves now.
 FLOW_X, FLOW_Y, TURN_X, TURN_Y, TURN_Z, RATE_X, RATE_Y, FASTEST, DISTANCE = range(9)

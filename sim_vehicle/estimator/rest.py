@@ -1,12 +1,10 @@
 """Whether the vehicle stands still, from its own motors' state and its inertial sensor."""
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.estimator.strapdown import FORCE, RATES
 from sim_vehicle.physics.layout import GRAVITY_M_S2
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 # Still for as long as this, and the rates of this long are averaged: their noise is down to a fifth.
 WINDOW_S = 0.1

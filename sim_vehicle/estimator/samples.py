@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from sim_vehicle.world import Vector3
+from sim_vehicle.quantities import Vector3
 
 NO_QUALITY, BEST_QUALITY = 0, 255
 

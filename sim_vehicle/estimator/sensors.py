@@ -4,7 +4,6 @@ import math
 import random
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.aiding import Aid, Compass, MotionCapture, OpticalFlow, RangeFinder, Sensors
 from sim_vehicle.estimator.estimate import yaw_of
@@ -28,8 +27,7 @@ from sim_vehicle.estimator.samples import (
     RangeSample,
 )
 from sim_vehicle.physics.rotation import matrix_from_quaternion
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 
 class Schedule:

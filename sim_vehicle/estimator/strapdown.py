@@ -9,13 +9,11 @@ biases, integrated flow.
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise, turn
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 # Rows of ``nominal``.
 POSITION, VELOCITY, QUATERNION, GYROSCOPE_BIAS, ACCELEROMETER_BIAS, FLOW = 0, 3, 6, 10, 13, 16

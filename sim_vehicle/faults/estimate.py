@@ -3,13 +3,10 @@
 from bisect import insort
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import AidingLoss, EstimatorAfterClipping, EstimatorReset
 from sim_vehicle.physics.layout import Disturbance, PlantState
-
-Floats = npt.NDArray[np.float64]
 
 
 class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):

@@ -31,8 +31,8 @@ from sim_vehicle.faults.spec import (
 )
 from sim_vehicle.faults.wind import Air
 from sim_vehicle.physics.layout import Disturbance, PlantState
+from sim_vehicle.quantities import Vector3
 from sim_vehicle.truth import FaultSpan
-from sim_vehicle.world import Vector3
 
 # So that faults draw their own numbers: a flight with a fault that does nothing is the flight without it.
 _OWN_SEED = 0xFA17

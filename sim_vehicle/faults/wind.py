@@ -7,7 +7,7 @@ import numpy as np
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import Gust, Turbulence
 from sim_vehicle.physics.layout import Disturbance, PlantState
-from sim_vehicle.world import Vector3
+from sim_vehicle.quantities import Vector3
 
 _FOOT_M = 0.3048
 # The model's low-altitude figures hold from 10 ft up to 1000 ft.

@@ -2,7 +2,7 @@
 
 from sim_vehicle.geography import HOME, Place
 from sim_vehicle.hil.messages import Air
-from sim_vehicle.world import Vector3
+from sim_vehicle.quantities import Vector3
 
 # Inside the five years of WMM2025; fixed, so that the same flight has the same field.
 FIELD_YEAR = 2026.0

@@ -6,9 +6,7 @@ from typing import TypeAlias
 from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Place
-from sim_vehicle.world import Vector3
-
-Quadruple = tuple[float, float, float, float]
+from sim_vehicle.quantities import Quaternion, Vector3
 
 MOTORS_STOPPED = (0.0,) * MOST_ROTORS
 
@@ -52,7 +50,7 @@ class MotionCapture:
 
     time_us: int
     position_ned_m: Vector3
-    attitude_wxyz: Quadruple
+    attitude_wxyz: Quaternion
     position_variance_m2: float
     attitude_variance_rad2: float
 
@@ -64,7 +62,7 @@ class HilState:
     time_us: int
     place: Place
     velocity_ned_m_s: Vector3
-    attitude_wxyz: Quadruple
+    attitude_wxyz: Quaternion
     angular_velocity_frd_rad_s: Vector3
 
 

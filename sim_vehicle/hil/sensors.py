@@ -6,8 +6,8 @@ import random
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.geography import HOME, Origin, Place
 from sim_vehicle.hil.earth import magnetic_field_ned_gauss
-from sim_vehicle.hil.messages import HilGps, MotionCapture, Quadruple
-from sim_vehicle.world import Vector3
+from sim_vehicle.hil.messages import HilGps, MotionCapture
+from sim_vehicle.quantities import Quaternion, Vector3
 
 # Rates usual on flight controllers; PX4 asks for no particular ones.
 MAGNETOMETER_PERIOD_US = 20_000
@@ -49,7 +49,7 @@ class Magnetometer:
         self._field_ned_gauss = magnetic_field_ned_gauss(home)
         self._rng = rng
 
-    def sample(self, attitude_wxyz: Quadruple) -> Vector3:
+    def sample(self, attitude_wxyz: Quaternion) -> Vector3:
         """In gauss, FRD."""
         x, y, z = to_body(attitude_wxyz, self._field_ned_gauss)
         gauss, noise = self._rng.gauss, MAGNETOMETER_NOISE_GAUSS
@@ -85,7 +85,7 @@ class Cameras:
     def __init__(self, rng: random.Random) -> None:
         self._rng = rng
 
-    def sample(self, time_us: int, position_ned_m: Vector3, attitude_wxyz: Quadruple) -> MotionCapture:
+    def sample(self, time_us: int, position_ned_m: Vector3, attitude_wxyz: Quaternion) -> MotionCapture:
         return MotionCapture(
             time_us=time_us,
             position_ned_m=_sum(position_ned_m, self._error(CAMERA_POSITION_NOISE_M)),
@@ -99,7 +99,7 @@ class Cameras:
         return gauss(0, deviation), gauss(0, deviation), gauss(0, deviation)
 
 
-def turned(attitude_wxyz: Quadruple, angle_frd_rad: Vector3) -> Quadruple:
+def turned(attitude_wxyz: Quaternion, angle_frd_rad: Vector3) -> Quaternion:
     """An attitude after a small turn about the body's axes."""
     w, x, y, z = attitude_wxyz
     a, b, c = (0.5 * angle for angle in angle_frd_rad)
@@ -109,7 +109,7 @@ def turned(attitude_wxyz: Quadruple, angle_frd_rad: Vector3) -> Quadruple:
     return turned_w / norm, turned_x / norm, turned_y / norm, turned_z / norm
 
 
-def to_body(attitude_wxyz: Quadruple, vector_ned: Vector3) -> Vector3:
+def to_body(attitude_wxyz: Quaternion, vector_ned: Vector3) -> Vector3:
     """A NED vector in the body's FRD frame: the transpose of the attitude's rotation."""
     w, x, y, z = attitude_wxyz
     north, east, down = vector_ned

@@ -2,15 +2,12 @@
 
 import random
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.earth import air_at
 from sim_vehicle.hil.messages import Air, HilGps
 from sim_vehicle.hil.sensors import BAROMETER_NOISE_PA, Gps, Magnetometer
-from sim_vehicle.world import Vector3
+from sim_vehicle.quantities import Floats, Vector3
 
 # SENS_MAG_RATE 15 Hz and SENS_BARO_RATE 20 Hz, in whole intervals of 4 ms; PX4's simulated receiver gives 8 fixes a
 # second.
@@ -36,7 +33,7 @@ class SlowSensors:
         self.gps_is_blocked = False
         """No fix while it is: the receiver goes on without one."""
 
-    def update(self, now_us: int, body: npt.NDArray[np.float64]) -> None:
+    def update(self, now_us: int, body: Floats) -> None:
         """Renew what is due; ``body`` (13,): true position and velocity NED, attitude (w, x, y, z), rates, SI units."""
         due_us = self._due_us
         north, east, down, v_north, v_east, v_down, w, x, y, z = body[:10].tolist()

@@ -7,7 +7,7 @@ from sim_vehicle.airframe import Airframe, Imu
 from sim_vehicle.estimator.sensors import DownwardSensors
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.earth import air_at
-from sim_vehicle.hil.messages import Air, HilSensor, HilState, Quadruple, ToPx4
+from sim_vehicle.hil.messages import Air, HilSensor, HilState, ToPx4
 from sim_vehicle.hil.sensors import (
     BAROMETER_NOISE_PA,
     BAROMETER_PERIOD_US,
@@ -19,9 +19,9 @@ from sim_vehicle.hil.sensors import (
     Magnetometer,
 )
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.scene import Scene, check_start_is_free
 from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.world import Vector3
 
 # What PX4 asks for when it connects.
 STATE_PERIOD_US = 5_000
@@ -77,7 +77,7 @@ class HilVehicle:
         px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r = self._body.tolist()
         position_ned_m: Vector3 = (px, py, pz)
         velocity_ned_m_s: Vector3 = (vx, vy, vz)
-        attitude_wxyz: Quadruple = (qw, qx, qy, qz)
+        attitude_wxyz: Quaternion = (qw, qx, qy, qz)
         messages: list[ToPx4] = []
         faults = self._plant.faults
         if self._is_due(GPS_PERIOD_US) and not (faults is not None and faults.gps_is_lost(now_us / 1e6)):

@@ -18,7 +18,8 @@ from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.setpoint import AttitudeSetpoint, Axis3, RatesSetpoint, TrajectorySetpoint
+from sim_vehicle.quantities import Axis3
+from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 
 # One of pymavlink's, which carry no types, or a `framing.Packed`; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any

@@ -3,15 +3,12 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.world import Vector3
+from sim_vehicle.quantities import Floats, Vector3
 
 _KEPT = 0.99
 _ADDED = 1.0 - _KEPT
@@ -54,9 +51,9 @@ class Telemetry:
     attitude_variance_rad2: float
     flow: FlowSample | None = None
     range: RangeSample | None = None
-    true_body: npt.NDArray[np.float64] | None = None
+    true_body: Floats | None = None
     """The plant's own state (13,), for the truth channel alone."""
-    attitude_setpoint: npt.NDArray[np.float64] | None = None
+    attitude_setpoint: Floats | None = None
     """The attitude control's R_d (3, 3), body to NED."""
     gps: HilGps | None = None
     air: Air | None = None

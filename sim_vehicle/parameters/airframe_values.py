@@ -5,7 +5,7 @@ import math
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Vector3
+from sim_vehicle.quantities import Vector3
 
 _MICROSECONDS = 1_000_000
 # Quadrotor, hexarotor, octorotor.

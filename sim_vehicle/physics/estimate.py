@@ -8,8 +8,9 @@ import numpy as np
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import BODY_SIZE, GRAVITY_M_S2, Disturbance, PlantState
-from sim_vehicle.physics.record import Floats, Matrix3, Vector3, new_record
+from sim_vehicle.physics.record import Matrix3, Vector3, new_record
 from sim_vehicle.physics.rotation import matrix_from_quaternion, turn
+from sim_vehicle.quantities import Floats
 
 # Low-pass on the slope of the estimated velocity, the D of eq. 6: the noise of an optical-flow velocity
 # differentiated at 100 Hz would otherwise tilt the vehicle by degrees.

@@ -2,13 +2,9 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, PlantState, Scratch
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 
 @inlined

@@ -5,13 +5,9 @@ hub radius + arm length - fold from the centre; everything else is rigid. The ce
 arms folded fully move it by 2 mm.
 """
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import Constants
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 # Entries of an inertia: the body's axes are principal but for x and y, which one folded arm couples.
 XX, YY, ZZ, XY = range(4)

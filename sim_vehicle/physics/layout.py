@@ -6,7 +6,8 @@ from typing import Annotated
 import numpy as np
 
 from sim_vehicle.airframe import MOST_ROTORS, Airframe, Bounce
-from sim_vehicle.physics.record import Floats, Matrix3, Vector3, Vector4, new_record
+from sim_vehicle.physics.record import Matrix3, Vector3, Vector4, new_record
+from sim_vehicle.quantities import Floats
 
 GRAVITY_M_S2 = 9.81
 

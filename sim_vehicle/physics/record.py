@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 Vector3 = Annotated[Floats, (3,)]
 Vector4 = Annotated[Floats, (4,)]

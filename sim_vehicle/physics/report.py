@@ -3,7 +3,7 @@
 from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import Constants, PlantState
-from sim_vehicle.physics.record import Floats
+from sim_vehicle.quantities import Floats
 
 # What really is: time (us), position, velocity, attitude, contact force, folds. `truth.py` keeps these.
 _FOLDS, TRUTH = 12, slice(0, 12 + MOST_ROTORS)

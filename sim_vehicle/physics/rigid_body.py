@@ -1,8 +1,5 @@
 """The rigid body of the paper's eq. 1 with drag, contact and what else acts on it, and one Runge-Kutta step of it."""
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of, times
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import (
@@ -16,10 +13,8 @@ from sim_vehicle.physics.layout import (
 )
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise
 from sim_vehicle.physics.touching.contact import contact_wrench
+from sim_vehicle.quantities import Floats, Ints
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 @inlined

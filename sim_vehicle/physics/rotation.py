@@ -6,12 +6,8 @@ whole array costs a kernel less than cutting a slice.
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.physics.jit import inlined, njit
-
-Floats = npt.NDArray[np.float64]
+from sim_vehicle.quantities import Floats
 
 
 @inlined

@@ -6,8 +6,7 @@ import numpy as np
 
 from sim_vehicle.physics.estimate import EstimateErrors
 from sim_vehicle.physics.layout import BODY_SIZE, GRAVITY_M_S2, Constants, Disturbance, PlantState
-from sim_vehicle.physics.record import Floats
-from sim_vehicle.world import Vector3
+from sim_vehicle.quantities import Floats, Vector3
 
 
 def trim(

@@ -3,9 +3,9 @@
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
-from sim_vehicle.world import Vector3
 
 
 class Cruise:

@@ -2,9 +2,6 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.control.attitude import (
     ATTITUDE_LOOP_HZ,
     allocate_motors,
@@ -33,10 +30,8 @@ from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 from sim_vehicle.physics.touching.contact import relax_arms, settle_arms
 from sim_vehicle.physics.touching.hits import close_old_hit, note_contact
 from sim_vehicle.physics.touching.proximity import find_close, find_near, wake_faces
+from sim_vehicle.quantities import Floats, Ints
 from sim_vehicle.world import FACE_VELOCITY
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 MOTORS_OFF, MOTORS_IDLE, MOTORS_FLYING, MOTORS_DRIVEN = range(4)
 

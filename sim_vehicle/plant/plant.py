@@ -14,7 +14,7 @@ from sim_vehicle.faults.spec import Fault
 from sim_vehicle.physics.asked import AskedSetpoint
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
-from sim_vehicle.physics.record import Floats, boxed, new_record
+from sim_vehicle.physics.record import boxed, new_record
 from sim_vehicle.physics.report import HITS_ENDED, KNOWN, REPORT_COLUMNS, SENSED, TRUTH, report_estimate
 from sim_vehicle.physics.touching.proximity import points_behind
 from sim_vehicle.physics.touching.surroundings import Surroundings
@@ -27,10 +27,11 @@ from sim_vehicle.plant.interval import (
     MOTORS_OFF,
     advance_interval,
 )
+from sim_vehicle.quantities import Floats, Vector3
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import Setpoint
 from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.world import Vector3, World
+from sim_vehicle.world import World
 
 if TYPE_CHECKING:
     from sim_vehicle.estimator.onboard import OnboardEstimator

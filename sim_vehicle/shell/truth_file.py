@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from sim_vehicle.quantities import Floats
 from sim_vehicle.truth import FaultSpan, Hit, TruthRecorder
 
 # What else is in the file.
 _NO_SERIES = ("hits", "faults", "epoch_at_boot_us", "stalls")
-
-Floats = npt.NDArray[np.float64]
 
 
 def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int, stalls: Sequence[tuple[int, int]] = ()) -> None:

@@ -6,7 +6,7 @@ from enum import Enum, auto
 
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Quaternion, Vector3
+from sim_vehicle.quantities import Quaternion, Vector3
 
 _MICROSECONDS = 1e6
 # FlightTaskAuto wants to take off where the way to its target climbs faster than this.

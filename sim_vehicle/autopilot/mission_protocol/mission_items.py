@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from sim_vehicle.geography import Origin, Place
-from sim_vehicle.setpoint import Vector3
+from sim_vehicle.quantities import Vector3
 
 FRAME_GLOBAL, FRAME_MISSION, FRAME_GLOBAL_RELATIVE = 0, 2, 3
 FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT = 5, 6

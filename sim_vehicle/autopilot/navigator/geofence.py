@@ -13,7 +13,7 @@ from sim_vehicle.autopilot.mission_protocol import mission_items
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Vector3
+from sim_vehicle.quantities import Vector3
 
 # GEOFENCE_CHECK_INTERVAL_US.
 CHECK_PERIOD_US = 200_000

@@ -25,7 +25,7 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Vector3
+from sim_vehicle.quantities import Vector3
 
 
 class Work(Enum):

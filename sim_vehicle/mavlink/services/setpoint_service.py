@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, FollowTarget, PositionTarget, StickInput
 from sim_vehicle.mavlink.services.service import Board, Channel, Handler
-from sim_vehicle.setpoint import Axis3
+from sim_vehicle.quantities import Axis3
 
 _FORCE_BIT, _YAW_IGNORED, _YAW_RATE_IGNORED = 0x200, 0x400, 0x800
 _NO_RATES = (0x1, 0x2, 0x4)

@@ -12,7 +12,7 @@ from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Message, units_of
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.setpoint import Quaternion, Vector3
+from sim_vehicle.quantities import Quaternion, Vector3
 
 _UNKNOWN_DISTANCE = -1.0
 _LASER, _LOOKS_DOWN = dialect.MAV_DISTANCE_SENSOR_LASER, dialect.MAV_SENSOR_ROTATION_PITCH_270

@@ -2,18 +2,13 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GUARDS, HUB, ContactSprings, PlantState, Scratch
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.physics.touching.meeting import is_absent, meet
 from sim_vehicle.physics.touching.proximity import IN_FRONT, INSIDE, NEAR, points_at
+from sim_vehicle.quantities import Floats, Ints
 from sim_vehicle.world import FACE_RADIUS, FACE_VELOCITY
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 # Sliding speed over which friction reaches its full value: far below any speed of interest.
 FRICTION_SPEED_M_S = 0.02

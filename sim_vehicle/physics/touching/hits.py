@@ -1,7 +1,6 @@
 """Bookkeeping of hits as they happen: when, how fast, how hard, how deep. Truth, never telemetry."""
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.physics.inertia import turning_energy
 from sim_vehicle.physics.jit import inlined, njit
@@ -29,10 +28,8 @@ from sim_vehicle.physics.layout import (
 )
 from sim_vehicle.physics.touching.meeting import meet
 from sim_vehicle.physics.touching.proximity import NEAR
+from sim_vehicle.quantities import Floats, Ints
 from sim_vehicle.world import FACE_VELOCITY
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 @inlined

@@ -2,11 +2,9 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import FEET, GUARDS, HUB, QUAD_X_FRD, ContactSprings, Scratch
+from sim_vehicle.quantities import Floats
 from sim_vehicle.world import (
     FACE_ACROSS,
     FACE_ALONG,
@@ -19,8 +17,6 @@ from sim_vehicle.world import (
     FACE_POINT,
     FACE_RADIUS,
 )
-
-Floats = npt.NDArray[np.float64]
 
 # Leaning by this the hoop stands on one edge; less, on both of them in part, as a hoop that gives a little does.
 EDGE_LEAN_RAD = 0.1

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import FEET, POINTS, ContactSprings, Scratch
@@ -16,10 +15,8 @@ from sim_vehicle.physics.touching.meeting import (
     part_centre,
     within,
 )
+from sim_vehicle.quantities import Floats, Ints
 from sim_vehicle.world import FACE_MEETS_FEET, FACE_NORMAL, FACE_POINT, FACE_RADIUS, FACE_VELOCITY
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 # Values of `near`, per face: out of reach for this interval, out of reach now, within reach, and so close that
 # guards and hub must be looked at.

@@ -1,14 +1,11 @@
 """What the kernels need of the world around the vehicle; another world may take its place in the middle of a flight."""
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.physics.layout import POINTS
 from sim_vehicle.physics.touching.proximity import points_behind
-from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Vector3, World
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from sim_vehicle.quantities import Vector3
+from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, World
 
 
 class Surroundings:
