@@ -15,7 +15,7 @@ import numpy as np
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.encode import Encoder, Message
 from sim_vehicle.mavlink.streams import aiding, condition, navigation
-from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.stream_rates import ON_REQUEST, UNLIMITED, LinkKind, Rates
 from sim_vehicle.mavlink.streams.topics import NEVER_SENT, Topic, Topics
 from sim_vehicle.mavlink.telemetry import Telemetry
 
@@ -31,6 +31,8 @@ class StreamKind:
     topic: Topic
     build: Callable[[Telemetry], Message | None]
     """None where there is nothing to say at the moment."""
+    rates: Rates = ON_REQUEST
+    """At which it is sent unasked."""
     notes: tuple[Topic, ...] = ()
     """Slower topics whose news the message marks as such: `Telemetry.renewed`, in this order."""
 
@@ -40,42 +42,40 @@ HEARTBEAT_ID = 0
 EARLY_US = 450
 # Topics whose messages are sent on request even if they were sent already.
 SENT_AGAIN = (Topic.ALWAYS_NEW, Topic.ORIGIN)
-# On every link, whatever its set.
-HEARTBEAT_HZ = 1.0
 
 # In the order in which PX4 sends them: what needs low latency comes first.
 KINDS: tuple[StreamKind, ...] = (
-    StreamKind(HEARTBEAT_ID, Topic.ALWAYS_NEW, encode.heartbeat),
-    StreamKind(111, Topic.ALWAYS_NEW, encode.timesync),
-    StreamKind(105, Topic.SAMPLE, encode.highres_imu, notes=(Topic.MAGNETIC_FIELD, Topic.AIR)),
-    StreamKind(32, Topic.POSITION, encode.local_position_ned),
-    StreamKind(30, Topic.SAMPLE, encode.attitude),
-    StreamKind(331, Topic.POSITION, encode.odometry),
-    StreamKind(31, Topic.SAMPLE, encode.attitude_quaternion),
-    StreamKind(83, Topic.POSITION, condition.attitude_target),
-    StreamKind(132, Topic.RANGE, aiding.distance_sensor),
-    StreamKind(106, Topic.FLOW, aiding.optical_flow_rad),
-    StreamKind(436, Topic.STATUS, encode.current_mode),
-    StreamKind(245, Topic.ALWAYS_NEW, encode.extended_sys_state),
-    StreamKind(85, Topic.POSITION, encode.position_target_local_ned),
-    StreamKind(1, Topic.SAMPLE, condition.sys_status),
-    StreamKind(241, Topic.SAMPLE, encode.vibration),
+    StreamKind(HEARTBEAT_ID, Topic.ALWAYS_NEW, encode.heartbeat, Rates(1, 1, 1)),
+    StreamKind(111, Topic.ALWAYS_NEW, encode.timesync, Rates(10, None, None)),
+    StreamKind(105, Topic.SAMPLE, encode.highres_imu, Rates(50, None, None), notes=(Topic.MAGNETIC_FIELD, Topic.AIR)),
+    StreamKind(32, Topic.POSITION, encode.local_position_ned, Rates(30, 1, 50)),
+    StreamKind(30, Topic.SAMPLE, encode.attitude, Rates(100, 15, 50)),
+    StreamKind(331, Topic.POSITION, encode.odometry, Rates(30, None, None)),
+    StreamKind(31, Topic.SAMPLE, encode.attitude_quaternion, Rates(50, 10, 50)),
+    StreamKind(83, Topic.POSITION, condition.attitude_target, Rates(10, 2, 50)),
+    StreamKind(132, Topic.RANGE, aiding.distance_sensor, Rates(10, 0.5, 0.5)),
+    StreamKind(106, Topic.FLOW, aiding.optical_flow_rad, Rates(10, None, 10)),
+    StreamKind(436, Topic.STATUS, encode.current_mode, Rates(0.5, 0.5, 0.5)),
+    StreamKind(245, Topic.ALWAYS_NEW, encode.extended_sys_state, Rates(5, 1, 1)),
+    StreamKind(85, Topic.POSITION, encode.position_target_local_ned, Rates(10, 1.5, 50)),
+    StreamKind(1, Topic.SAMPLE, condition.sys_status, Rates(5, 1, 1)),
+    StreamKind(241, Topic.SAMPLE, encode.vibration, Rates(0.5, 0.1, 0.1)),
     StreamKind(148, Topic.ALWAYS_NEW, condition.autopilot_version),
-    StreamKind(33, Topic.POSITION, navigation.global_position_int),
-    StreamKind(141, Topic.POSITION, navigation.altitude),
-    StreamKind(74, Topic.POSITION, navigation.vfr_hud),
-    StreamKind(36, Topic.SAMPLE, condition.servo_output_raw),
-    StreamKind(24, Topic.GPS, navigation.gps_raw_int),
-    StreamKind(87, Topic.POSITION, navigation.position_target_global_int),
-    StreamKind(230, Topic.POSITION, navigation.estimator_status),
-    StreamKind(360, Topic.ORBIT, navigation.orbit_execution_status),
-    StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin),
-    StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position),
-    StreamKind(147, Topic.BATTERY, condition.battery_status),
-    StreamKind(2, Topic.ALWAYS_NEW, condition.system_time),
-    StreamKind(4, Topic.ALWAYS_NEW, condition.ping),
+    StreamKind(33, Topic.POSITION, navigation.global_position_int, Rates(50, 5, 50)),
+    StreamKind(141, Topic.POSITION, navigation.altitude, Rates(10, 1, 1)),
+    StreamKind(74, Topic.POSITION, navigation.vfr_hud, Rates(10, 4, 4)),
+    StreamKind(36, Topic.SAMPLE, condition.servo_output_raw, Rates(10, 1, 50)),
+    StreamKind(24, Topic.GPS, navigation.gps_raw_int, Rates(UNLIMITED, 5, 5)),
+    StreamKind(87, Topic.POSITION, navigation.position_target_global_int, Rates(10, 1, 1)),
+    StreamKind(230, Topic.POSITION, navigation.estimator_status, Rates(1, 0.5, 0.5)),
+    StreamKind(360, Topic.ORBIT, navigation.orbit_execution_status, Rates(5, 2, 2)),
+    StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin, Rates(1, 1, 1)),
+    StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position, Rates(0.5, 0.5, 0.5)),
+    StreamKind(147, Topic.BATTERY, condition.battery_status, Rates(0.5, 0.5, 0.5)),
+    StreamKind(2, Topic.ALWAYS_NEW, condition.system_time, Rates(1, None, None)),
+    StreamKind(4, Topic.ALWAYS_NEW, condition.ping, Rates(1, 0.1, 0.1)),
     StreamKind(69, Topic.STICKS, condition.manual_control),
-    StreamKind(29, Topic.AIR, condition.scaled_pressure),
+    StreamKind(29, Topic.AIR, condition.scaled_pressure, Rates(1, 1, 1)),
     StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
     StreamKind(375, Topic.SAMPLE, condition.actuator_output_status),
     StreamKind(264, Topic.ALWAYS_NEW, condition.flight_information),
@@ -168,10 +168,7 @@ class Streams:
         self._state = state
         self._encoder = encoder
         self._now_us = state.sample.time_boot_us
-        rates_hz = {HEARTBEAT_ID: HEARTBEAT_HZ, **link.rates_hz}
-        self._streams = [
-            Stream(kind, self._now_us, interval_from_rate(rates_hz.get(kind.message_id))) for kind in KINDS
-        ]
+        self._streams = [Stream(kind, self._now_us, interval_from_rate(kind.rates.on(link))) for kind in KINDS]
         self._by_id = {stream.kind.message_id: stream for stream in self._streams}
         self._versions = topics.versions
         self._loops = LateLoops(seed)
