@@ -8,6 +8,7 @@ from enum import Enum, auto
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator import strapdown
 from sim_vehicle.estimator.filter import NavigationFilter
 from sim_vehicle.estimator.rest import STILL_SPEED_M_S, RestDetector
 from sim_vehicle.estimator.samples import (
@@ -18,17 +19,6 @@ from sim_vehicle.estimator.samples import (
     Sample,
 )
 from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, DownwardSensors
-from sim_vehicle.estimator.strapdown import (
-    D_ATTITUDE,
-    D_POSITION,
-    D_VELOCITY,
-    FORCE,
-    NOMINAL_ROWS,
-    SAMPLE_COLUMNS,
-    keep_sample,
-    predict_now,
-    show,
-)
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
 from sim_vehicle.physics.layout import GRAVITY_M_S2
 from sim_vehicle.quantities import Floats
@@ -65,7 +55,7 @@ class OnboardEstimator:
         # At least one sample behind, so that the output predictor always has one to go by.
         self._slots = max(math.ceil(sensors.delay_s / self._step_s - 1e-9), 1) + 1
         self._share = 1 - math.exp(-self._step_s / SLOPE_TIME_CONSTANT_S)
-        self._now = np.zeros(NOMINAL_ROWS + 3)
+        self._now = np.zeros(strapdown.NOMINAL_ROWS + 3)
         self._clipped = np.zeros(3)
         self.flow: FlowSample | None = None
         self.range: RangeSample | None = None
@@ -82,8 +72,8 @@ class OnboardEstimator:
         px, py, pz, vx, vy, vz, w, x, y, z = body[0:10].tolist()
         attitude_wxyz = (cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w)
         self.filter = NavigationFilter(self._airframe, (px, py, pz), (vx, vy, vz), attitude_wxyz)
-        self._samples = np.zeros((self._slots, SAMPLE_COLUMNS))
-        self._samples[:, FORCE + 2] = -GRAVITY_M_S2
+        self._samples = np.zeros((self._slots, strapdown.SAMPLE_COLUMNS))
+        self._samples[:, strapdown.FORCE + 2] = -GRAVITY_M_S2
         self._head = 0
         self._waiting: deque[Sample] = deque()
         self._fused_us = dict.fromkeys(_Aided, time_us)
@@ -108,20 +98,22 @@ class OnboardEstimator:
         """
         self._sense(time_us, body)
         head = self._head = (self._head + 1) % self._slots
-        keep_sample(self._samples, head, sensed, self._clipped)
+        strapdown.keep_sample(self._samples, head, sensed, self._clipped)
         oldest = (head + 1) % self._slots
         self.filter.predict(self._samples[oldest])
         horizon_us = time_us - (self._slots - 1) * self._interval_us
         self._fuse_rest(self._samples[oldest], flies, horizon_us)
         while self._waiting and self._waiting[0].time_us <= horizon_us:
             self._fuse(self._waiting.popleft())
-        predict_now(self.filter.nominal, self._samples, oldest, self._step_s, self._now)
-        show(self._now, self._share, estimate, acceleration_ned_m_s2)
+        strapdown.predict_now(self.filter.nominal, self._samples, oldest, self._step_s, self._now)
+        strapdown.show(self._now, self._share, estimate, acceleration_ned_m_s2)
 
     def variances(self) -> tuple[float, float, float]:
         """Of position (m2), velocity (m2/s2) and attitude (rad2), each on its worst axis."""
         diagonal: list[float] = self.filter.covariance.diagonal().tolist()
-        position, velocity, attitude = (diagonal[row : row + 3] for row in (D_POSITION, D_VELOCITY, D_ATTITUDE))
+        position, velocity, attitude = (
+            diagonal[row : row + 3] for row in (strapdown.D_POSITION, strapdown.D_VELOCITY, strapdown.D_ATTITUDE)
+        )
         return max(position), max(velocity), max(attitude)
 
     # --- sensing: the only place that looks at the truth ----------------------------------------------------

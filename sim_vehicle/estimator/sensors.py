@@ -6,18 +6,8 @@ import random
 import numpy as np
 
 from sim_vehicle.aiding import Aid, Compass, MotionCapture, OpticalFlow, RangeFinder, Sensors
+from sim_vehicle.estimator import optics
 from sim_vehicle.estimator.estimate import yaw_of
-from sim_vehicle.estimator.optics import (
-    CAMERA_ROWS,
-    DISTANCE,
-    FASTEST,
-    FLOW_X,
-    FLOW_Y,
-    TURN_X,
-    TURN_Z,
-    distance_below,
-    watch,
-)
 from sim_vehicle.estimator.samples import (
     BEST_QUALITY,
     NO_QUALITY,
@@ -60,7 +50,7 @@ class FlowSensor:
         self._step_s = 1e-6 * interval_us
         self.schedule = Schedule(spec, interval_us, rng)
         self._rng = rng
-        self._camera = np.zeros(CAMERA_ROWS)
+        self._camera = np.zeros(optics.CAMERA_ROWS)
         self._last_us = 0
 
     def look_at(self, faces: Floats) -> None:
@@ -69,27 +59,30 @@ class FlowSensor:
 
     def observe(self, time_us: int, body: Floats) -> FlowSample | None:
         """See one interval; the sample if one is due."""
-        watch(body, self._faces, self._step_s, self._camera)
+        optics.watch(body, self._faces, self._step_s, self._camera)
         if not self.schedule.is_due(time_us):
             return None
         seen: list[float] = self._camera.tolist()
-        self._camera[FLOW_X : TURN_Z + 1] = 0.0
-        self._camera[FASTEST] = 0.0
+        self._camera[optics.FLOW_X : optics.TURN_Z + 1] = 0.0
+        self._camera[optics.FASTEST] = 0.0
         integration_us, self._last_us = time_us - self._last_us, time_us
         if not self._sees(seen) or self.schedule.is_lost(time_us):
             return FlowSample(time_us, integration_us, (0.0, 0.0), (0.0, 0.0, 0.0), NO_QUALITY)
         spec, gauss, seconds = self._spec, self._rng.gauss, 1e-6 * integration_us
         turn_x, turn_y, turn_z = (
-            seen[TURN_X + axis] + gauss(0, spec.gyroscope_noise_rad_s * seconds) for axis in range(3)
+            seen[optics.TURN_X + axis] + gauss(0, spec.gyroscope_noise_rad_s * seconds) for axis in range(3)
         )
-        flow_x = seen[FLOW_X] + seen[TURN_X] + gauss(0, spec.noise_rad_s * seconds)
-        flow_y = seen[FLOW_Y] + seen[TURN_X + 1] + gauss(0, spec.noise_rad_s * seconds)
+        flow_x = seen[optics.FLOW_X] + seen[optics.TURN_X] + gauss(0, spec.noise_rad_s * seconds)
+        flow_y = seen[optics.FLOW_Y] + seen[optics.TURN_X + 1] + gauss(0, spec.noise_rad_s * seconds)
         return FlowSample(time_us, integration_us, (flow_x, flow_y), (turn_x, turn_y, turn_z), BEST_QUALITY)
 
     def _sees(self, seen: list[float]) -> bool:
         """Sharp enough to compare pictures, and slow enough that they still overlap."""
         spec = self._spec
-        return spec.distance_min_m <= seen[DISTANCE] <= spec.distance_max_m and seen[FASTEST] <= spec.rate_max_rad_s
+        return (
+            spec.distance_min_m <= seen[optics.DISTANCE] <= spec.distance_max_m
+            and seen[optics.FASTEST] <= spec.rate_max_rad_s
+        )
 
 
 class RangeSensor:
@@ -143,7 +136,7 @@ class DownwardSensors:
                 samples.append(flow)
         if self._sensors.range_finder.fitted and self._range.is_due(time_us):
             matrix_from_quaternion(body, self._rotation)
-            samples.append(self._range.observe(time_us, distance_below(body, self._rotation, self._faces)))
+            samples.append(self._range.observe(time_us, optics.distance_below(body, self._rotation, self._faces)))
         return samples
 
 

@@ -5,25 +5,15 @@ import math
 import numpy as np
 
 from sim_vehicle.airframe import MOST_ROTORS
+from sim_vehicle.faults import spec
 from sim_vehicle.faults.group import Group
-from sim_vehicle.faults.spec import (
-    BatterySag,
-    FreeFall,
-    HandCatch,
-    ImuBias,
-    ImuStuck,
-    MotorFailure,
-    PayloadDrop,
-    Push,
-    Vibration,
-)
 from sim_vehicle.faults.wind import risen
 from sim_vehicle.physics.layout import Disturbance, PlantState
 
 _AXES = ("accelerometer_x", "accelerometer_y", "accelerometer_z", "gyroscope_x", "gyroscope_y", "gyroscope_z")
 
 
-class Motors(Group[MotorFailure | FreeFall | BatterySag]):
+class Motors(Group[spec.MotorFailure | spec.FreeFall | spec.BatterySag]):
     """What each motor gives of what it is commanded."""
 
     def __init__(self) -> None:
@@ -36,27 +26,27 @@ class Motors(Group[MotorFailure | FreeFall | BatterySag]):
             start_s, end_s = fault.window_s
             if time_s < start_s:
                 continue
-            if isinstance(fault, BatterySag):
+            if isinstance(fault, spec.BatterySag):
                 # A propeller's speed goes with voltage, its thrust with the square of its speed.
                 fallen = min((time_s - start_s) / (end_s - start_s), 1.0)
                 voltage_share = 1.0 - fallen * (1.0 - fault.voltage_share)
                 self.voltage_share *= voltage_share
                 shares = [share * voltage_share**2 for share in shares]
-            elif time_s < end_s and isinstance(fault, MotorFailure):
+            elif time_s < end_s and isinstance(fault, spec.MotorFailure):
                 shares[fault.motor] *= fault.thrust_share
             elif time_s < end_s:
                 shares = [0.0] * MOST_ROTORS
         disturbance.motor_share[:] = shares
 
 
-class Load(Group[PayloadDrop]):
+class Load(Group[spec.PayloadDrop]):
     """What the vehicle still carries."""
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         disturbance.carried_kg = sum(drop.mass_kg for drop in self._faults if time_s < drop.window_s[0])
 
 
-class Pushes(Group[Push]):
+class Pushes(Group[spec.Push]):
     """Forces on a point of the body, one at a time."""
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
@@ -71,12 +61,12 @@ class Pushes(Group[Push]):
                 disturbance.push_point_frd_m[:] = push.point_frd_m
 
 
-class Hands(Group[HandCatch]):
+class Hands(Group[spec.HandCatch]):
     """Hands that take hold of the vehicle where it is."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._held: HandCatch | None = None
+        self._held: spec.HandCatch | None = None
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         held = None
@@ -93,7 +83,7 @@ class Hands(Group[HandCatch]):
         self._held = held
 
 
-class Shaking(Group[Vibration]):
+class Shaking(Group[spec.Vibration]):
     """Vibration of the rotors, several sources of it adding as powers do."""
 
     def __init__(self, rotors: int) -> None:
@@ -121,7 +111,7 @@ class Shaking(Group[Vibration]):
         state.rotor_phase[: self._rotors] = rng.uniform(0.0, 2.0 * math.pi, self._rotors)
 
 
-class InertialSensor(Group[ImuBias | ImuStuck]):
+class InertialSensor(Group[spec.ImuBias | spec.ImuStuck]):
     """Zeros that move and axes that are stuck."""
 
     def __init__(self, raw_per_interval: int) -> None:
@@ -134,7 +124,7 @@ class InertialSensor(Group[ImuBias | ImuStuck]):
             start_s, end_s = fault.window_s
             if not start_s <= time_s < end_s:
                 continue
-            if isinstance(fault, ImuBias):
+            if isinstance(fault, spec.ImuBias):
                 biases += [*fault.accelerometer_frd_m_s2, *fault.gyroscope_frd_rad_s]
                 continue
             axis = _AXES.index(fault.axis)

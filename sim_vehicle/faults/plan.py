@@ -8,27 +8,10 @@ from typing import Any
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.faults import spec
 from sim_vehicle.faults.body import Hands, InertialSensor, Load, Motors, Pushes, Shaking
 from sim_vehicle.faults.estimate import Estimate
-from sim_vehicle.faults.spec import (
-    AidingLoss,
-    BatterySag,
-    EstimatorAfterClipping,
-    EstimatorReset,
-    Fault,
-    FreeFall,
-    Gust,
-    HandCatch,
-    ImuBias,
-    ImuStuck,
-    Moment,
-    MotorFailure,
-    PayloadDrop,
-    Push,
-    Turbulence,
-    Vibration,
-    check_motor,
-)
+from sim_vehicle.faults.spec import Fault
 from sim_vehicle.faults.wind import Air
 from sim_vehicle.physics.layout import Disturbance, PlantState
 from sim_vehicle.quantities import Vector3
@@ -50,14 +33,14 @@ class Faults:
         self._estimate = Estimate(airframe.estimate.kind == "markov", step_s, rng)
         # Which group takes which faults, in the order in which they write.
         self._groups: tuple[tuple[tuple[type[Any], ...], Any], ...] = (
-            ((Gust, Turbulence), Air(wind_ned_m_s, step_s, rng)),
-            ((MotorFailure, FreeFall, BatterySag), self._motors),
-            ((PayloadDrop,), Load()),
-            ((Push,), Pushes()),
-            ((HandCatch,), Hands()),
-            ((ImuBias, ImuStuck), InertialSensor(raw)),
-            ((Vibration,), self._shaking),
-            ((EstimatorReset, EstimatorAfterClipping, AidingLoss), self._estimate),
+            ((spec.Gust, spec.Turbulence), Air(wind_ned_m_s, step_s, rng)),
+            ((spec.MotorFailure, spec.FreeFall, spec.BatterySag), self._motors),
+            ((spec.PayloadDrop,), Load()),
+            ((spec.Push,), Pushes()),
+            ((spec.HandCatch,), Hands()),
+            ((spec.ImuBias, spec.ImuStuck), InertialSensor(raw)),
+            ((spec.Vibration,), self._shaking),
+            ((spec.EstimatorReset, spec.EstimatorAfterClipping, spec.AidingLoss), self._estimate),
         )
         self._acts: list[Callable[[float, PlantState, Disturbance], None]] = []
         self._faults: dict[int, Fault] = {}
@@ -70,7 +53,7 @@ class Faults:
 
     def add(self, fault: Fault) -> None:
         """Add a fault. It acts in its own window of the boot clock. Raises FaultError for a motor that is not there."""
-        check_motor(fault, self._rotors)
+        spec.check_motor(fault, self._rotors)
         number, self._count = self._count, self._count + 1
         self._faults[number] = fault
         for time_s in _turns_s(fault):
@@ -118,7 +101,7 @@ class Faults:
     def gps_is_lost(self, time_s: float) -> bool:
         """At that time."""
         return any(
-            isinstance(fault, AidingLoss) and fault.window_s[0] <= time_s < fault.window_s[1]
+            isinstance(fault, spec.AidingLoss) and fault.window_s[0] <= time_s < fault.window_s[1]
             for fault in self._faults.values()
         )
 
@@ -128,7 +111,7 @@ class Faults:
             return
         fault = self._faults[number]
         self._spans[number] = len(self.spans)
-        ended_us = time_us if isinstance(fault, Moment) else None
+        ended_us = time_us if isinstance(fault, spec.Moment) else None
         details = fault.model_dump(mode="json", exclude={"kind", "at_s", "between_s"}, exclude_none=True)
         self.spans.append(FaultSpan(fault.kind, time_us, ended_us, details))
 
@@ -139,4 +122,4 @@ class Faults:
 
 def _turns_s(fault: Fault) -> tuple[float, ...]:
     """When a fault begins and, if it does, ends."""
-    return fault.window_s[:1] if isinstance(fault, Moment) else fault.window_s
+    return fault.window_s[:1] if isinstance(fault, spec.Moment) else fault.window_s

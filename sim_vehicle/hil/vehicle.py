@@ -6,18 +6,9 @@ import random
 from sim_vehicle.airframe import Airframe, Imu
 from sim_vehicle.estimator.sensors import DownwardSensors
 from sim_vehicle.geography import Origin
+from sim_vehicle.hil import sensors
 from sim_vehicle.hil.earth import air_at
 from sim_vehicle.hil.messages import Air, HilSensor, HilState, ToPx4
-from sim_vehicle.hil.sensors import (
-    BAROMETER_NOISE_PA,
-    BAROMETER_PERIOD_US,
-    GPS_PERIOD_US,
-    MAGNETOMETER_PERIOD_US,
-    MOTION_CAPTURE_PERIOD_US,
-    Cameras,
-    Gps,
-    Magnetometer,
-)
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.scene import Scene, check_start_is_free
@@ -53,10 +44,10 @@ class HilVehicle:
         check_start_is_free(scene, airframe)
         self._plant = Plant(sampled_every(airframe, sample_interval_us), scene, seed)
         rng = random.Random(seed)
-        self._magnetometer = Magnetometer(rng)
+        self._magnetometer = sensors.Magnetometer(rng)
         self._rng, self._origin = rng, Origin()
-        self._gps = Gps(airframe, rng, self._origin)
-        self._cameras = Cameras(rng)
+        self._gps = sensors.Gps(airframe, rng, self._origin)
+        self._cameras = sensors.Cameras(rng)
         self.interval_us = self._plant.interval_us
         self._downward = DownwardSensors(
             airframe.sensors, self._plant.seen_faces, self.interval_us, random.Random(~seed)
@@ -80,29 +71,29 @@ class HilVehicle:
         attitude_wxyz: Quaternion = (qw, qx, qy, qz)
         messages: list[ToPx4] = []
         faults = self._plant.faults
-        if self._is_due(GPS_PERIOD_US) and not (faults is not None and faults.gps_is_lost(now_us / 1e6)):
+        if self._is_due(sensors.GPS_PERIOD_US) and not (faults is not None and faults.gps_is_lost(now_us / 1e6)):
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
-        if self._is_due(MOTION_CAPTURE_PERIOD_US):
+        if self._is_due(sensors.MOTION_CAPTURE_PERIOD_US):
             messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
         messages += self._downward.observe(now_us, self._body)
         if self._is_due(STATE_PERIOD_US):
             place = self._origin.place_at(position_ned_m)
             messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))
-        is_magnetometer_due = self._is_due(MAGNETOMETER_PERIOD_US)
+        is_magnetometer_due = self._is_due(sensors.MAGNETOMETER_PERIOD_US)
         messages.append(
             HilSensor(
                 time_us=now_us,
                 specific_force_frd_m_s2=output.specific_force_frd_m_s2,
                 angular_velocity_frd_rad_s=output.angular_velocity_frd_rad_s,
                 magnetic_field_frd_gauss=self._magnetometer.sample(attitude_wxyz) if is_magnetometer_due else None,
-                air=self._air(pz) if self._is_due(BAROMETER_PERIOD_US) else None,
+                air=self._air(pz) if self._is_due(sensors.BAROMETER_PERIOD_US) else None,
             )
         )
         return tuple(messages)
 
     def _air(self, down_m: float) -> Air:
         altitude_m = self._origin.place.altitude_m - down_m
-        return air_at(altitude_m, self._rng.gauss(0, BAROMETER_NOISE_PA))
+        return air_at(altitude_m, self._rng.gauss(0, sensors.BAROMETER_NOISE_PA))
 
     def _is_due(self, period_us: int) -> bool:
         """Whether the interval just simulated contains a multiple of the period."""

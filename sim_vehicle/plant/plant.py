@@ -19,14 +19,8 @@ from sim_vehicle.physics.report import HITS_ENDED, KNOWN, REPORT_COLUMNS, SENSED
 from sim_vehicle.physics.touching.proximity import points_behind
 from sim_vehicle.physics.touching.surroundings import Surroundings
 from sim_vehicle.physics.trim import trim
-from sim_vehicle.plant.interval import (
-    FINE_STEPS,
-    MOTORS_DRIVEN,
-    MOTORS_FLYING,
-    MOTORS_IDLE,
-    MOTORS_OFF,
-    advance_interval,
-)
+from sim_vehicle.plant import interval
+from sim_vehicle.plant.interval import advance_interval
 from sim_vehicle.quantities import Floats, Vector3
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import Setpoint
@@ -53,7 +47,7 @@ class Plant:
         scene: Scene,
         seed: int,
         keeps_path: bool = True,
-        fine_steps: int = FINE_STEPS,
+        fine_steps: int = interval.FINE_STEPS,
     ) -> None:
         self._rng = np.random.default_rng(seed)
         self._constants = constants_from(airframe, self._rng)
@@ -171,7 +165,9 @@ class Plant:
 
     def step(self, setpoint: Setpoint | None, armed: bool) -> Estimate:
         """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
-        motors = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
+        motors = (
+            interval.MOTORS_OFF if not armed else interval.MOTORS_IDLE if setpoint is None else interval.MOTORS_FLYING
+        )
         if setpoint is not None:
             self._asked.take(setpoint)
         return self._advance(motors)
@@ -180,7 +176,7 @@ class Plant:
         """Advance one interval under an autopilot from outside: thrust asked of each motor over its greatest."""
         self._motor_command_n[: self._rotors] = motor_fractions[: self._rotors]
         self._motor_command_n *= self._motor_max_n
-        return self._advance(MOTORS_DRIVEN)
+        return self._advance(interval.MOTORS_DRIVEN)
 
     def _advance(self, motors: int) -> Estimate:
         around = self._around
@@ -211,8 +207,8 @@ class Plant:
         if report[HITS_ENDED]:
             for row in self._finished_hits[: int(report[HITS_ENDED])]:
                 self.truth.add_hit(row, self.world)
-        if self.onboard is not None and motors != MOTORS_DRIVEN:
-            self._estimate_state(self.onboard, motors == MOTORS_FLYING)
+        if self.onboard is not None and motors != interval.MOTORS_DRIVEN:
+            self._estimate_state(self.onboard, motors == interval.MOTORS_FLYING)
         return self._output()
 
     def _estimate_state(self, onboard: "OnboardEstimator", flies: bool) -> None:

@@ -2,30 +2,10 @@
 
 import numpy as np
 
+from sim_vehicle.physics import layout
 from sim_vehicle.physics.inertia import turning_energy
 from sim_vehicle.physics.jit import inlined, njit
-from sim_vehicle.physics.layout import (
-    HIT_ACTIVE,
-    HIT_ENERGY_AFTER_J,
-    HIT_ENERGY_BEFORE_J,
-    HIT_EXIT_VELOCITY,
-    HIT_FACE,
-    HIT_FOLD_M,
-    HIT_FRAME_OFFSET,
-    HIT_IMPULSE,
-    HIT_LAST_US,
-    HIT_NORMAL,
-    HIT_PEAK_N,
-    HIT_POINT,
-    HIT_POSITION,
-    HIT_START_US,
-    HIT_SURFACE_VELOCITY,
-    HIT_VELOCITY,
-    SAME_HIT_US,
-    ContactSprings,
-    PlantState,
-    Scratch,
-)
+from sim_vehicle.physics.layout import ContactSprings, PlantState, Scratch
 from sim_vehicle.physics.touching.meeting import meet
 from sim_vehicle.physics.touching.proximity import NEAR
 from sim_vehicle.quantities import Floats, Ints
@@ -64,33 +44,33 @@ def note_contact(
         return
     now_us = state.time_us + offset_us
     hit = state.hit
-    if hit[HIT_ACTIVE] == 1.0 and now_us - hit[HIT_LAST_US] >= SAME_HIT_US:
+    if hit[layout.HIT_ACTIVE] == 1.0 and now_us - hit[layout.HIT_LAST_US] >= layout.SAME_HIT_US:
         _finish(state)
-    if hit[HIT_ACTIVE] == 0.0:
-        hit[HIT_ACTIVE], hit[HIT_FACE], hit[HIT_START_US] = 1.0, hardest, now_us
-        hit[HIT_PEAK_N], hit[HIT_FOLD_M] = 0.0, 0.0
-        hit[HIT_POSITION] = state.body[0:3]
-        hit[HIT_VELOCITY] = state.body[3:6]
+    if hit[layout.HIT_ACTIVE] == 0.0:
+        hit[layout.HIT_ACTIVE], hit[layout.HIT_FACE], hit[layout.HIT_START_US] = 1.0, hardest, now_us
+        hit[layout.HIT_PEAK_N], hit[layout.HIT_FOLD_M] = 0.0, 0.0
+        hit[layout.HIT_POSITION] = state.body[0:3]
+        hit[layout.HIT_VELOCITY] = state.body[3:6]
         # A round has a normal only where something meets it.
         meet(first_point, hardest, scratch.turned, state.body, contact, faces, scratch)
-        hit[HIT_NORMAL], hit[HIT_POINT] = scratch.normal, scratch.where
-        hit[HIT_SURFACE_VELOCITY] = faces[hardest, FACE_VELOCITY : FACE_VELOCITY + 3]
-        hit[HIT_IMPULSE] = 0.0
-        hit[HIT_FRAME_OFFSET] = state.frame_offset_ned_m
-        hit[HIT_ENERGY_BEFORE_J] = moving_energy(state, mass_kg)
-    hit[HIT_LAST_US] = now_us
-    hit[HIT_PEAK_N] = max(hit[HIT_PEAK_N], total_n)
-    hit[HIT_FOLD_M] = max(hit[HIT_FOLD_M], np.max(state.fold_m))
-    hit[HIT_EXIT_VELOCITY] = state.body[3:6]
-    hit[HIT_IMPULSE] += step_s * scratch.contact_ned
-    hit[HIT_ENERGY_AFTER_J] = moving_energy(state, mass_kg)
+        hit[layout.HIT_NORMAL], hit[layout.HIT_POINT] = scratch.normal, scratch.where
+        hit[layout.HIT_SURFACE_VELOCITY] = faces[hardest, FACE_VELOCITY : FACE_VELOCITY + 3]
+        hit[layout.HIT_IMPULSE] = 0.0
+        hit[layout.HIT_FRAME_OFFSET] = state.frame_offset_ned_m
+        hit[layout.HIT_ENERGY_BEFORE_J] = moving_energy(state, mass_kg)
+    hit[layout.HIT_LAST_US] = now_us
+    hit[layout.HIT_PEAK_N] = max(hit[layout.HIT_PEAK_N], total_n)
+    hit[layout.HIT_FOLD_M] = max(hit[layout.HIT_FOLD_M], np.max(state.fold_m))
+    hit[layout.HIT_EXIT_VELOCITY] = state.body[3:6]
+    hit[layout.HIT_IMPULSE] += step_s * scratch.contact_ned
+    hit[layout.HIT_ENERGY_AFTER_J] = moving_energy(state, mass_kg)
     state.peak_force_n = max(state.peak_force_n, total_n)
 
 
 @njit
 def moving_energy(state: PlantState, mass_kg: float) -> float:
     """Kinetic energy of the vehicle relative to the obstacle, J."""
-    against = state.hit[HIT_SURFACE_VELOCITY]
+    against = state.hit[layout.HIT_SURFACE_VELOCITY]
     x, y, z = state.body[3] - against[0], state.body[4] - against[1], state.body[5] - against[2]
     turning: float = turning_energy(state.inertia, state.body[10], state.body[11], state.body[12])
     moving: float = 0.5 * mass_kg * (x * x + y * y + z * z)
@@ -100,7 +80,7 @@ def moving_energy(state: PlantState, mass_kg: float) -> float:
 @njit
 def close_old_hit(state: PlantState) -> None:
     """End the hit in progress once everything has been clear for long enough."""
-    if state.hit[HIT_ACTIVE] == 1.0 and state.time_us - state.hit[HIT_LAST_US] >= SAME_HIT_US:
+    if state.hit[layout.HIT_ACTIVE] == 1.0 and state.time_us - state.hit[layout.HIT_LAST_US] >= layout.SAME_HIT_US:
         _finish(state)
 
 
@@ -108,4 +88,4 @@ def close_old_hit(state: PlantState) -> None:
 def _finish(state: PlantState) -> None:
     state.finished_hits[state.finished_count] = state.hit
     state.finished_count += 1
-    state.hit[HIT_ACTIVE] = 0.0
+    state.hit[layout.HIT_ACTIVE] = 0.0
