@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
-from sim_vehicle.autopilot import flight_commands, ground_commands
+from sim_vehicle.autopilot import flight_commands
 from sim_vehicle.autopilot.flight_commands import CommandedVehicle
 from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result, Severity
 from sim_vehicle.autopilot.mode_numbers import AUTO_MAIN_MODE, CUSTOM_FLAG, mode_from_request
@@ -31,6 +31,26 @@ Commander::handle_command runs the checks for every command from outside, as a S
 # The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, HOME_POSITION, FLIGHT_INFORMATION,
 # STORAGE_INFORMATION.
 REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, 410: 242, 528: 264, 525: 261}
+
+DO_SET_ACTUATOR = 187
+# NAV_ROI and the kinds of DO_SET_ROI: PX4 takes every region of interest, and without a gimbal looks nowhere.
+REGIONS_OF_INTEREST = (80, 195, 196, 197, 201)
+PREFLIGHT_REBOOT_SHUTDOWN = 246
+RUN_PREARM_CHECKS = 401
+INJECT_FAILURE = 420
+LOGGING_START, LOGGING_STOP = 2510, 2511
+
+# Left by the commander to modules that this vehicle does not have: cameras, gimbals, grippers, the logger, tunes.
+# On a PX4 without them nobody answers either.
+UNANSWERED = frozenset(
+    {203, 204, 205, 206, 214, 242, 243, 500, 530, 531, 532, 1000, 1001, 2003, 3000, 31_010, 31_011, 31_012}
+    | {LOGGING_START, LOGGING_STOP}
+)
+
+
+# FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.
+_GPS = 4
+_WELL, _OFF = 0, 1
 
 NO_ID = -1
 """No message has it: stands for a parameter that is not a number."""
@@ -119,19 +139,57 @@ def _return(command: Command, flight: CommandedVehicle) -> Result:
     return flight.request_mode(Mode.RETURN, says_so="Returning to launch")
 
 
+def _reboot(command: Command, flight: CommandedVehicle) -> Result:
+    action = _cast(command.param1)
+    if action == 0:
+        return Result.ACCEPTED
+    # No board that this vehicle stands for can switch itself off or wait in its bootloader.
+    if action != 1 or flight.commander.arming.armed:
+        return Result.DENIED
+    flight.wants_reboot = True
+    return Result.ACCEPTED
+
+
+def _inject_failure(command: Command, flight: CommandedVehicle) -> Result:
+    """No fix any more; or well again."""
+    unit, kind = _cast(command.param1), _cast(command.param2)
+    if unit != _GPS or kind not in (_WELL, _OFF):
+        return Result.UNSUPPORTED
+    if not flight.parameters["SYS_FAILURE_EN"]:
+        return Result.DENIED
+    flight.commander.positioning.gps_is_off = kind == _OFF
+    return Result.ACCEPTED
+
+
+def _accept(command: Command, flight: CommandedVehicle) -> Result:
+    return Result.ACCEPTED
+
+
+def _leave_unanswered(command: Command, flight: CommandedVehicle) -> None:
+    return None
+
+
 _HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     **flight_commands.HANDLERS,
     DO_SET_MODE: _set_mode,
     COMPONENT_ARM_DISARM: _arm_disarm,
     NAV_LAND: _land,
     NAV_RETURN_TO_LAUNCH: _return,
-    **ground_commands.HANDLERS,
+    PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
+    INJECT_FAILURE: _inject_failure,
+    **dict.fromkeys((DO_SET_ACTUATOR, RUN_PREARM_CHECKS, *REGIONS_OF_INTEREST), _accept),
+    **dict.fromkeys(UNANSWERED, _leave_unanswered),
 }
 
 
 def _whole(value: float, unset: int = NO_ID) -> int:
     """The nearest whole number; ``unset`` for NaN and infinity."""
     return math.floor(value + 0.5) if math.isfinite(value) else unset
+
+
+def _cast(value: float) -> int:
+    """A parameter that PX4 casts to int; -1 for NaN."""
+    return int(value) if math.isfinite(value) else -1
 
 
 def _byte(value: float) -> int:

@@ -40,14 +40,14 @@ class _Aided(Enum):
 class OnboardEstimator:
     """Sensors and filter of one flight; everything in it that is not a sensor knows samples only."""
 
-    def __init__(self, airframe: Airframe, faces: Floats, body: Floats, seed: int) -> None:
+    def __init__(self, airframe: Airframe, body: Floats, seed: int) -> None:
         """``body`` is the true state at the start, of which the vehicle knows where its frame begins."""
         sensors, interval_us = airframe.sensors, airframe.imu.integration_interval_us
         rng = random.Random(seed ^ _OWN_SEED)
         self._airframe = airframe
         self._interval_us = interval_us
         self._step_s = 1e-6 * interval_us
-        self._downward = DownwardSensors(sensors, faces, interval_us, rng)
+        self._downward = DownwardSensors(sensors, interval_us, rng)
         self._compass = CompassSensor(sensors.compass, interval_us, rng)
         self._cameras = CaptureSensor(sensors.motion_capture, interval_us, rng)
         self._has_cameras = sensors.motion_capture.fitted
@@ -78,25 +78,22 @@ class OnboardEstimator:
         self._waiting: deque[Sample] = deque()
         self._fused_us = dict.fromkeys(_Aided, time_us)
 
-    def look_at(self, faces: Floats) -> None:
-        """Camera and beam see another world from now on."""
-        self._downward.look_at(faces)
-
     def update(
         self,
         time_us: int,
         sensed: Floats,
         flies: bool,
         body: Floats,
+        faces: Floats,
         estimate: Floats,
         acceleration_ned_m_s2: Floats,
     ) -> None:
         """Take one inertial sample; renew ``estimate`` (position, velocity, attitude) and the acceleration.
 
-        ``sensed`` (SAMPLE_COLUMNS,): the sample, with the clipped raw samples counted since boot. ``body``, the
-        truth, goes no further than the sensors.
+        ``sensed`` (SAMPLE_COLUMNS,): the sample, with the clipped raw samples counted since boot. ``body`` and
+        ``faces``, the truth, go no further than the sensors.
         """
-        self._sense(time_us, body)
+        self._sense(time_us, body, faces)
         head = self._head = (self._head + 1) % self._slots
         strapdown.keep_sample(self._samples, head, sensed, self._clipped)
         oldest = (head + 1) % self._slots
@@ -118,9 +115,9 @@ class OnboardEstimator:
 
     # --- sensing: the only place that looks at the truth ----------------------------------------------------
 
-    def _sense(self, time_us: int, body: Floats) -> None:
+    def _sense(self, time_us: int, body: Floats, faces: Floats) -> None:
         sensors, waiting = self._airframe.sensors, self._waiting
-        for sample in self._downward.observe(time_us, body):
+        for sample in self._downward.observe(time_us, body, faces):
             if isinstance(sample, FlowSample):
                 self.flow = sample
             else:

@@ -44,22 +44,17 @@ class Schedule:
 class FlowSensor:
     """A PX4FLOW: integrates flow and its own gyroscope between samples; what is lost has quality 0."""
 
-    def __init__(self, spec: OpticalFlow, faces: Floats, interval_us: int, rng: random.Random) -> None:
+    def __init__(self, spec: OpticalFlow, interval_us: int, rng: random.Random) -> None:
         self._spec = spec
-        self._faces = faces
         self._step_s = 1e-6 * interval_us
         self.schedule = Schedule(spec, interval_us, rng)
         self._rng = rng
         self._camera = np.zeros(optics.CAMERA_ROWS)
         self._last_us = 0
 
-    def look_at(self, faces: Floats) -> None:
-        """See another world from now on."""
-        self._faces = faces
-
-    def observe(self, time_us: int, body: Floats) -> FlowSample | None:
+    def observe(self, time_us: int, body: Floats, faces: Floats) -> FlowSample | None:
         """See one interval; the sample if one is due."""
-        optics.watch(body, self._faces, self._step_s, self._camera)
+        optics.watch(body, faces, self._step_s, self._camera)
         if not self.schedule.is_due(time_us):
             return None
         seen: list[float] = self._camera.tolist()
@@ -114,29 +109,24 @@ class DownwardSensors:
     told that it is not late (EKF2_OF_DELAY and EKF2_RNG_DELAY of 0).
     """
 
-    def __init__(self, sensors: Sensors, faces: Floats, interval_us: int, rng: random.Random) -> None:
-        """``faces``: ground and obstacles as the optics see them (see `World`)."""
+    def __init__(self, sensors: Sensors, interval_us: int, rng: random.Random) -> None:
         self._sensors = sensors
-        self._flow = FlowSensor(sensors.optical_flow, faces, interval_us, rng)
+        self._flow = FlowSensor(sensors.optical_flow, interval_us, rng)
         self._range = RangeSensor(sensors.range_finder, interval_us, rng)
         self._rotation = np.empty((3, 3))
-        self.look_at(faces)
 
-    def look_at(self, faces: Floats) -> None:
-        """See another world from now on."""
-        self._faces = faces
-        self._flow.look_at(faces)
-
-    def observe(self, time_us: int, body: Floats) -> list[FlowSample | RangeSample]:
-        """See one interval of the true body; the samples that are due."""
+    def observe(self, time_us: int, body: Floats, faces: Floats) -> list[FlowSample | RangeSample]:
+        """See one interval of the true body over ``faces``, ground and obstacles as the optics see them (see `World`);
+        the samples that are due.
+        """
         samples: list[FlowSample | RangeSample] = []
         if self._sensors.optical_flow.fitted:
-            flow = self._flow.observe(time_us, body)
+            flow = self._flow.observe(time_us, body, faces)
             if flow is not None:
                 samples.append(flow)
         if self._sensors.range_finder.fitted and self._range.is_due(time_us):
             matrix_from_quaternion(body, self._rotation)
-            samples.append(self._range.observe(time_us, optics.distance_below(body, self._rotation, self._faces)))
+            samples.append(self._range.observe(time_us, optics.distance_below(body, self._rotation, faces)))
         return samples
 
 

@@ -49,9 +49,7 @@ class HilVehicle:
         self._gps = sensors.Gps(airframe, rng, self._origin)
         self._cameras = sensors.Cameras(rng)
         self.interval_us = self._plant.interval_us
-        self._downward = DownwardSensors(
-            airframe.sensors, self._plant.seen_faces, self.interval_us, random.Random(~seed)
-        )
+        self._downward = DownwardSensors(airframe.sensors, self.interval_us, random.Random(~seed))
         # Taken once: looking a record's field up costs microseconds.
         self._body = self._plant.state.body
         self.time_boot_us = 0
@@ -75,7 +73,7 @@ class HilVehicle:
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
         if self._is_due(sensors.MOTION_CAPTURE_PERIOD_US):
             messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
-        messages += self._downward.observe(now_us, self._body)
+        messages += self._downward.observe(now_us, self._body, self._plant.seen_faces)
         if self._is_due(STATE_PERIOD_US):
             place = self._origin.place_at(position_ned_m)
             messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from sim_vehicle.estimator.onboard import OnboardEstimator
 
 
-def _onboard_estimator(airframe: Airframe, faces: Floats, body: Floats, seed: int) -> "OnboardEstimator":
+def _onboard_estimator(airframe: Airframe, body: Floats, seed: int) -> "OnboardEstimator":
     # Here, because its Kalman filter brings scipy's statistics, which take half a second to load.
     from sim_vehicle.estimator.onboard import OnboardEstimator
 
-    return OnboardEstimator(airframe, faces, body, seed)
+    return OnboardEstimator(airframe, body, seed)
 
 
 class Plant:
@@ -63,7 +63,7 @@ class Plant:
         self._errors_box = boxed(self._errors)
         self.onboard: OnboardEstimator | None = None
         if airframe.estimate.kind == "ekf":
-            self.onboard = _onboard_estimator(airframe, self._around.flat_faces, self.state.body, seed)
+            self.onboard = _onboard_estimator(airframe, self.state.body, seed)
         self._estimate = self.state.estimate
         self._frame_offset_ned_m = self.state.frame_offset_ned_m
         self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
@@ -98,7 +98,6 @@ class Plant:
         self.truth, self.faults = other.truth, other.faults
         np.copyto(self._disturbance_box, other._disturbance_box)
         if self.onboard is not None and other.onboard is not None:
-            self.onboard.look_at(self.seen_faces)
             self.onboard.start(self.state.body, self.state.time_us)
 
     @property
@@ -128,8 +127,6 @@ class Plant:
                 hit[HIT_FACE] = row[0]
         x, y, z = self._body[:3].tolist()
         self._around = self._around.changed(world, (x, y, z), int(self.state.time_us))
-        if self.onboard is not None:
-            self.onboard.look_at(self.seen_faces)
 
     def add_fault(self, fault: Fault) -> None:
         """One more fault from now on."""
@@ -214,7 +211,8 @@ class Plant:
     def _estimate_state(self, onboard: "OnboardEstimator", flies: bool) -> None:
         """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""
         estimate, acceleration = self._estimate, self._acceleration_ned_m_s2
-        onboard.update(int(self._report[0]), self._sensed_columns, flies, self._body, estimate, acceleration)
+        time_us, faces = int(self._report[0]), self.seen_faces
+        onboard.update(time_us, self._sensed_columns, flies, self._body, faces, estimate, acceleration)
         if self.faults is not None:
             estimate[0:6] += self.disturbance.estimate_jump
         report_estimate(self._body, estimate, acceleration, self._frame_offset_ned_m, self._report)

@@ -10,9 +10,8 @@ from sim_vehicle.autopilot.commander.failsafe_table import (
     FailsafeTrigger,
     responses_now,
 )
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, INJECT_FAILURE
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
-from sim_vehicle.autopilot.ground_commands import INJECT_FAILURE
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters

@@ -7,8 +7,7 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.autopilot import offboard
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
-from sim_vehicle.autopilot.ground_commands import RUN_PREARM_CHECKS
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, RUN_PREARM_CHECKS
 from sim_vehicle.autopilot.messages import AttitudeTarget, Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.plant.plant import Plant

@@ -26,9 +26,9 @@ def body(north=0.0, down=-1.5, velocity=(0.0, 0.0, 0.0), attitude=(1.0, 0.0, 0.0
 
 def flow_samples(state, seconds=1.0, **changes):
     spec = SPECS.optical_flow.model_copy(update=changes)
-    sensor = FlowSensor(spec, GROUND, INTERVAL_US, random.Random(1))
+    sensor = FlowSensor(spec, INTERVAL_US, random.Random(1))
     times = range(INTERVAL_US, round(1e6 * seconds) + INTERVAL_US, INTERVAL_US)
-    return [sample for time_us in times if (sample := sensor.observe(time_us, state)) is not None]
+    return [sample for time_us in times if (sample := sensor.observe(time_us, state, GROUND)) is not None]
 
 
 def test_flow_is_speed_over_distance_and_turns_are_in_both_flow_and_gyroscope():
