@@ -5,10 +5,9 @@ docs/how-to/testing.md.
 """
 
 from sim_vehicle.bench import faults
-from sim_vehicle.bench.bench import Handle, Setup
+from sim_vehicle.bench.bench import Handle, LockstepVehicle, Setup
 from sim_vehicle.bench.faults import FaultRequest
-from sim_vehicle.bench.lockstep import LockstepVehicle
-from sim_vehicle.bench.timeline import TimelineEntry as Event
+from sim_vehicle.bench.truth import TimelineEntry as Event
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.obstacles import BoxSpec as Box
 from sim_vehicle.obstacles import MotionSpec as Motion

@@ -25,7 +25,7 @@ OUTSIDE = {
 # Built-in airframes and the table of parameters are read where they lie; compiled kernels in the user's cache.
 MAY_READ_FILES = {
     "sim_vehicle/airframe.py",
-    "sim_vehicle/parameters/definitions.py",
+    "sim_vehicle/parameters/store.py",
     "sim_vehicle/physics/jit.py",
 }
 

@@ -18,7 +18,7 @@ from rebound_cli.results.ending import impact_text
 from rebound_cli.simulation.compiling import prepare_vehicle
 from rebound_cli.simulation.vehicle_process import READY_WORDS
 from sim_vehicle.mavlink.signing import Signing
-from sim_vehicle.parameters.definitions import time_outs_at
+from sim_vehicle.parameters.store import time_outs_at
 from sim_vehicle.shell.addresses import COMPANION_PORT, GROUND_PORT, open_port, px4_ports
 from sim_vehicle.shell.realtime import serve
 from sim_vehicle.truth import Hit

@@ -1,4 +1,7 @@
-"""A vehicle under test: what may be done to it between two intervals, and what a test may read. No clock, no socket."""
+"""A vehicle under test: what may be done to it between two intervals, and what a test may read. No clock, no socket.
+
+`LockstepVehicle` flies it on virtual time: bytes in, bytes out, the same bits every time, as fast as the machine goes.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,12 +13,12 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest, opposite
 from sim_vehicle.bench.strike import DURATION_S, strike
-from sim_vehicle.bench.timeline import Timeline, TimelineEntry
-from sim_vehicle.bench.truth import Truth, truth_of
-from sim_vehicle.errors import FaultError, ParameterError, SceneError
+from sim_vehicle.bench.truth import Timeline, TimelineEntry, Truth, truth_of
+from sim_vehicle.errors import ConditionNotMet, FaultError, ParameterError, SceneError
 from sim_vehicle.faults.spec import Fault
+from sim_vehicle.mavlink.streams.stream_rates import link_kind
 from sim_vehicle.obstacles import BoxSpec, PoleSpec, WallSpec
-from sim_vehicle.parameters.definitions import definitions
+from sim_vehicle.parameters.store import definitions
 from sim_vehicle.scene import Scene, Start
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Obstacle
@@ -193,3 +196,46 @@ class Bench:
         if obstacle.motion is None:
             return obstacle
         return replace(obstacle, motion=obstacle.motion.later(self.time_s))
+
+
+class LockstepVehicle(Bench):
+    """Nothing happens but in `advance`: no socket, no thread, no clock."""
+
+    def __init__(self, streams: str = "onboard", **setup: Any) -> None:
+        """``setup``: the fields of `Setup`. ``streams``: onboard, normal or ground, PX4's sets for a link.
+
+        Raises AirframeError, SceneError, ParameterError and LinkAddressError.
+        """
+        super().__init__(Setup(**setup))
+        self._link = self.vehicle.add_link(link_kind(streams))
+
+    def send(self, data: bytes) -> None:
+        """MAVLink bytes to the vehicle, which reads them in the next interval."""
+        self._link.push(data)
+
+    def advance(self, seconds: float) -> bytes:
+        """Advance time in whole intervals (4 ms unless IMU_INTEG_RATE is changed), at least one; return what the
+        vehicle has sent.
+        """
+        until_us = self.vehicle.time_boot_us + round(1e6 * seconds)
+        sent = self._step()
+        while self.vehicle.time_boot_us < until_us:
+            sent += self._step()
+        return b"".join(sent)
+
+    def advance_until(self, condition: Condition, within_s: float) -> bytes:
+        """Let time pass until a condition on the truth holds; return what the vehicle has sent.
+
+        Raises ConditionNotMet when it does not within that time.
+        """
+        until_us = self.vehicle.time_boot_us + round(1e6 * within_s)
+        sent: list[bytes] = []
+        while not condition(self.truth):
+            if self.vehicle.time_boot_us >= until_us:
+                raise ConditionNotMet(f"the condition did not hold within {within_s:g} s (seed {self.setup.seed}).")
+            sent += self._step()
+        return b"".join(sent)
+
+    def _step(self) -> list[bytes]:
+        self.step()
+        return list(self._link.take())

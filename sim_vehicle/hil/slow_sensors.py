@@ -4,9 +4,8 @@ import random
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.geography import Origin
-from sim_vehicle.hil.earth import air_at
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.hil.sensors import BAROMETER_NOISE_PA, Gps, Magnetometer
+from sim_vehicle.hil.sensors import BAROMETER_NOISE_PA, Gps, Magnetometer, air_at
 from sim_vehicle.quantities import Floats, Vector3
 
 # SENS_MAG_RATE 15 Hz and SENS_BARO_RATE 20 Hz, in whole intervals of 4 ms; PX4's simulated receiver gives 8 fixes a

@@ -7,8 +7,8 @@ from sim_vehicle.airframe import Airframe, Imu
 from sim_vehicle.estimator.sensors import DownwardSensors
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil import sensors
-from sim_vehicle.hil.earth import air_at
 from sim_vehicle.hil.messages import Air, HilSensor, HilState, ToPx4
+from sim_vehicle.hil.sensors import air_at
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.scene import Scene, check_start_is_free

@@ -12,10 +12,7 @@ import re
 
 from sim_vehicle.errors import LinkAddressError
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind, link_kind
-from sim_vehicle.shell.port import Address, Port
-from sim_vehicle.shell.serial_port import SerialPort
-from sim_vehicle.shell.tcp_port import TcpServerPort
-from sim_vehicle.shell.udp_ports import UdpPeerPort, UdpServerPort
+from sim_vehicle.shell.ports import Address, Port, SerialPort, TcpServerPort, UdpPeerPort, UdpServerPort
 from sim_vehicle.vehicle import SimulatedVehicle
 
 # Where PX4's SITL listens and sends unasked, plus its instance: a companion's link and a ground station's.

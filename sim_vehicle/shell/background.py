@@ -11,17 +11,14 @@ from typing import Any, Self, TypeVar
 
 from sim_vehicle.bench.bench import Bench, Condition, Handle, ObstacleSpec, Setup
 from sim_vehicle.bench.faults import FaultRequest
-from sim_vehicle.bench.timeline import TimelineEntry
-from sim_vehicle.bench.truth import Truth
+from sim_vehicle.bench.truth import TimelineEntry, Truth
 from sim_vehicle.errors import ConditionNotMet, SimulationError, VehicleEnded
 from sim_vehicle.mavlink.streams.stream_rates import link_kind
-from sim_vehicle.parameters.definitions import time_outs_at
+from sim_vehicle.parameters.store import time_outs_at
 from sim_vehicle.shell.addresses import open_port
-from sim_vehicle.shell.port import Port
+from sim_vehicle.shell.ports import Port, TcpServerPort, UdpServerPort
 from sim_vehicle.shell.realtime import RealtimePace, serve_interval
-from sim_vehicle.shell.tcp_port import TcpServerPort
 from sim_vehicle.shell.truth_file import save_truth
-from sim_vehicle.shell.udp_ports import UdpServerPort
 from sim_vehicle.truth import TruthRecorder
 
 Answer = TypeVar("Answer")

@@ -9,7 +9,7 @@ from pathlib import Path
 from sim_vehicle.hil.exchange import Exchange, ExchangePhase
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
-from sim_vehicle.shell.port import bound_socket
+from sim_vehicle.shell.ports import bound_socket
 from sim_vehicle.shell.realtime import RealtimePace
 from sim_vehicle.shell.truth_file import save_truth
 

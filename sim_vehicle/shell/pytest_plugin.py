@@ -14,7 +14,7 @@ import pytest
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sim_vehicle.bench.lockstep import LockstepVehicle
+    from sim_vehicle.bench.bench import LockstepVehicle
     from sim_vehicle.shell.background import RunningVehicle
 
 _FLOWN: "pytest.StashKey[tuple[RunningVehicle | LockstepVehicle, pytest.TempPathFactory]]" = pytest.StashKey()
@@ -47,7 +47,7 @@ def rebound_vehicle(
     """A simulated PX4: on real sockets, or in memory with `lockstep=True`; it ends with the test."""
     options = _options(request)
     if options.pop("lockstep", False):
-        from sim_vehicle.bench.lockstep import LockstepVehicle
+        from sim_vehicle.bench.bench import LockstepVehicle
 
         options.pop("speed", None)
         vehicle = LockstepVehicle(**options)

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from sim_vehicle.shell.port import Port
+from sim_vehicle.shell.ports import Port
 from sim_vehicle.shell.truth_file import save_truth
 from sim_vehicle.vehicle import SimulatedVehicle
 

@@ -4,7 +4,7 @@ import re
 from fnmatch import fnmatch
 from pathlib import Path
 
-from sim_vehicle.parameters.definitions import TABLE, definitions
+from sim_vehicle.parameters.store import TABLE, definitions
 
 ROOT = Path(__file__).parents[2]
 DOCUMENT = (ROOT / "docs" / "reference" / "simulated-vehicle.md").read_text()

@@ -15,10 +15,9 @@ from sim_vehicle.errors import LinkAddressError, PortInUse
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.addresses import open_port, px4_ports
-from sim_vehicle.shell.port import Port
+from sim_vehicle.shell.ports import Port, UdpPeerPort
 from sim_vehicle.shell.realtime import RealtimePace, serve
 from sim_vehicle.shell.truth_file import load_truth
-from sim_vehicle.shell.udp_ports import UdpPeerPort
 from sim_vehicle.vehicle import SimulatedVehicle
 
 TIMEOUT_S = 5.0

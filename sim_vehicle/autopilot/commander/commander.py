@@ -9,8 +9,7 @@ from sim_vehicle.autopilot.commander.arming import Arming, Reason, preflight_pro
 from sim_vehicle.autopilot.commander.battery import Battery
 from sim_vehicle.autopilot.commander.failsafe import Failsafe
 from sim_vehicle.autopilot.commander.failsafe_table import FailsafeSituation
-from sim_vehicle.autopilot.commander.manual_control import ManualInput
-from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning
+from sim_vehicle.autopilot.commander.watching import GroundStation, ManualInput, Positioning
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.modes import (

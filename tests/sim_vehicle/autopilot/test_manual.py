@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from sim_vehicle.autopilot.commander.manual_control import ManualInput
+from sim_vehicle.autopilot.commander.watching import ManualInput
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.messages import Result, StickInput
 from sim_vehicle.autopilot.modes import Mode

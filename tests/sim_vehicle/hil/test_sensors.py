@@ -8,9 +8,8 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.estimator.samples import BEST_QUALITY, FlowSample, RangeSample
 from sim_vehicle.geography import HOME, Origin
-from sim_vehicle.hil.earth import air_at, magnetic_field_ned_gauss
 from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, HilState, MotionCapture
-from sim_vehicle.hil.sensors import Cameras, Gps, to_body
+from sim_vehicle.hil.sensors import Cameras, Gps, air_at, magnetic_field_ned_gauss, to_body
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 

@@ -6,8 +6,7 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
-from sim_vehicle.parameters.definitions import definitions
-from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.parameters.store import Parameters, definitions
 
 
 def test_names_are_px4s_and_their_defaults_lie_within_their_ranges():

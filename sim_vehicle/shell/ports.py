@@ -1,0 +1,273 @@
+"""What the outside of a link is to the loop in `realtime.py`: UDP, TCP and serial."""
+
+import contextlib
+import errno
+import socket
+from typing import Protocol
+
+import serial
+
+from sim_vehicle.errors import LinkAddressError, PortInUse
+from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.vehicle import SimulatedVehicle
+
+Address = tuple[str, int]
+
+LONGEST_DATAGRAM = 65_535
+
+
+class Port(Protocol):
+    """A socket, with the links of whoever is at its other end."""
+
+    def receive(self) -> None:
+        """Hand all that has arrived to the links."""
+
+    def send(self) -> None:
+        """Send what the links have ready; what cannot be sent is lost."""
+
+    def close(self) -> None:
+        """Give the socket back."""
+
+
+def connected(vehicle: SimulatedVehicle, kind: LinkKind) -> Link:
+    """A new link that says at once who is there, as PX4's streams send their first message (mavlink_stream.cpp).
+
+    In lockstep, where nobody waits, HEARTBEAT comes after the link's first second.
+    """
+    link = vehicle.add_link(kind)
+    link.introduce()
+    return link
+
+
+def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket:
+    """A non-blocking IPv4 socket of ``kind`` on ``host``:``port``.
+
+    Raises PortInUse where it cannot be had, LinkAddressError for a host that cannot be one.
+    """
+    name = "UDP" if kind is socket.SOCK_DGRAM else "TCP"
+    link = socket.socket(socket.AF_INET, kind)
+    try:
+        if kind is socket.SOCK_STREAM:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        link.bind((host, port))
+    except (UnicodeError, socket.gaierror) as problem:
+        link.close()
+        raise LinkAddressError(f"Host {host!r} is unknown: give a name or a number such as 127.0.0.1.") from problem
+    except OSError as problem:
+        link.close()
+        if problem.errno == errno.EADDRINUSE:
+            raise PortInUse(
+                f"{name} port {port} is in use: another simulation may be running; stop it or choose another port."
+            ) from problem
+        raise PortInUse(f"{name} port {port} cannot be opened: {problem.strerror}; choose another port.") from problem
+    link.setblocking(False)
+    return link
+
+
+def received_datagrams(link: socket.socket) -> list[tuple[bytes, Address]]:
+    """Everything that has arrived, in order, with its sender."""
+    datagrams: list[tuple[bytes, Address]] = []
+    while True:
+        try:
+            datagrams.append(link.recvfrom(LONGEST_DATAGRAM))
+        except BlockingIOError:
+            return datagrams
+        except ConnectionError:
+            # Some systems report here that an earlier packet found nobody.
+            continue
+
+
+def send_datagrams(link: socket.socket, packets: tuple[bytes, ...], remote: Address) -> None:
+    """One packet a datagram. A full buffer or a peer that is gone loses it, as on any UDP link."""
+    for packet in packets:
+        with contextlib.suppress(OSError):
+            link.sendto(packet, remote)
+
+
+# A client silent for this time has gone; ground stations send a heartbeat a second.
+CLIENT_GONE_AFTER_US = 30_000_000
+# More clients than this are no ground stations: somebody sends from ever new ports.
+MOST_CLIENTS = 32
+
+
+class UdpPeerPort:
+    """Sends unasked to ``remote``, and from the first datagram on to its sender for good, as PX4 does."""
+
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, listen_port: int, remote: Address) -> None:
+        """Raises LinkAddressError for a host that nobody knows, PortInUse where ``listen_port`` cannot be had."""
+        self._remote = _resolved(remote)
+        # Nobody but this machine is listened to, unless another was named.
+        here = "127.0.0.1" if self._remote[0].startswith("127.") else "0.0.0.0"
+        self._socket = bound_socket(socket.SOCK_DGRAM, here, listen_port)
+        self._has_peer = False
+        self._link = connected(vehicle, kind)
+
+    @property
+    def local_port(self) -> int:
+        """Where it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def receive(self) -> None:
+        for datagram, sender in received_datagrams(self._socket):
+            if not self._has_peer:
+                self._remote, self._has_peer = sender, True
+            self._link.push(datagram)
+
+    def send(self) -> None:
+        send_datagrams(self._socket, self._link.take(), self._remote)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _resolved(remote: Address) -> Address:
+    """With the host's number in place of its name, which would be looked up for every packet."""
+    host, port = remote
+    try:
+        *_, address = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0]
+    except (OSError, UnicodeError) as problem:
+        raise LinkAddressError(f"Host {host!r} is unknown: give a name or a number such as 127.0.0.1.") from problem
+    return str(address[0]), port
+
+
+class UdpServerPort:
+    """Waits for clients; each that sends something gets a link of its own."""
+
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, host: str, port: int) -> None:
+        self._socket = bound_socket(socket.SOCK_DGRAM, host, port)
+        self._vehicle = vehicle
+        self._kind = kind
+        self._clients: dict[Address, Link] = {}
+        self._heard_us: dict[Address, int] = {}
+
+    @property
+    def local_port(self) -> int:
+        """Where it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def receive(self) -> None:
+        now_us = self._vehicle.time_boot_us
+        for datagram, sender in received_datagrams(self._socket):
+            link = self._clients.get(sender)
+            if link is None:
+                if len(self._clients) >= MOST_CLIENTS:
+                    continue
+                link = self._clients[sender] = connected(self._vehicle, self._kind)
+            self._heard_us[sender] = now_us
+            link.push(datagram)
+        for address, heard_us in list(self._heard_us.items()):
+            if now_us - heard_us > CLIENT_GONE_AFTER_US:
+                del self._heard_us[address]
+                self._vehicle.remove_link(self._clients.pop(address))
+
+    def send(self) -> None:
+        for address, link in self._clients.items():
+            send_datagrams(self._socket, link.take(), address)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+_READ_BYTES = 65_536
+# Unread bytes of a client that has stopped reading: some ten seconds of all streams.
+_MOST_UNREAD_BYTES = 500_000
+
+
+class TcpServerPort:
+    """PX4 itself speaks no TCP; this is what stands for the router or the simulator's bridge before it."""
+
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, host: str, port: int) -> None:
+        self._listener = bound_socket(socket.SOCK_STREAM, host, port)
+        self._listener.listen()
+        self._vehicle = vehicle
+        self._kind = kind
+        self._clients: list[_Client] = []
+
+    @property
+    def local_port(self) -> int:
+        """Where it listens."""
+        return int(self._listener.getsockname()[1])
+
+    def receive(self) -> None:
+        # Nobody waits to be let in, or has gone again before he was.
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            connection, _ = self._listener.accept()
+            self._clients.append(_Client(connection, connected(self._vehicle, self._kind)))
+        for client in self._clients:
+            client.receive()
+        self._forget_the_gone()
+
+    def send(self) -> None:
+        for client in self._clients:
+            client.send()
+        self._forget_the_gone()
+
+    def close(self) -> None:
+        for client in self._clients:
+            client.connection.close()
+        self._listener.close()
+
+    def _forget_the_gone(self) -> None:
+        for client in [client for client in self._clients if client.is_gone]:
+            client.connection.close()
+            self._vehicle.remove_link(client.link)
+            self._clients.remove(client)
+
+
+class _Client:
+    def __init__(self, connection: socket.socket, link: Link) -> None:
+        connection.setblocking(False)
+        # Packets are small and wanted at once.
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.connection = connection
+        self.link = link
+        self.is_gone = False
+        self._unsent = b""
+
+    def receive(self) -> None:
+        while not self.is_gone:
+            try:
+                data = self.connection.recv(_READ_BYTES)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            self.is_gone = not data
+            self.link.push(data)
+
+    def send(self) -> None:
+        self._unsent += b"".join(self.link.take())
+        if not self._unsent or self.is_gone:
+            return
+        try:
+            self._unsent = self._unsent[self.connection.send(self._unsent) :]
+        except BlockingIOError:
+            self.is_gone = len(self._unsent) > _MOST_UNREAD_BYTES
+        except OSError:
+            self.is_gone = True
+
+
+class SerialPort:
+    """What the line cannot carry at its speed is lost."""
+
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, device: str, baud: int) -> None:
+        """Raises PortInUse where the device cannot be opened."""
+        try:
+            self._serial = serial.Serial(device, baud, timeout=0, write_timeout=0)
+        except (OSError, ValueError) as problem:
+            raise PortInUse(f"Serial port {device} cannot be opened: {problem}") from problem
+        self._link = connected(vehicle, kind)
+
+    def receive(self) -> None:
+        # A line that is unplugged falls silent.
+        with contextlib.suppress(OSError):
+            self._link.push(self._serial.read(self._serial.in_waiting))
+
+    def send(self) -> None:
+        for packet in self._link.take():
+            with contextlib.suppress(OSError, serial.SerialTimeoutException):
+                self._serial.write(packet)
+
+    def close(self) -> None:
+        self._serial.close()
