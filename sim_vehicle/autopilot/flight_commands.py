@@ -11,9 +11,9 @@ from sim_vehicle.autopilot.commander.arming import Reason
 from sim_vehicle.autopilot.commander.commander import Commander
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Command, Result, Severity
+from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
-from sim_vehicle.autopilot.navigator.mission import MissionCommand
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin, Place
 from sim_vehicle.parameters.store import Parameters
@@ -47,7 +47,7 @@ class CommandedVehicle(Protocol):
         """Tell the ground stations."""
 
 
-def from_mission(given: MissionCommand) -> Command:
+def from_mission(given: StoredItem) -> Command:
     """A mission item's command, as the vehicle sends it to itself."""
     p1, p2, p3, p4, p5, p6, p7 = given.params
     return Command(0, 0, 0, 0, given.command, p1, p2, p3, p4, p5, p6, p7)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, TypeAlias
 
+from sim_vehicle.geography import Place
 from sim_vehicle.quantities import Axis3, Quaternion, Vector3
 
 EVERY_ID = 0
@@ -119,9 +120,7 @@ class StickInput:
 class FollowTarget:
     """FOLLOW_TARGET: where a target is and how it moves."""
 
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
+    place: Place
     velocity_ned_m_s: Vector3
 
 

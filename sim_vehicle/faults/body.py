@@ -52,13 +52,11 @@ class Pushes(Group[spec.Push]):
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         """Write the force (NED, N) and its point (FRD, m) at this boot time into ``disturbance``."""
         disturbance.pushes = 0
-        for push in self._faults:
-            start_s, end_s = push.window_s
-            if start_s <= time_s < end_s:
-                share = risen(time_s, start_s, end_s, push.rise_s) if push.rise_s > 0.0 else 1.0
-                disturbance.pushes = 1
-                disturbance.push_ned_n[:] = share * np.array(push.force_ned_n)
-                disturbance.push_point_frd_m[:] = push.point_frd_m
+        for push in self.acting(time_s):
+            share = risen(time_s, *push.window_s, push.rise_s) if push.rise_s > 0.0 else 1.0
+            disturbance.pushes = 1
+            disturbance.push_ned_n[:] = share * np.array(push.force_ned_n)
+            disturbance.push_point_frd_m[:] = push.point_frd_m
 
 
 class Hands(Group[spec.HandCatch]):
@@ -69,11 +67,8 @@ class Hands(Group[spec.HandCatch]):
         self._held: spec.HandCatch | None = None
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
-        held = None
-        for catch in self._faults:
-            start_s, end_s = catch.window_s
-            if start_s <= time_s < end_s:
-                held = catch
+        # Never two at a time.
+        held = next(iter(self.acting(time_s)), None)
         if held is not None and held is not self._held:
             disturbance.hold_point_ned_m[:] = state.body[0:3]
             disturbance.hold_stiffness_n_m = held.stiffness_n_m
@@ -92,10 +87,7 @@ class Shaking(Group[spec.Vibration]):
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         squares = np.zeros((2, MOST_ROTORS))
-        for vibration in self._faults:
-            start_s, end_s = vibration.window_s
-            if not start_s <= time_s < end_s:
-                continue
+        for vibration in self.acting(time_s):
             # Rotors of which none keeps step with another: their powers add.
             motors, share = (slice(0, self._rotors), 1.0 / self._rotors)
             if vibration.motor is not None:
@@ -120,10 +112,7 @@ class InertialSensor(Group[spec.ImuBias | spec.ImuStuck]):
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         biases, stuck = np.zeros(6), np.zeros(6, np.int64)
-        for fault in self._faults:
-            start_s, end_s = fault.window_s
-            if not start_s <= time_s < end_s:
-                continue
+        for fault in self.acting(time_s):
             if isinstance(fault, spec.ImuBias):
                 biases += [*fault.accelerometer_frd_m_s2, *fault.gyroscope_frd_rad_s]
                 continue

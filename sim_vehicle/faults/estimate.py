@@ -54,12 +54,9 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
 
     def _switch(self, time_s: float, state: PlantState) -> None:
         """After a clipped hit resets follow, each leaving an error of its own."""
-        for fault in self._faults:
-            if not isinstance(fault, EstimatorAfterClipping):
-                continue
-            start_s, end_s = fault.window_s
-            hidden = np.array(state.clipped_off_m_s)
-            if not start_s <= time_s < end_s or float(np.linalg.norm(hidden)) < fault.least_hidden_m_s:
+        hidden_m_s = float(np.linalg.norm(np.array(state.clipped_off_m_s)))
+        for fault in self.acting(time_s):
+            if not isinstance(fault, EstimatorAfterClipping) or hidden_m_s < fault.least_hidden_m_s:
                 continue
             self._settles_s, self._kick_m_s = fault.settles_s, fault.kick_m_s
             if not self._due_s:
@@ -74,8 +71,7 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
         """Random walk of the velocity while a sensor is lost; when it is back the estimate jumps back to the truth."""
         if not self._drifts:
             return
-        losses = [fault for fault in self._faults if isinstance(fault, AidingLoss)]
-        acting = [fault for fault in losses if fault.window_s[0] <= time_s < fault.window_s[1]]
+        acting = [fault for fault in self.acting(time_s) if isinstance(fault, AidingLoss)]
         for fault in acting:
             # North and east: the barometer keeps the height.
             walk = fault.drift_m_s2 * np.sqrt(self._step_s) * self._rng.standard_normal(3)

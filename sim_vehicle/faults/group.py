@@ -2,7 +2,9 @@
 
 from typing import Generic, TypeVar
 
-FaultType = TypeVar("FaultType")
+from sim_vehicle.faults.spec import Timed
+
+FaultType = TypeVar("FaultType", bound=Timed)
 
 
 class Group(Generic[FaultType]):
@@ -16,6 +18,10 @@ class Group(Generic[FaultType]):
         """Add a fault. It acts in its own window of the boot clock, s."""
         self._faults.append(fault)
         self.had_any = True
+
+    def acting(self, time_s: float) -> list[FaultType]:
+        """Those in whose window this boot time lies."""
+        return [fault for fault in self._faults if fault.window_s[0] <= time_s < fault.window_s[1]]
 
     def remove(self, fault: FaultType) -> None:
         """End or cancel a fault: the same object that was added."""

@@ -9,7 +9,7 @@ import math
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import FollowTarget
-from sim_vehicle.geography import Origin, Place
+from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 
@@ -49,8 +49,7 @@ class Follow:
         if self._target is not None and view.now_us - self._heard_us < _TARGET_LOST_US:
             age_s = 1e-6 * (view.now_us - self._heard_us)
             v_north, v_east, _ = self._target.velocity_ned_m_s
-            place_now = Place(self._target.latitude_deg, self._target.longitude_deg, self._target.altitude_m)
-            north, east, _ = self._origin.position_of(place_now)
+            north, east, _ = self._origin.position_of(self._target.place)
             north, east = north + v_north * age_s, east + v_east * age_s
             angle_rad = self._course_rad + math.radians(parameters["FLW_TGT_FA"])
             distance_m = parameters["FLW_TGT_DST"]

@@ -4,7 +4,6 @@ Source: PX4's FlightTaskOrbit.cpp (its sticks and its other headings left out).
 """
 
 import math
-from dataclasses import dataclass
 
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards
 from sim_vehicle.autopilot.flight_tasks.target import View
@@ -16,15 +15,6 @@ RADIUS_MIN_M = 1.0
 ACCELERATION_MAX_M_S2 = 2.0
 # On the circle within this of its radius; PX4's _horizontal_acceptance_radius.
 _ON_CIRCLE_M = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class OrbitStatus:
-    """What ORBIT_EXECUTION_STATUS tells."""
-
-    radius_m: float
-    """Positive: clockwise."""
-    centre_ned_m: Vector3
 
 
 class Orbit:
@@ -72,9 +62,9 @@ class Orbit:
         return True
 
     @property
-    def status(self) -> OrbitStatus:
-        """As it is flown."""
-        return OrbitStatus(math.copysign(self._radius_m, self._speed_m_s), self._centre_ned_m)
+    def status(self) -> tuple[float, Vector3]:
+        """Radius, positive for clockwise, and centre, as they are flown."""
+        return math.copysign(self._radius_m, self._speed_m_s), self._centre_ned_m
 
     def demand(self, view: View, step_s: float) -> TrajectorySetpoint:
         """The next setpoint: straight to the circle, then along it."""

@@ -66,16 +66,10 @@ class StoredItem:
     """The fifth and sixth are latitude and longitude in degrees where the frame is global; the seventh is metres."""
 
     @property
-    def latitude_deg(self) -> float:
-        return self.params[4]
-
-    @property
-    def longitude_deg(self) -> float:
-        return self.params[5]
-
-    @property
-    def altitude_m(self) -> float:
-        return self.params[6]
+    def place(self) -> Place:
+        """Where the frame is global; the altitude from home, where it `is_relative`."""
+        *_, latitude_deg, longitude_deg, altitude_m = self.params
+        return Place(latitude_deg, longitude_deg, altitude_m)
 
     @property
     def is_relative(self) -> bool:
@@ -90,5 +84,5 @@ class StoredItem:
 
 def place_of(item: StoredItem, origin: Origin, home_ned_m: Vector3) -> Vector3:
     """Where an item with a place lies."""
-    north, east, down = origin.position_of(Place(item.latitude_deg, item.longitude_deg, item.altitude_m))
-    return north, east, home_ned_m[2] - item.altitude_m if item.is_relative else down
+    north, east, down = origin.position_of(item.place)
+    return north, east, home_ned_m[2] - item.place.altitude_m if item.is_relative else down

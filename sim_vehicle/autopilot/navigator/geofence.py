@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
-from sim_vehicle.geography import Origin, Place
+from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
 
@@ -127,5 +127,5 @@ def shapes_of(items: Sequence[StoredItem], origin: Origin) -> list[Shape]:
 
 
 def _place(item: StoredItem, origin: Origin) -> tuple[float, float]:
-    north, east, _ = origin.position_of(Place(item.latitude_deg, item.longitude_deg, origin.place.altitude_m))
+    north, east, _ = origin.position_of(item.place)
     return north, east

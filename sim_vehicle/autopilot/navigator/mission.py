@@ -6,7 +6,6 @@ gimbals and other payload are passed at once: this vehicle has none.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum, auto
 
 from sim_vehicle.autopilot.flight_tasks.smoothing import stop_point
@@ -36,14 +35,6 @@ class Work(Enum):
     MOVE_TO_LAND = auto()
 
 
-@dataclass(frozen=True, slots=True)
-class MissionCommand:
-    """A command that an item gives; the commander and the navigator see to it."""
-
-    command: int
-    params: tuple[float, float, float, float, float, float, float]
-
-
 class MissionFlight:
     """The run through the stored items."""
 
@@ -60,8 +51,9 @@ class MissionFlight:
         """An item is being flown."""
         self.target = NavigatorTarget(Kind.IDLE, (0.0, 0.0, 0.0))
         self.texts: list[StatusText] = []
-        self.commands: list[MissionCommand] = []
-        self._given: list[MissionCommand] = []
+        self.commands: list[StoredItem] = []
+        """Items that give a command; the commander and the navigator see to it."""
+        self._given: list[StoredItem] = []
 
     # --- beginning and ending ----------------------------------------------------------------------------------
 
@@ -112,7 +104,7 @@ class MissionFlight:
         """The last change of speed before the current item counts again."""
         for item in reversed(self._store.mission.items[: self._store.current]):
             if item.command == kinds.DO_CHANGE_SPEED:
-                self.commands.append(MissionCommand(item.command, item.params))
+                self.commands.append(item)
                 return
 
     def _plan_climb(self, view: View) -> None:
@@ -206,7 +198,7 @@ class MissionFlight:
             self.target = NavigatorTarget(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
         elif view.landed:
             self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
-        self._given.append(MissionCommand(item.command, item.params))
+        self._given.append(item)
 
     def _fly_to(self, item: StoredItem, view: View) -> None:
         place = self._place(item, view)

@@ -5,7 +5,7 @@ Source: PX4's navigator (navigator_main.cpp, loiter.cpp, takeoff.cpp, land.cpp) 
 
 from sim_vehicle.autopilot.flight_tasks.auto_flight import AutoFlight
 from sim_vehicle.autopilot.flight_tasks.follow import Follow
-from sim_vehicle.autopilot.flight_tasks.orbit import Orbit, OrbitStatus
+from sim_vehicle.autopilot.flight_tasks.orbit import Orbit
 from sim_vehicle.autopilot.flight_tasks.smoothing import stop_point
 from sim_vehicle.autopilot.flight_tasks.target import (
     Arrival,
@@ -299,8 +299,8 @@ class Navigator:
         return self._mode is Mode.MISSION and not self._missions.progress.finished
 
     @property
-    def orbit_status(self) -> OrbitStatus | None:
-        """None while no orbit is flown."""
+    def orbit_status(self) -> tuple[float, Vector3] | None:
+        """Radius, positive for clockwise, and centre; None while no orbit is flown."""
         return self._orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
 
     def take_texts(self) -> list[StatusText]:

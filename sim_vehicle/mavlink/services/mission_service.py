@@ -7,7 +7,6 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.services.mission_transfer import MESSAGES, MissionTransfer
 from sim_vehicle.mavlink.services.service import Board, Channel, Handler
@@ -20,54 +19,46 @@ _NO_MISSION = 0xFFFF
 
 
 class MissionService:
-    """One link's transfer; the lists are the autopilot's."""
+    """One link's transfer of the autopilot's lists, and how far the mission is.
+
+    MISSION_CURRENT and MISSION_ITEM_REACHED come at every change, and again for whoever missed it.
+    """
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
-        self._transfer = MissionTransfer(board.autopilot.missions, link.send)
-        self._report = ProgressReport(board.autopilot.missions)
+        self._store = store = board.autopilot.missions
+        self._transfer = MissionTransfer(store, link.send)
+        self._sent_us = 0
+        self._current, self._reached = store.current, store.progress.reached
+        self._repeats = 0
+        self._state = 0
         self.handlers: Mapping[int, Handler] = dict.fromkeys(MESSAGES, self._receive)
 
     def update(self, now_us: int) -> None:
         """Repeats, time-outs, and what the mission has come to."""
-        for message in self._report.update(now_us):
-            self._link.send(message)
+        self._report(now_us)
         self._transfer.update(now_us)
 
     def _receive(self, packet: dialect.MAVLink_message) -> None:
         self._transfer.receive(packet, self._link.now_us)
 
-
-class ProgressReport:
-    """MISSION_CURRENT and MISSION_ITEM_REACHED: at every change, and again for whoever missed it."""
-
-    def __init__(self, store: MissionStore) -> None:
-        self._store = store
-        self._sent_us = 0
-        self._current = store.current
-        self._reached = store.progress.reached
-        self._repeats = 0
-        self._state = 0
-
-    def update(self, now_us: int) -> list[Message]:
+    def _report(self, now_us: int) -> None:
         """What is due now, nearly always nothing."""
         store, progress = self._store, self._store.progress
         is_due = now_us - self._sent_us >= CURRENT_PERIOD_US
         if not is_due and store.current == self._current and progress.reached == self._reached:
-            return []
-        answers: list[Message] = []
+            return
         if is_due or store.current != self._current:
             self._sent_us, self._current = now_us, store.current
-            answers.append(self._current_message())
+            self._link.send(self._current_message())
         if progress.reached != self._reached:
             self._reached, self._repeats = progress.reached, 0
         elif not is_due or self._repeats == REACHED_REPEATS:
-            return answers
+            return
         else:
             self._repeats += 1
         if progress.reached >= 0 and store.mission.items:
-            answers.append(dialect.MAVLink_mission_item_reached_message(progress.reached))
-        return answers
+            self._link.send(dialect.MAVLink_mission_item_reached_message(progress.reached))
 
     def _current_message(self) -> Message:
         store = self._store

@@ -6,6 +6,7 @@ from math import isfinite
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, FollowTarget, PositionTarget, StickInput
+from sim_vehicle.geography import Place
 from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 from sim_vehicle.quantities import Axis3
 
@@ -53,7 +54,7 @@ def _stick(value: int) -> float:
 
 def follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget:
     v_north, v_east, v_down = (value if isfinite(value) else 0.0 for value in packet.vel)
-    return FollowTarget(packet.lat * 1e-7, packet.lon * 1e-7, packet.alt, (v_north, v_east, v_down))
+    return FollowTarget(Place(packet.lat * 1e-7, packet.lon * 1e-7, packet.alt), (v_north, v_east, v_down))
 
 
 def _axes(mask: int, x: float, y: float, z: float) -> Axis3:

@@ -148,10 +148,11 @@ def orbit_execution_status(state: Telemetry) -> Message | None:
     orbit = state.autopilot.navigator.orbit_status
     if orbit is None:
         return None
-    place = state.origin.place_at(orbit.centre_ned_m)
+    radius_m, centre_ned_m = orbit
+    place = state.origin.place_at(centre_ned_m)
     return dialect.MAVLink_orbit_execution_status_message(
         state.published.time_boot_us,
-        orbit.radius_m,
+        radius_m,
         dialect.MAV_FRAME_GLOBAL,
         *units_of(place)[:2],
         place.altitude_m,

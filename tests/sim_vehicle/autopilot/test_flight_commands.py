@@ -89,7 +89,7 @@ def test_an_orbit_keeps_its_radius_its_speed_and_its_eye_on_the_centre(radius_m)
         looks = math.atan2(-out[1], -out[0])
         assert abs(math.remainder(yaw_of(flight.state.attitude_wxyz) - looks, 2 * math.pi)) < 0.2
     assert flight.height_m == pytest.approx(8.0, abs=0.1)
-    assert flight.autopilot.navigator.orbit_status.radius_m == radius_m
+    assert flight.autopilot.navigator.orbit_status[0] == radius_m
 
 
 def test_an_orbit_too_wide_is_not_flown_and_one_too_fast_is_slowed():
@@ -107,9 +107,7 @@ def test_following_stays_behind_and_above_and_looks_at_the_target():
     assert set_mode(flight, Mode.FOLLOW_TARGET) is Result.ACCEPTED
     for second in range(30):
         there = ORIGIN.place_at((2.0 * second, 0.0, 0.0))
-        flight.autopilot.receive(
-            FollowTarget(there.latitude_deg, there.longitude_deg, SEA_LEVEL_HOME_M, (2.0, 0.0, 0.0))
-        )
+        flight.autopilot.receive(FollowTarget(there, (2.0, 0.0, 0.0)))
         flight.fly(1.0)
     assert 60.0 - north_east(flight)[0] == pytest.approx(6.0, abs=2.0)
     assert flight.height_m == pytest.approx(10.0, abs=0.1)

@@ -63,7 +63,7 @@ def test_lists_survive_loss_repetition_and_reordering(seed, loss, repeat, latest
             exchange.step()
     # Then the vehicle holds exactly that list, never parts of it
     stored = exchange.store.mission.items
-    assert [round(1e7 * item.latitude_deg) for item in stored] == [item.x for item in items]
+    assert [round(1e7 * item.place.latitude_deg) for item in stored] == [item.x for item in items]
 
 
 @settings(max_examples=200, deadline=None)
@@ -89,7 +89,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
         )
         exchange.ask(message)
     plan = exchange.store.mission
-    assert plan == before or len(plan.items) == len({item.latitude_deg for item in plan.items})
+    assert plan == before or len(plan.items) == len({item.place.latitude_deg for item in plan.items})
     # And once everybody is silent, it is free again
     exchange.now_us += TIMEOUT_US + RETRY_US
     exchange.step()
