@@ -168,14 +168,10 @@ class OnboardEstimator:
             else:
                 self.range = sample
             waiting.append(sample)
-        if sensors.compass.fitted:
-            heading = self._compass.observe(time_us, body)
-            if heading is not None:
-                waiting.append(heading)
-        if sensors.motion_capture.fitted:
-            capture = self._cameras.observe(time_us, body)
-            if capture is not None:
-                waiting.append(capture)
+        if sensors.compass.fitted and (heading := self._compass.observe(time_us, body)) is not None:
+            waiting.append(heading)
+        if sensors.motion_capture.fitted and (capture := self._cameras.observe(time_us, body)) is not None:
+            waiting.append(capture)
 
     # --- fusing ---------------------------------------------------------------------------------------------
 

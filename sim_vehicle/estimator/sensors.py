@@ -2,6 +2,7 @@
 
 import math
 import random
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -19,16 +20,16 @@ from sim_vehicle.estimator.samples import (
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.quantities import Floats
 
+AidType = TypeVar("AidType", bound=Aid)
 
-class Schedule:
-    """When a sensor's samples are due, and which of them are lost."""
 
-    def __init__(self, aid: Aid, interval_us: int, rng: random.Random) -> None:
-        self._period_us = round(1e6 / aid.rate_hz)
-        self._interval_us = interval_us
-        self._share_lost = aid.share_lost
-        self._lost_us = [(1e6 * start_s, 1e6 * end_s) for start_s, end_s in aid.lost_between_s]
-        self._rng = rng
+class Sensor(Generic[AidType]):
+    """When its samples are due, and which of them are lost."""
+
+    def __init__(self, spec: AidType, interval_us: int, rng: random.Random) -> None:
+        self._spec, self._rng = spec, rng
+        self._interval_us, self._period_us = interval_us, round(1e6 / spec.rate_hz)
+        self._lost_us = [(1e6 * start_s, 1e6 * end_s) for start_s, end_s in spec.lost_between_s]
 
     def is_due(self, time_us: int) -> bool:
         """Whether the interval just ended contains a multiple of the period."""
@@ -38,30 +39,28 @@ class Schedule:
         """Whether the sample of this moment is lost, by the file's plan or by chance."""
         if any(start <= time_us < end for start, end in self._lost_us):
             return True
-        return self._share_lost > 0 and self._rng.random() < self._share_lost
+        return self._spec.share_lost > 0 and self._rng.random() < self._spec.share_lost
 
 
-class FlowSensor:
+class FlowSensor(Sensor[OpticalFlow]):
     """A PX4FLOW: integrates flow and its own gyroscope between samples; what is lost has quality 0."""
 
     def __init__(self, spec: OpticalFlow, interval_us: int, rng: random.Random) -> None:
-        self._spec = spec
+        super().__init__(spec, interval_us, rng)
         self._step_s = 1e-6 * interval_us
-        self.schedule = Schedule(spec, interval_us, rng)
-        self._rng = rng
         self._camera = np.zeros(optics.CAMERA_ROWS)
         self._last_us = 0
 
     def observe(self, time_us: int, body: Floats, faces: Floats) -> FlowSample | None:
         """See one interval; the sample if one is due."""
         optics.watch(body, faces, self._step_s, self._camera)
-        if not self.schedule.is_due(time_us):
+        if not self.is_due(time_us):
             return None
         seen: list[float] = self._camera.tolist()
         self._camera[optics.FLOW_X : optics.TURN_Z + 1] = 0.0
         self._camera[optics.FASTEST] = 0.0
         integration_us, self._last_us = time_us - self._last_us, time_us
-        if not self._sees(seen) or self.schedule.is_lost(time_us):
+        if not self._sees(seen) or self.is_lost(time_us):
             return FlowSample(time_us, integration_us, (0.0, 0.0), (0.0, 0.0, 0.0), NO_QUALITY)
         spec, gauss, seconds = self._spec, self._rng.gauss, 1e-6 * integration_us
         turn_x, turn_y, turn_z = (
@@ -80,23 +79,18 @@ class FlowSensor:
         )
 
 
-class RangeSensor:
+class RangeSensor(Sensor[RangeFinder]):
     """A LeddarOne that looks along the body's down axis."""
 
     def __init__(self, spec: RangeFinder, interval_us: int, rng: random.Random) -> None:
-        self._spec = spec
-        self.schedule = Schedule(spec, interval_us, rng)
-        self._rng = rng
+        super().__init__(spec, interval_us, rng)
         self._bias_m = rng.gauss(0, spec.bias_m)
-
-    def is_due(self, time_us: int) -> bool:
-        return self.schedule.is_due(time_us)
 
     def observe(self, time_us: int, distance_m: float) -> RangeSample:
         """The sample of a true distance, which is only worth computing when one is due."""
         spec = self._spec
         least_m, most_m = spec.distance_min_m, spec.distance_max_m
-        if self.schedule.is_lost(time_us) or not least_m <= distance_m <= most_m:
+        if self.is_lost(time_us) or not least_m <= distance_m <= most_m:
             return RangeSample(time_us, None, least_m, most_m)
         measured_m = distance_m + self._bias_m + self._rng.gauss(0, spec.noise_m)
         return RangeSample(time_us, max(measured_m, 0.0), least_m, most_m)
@@ -130,32 +124,22 @@ class DownwardSensors:
         return samples
 
 
-class CompassSensor:
+class CompassSensor(Sensor[Compass]):
     """A magnetometer already turned into a heading. A constant error would only rename north."""
-
-    def __init__(self, spec: Compass, interval_us: int, rng: random.Random) -> None:
-        self._spec = spec
-        self.schedule = Schedule(spec, interval_us, rng)
-        self._rng = rng
 
     def observe(self, time_us: int, body: Floats) -> HeadingSample | None:
         """The sample if one is due and not lost."""
-        if not self.schedule.is_due(time_us) or self.schedule.is_lost(time_us):
+        if not self.is_due(time_us) or self.is_lost(time_us):
             return None
         return HeadingSample(time_us, true_yaw(body) + self._rng.gauss(0, self._spec.noise_rad))
 
 
-class CaptureSensor:
+class CaptureSensor(Sensor[MotionCapture]):
     """Cameras around the room: position and heading, with errors that are new in every frame."""
-
-    def __init__(self, spec: MotionCapture, interval_us: int, rng: random.Random) -> None:
-        self._spec = spec
-        self.schedule = Schedule(spec, interval_us, rng)
-        self._rng = rng
 
     def observe(self, time_us: int, body: Floats) -> CaptureSample | None:
         """The sample if one is due and not lost."""
-        if not self.schedule.is_due(time_us) or self.schedule.is_lost(time_us):
+        if not self.is_due(time_us) or self.is_lost(time_us):
             return None
         gauss, noise_m = self._rng.gauss, self._spec.noise_m
         x, y, z = body[0:3].tolist()

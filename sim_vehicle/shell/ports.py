@@ -91,7 +91,22 @@ CLIENT_GONE_AFTER_US = 30_000_000
 MOST_CLIENTS = 32
 
 
-class UdpPeerPort:
+class SocketPort:
+    """What all but serial lines have."""
+
+    def __init__(self, kind: socket.SocketKind, host: str, port: int) -> None:
+        self._socket = bound_socket(kind, host, port)
+
+    @property
+    def local_port(self) -> int:
+        """Where it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class UdpPeerPort(SocketPort):
     """Sends unasked to ``remote``, and from the first datagram on to its sender for good, as PX4 does."""
 
     def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, listen_port: int, remote: Address) -> None:
@@ -99,14 +114,9 @@ class UdpPeerPort:
         self._remote = _resolved(remote)
         # Nobody but this machine is listened to, unless another was named.
         here = "127.0.0.1" if self._remote[0].startswith("127.") else "0.0.0.0"
-        self._socket = bound_socket(socket.SOCK_DGRAM, here, listen_port)
+        super().__init__(socket.SOCK_DGRAM, here, listen_port)
         self._has_peer = False
         self._link = connected(vehicle, kind)
-
-    @property
-    def local_port(self) -> int:
-        """Where it listens."""
-        return int(self._socket.getsockname()[1])
 
     def receive(self) -> None:
         for datagram, sender in received_datagrams(self._socket):
@@ -116,9 +126,6 @@ class UdpPeerPort:
 
     def send(self) -> None:
         send_datagrams(self._socket, self._link.take(), self._remote)
-
-    def close(self) -> None:
-        self._socket.close()
 
 
 def _resolved(remote: Address) -> Address:
@@ -131,20 +138,15 @@ def _resolved(remote: Address) -> Address:
     return str(address[0]), port
 
 
-class UdpServerPort:
+class UdpServerPort(SocketPort):
     """Waits for clients; each that sends something gets a link of its own."""
 
     def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, host: str, port: int) -> None:
-        self._socket = bound_socket(socket.SOCK_DGRAM, host, port)
+        super().__init__(socket.SOCK_DGRAM, host, port)
         self._vehicle = vehicle
         self._kind = kind
         self._clients: dict[Address, Link] = {}
         self._heard_us: dict[Address, int] = {}
-
-    @property
-    def local_port(self) -> int:
-        """Where it listens."""
-        return int(self._socket.getsockname()[1])
 
     def receive(self) -> None:
         now_us = self._vehicle.time_boot_us
@@ -165,34 +167,26 @@ class UdpServerPort:
         for address, link in self._clients.items():
             send_datagrams(self._socket, link.take(), address)
 
-    def close(self) -> None:
-        self._socket.close()
-
 
 _READ_BYTES = 65_536
 # Unread bytes of a client that has stopped reading: some ten seconds of all streams.
 _MOST_UNREAD_BYTES = 500_000
 
 
-class TcpServerPort:
+class TcpServerPort(SocketPort):
     """PX4 itself speaks no TCP; this is what stands for the router or the simulator's bridge before it."""
 
     def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, host: str, port: int) -> None:
-        self._listener = bound_socket(socket.SOCK_STREAM, host, port)
-        self._listener.listen()
+        super().__init__(socket.SOCK_STREAM, host, port)
+        self._socket.listen()
         self._vehicle = vehicle
         self._kind = kind
         self._clients: list[_Client] = []
 
-    @property
-    def local_port(self) -> int:
-        """Where it listens."""
-        return int(self._listener.getsockname()[1])
-
     def receive(self) -> None:
         # Nobody waits to be let in, or has gone again before he was.
         with contextlib.suppress(BlockingIOError, ConnectionError):
-            connection, _ = self._listener.accept()
+            connection, _ = self._socket.accept()
             self._clients.append(_Client(connection, connected(self._vehicle, self._kind)))
         for client in self._clients:
             client.receive()
@@ -206,7 +200,7 @@ class TcpServerPort:
     def close(self) -> None:
         for client in self._clients:
             client.connection.close()
-        self._listener.close()
+        super().close()
 
     def _forget_the_gone(self) -> None:
         for client in [client for client in self._clients if client.is_gone]:
