@@ -52,14 +52,6 @@ def test_after_disarming_the_mode_before_is_meant(ends_in):
     assert state.intended is Mode.OFFBOARD
 
 
-def test_nothing_leads_out_of_termination():
-    state = ModeState()
-    state.flown = Mode.TERMINATION
-    for mode in ASKED_FOR:
-        assert not state.apply(ModeEvent.REQUEST, DISARMED, mode)
-    assert not state.apply(ModeEvent.DISARMED, DISARMED)
-
-
 @pytest.mark.parametrize("row", TRANSITIONS, ids=lambda row: f"{row.event}-{row.target}")
 def test_every_row_can_happen_and_no_earlier_one_hides_it(row: Transition):
     source = row.sources[0] if row.sources else Mode.LOITER

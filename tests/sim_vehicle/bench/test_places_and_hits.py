@@ -23,17 +23,6 @@ def approaching(point_north_m: float, down_m: float = -HOVER_M) -> Wall:
     return Wall(point_ned_m=(point_north_m, 0, down_m), normal_ned=(-1, 0, 0))
 
 
-def test_a_wall_placed_in_flight_is_hit() -> None:
-    pilot = hovering()
-    pilot.vehicle.place(approaching(0.6))
-    pushed_north(pilot)
-    pilot.vehicle.advance_until(lambda truth: truth.hits, 3.0)
-    (hit,) = pilot.vehicle.truth.hits
-    assert (hit.obstacle, hit.kind) == ("wall 1", "wall")
-    assert hit.normal_ned == pytest.approx((-1, 0, 0))
-    assert hit.contact_position_ned_m[0] == pytest.approx(0.6 - 0.18, abs=0.02)
-
-
 def test_a_second_obstacle_during_a_contact_leaves_the_contact_what_it_is() -> None:
     """The pole's row in the world moves on when a wall comes before it."""
 

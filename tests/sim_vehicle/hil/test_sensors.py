@@ -6,7 +6,6 @@ import random
 import pytest
 
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.estimator.samples import BEST_QUALITY, FlowSample, RangeSample
 from sim_vehicle.geography import HOME, Origin
 from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, HilState, MotionCapture
 from sim_vehicle.hil.sensors import Cameras, Gps, air_at, magnetic_field_ned_gauss, to_body
@@ -100,19 +99,6 @@ def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():
 
 def rms(values: list[float]) -> float:
     return math.sqrt(sum(value * value for value in values) / len(values))
-
-
-def test_what_looks_down_sees_height_and_stands_still_in_a_straight_climb():
-    """Given a climb, then range is the true height and nothing flows sideways, ten times a second."""
-    vehicle = new_vehicle()
-    messages = flown(vehicle, 1.0, 0.95)
-    flows, ranges = of_kind(messages, FlowSample), of_kind(messages, RangeSample)
-
-    assert len(flows) == len(ranges) == 10
-    height_m = -vehicle._plant.state.body[2]
-    assert ranges[-1].distance_m == pytest.approx(height_m, abs=0.05)
-    assert flows[-1].quality == BEST_QUALITY
-    assert flows[-1].flow_frd_rad == pytest.approx((0, 0), abs=0.015)
 
 
 def test_a_lost_gps_is_silent():

@@ -6,13 +6,13 @@ import random
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import Command, Identity, PositionTarget
+from sim_vehicle.autopilot.messages import Command, Identity
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.mavlink.services.command_service import command_from_int, command_from_long
 from sim_vehicle.mavlink.services.setpoint_service import position_target
-from sim_vehicle.setpoint import FREE
 from tests.sim_vehicle import packets
+from tests.sim_vehicle.autopilot.kinematic_plant import target
 
 NAN = math.nan
 
@@ -29,31 +29,18 @@ def target_message(frame, mask, *values):
 NUMBERS = (1.0, 2.0, -3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 0.5, 0.25)
 
 
-def target(**fields) -> PositionTarget:
-    nothing = {
-        "frame": 1,
-        "position_m": FREE,
-        "velocity_m_s": FREE,
-        "acceleration_m_s2": FREE,
-        "yaw_rad": None,
-        "yaw_rate_rad_s": None,
-        "is_force": False,
-    }
-    return PositionTarget(**{**nothing, **fields})
-
-
 TARGETS = [
-    (target_message(1, 0xDF8, *NUMBERS), target(position_m=(1.0, 2.0, -3.0))),
-    (target_message(1, 0xDC7, *NUMBERS), target(velocity_m_s=(4.0, 5.0, 6.0))),
+    (target_message(1, 0xDF8, *NUMBERS), target(position=(1.0, 2.0, -3.0))),
+    (target_message(1, 0xDC7, *NUMBERS), target(velocity=(4.0, 5.0, 6.0))),
     (
         target_message(1, 0x9C0, *NUMBERS),
-        target(position_m=(1.0, 2.0, -3.0), velocity_m_s=(4.0, 5.0, 6.0), yaw_rad=0.5),
+        target(position=(1.0, 2.0, -3.0), velocity=(4.0, 5.0, 6.0), yaw_rad=0.5),
     ),
-    (target_message(8, 0x5C7, *NUMBERS), target(frame=8, velocity_m_s=(4.0, 5.0, 6.0), yaw_rate_rad_s=0.25)),
+    (target_message(8, 0x5C7, *NUMBERS), target(frame=8, velocity=(4.0, 5.0, 6.0), yaw_rate_rad_s=0.25)),
     (target_message(1, 0xE3F, *NUMBERS), target(acceleration_m_s2=(7.0, 8.0, 9.0), is_force=True)),
     (target_message(1, 0xFFF, *NUMBERS), target(is_force=True)),
-    (target_message(1, 0xDFB, *NUMBERS), target(position_m=(None, None, -3.0))),
-    (target_message(1, 0xDF8, NAN, math.inf, -3.0, *NUMBERS[3:]), target(position_m=(None, None, -3.0))),
+    (target_message(1, 0xDFB, *NUMBERS), target(position=(None, None, -3.0))),
+    (target_message(1, 0xDF8, NAN, math.inf, -3.0, *NUMBERS[3:]), target(position=(None, None, -3.0))),
 ]
 
 
