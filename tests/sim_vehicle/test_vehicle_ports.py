@@ -19,6 +19,7 @@ from sim_vehicle.shell.ports import Port, UdpPeerPort
 from sim_vehicle.shell.realtime import RealtimePace, serve
 from sim_vehicle.shell.truth_file import load_truth
 from sim_vehicle.vehicle import SimulatedVehicle
+from tests.sim_vehicle.vehicle_client import heard_until
 
 TIMEOUT_S = 5.0
 
@@ -40,21 +41,6 @@ def served(vehicle: SimulatedVehicle, *ports: Port, truth_path: Path | None = No
         assert not thread.is_alive()
 
 
-class Reader:
-    """Takes a stream of bytes apart."""
-
-    def __init__(self) -> None:
-        self._parser = dialect.MAVLink(None)
-        self._parser.robust_parsing = True
-        self.messages: list = []
-
-    def push(self, data: bytes) -> None:
-        self.messages += self._parser.parse_buffer(data) or []
-
-    def kinds(self) -> set[str]:
-        return {message.get_type() for message in self.messages}
-
-
 @contextmanager
 def bound() -> Iterator[socket.socket]:
     """Somebody on UDP."""
@@ -66,18 +52,6 @@ def bound() -> Iterator[socket.socket]:
 
 def client(system: int = 255) -> dialect.MAVLink:
     return dialect.MAVLink(None, srcSystem=system, srcComponent=190)
-
-
-REQUEST = dialect.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0)
-
-
-def read_socket(connection: socket.socket, wanted: set[str]) -> Reader:
-    reader, until_s = Reader(), time.monotonic() + TIMEOUT_S
-    connection.settimeout(TIMEOUT_S)
-    while not wanted <= reader.kinds():
-        assert time.monotonic() < until_s, f"only {reader.kinds()}"
-        reader.push(connection.recv(65_536))
-    return reader
 
 
 @pytest.mark.parametrize(("words", "kind"), [("", LinkKind.GROUND), ("?set=normal", LinkKind.NORMAL)])
@@ -141,7 +115,7 @@ def test_the_first_sender_becomes_the_companion_for_good():
                 sender.sendto(
                     client().heartbeat_encode(18, 8, 0, 0, 0).pack(client()), ("127.0.0.1", ports[0].local_port)
                 )
-                read_socket(first, {"HEARTBEAT", "ATTITUDE"})
+                heard_until(first, {"HEARTBEAT", "ATTITUDE"})
         second.setblocking(False)
         with pytest.raises(BlockingIOError):
             second.recv(2048)

@@ -1,6 +1,7 @@
 """Who speaks MAVLink with a simulated vehicle in memory, and what has been heard."""
 
 import math
+import socket
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -15,6 +16,15 @@ SET_INTERVAL, REQUEST_MESSAGE = 511, 512
 POSITION_ONLY = 0xDF8
 
 IGNORED = (0.0,) * 3
+
+
+def heard_until(connection: socket.socket, wanted: set[str]) -> set[str]:
+    """The kinds of what comes until all that is wanted has come; the socket's time-out ends a vain wait."""
+    parser, heard = dialect.MAVLink(None), set()
+    parser.robust_parsing = True
+    while not wanted <= heard:
+        heard |= {message.get_type() for message in parser.parse_buffer(connection.recv(65_536)) or []}
+    return heard
 
 
 class End:

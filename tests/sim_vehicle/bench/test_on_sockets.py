@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.errors import ConditionNotMet, SceneError, SimulationError, VehicleEnded
 from sim_vehicle.testing import RunningVehicle, Truth, Wall, faults, start_vehicle
+from tests.sim_vehicle.vehicle_client import heard_until
 
 TIMEOUT_S = 10.0
 HERE = "127.0.0.1"
@@ -19,15 +20,6 @@ def connected(vehicle: RunningVehicle) -> socket.socket:
     client = socket.create_connection((HERE, vehicle.tcp_port), TIMEOUT_S)
     client.settimeout(TIMEOUT_S)
     return client
-
-
-def kinds(client: socket.socket, wanted: set[str]) -> list[str]:
-    """What comes until all that is wanted has come."""
-    parser, heard = dialect.MAVLink(None), []
-    parser.robust_parsing = True
-    while not wanted <= set(heard):
-        heard += [message.get_type() for message in parser.parse_buffer(client.recv(65_536)) or []]
-    return heard
 
 
 def command(number: int, *params: float) -> bytes:
@@ -52,11 +44,11 @@ def test_it_is_there_at_its_addresses_and_gone_afterwards() -> None:
     with start_vehicle() as vehicle, connected(vehicle) as client:
         assert vehicle.address == f"udpout://{HERE}:{vehicle.udp_port}"
         assert vehicle.mavutil_address == f"tcp:{HERE}:{vehicle.tcp_port}"
-        kinds(client, {"HEARTBEAT", "HIGHRES_IMU"})
+        heard_until(client, {"HEARTBEAT", "HIGHRES_IMU"})
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
             second.settimeout(TIMEOUT_S)
             second.sendto(command(512, 148), (HERE, vehicle.udp_port))
-            kinds(second, {"AUTOPILOT_VERSION", "HEARTBEAT"})
+            heard_until(second, {"AUTOPILOT_VERSION", "HEARTBEAT"})
     assert vehicle_threads() == 0
     assert is_free(socket.SOCK_DGRAM, vehicle.udp_port)
     with pytest.raises(VehicleEnded, match="has been stopped"):
@@ -95,7 +87,7 @@ def test_walls_strikes_faults_and_truth_while_it_flies() -> None:
 
 def test_a_pause_stands_still_and_goes_on_where_it_stood() -> None:
     with start_vehicle() as vehicle, connected(vehicle) as client:
-        kinds(client, {"HEARTBEAT"})
+        heard_until(client, {"HEARTBEAT"})
         vehicle.pause()
         paused_s = vehicle.truth.time_boot_s
         with pytest.raises(SimulationError, match="stands still"):
