@@ -23,6 +23,8 @@ GONE = {
     "paper results": "`bench paper` has the flight tests by speed and airframe",
     "soak": "hours as a service are no study any more",
 }
+# Options that were, of every study.
+NO_MORE = {"--scheduler": "`--jobs` has all cores of this machine"}
 # What the file names, and what it cannot know.
 TYPES = {
     "count": count,
@@ -55,7 +57,7 @@ def build_parser() -> ArgumentParser:
     written = yaml.safe_load(Path(__file__).with_name("studies.yaml").read_text("utf-8"))
     for name, study in written["commands"].items():
         command = commands.add_parser(name, help=study["does"], description=study["more"])
-        gone = study.get("gone", {})
+        gone = NO_MORE | study.get("gone", {})
         command.set_defaults(run=runs(study["run"]), gone=gone)
         for option, settings in study["options"].items():
             command.add_argument(option, **_settings(settings))

@@ -66,6 +66,13 @@ def first_possible(
     return Possible(first, times)
 
 
+def work_out_heard(case: HitCase | HandCase | FlightCase) -> Json:
+    """Fly it once, then let every detector hear it at every rate: a row for each."""
+    if isinstance(case, HitCase):
+        return work_out_hit(case)
+    return work_out_hand(case) if isinstance(case, HandCase) else work_out_flight(case)
+
+
 def work_out_hit(case: HitCase) -> Json:
     """Fly it once, then let every detector hear it at every rate: a row for each."""
     vehicle = vehicle_of_hit(case)

@@ -48,6 +48,7 @@ class StudyFlight:
     seed: int
     changes: Mapping[str, Any] = field(default_factory=dict)
     is_drawn: bool = False
+    study: str = ""
 
 
 def fly(flight: StudyFlight) -> Json:
@@ -68,6 +69,7 @@ def fly(flight: StudyFlight) -> Json:
     report, settled_s = flown.report, mission.companion.settled.duration_s
     matches = match_contacts(report.collisions, truth.hits, settled_s)
     row = {
+        "study": flight.study,
         **flight.names,
         "airframe": flight.airframe,
         "seed": flight.seed,

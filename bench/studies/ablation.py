@@ -5,20 +5,22 @@ import statistics
 import tempfile
 from argparse import Namespace
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
-from bench.fly.campaign import Campaign, Json, Workers, run_campaign
+from bench.fly.campaign import Json, Results
 from bench.fly.lockstep import JudgedFlight, fly
 from bench.rows.contacts import JudgedContact, Role, contacts_of
 from bench.rows.heard import angle_deg
 from bench.rows.judge import failures
 from bench.rows.recovered import recoveries
-from bench.rows.tables import Page, table
+from bench.rows.tables import table
 from bench.studies.rules import RULES, Rule, switched
+from bench.studies.study import Shown, run_study, seeds_of
 from sim_vehicle.truth import Hit
 
 # At rest: slower than what a hover wavers by, for longer than a vehicle turns round.
@@ -37,36 +39,36 @@ FIGURES: dict[str, tuple[str, float, int]] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A mission, and the names of the rules that are looked at in it."""
+
+    mission: MissionCase
+    rules: tuple[str, ...]
+
+
 def run_ablation(options: Namespace) -> int:
     """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
-    page = Page(options.out, "ablation")
     names = tuple(options.rule or (rule.name for rule in RULES))
-    campaign = ablation_campaign(options.missions, options.first_seed, names)
-    results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
-    rules, failed = [rule for rule in RULES if rule.name in names], results.text(campaign)
-    parts = {"Flights": flights_table(rules, list(results.results.values()))}
-    page.write("What each special rule is worth: with it, less without", options.typed, parts)
-    print(failed)
-    return 1 if failed else 0
+    seeds = seeds_of(options, options.missions)
+    cases = [Case(MissionCase(seed, kind, is_drawn=True), names) for seed in seeds for kind in AIRFRAMES]
+    title = "What each special rule is worth: with it, less without"
+    return run_study(options, "ablation", title, cases, work_out, lambda results: shown(results, names))
 
 
-def ablation_campaign(missions: int, first_seed: int, names: tuple[str, ...]) -> Campaign:
-    """`names`: of the rules that are looked at."""
-    seeds = range(first_seed, first_seed + missions)
-    cases = [(MissionCase(seed, kind, is_drawn=True), names) for seed in seeds for kind in AIRFRAMES]
-    parameters = {"missions": missions, "first_seed": first_seed, "rules": list(names)}
-    return Campaign("ablation", parameters, cases, work_out)
+def shown(results: Results, names: tuple[str, ...]) -> Shown:
+    flights = [flight for _, flight in results.found]
+    return Shown({"Flights": flights_table([rule for rule in RULES if rule.name in names], flights)})
 
 
-def work_out(case: tuple[MissionCase, tuple[str, ...]]) -> Json:
+def work_out(case: Case) -> Json:
     """What became of the flight, and of its copies by rule."""
-    mission, names = case
-    drawn = random_mission(mission)
-    rules = [rule for rule in RULES if rule.name in names]
+    drawn = random_mission(case.mission)
+    rules = [rule for rule in RULES if rule.name in case.rules]
     with tempfile.TemporaryDirectory() as folder, switched(rules) as copies:
         flight: JudgedFlight | None = None
         try:
-            flight = fly(*flyable(mission, drawn), Path(folder))
+            flight = fly(*flyable(case.mission, drawn), Path(folder))
         finally:
             copies.leave(lambda: {"failure": "the companion failed"} if flight is None else verdict(flight))
         return {"with": verdict(flight), "without": copies.found}

@@ -9,10 +9,11 @@ import pandas as pd
 
 from bench.cases.missions import MissionCase, airframe_data, flyable, random_mission
 from bench.cases.vehicles import AIRFRAMES
-from bench.fly.campaign import Campaign, Results, Workers, run_campaign
+from bench.fly.campaign import Results
 from bench.fly.lockstep import NOTICED_M_S, fly
 from bench.rows.judge import failures, work_out_mission
-from bench.rows.tables import Bar, Page, bars_text, share_bar, summary_text, table
+from bench.rows.tables import Bar, bars_text, share_bar, summary_text, table
+from bench.studies.study import Shown, run_study, seeds_of
 from companion.errors import ConfigurationError
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
@@ -38,48 +39,41 @@ OF_ANSWERED = ["seen", "again", "others", "returned"]
 OF_ANSWERED += ["past_m", "settled_s", "clear_m", "lost_m", "risen_m", "leant_deg"]
 
 
-def missions_campaign(missions: int, first_seed: int = 1, is_drawn: bool = False) -> Campaign:
-    """Seeds from the first on, each with every airframe, or where `is_drawn` with a vehicle of its kind."""
-    seeds = range(first_seed, first_seed + missions)
-    cases = [MissionCase(seed, name, is_drawn) for seed in seeds for name in AIRFRAMES]
-    parameters = {"missions": missions, "first_seed": first_seed, "is_drawn": is_drawn}
-    return Campaign("missions", parameters, cases, work_out_mission)
-
-
 def run_missions(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed to be flown."""
     is_drawn = options.vehicles == "drawn"
     if options.only is not None:
-        return run_only(MissionCase(options.only, options.airframe or "foldable", is_drawn=is_drawn), options.out)
+        return run_only(MissionCase(options.only, options.airframe or "foldable", is_drawn), options.out)
     if options.airframe is not None:
         raise ConfigurationError("--airframe belongs to --only: a campaign flies every mission with both.")
-    page, workers = Page(options.out, "drawn" if is_drawn else "campaign"), Workers(options.jobs, options.scheduler)
-    campaign = missions_campaign(options.missions, options.first_seed, is_drawn)
-    results = run_campaign(campaign, workers)
-    flights, hits = mission_rows(campaign, results), hit_rows(campaign, results)
-    bars = mission_bars(flights, hits, DRAWN_WANTED if is_drawn else MISSIONS_WANTED)
-    parts, failed = tables(flights, hits), results.text(campaign)
-    page.write("Campaign", options.typed, {"What must be shown": bars_text(bars), **parts}, rows=flights)
-    print(f"{summary_text(bars)}\n{failed}")
-    return 1 if failed else 0
+    cases = [MissionCase(seed, name, is_drawn) for seed in seeds_of(options, options.missions) for name in AIRFRAMES]
+    wanted = DRAWN_WANTED if is_drawn else MISSIONS_WANTED
+    return run_study(options, "campaign", "Campaign", cases, work_out_mission, lambda results: shown(results, wanted))
 
 
-def mission_rows(campaign: Campaign, results: Results) -> pd.DataFrame:
+def shown(results: Results, wanted: Mapping[str, float]) -> Shown:
+    flights, hits = mission_rows(results), hit_rows(results)
+    bars = mission_bars(flights, hits, wanted)
+    parts = {"What must be shown": bars_text(bars), **tables(flights, hits)}
+    return Shown(parts, summary_text(bars), flights)
+
+
+def mission_rows(results: Results) -> pd.DataFrame:
     """One a flight."""
-    found = [{**asdict(campaign.cases[at]), **one} for at, one in results.results.items()]
-    frame = pd.DataFrame(found).drop(columns="hits")
-    frame["hits"] = [len(one["hits"]) for one in found]
-    frame["is_good"] = [not one["failures"] for one in found]
-    frame["again"] = [command_again(campaign.cases[at]) for at in results.results]
-    return frame
+    frame = pd.DataFrame(results.rows())
+    return frame.assign(
+        hits=frame["hits"].map(len),
+        is_good=~frame["failures"].map(bool),
+        again=[command_again(case) for case, _ in results.found],
+    )
 
 
-def hit_rows(campaign: Campaign, results: Results) -> pd.DataFrame:
+def hit_rows(results: Results) -> pd.DataFrame:
     """One a hit, with its flight's own numbers."""
     found = [
-        {**asdict(campaign.cases[at]), "hit": number, **hit}
-        for at, one in results.results.items()
-        for number, hit in enumerate(one["hits"])
+        {**asdict(case), "hit": number, **hit}
+        for case, flight in results.found
+        for number, hit in enumerate(flight["hits"])
     ]
     frame = pd.DataFrame(found)
     return frame.reindex(columns=[*frame.columns, *(name for name in OF_ANSWERED if name not in frame.columns)])
@@ -162,7 +156,7 @@ def level(hits: pd.DataFrame) -> pd.DataFrame:
     return hits[is_level & hits["past_m"].notna()]
 
 
-def mission_bars(flights: pd.DataFrame, hits: pd.DataFrame, wanted: Mapping[str, float] = MISSIONS_WANTED) -> list[Bar]:
+def mission_bars(flights: pd.DataFrame, hits: pd.DataFrame, wanted: Mapping[str, float]) -> list[Bar]:
     bars: list[Bar] = []
     for name in AIRFRAMES:
         bars += _endings(name, flights[flights["airframe"] == name], wanted[name])

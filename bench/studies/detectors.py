@@ -2,7 +2,7 @@
 
 import math
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -12,10 +12,11 @@ from bench.cases.hits import SPEEDS_M_S, HandCase, HitCase, draw_case, draw_hand
 from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
 from bench.cases.vehicles import AIRFRAMES
 from bench.detectors.config import BaselineConfig
-from bench.fly.campaign import Campaign, Json, Results, Workers, run_campaign
+from bench.fly.campaign import Results
 from bench.fly.wire import ASKED_HZ, FLOWN_WITH, JITTERY
-from bench.rows.heard import work_out_flight, work_out_hand, work_out_hit
-from bench.rows.tables import Bar, Page, bars_text, per_cent, rms, share_bar, summary_text, table, text_of
+from bench.rows.heard import work_out_heard
+from bench.rows.tables import Bar, bars_text, per_cent, rms, share_bar, summary_text, table, text_of
+from bench.studies.study import Shown, run_study
 
 # Tried on everything. The others are compared on at least so many hits and flights, and on one in eight at most sizes:
 # all seven take three times as long as these two.
@@ -45,44 +46,35 @@ BESIDE = {
 }
 SPEED_BINS_M_S = [0.3, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0]
 USUAL = ("airframe", "rate")
+Frames = Mapping[type[object], pd.DataFrame]
 OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "normal_error_deg")
 
 
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
-    page = Page(options.out, "drawn" if options.vehicles == "drawn" else "detection")
-    workers = Workers(options.jobs, options.scheduler)
-    campaigns = campaigns_of(options.hits, options.hours, options.first_seed, options.vehicles)
-    results = {campaign.name: run_campaign(campaign, workers) for campaign in campaigns}
-    frames = {campaign.name: rows(campaign, results[campaign.name]) for campaign in campaigns}
-    bars, failed = all_bars(frames), "\n".join(filter(None, (results[one.name].text(one) for one in campaigns)))
+    hits, first = options.hits, options.first_seed
+    cases: list[Any] = [*hit_cases(hits, first), *hand_cases(hits, first), *flight_cases(options.hours, first)]
+    cases = [replace(case, is_drawn=options.vehicles == "drawn") for case in cases]
+    return run_study(options, "detectors", "Detection", cases, work_out_heard, shown)
+
+
+def shown(results: Results) -> Shown:
+    frames: Frames = {kind: rows(results, kind) for kind in (HitCase, HandCase, FlightCase)}
+    bars = all_bars(frames)
     parts = {"What must be shown": bars_text(bars), **all_tables(frames)}
-    page.write("Detection", options.typed, parts, rows=frames["hits"])
-    print(f"{summary_text(bars)}\n{failed}")
-    return 1 if failed else 0
+    return Shown(parts, summary_text(bars), frames[HitCase])
 
 
-def rows(campaign: Campaign, results: Results) -> pd.DataFrame:
-    """One for each case, rate and detector: the case's own numbers, the truth's, and what the detector reported."""
-    cases = {at: {"case": at, **asdict(campaign.cases[at])} for at in results.results}
-    found = [{**cases[at], **row} for at, one in results.results.items() for row in one["rows"]]
+def rows(results: Results, kind: type) -> pd.DataFrame:
+    """One for each case of a kind, rate and detector: the case's own numbers, the truth's, and what was reported."""
+    found = [
+        {"case": at, **asdict(case), **row}
+        for at, (case, heard) in enumerate(each for each in results.found if isinstance(each[0], kind))
+        for row in heard["rows"]
+    ]
     frame = pd.DataFrame(found).drop(columns="detectors")
     # A detector that finds nothing tells nothing of it.
     return frame.reindex(columns=[*frame.columns, *(name for name in OF_FOUND if name not in frame.columns)])
-
-
-def campaigns_of(hits: int, hours: float, first_seed: int, vehicles: str) -> list[Campaign]:
-    """Hits, hands and healthy flights by the named vehicles, or each by one of its own."""
-    flown: dict[str, tuple[dict[str, float], Sequence[Any], Callable[[Any], Json]]] = {
-        "hits": ({"hits": hits}, hit_cases(hits, first_seed), work_out_hit),
-        "hands": ({"hits": hits}, hand_cases(hits, first_seed), work_out_hand),
-        "flights": ({"hours": hours}, flight_cases(hours, first_seed), work_out_flight),
-    }
-    named = {"first_seed": first_seed, "vehicles": vehicles}
-    return [
-        Campaign(name, {**size, **named}, [replace(case, is_drawn=vehicles == "drawn") for case in cases], work_out)
-        for name, (size, cases, work_out) in flown.items()
-    ]
 
 
 def hit_cases(hits: int, first: int) -> list[HitCase]:
@@ -130,20 +122,20 @@ def _compared(seed: int, every: int) -> tuple[str, ...]:
     return tuple(BaselineConfig.detectors) if seed // 2 % every == 0 else THOROUGH
 
 
-# --- tables: a frame a campaign, a row a case, rate and detector
+# --- tables: a frame a kind of case, a row a case, rate and detector
 
 
-def all_tables(frames: Mapping[str, pd.DataFrame]) -> dict[str, str]:
+def all_tables(frames: Frames) -> dict[str, str]:
     """By their headings; of every detector, and more of the drone's own."""
-    hits = frames["hits"].assign(band=pd.cut(frames["hits"]["speed_m_s"], SPEED_BINS_M_S, right=False))
-    ours, flights = hits[hits["detector"] == DEFAULT], frames["flights"]
+    hits = frames[HitCase].assign(band=pd.cut(frames[HitCase]["speed_m_s"], SPEED_BINS_M_S, right=False))
+    ours, flights = hits[hits["detector"] == DEFAULT], frames[FlightCase]
     return {
         "Every detector on simulated hits": by(usual(hits), "detector", *USUAL),
         "By obstacle": by(usual(ours), "approach", *USUAL),
         "By speed": by(ours[ours["family"] == "plain"], "band", *USUAL),
         "By vibration": by(ours[ours["family"] == "vibration"], "vibration_m_s2", *USUAL),
         "Over a bad link, and struck in hover": by(hits[hits["family"].isin(["link", "struck"])], "family", *USUAL),
-        "In a person's hand": hands_table(frames["hands"]),
+        "In a person's hand": hands_table(frames[HandCase]),
         "Healthy flights, simulated": alarms_table(flights, "detector", "rate"),
         "By kind of flight": alarms_table(flights[flights["detector"] == DEFAULT], "family", "rate"),
     }
@@ -194,9 +186,8 @@ def alarms_table(flights: pd.DataFrame, *keys: str) -> str:
 # --- what must be shown of the drone's own detector
 
 
-def all_bars(frames: Mapping[str, pd.DataFrame]) -> list[Bar]:
-    """Frames are by campaign."""
-    ours, hands, flights = (frames[name].query("detector == @DEFAULT") for name in ("hits", "hands", "flights"))
+def all_bars(frames: Frames) -> list[Bar]:
+    ours, hands, flights = (frames[kind].query("detector == @DEFAULT") for kind in (HitCase, HandCase, FlightCase))
     bars: list[Bar] = []
     for (airframe, rate), hits in ours.groupby(list(USUAL)):
         where, least = f"{airframe}, {rate} Hz", FOUND_BARS[airframe, rate]

@@ -2,15 +2,15 @@
 
 from argparse import Namespace
 from collections import Counter
-from dataclasses import asdict
 
 import pandas as pd
 
 from bench.faults.catalogue import FLOWN, GROUPS
 from bench.fly.air import ENDS
-from bench.fly.campaign import Campaign, Results, Workers, run_campaign
+from bench.fly.campaign import Results
 from bench.rows.faulted import FaultCase, work_out_fault
-from bench.rows.tables import Page, table
+from bench.rows.tables import table
+from bench.studies.study import Shown, run_study
 from companion.errors import ConfigurationError
 
 GROUP_OF = {fault.name: group for group, faults in GROUPS.items() for fault in faults}
@@ -22,23 +22,18 @@ def run_faults(options: Namespace) -> int:
     names = [*FLOWN] if options.only is None else [options.only]
     if options.only not in (None, *FLOWN):
         raise ConfigurationError(f"--only {options.only}: there is no such fault; there are {', '.join(FLOWN)}.")
-    # Not how many: more seeds go on where fewer ended.
     cases = [FaultCase(seed, name) for seed in range(options.seeds) for name in names]
-    campaign = Campaign("faults", {"only": options.only}, cases, work_out_fault)
-    page, results = Page(options.out, "faults"), run_campaign(campaign, Workers(options.jobs))
-    rows = fault_rows(campaign, results)
+    return run_study(options, "faults", "Faults and attacks", cases, work_out_fault, shown)
+
+
+def shown(results: Results) -> Shown:
+    # The faults in the table's order.
+    order = [*FLOWN].index
+    rows = pd.DataFrame(results.rows()).sort_values("fault", key=lambda names: names.map(order), kind="stable")
     failing = list(rows[rows["complaints"].map(bool)]["fault"].unique())
     lead = f"{rows['fault'].nunique()} faults, {len(rows)} flights; {len(failing)} rows not as expected."
     parts = {"": f"{lead}\n\n{faults_table(rows)}", "What was not as expected": complaints(rows)}
-    page.write("Faults and attacks", options.typed, parts, rows=rows)
-    print(f"{lead} {', '.join(failing)}\n{results.text(campaign)}")
-    return 1 if failing or results.failures else 0
-
-
-def fault_rows(campaign: Campaign, results: Results) -> pd.DataFrame:
-    """One a flight; the faults in the table's order."""
-    frame = pd.DataFrame([{**asdict(campaign.cases[at]), **one} for at, one in results.results.items()])
-    return frame.sort_values("fault", key=lambda names: names.map([*FLOWN].index), kind="stable")
+    return Shown(parts, f"{lead} {', '.join(failing)}", rows, is_met=not failing)
 
 
 def faults_table(rows: pd.DataFrame) -> str:

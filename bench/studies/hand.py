@@ -13,8 +13,9 @@ from bench.cases.mishaps import FAMILIES
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row
-from bench.fly.campaign import Campaign, Workers, rows_of
-from bench.rows.tables import Page, at_most_an_hour, by_each
+from bench.fly.campaign import Results
+from bench.rows.tables import at_most_an_hour, by_each
+from bench.studies.study import Shown, run_study, seeds_of
 from companion.autopilot.known import GUARDED_MODES
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
@@ -43,16 +44,15 @@ class HandCase:
 
 def run_hand(options: Namespace) -> int:
     """0 when nothing was reported in the air, else 1."""
-    page = Page(options.out, "hand")
-    seeds = range(options.first_seed, options.first_seed + options.flights)
-    cases = [HandCase(seed, HAND_MODES[seed % len(HAND_MODES)]) for seed in seeds]
-    parameters = {"flights": options.flights, "first_seed": options.first_seed}
-    rows = rows_of(Campaign("hand", parameters, cases, fly_by_hand), Workers(options.jobs))
+    cases = [HandCase(seed, HAND_MODES[seed % len(HAND_MODES)]) for seed in seeds_of(options, options.flights)]
+    return run_study(options, "hand", "Flown hard by hand", cases, fly_by_hand, shown)
+
+
+def shown(results: Results) -> Shown:
+    rows = results.rows()
     watched = by_rate(rows)
     text = text_of(watched)
-    page.write("Flown hard by hand", options.typed, {"": text}, rows=pd.DataFrame(rows))
-    print(text)
-    return 1 if any(_in_the_air(row) for row in watched) else 0
+    return Shown({"": text}, text, pd.DataFrame(rows), is_met=not any(map(_in_the_air, watched)))
 
 
 # --- the vehicle

@@ -2,15 +2,15 @@
 
 import math
 from argparse import Namespace
-from dataclasses import asdict
 
 import pandas as pd
 
-from bench.fly.campaign import Campaign, Results, Workers, run_campaign
+from bench.fly.campaign import Results
 from bench.fly.guarded import MOST_RECOVERY_S, OVERTURNED_DEG, draw_flown
 from bench.fly.lockstep import NOTICED_M_S
 from bench.rows.hits import work_out_flown
-from bench.rows.tables import CONFIDENCE, Page, at_most_an_hour, at_most_of_groups, per_cent, table, text_of
+from bench.rows.tables import CONFIDENCE, at_most_an_hour, at_most_of_groups, per_cent, table, text_of
+from bench.studies.study import Shown, run_study, seeds_of
 from companion.errors import ConfigurationError
 
 # Into the surface.
@@ -26,27 +26,21 @@ OF_FOUND = ("latency_ms", "again", "rest_s")
 
 def run_hits(options: Namespace) -> int:
     """0 when it is written, whatever it says; 1 when a hit failed to be flown."""
-    page, is_drawn = Page(options.out, "hits"), options.vehicles == "drawn"
-    seeds = range(options.first_seed, options.first_seed + options.hits)
-    # Not how many: a longer campaign goes on where a shorter one ended.
-    parameters = {"first_seed": options.first_seed, "is_drawn": is_drawn}
-    campaign = Campaign("flown-hits", parameters, [draw_flown(seed, is_drawn) for seed in seeds], work_out_flown)
-    results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
-    flights, failed = flight_rows(campaign, results), results.text(campaign)
+    cases = [draw_flown(seed, options.vehicles == "drawn") for seed in seeds_of(options, options.hits)]
+    return run_study(options, "hits", "Hits alone", cases, work_out_flown, shown)
+
+
+def shown(results: Results) -> Shown:
+    flights = flight_rows(results)
     if not flights["touched"].any():
         raise ConfigurationError("Nothing was touched: fly more hits (--hits).")
     hits = hit_rows(flights)
-    page.write("Hits alone", options.typed, {"": lead(hits, flights), **parts(hits)}, rows=hits)
-    print(failed)
-    return 1 if failed else 0
+    return Shown({"": lead(hits, flights), **parts(hits)}, rows=hits)
 
 
-def flight_rows(campaign: Campaign, results: Results) -> pd.DataFrame:
+def flight_rows(results: Results) -> pd.DataFrame:
     """One a flight."""
-    cases = [campaign.cases[at] for at in results.results]
-    return pd.DataFrame([{**asdict(case.hit), "imu_hz": case.imu_hz} for case in cases]).join(
-        pd.DataFrame(results.results.values())
-    )
+    return pd.DataFrame([{**row.pop("hit"), **row} for row in results.rows()])
 
 
 def hit_rows(flights: pd.DataFrame) -> pd.DataFrame:

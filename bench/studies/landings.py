@@ -8,8 +8,9 @@ import pandas as pd
 
 from bench.fly.by_hand.watched import IMU_HZ, Row
 from bench.fly.by_hand.ways_down import FALLS, GROUNDS, LANDINGS, GroundCase, flown_to_the_ground
-from bench.fly.campaign import Campaign, Workers, rows_of
-from bench.rows.tables import Page, by_each
+from bench.fly.campaign import Results
+from bench.rows.tables import by_each
+from bench.studies.study import Shown, run_study, seeds_of
 
 CRASH, NO_COLLISION = "crash", ("landing", "contact")
 # A crash is reported within this time of its greatest deceleration.
@@ -18,15 +19,15 @@ CRASH_WITHIN_S = 0.2
 
 def run_landings(options: Namespace) -> int:
     """0 when every landing and every fall was reported for what it was, else 1."""
-    page, first = Page(options.out, "landings"), options.first_seed
-    cases = [draw_case(seed, LANDINGS) for seed in range(first, first + options.landings)]
-    cases += [draw_case(seed, FALLS) for seed in range(first, first + options.falls)]
-    parameters = {"landings": options.landings, "falls": options.falls, "first_seed": first}
-    rows = rows_of(Campaign("landings", parameters, cases, fly_to_the_ground), Workers(options.jobs))
+    cases = [draw_case(seed, LANDINGS) for seed in seeds_of(options, options.landings)]
+    cases += [draw_case(seed, FALLS) for seed in seeds_of(options, options.falls)]
+    return run_study(options, "landings", "Landings and falls", cases, fly_to_the_ground, shown)
+
+
+def shown(results: Results) -> Shown:
+    rows = results.rows()
     text = text_of(rows)
-    page.write("Landings and falls", options.typed, {"": text}, rows=pd.DataFrame(rows))
-    print(text)
-    return 1 if any(row["wrong"] for row in rows) else 0
+    return Shown({"": text}, text, pd.DataFrame(rows), is_met=not any(row["wrong"] for row in rows))
 
 
 def draw_case(seed: int, ways: Sequence[str]) -> GroundCase:

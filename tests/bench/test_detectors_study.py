@@ -5,10 +5,10 @@ import dataclasses
 import pandas as pd
 import pytest
 
-from bench.cases.hits import draw_case, draw_hand
+from bench.cases.hits import HandCase, HitCase, draw_case, draw_hand
 from bench.cases.mishaps import FlightCase
 from bench.fly import cruise
-from bench.fly.campaign import Campaign, Results
+from bench.fly.campaign import Results
 from bench.fly.wire import ASKED_HZ
 from bench.main import main
 from bench.rows.tables import MET, MISSED, REPORTED
@@ -23,7 +23,7 @@ BY = ("fused", "threshold")
 
 
 def frame(cases, results):
-    return rows(Campaign("made up", {}, cases, print), Results(dict(enumerate(results)), {}))
+    return rows(Results([*zip(cases, results, strict=True)]), type(cases[0]))
 
 
 def bars(count=200, hours=10.0, alarms=0, collisions=(), **changes):
@@ -47,9 +47,9 @@ def bars(count=200, hours=10.0, alarms=0, collisions=(), **changes):
     )
     return all_bars(
         {
-            "hits": frame(cases, hits),
-            "hands": frame(hands, [held] * 4),
-            "flights": frame([FlightCase("calm", 0, "foldable", BY)], [flight]),
+            HitCase: frame(cases, hits),
+            HandCase: frame(hands, [held] * 4),
+            FlightCase: frame([FlightCase("calm", 0, "foldable", BY)], [flight]),
         }
     )
 
@@ -90,8 +90,8 @@ def test_the_command_writes_tables_and_rows(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(cruise, "AIRBORNE_S", 2.0)
     monkeypatch.setattr(detectors, "THOROUGH", ("fused", "threshold"))
     assert main(["detectors", "--hits", "4", "--hours", "0.01", "--jobs", "1", "--out", "page"]) == 0
-    text = (tmp_path / "page" / "detection.md").read_text()
+    text = (tmp_path / "page" / "detectors.md").read_text()
     assert "`python -m bench detectors --hits 4 --hours 0.01 --jobs 1 --out page`" in text
     assert "## Every detector on simulated hits" in text and "bars are met" in capsys.readouterr().out
-    table = pd.read_json(tmp_path / "page" / "detection.jsonl", lines=True)
+    table = pd.read_json(tmp_path / "page" / "detectors.jsonl", lines=True)
     assert {*table["detector"]} >= {*BY} and {*table["rate"]} == {*ASKED_HZ}

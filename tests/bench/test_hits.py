@@ -3,7 +3,7 @@
 import pytest
 
 from bench.cases.hits import HitCase
-from bench.fly.campaign import Campaign, Results
+from bench.fly.campaign import Results
 from bench.fly.guarded import FlownHit, draw_flown
 from bench.rows.hits import work_out_flown
 from bench.rows.tables import at_most, at_most_of_groups
@@ -60,10 +60,10 @@ def test_a_page_counts_misses_by_cell_and_names_them():
     cases = [draw_flown(seed, False) for seed in range(64)]
     found = {"touched": True, "found": True, "false": 0, "again": 0, "seconds": 3.0, "processor_s": 0.1}
     found |= {"closing_m_s": 1.5, "latency_ms": 8.0, "tilt_deg": 9.0, "lost_m": 0.0, "rest_s": 1.0}
-    results = {at: dict(found) for at in range(64)}
+    results = [dict(found) for _ in cases]
     results[2] |= {"latency_ms": None, "found": False, "rest_s": None}
     results[3] = {"touched": False, "false": 1, "seconds": 3.0, "processor_s": 0.1}
-    flights = flight_rows(Campaign("made up", {}, cases, print), Results(results, {}))
+    flights = flight_rows(Results([*zip(cases, results, strict=True)]))
     rows = hit_rows(flights)
     page, case = parts(rows), cases[2]
     # Then the cell says so, is named as one that shows nothing, and the hit can be looked for

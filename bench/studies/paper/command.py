@@ -1,15 +1,17 @@
 """`bench paper`: flies every study of the paper and writes its numbers beside ours, tables and pictures."""
 
 from argparse import Namespace
+from dataclasses import replace
 
 import pandas as pd
 from matplotlib.figure import Figure
 
-from bench.fly.campaign import Campaign, Workers, rows_of
+from bench.fly.campaign import Results
 from bench.rows.paper import fly
-from bench.rows.tables import Page, table
+from bench.rows.tables import table
 from bench.studies.paper import rigid, scenarios, single, walls
 from bench.studies.paper.study import Claim, sampling_text, verdict_text
+from bench.studies.study import Shown, run_study
 
 STUDIES = (
     single.ARM,
@@ -25,11 +27,12 @@ STUDIES = (
 
 def run_paper(options: Namespace) -> int:
     """Fly everything and write it. 0 when it is written, whatever it says."""
-    page = Page(options.out, "paper")
-    planned = [(study.title, flight) for study in STUDIES for flight in study.flights(options.seeds)]
-    campaign = Campaign("paper", {"seeds": options.seeds}, [flight for _, flight in planned], fly)
-    rows = pd.DataFrame(rows_of(campaign, Workers(options.jobs)))
-    rows.insert(0, "study", [title for title, _ in planned])
+    planned = [replace(flight, study=study.title) for study in STUDIES for flight in study.flights(options.seeds)]
+    return run_study(options, "paper", "The paper's numbers beside ours", planned, fly, shown)
+
+
+def shown(results: Results) -> Shown:
+    rows = pd.DataFrame([row for _, row in results.found])
     parts: dict[str, str] = {}
     pictures: dict[str, Figure] = {}
     claims: list[Claim] = []
@@ -40,6 +43,4 @@ def run_paper(options: Namespace) -> int:
         parts |= found.tables
         pictures |= found.pictures
         claims += found.rows
-    page.write("The paper's numbers beside ours", options.typed, parts, pictures, rows.drop(columns="track"))
-    print(verdict_text(claims))
-    return 0
+    return Shown(parts, verdict_text(claims), rows.drop(columns="track"), pictures)

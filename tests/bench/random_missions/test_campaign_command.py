@@ -4,11 +4,13 @@ import json
 
 import pytest
 
+from bench.cases.missions import MissionCase
+from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Results
 from bench.main import main
 from bench.rows.tables import MET, MISSED
-from bench.studies import campaign as command
-from bench.studies.campaign import failures_table, hit_rows, mission_bars, mission_rows, missions_campaign, tables
+from bench.studies import study
+from bench.studies.campaign import MISSIONS_WANTED, failures_table, hit_rows, mission_bars, mission_rows, tables
 
 pytestmark = pytest.mark.slow
 
@@ -38,10 +40,9 @@ HIT = {
 
 def made_up(count=200, failing=(), **changes):
     """So many missions with a hit each; those of `failing` fail, the first hit of each airframe is changed."""
-    campaign = missions_campaign(count)
-    results = {}
-    for number, case in enumerate(campaign.cases):
-        results[number] = {
+    found = []
+    for case in (MissionCase(seed, name) for seed in range(1, count + 1) for name in AIRFRAMES):
+        result = {
             "room": "corner",
             "stream_hz": 50,
             "wind_m_s": 3.0,
@@ -51,16 +52,16 @@ def made_up(count=200, failing=(), **changes):
             "failures": [["fell", "at 3.00 s"]] if case.seed in failing else [],
             "hits": [{**HIT, **changes} if case.seed == 1 else dict(HIT)],
         }
-    return campaign, results
+        found.append((case, result))
+    return Results(found)
 
 
 def frames(flown):
-    campaign, results = flown
-    return mission_rows(campaign, Results(results, {})), hit_rows(campaign, Results(results, {}))
+    return mission_rows(flown), hit_rows(flown)
 
 
 def bars_of(flown):
-    return mission_bars(*frames(flown))
+    return mission_bars(*frames(flown), MISSIONS_WANTED)
 
 
 def verdicts(bars, word):
@@ -111,14 +112,14 @@ def test_the_command_writes_a_page_its_rows_and_a_record_to_go_on_from(written):
     assert f"`python -m bench campaign --missions 1 --first-seed {SEED} --jobs 1" in text
     flights = [json.loads(line) for line in (folder / "docs" / "campaign.jsonl").read_text().splitlines()]
     assert [(flight["seed"], flight["airframe"]) for flight in flights] == [(4, "foldable"), (4, "rigid")]
-    (record,) = folder.rglob("missions-*.jsonl")
-    assert len(record.read_text().splitlines()) == 1 + 2
+    (record,) = (folder / "runs").rglob("campaign-*.jsonl")
+    assert len(record.read_text().splitlines()) == 2
 
 
 def test_a_single_mission_again_is_the_same_flight_with_its_whole_folder(written, tmp_path, capsys):
     _, folder = written
-    (record,) = folder.rglob("missions-*.jsonl")
-    result = json.loads(record.read_text().splitlines()[2])["result"]
+    (record,) = (folder / "runs").rglob("campaign-*.jsonl")
+    result = json.loads(record.read_text().splitlines()[1])["result"]
     code = main(["campaign", "--only", SEED, "--airframe", "rigid", "--out", str(tmp_path / "again")])
     assert code == (1 if result["failures"] else 0)
     assert ("It ended as it says." in capsys.readouterr().out) is (not result["failures"])
@@ -129,7 +130,7 @@ def test_a_single_mission_again_is_the_same_flight_with_its_whole_folder(written
 
 
 def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(command, "run_campaign", lambda *_: pytest.fail("flown"))
+    monkeypatch.setattr(study, "run_campaign", lambda *_: pytest.fail("flown"))
     (tmp_path / "docs").write_text("a file")
     assert main(["campaign", "--missions", "1", "--out", str(tmp_path / "docs")]) == 1
     assert "cannot be made" in capsys.readouterr().err
