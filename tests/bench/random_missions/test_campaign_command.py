@@ -61,7 +61,8 @@ def frames(flown):
 
 
 def bars_of(flown):
-    return mission_bars(*frames(flown), MISSIONS_WANTED)
+    flights, hits = frames(flown)
+    return mission_bars(flights, hits, MISSIONS_WANTED)
 
 
 def verdicts(bars, word):
