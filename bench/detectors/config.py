@@ -5,9 +5,7 @@ from typing import Any, ClassVar
 
 from bench.detectors.contact import Threshold
 from bench.detectors.force import FuzzyDetector, LateralDetector, ThresholdDetector
-from bench.detectors.hybrid import HybridDetector
-from bench.detectors.momentum import MomentumDetector
-from bench.detectors.tracking import TrackingDetector
+from bench.detectors.observers import HybridDetector, MomentumDetector, TrackingDetector
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from companion.reflex.detector import Detector

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from companion.messages import (
     Attitude,
@@ -38,6 +38,15 @@ class BaselineState(DetectorState):
     thrust: ThrustGain = field(default_factory=ThrustGain)
 
 
+class Reading(NamedTuple):
+    """What a sample shows: a force, its size where forces are looked at, and until when there was surely no contact."""
+
+    is_loud: bool
+    force_frd_m_s2: Vector3
+    size_m_s2: float
+    free_until_us: int
+
+
 class Baseline(ABC):
     """Built from its settings, as the drone's own detector is. Each looks at samples of one kind."""
 
@@ -58,34 +67,28 @@ class Baseline(ABC):
         elif isinstance(sample, AttitudeTarget):
             state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         elif isinstance(sample, self.looks_at):
-            return state, self.look(state, sample, situation)
+            reading = self.look(state, sample, situation)
+            if reading is not None:
+                return state, judge(state, sample.time_boot_us, reading, situation.off_reason)
         return state, None
 
     @abstractmethod
-    def look(self, s: Any, sample: Any, situation: Situation) -> Impact | None:
-        """What one of its samples shows."""
+    def look(self, s: Any, sample: Any, situation: Situation) -> Reading | None:
+        """What one of its samples shows; None where it cannot show anything yet."""
 
     def free_until_us(self, s: DetectorState, now_us: int) -> int:
         """Before the sample's averaging window, or the gap before it."""
         return min(now_us - self._averaging_us, s.last_sample_boot_us)
 
 
-def judge(
-    state: DetectorState,
-    time_us: int,
-    free_until_us: int,
-    force_frd_m_s2: Vector3,
-    size_m_s2: float,
-    is_loud: bool,
-    off_reason: str | None,
-) -> Impact | None:
+def judge(state: DetectorState, time_us: int, reading: Reading, off_reason: str | None) -> Impact | None:
     """Move the state's phase by one sample; the impact if it is the first loud one of a contact."""
     before, state.last_sample_boot_us = state.phase, time_us
     if off_reason is not None:
         state.phase, state.off_reason = Phase.OFF, off_reason
         return None
     state.off_reason = ""
-    if not is_loud:
+    if not reading.is_loud:
         if before is Phase.OFF:
             state.phase, state.last_loud_boot_us = Phase.QUIET, time_us
         elif time_us - state.last_loud_boot_us >= REARM_US:
@@ -94,10 +97,10 @@ def judge(
     state.last_loud_boot_us = time_us
     if before is Phase.ARMED:
         state.phase = Phase.CONTACT
-        state.peak_specific_force_m_s2 = size_m_s2
-        return Impact(time_us, free_until_us, force_frd_m_s2)
+        state.peak_specific_force_m_s2 = reading.size_m_s2
+        return Impact(time_us, reading.free_until_us, reading.force_frd_m_s2)
     if before is Phase.CONTACT:
-        state.peak_specific_force_m_s2 = max(state.peak_specific_force_m_s2, size_m_s2)
+        state.peak_specific_force_m_s2 = max(state.peak_specific_force_m_s2, reading.size_m_s2)
     else:
         state.phase = Phase.QUIET
     return None

@@ -3,12 +3,12 @@
 import math
 from dataclasses import dataclass
 
-from bench.detectors.contact import Baseline, BaselineState, judge
+from bench.detectors.contact import Baseline, BaselineState, Reading
 from companion.messages import ImuSample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO
-from companion.reflex.detector import Impact, Phase, Situation
+from companion.reflex.detector import Phase, Situation
 from rebound_cli.logs.shaking import MEMORY_US
 
 # Samples, as in its authors' program.
@@ -46,14 +46,13 @@ class ThresholdDetector(Baseline):
 
     name, state = "threshold", ThresholdState
 
-    def look(self, s: ThresholdState, sample: ImuSample, situation: Situation) -> Impact | None:
+    def look(self, s: ThresholdState, sample: ImuSample, situation: Situation) -> Reading:
         f_x, f_y, f_z = sample.specific_force_frd_m_s2
         self._count(s, sample.time_boot_us, (f_x, f_y, f_z + GRAVITY_M_S2))
         is_told = s.is_open and s.since is not None and s.since > WINDOW
         if is_told:
             s.is_open = False
-        push, size, off = s.force_m_s2, s.largest_m_s2, situation.off_reason
-        return judge(s, sample.time_boot_us, s.opened_after_us, push, size, is_told, off)
+        return Reading(is_told, s.force_m_s2, s.largest_m_s2, s.opened_after_us)
 
     def _count(self, s: ThresholdState, now_us: int, force: Vector3) -> None:
         """Count the sample; open the window with it, or keep it if it is the loudest."""
@@ -88,11 +87,11 @@ class FuzzyDetector(Baseline):
 
     name = "fuzzy"
 
-    def look(self, s: BaselineState, sample: ImuSample, situation: Situation) -> Impact | None:
-        f, now_us = sample.specific_force_frd_m_s2, sample.time_boot_us
+    def look(self, s: BaselineState, sample: ImuSample, situation: Situation) -> Reading:
+        f = sample.specific_force_frd_m_s2
         north, east, _ = body_to_ned(s.attitude_wxyz, f)
-        size, free_until_us = math.hypot(north, east), self.free_until_us(s, now_us)
-        return judge(s, now_us, free_until_us, (f[0], f[1], 0.0), size, size > s.threshold_m_s2, situation.off_reason)
+        size = math.hypot(north, east)
+        return Reading(size > s.threshold_m_s2, (f[0], f[1], 0.0), size, self.free_until_us(s, sample.time_boot_us))
 
 
 @dataclass(slots=True)
@@ -135,17 +134,16 @@ class LateralDetector(Baseline):
 
     name, state = "lateral", LateralState
 
-    def look(self, s: LateralState, sample: ImuSample, situation: Situation) -> Impact | None:
+    def look(self, s: LateralState, sample: ImuSample, situation: Situation) -> Reading:
         now_us, (f_x, f_y, _) = sample.time_boot_us, sample.specific_force_frd_m_s2
         x, y = f_x - s.mean_x_m_s2, f_y - s.mean_y_m_s2
         # A gap says nothing about what was in it: a sample after one weighs as one sample.
         elapsed_us = min(max(now_us - s.last_sample_boot_us, 0), MEMORY_US // 10)
-        size, free_until_us = math.hypot(x, y), self.free_until_us(s, now_us)
+        size = math.hypot(x, y)
         is_loud = size >= s.threshold_m_s2
-        impact = judge(s, now_us, free_until_us, (x, y, 0.0), size, is_loud, situation.off_reason)
         # Also while it is off, for the spread must be known when it is switched on, and in a shake in which it was: a
         # threshold that is too low would never rise.
-        if not is_loud or s.phase is not Phase.CONTACT:
+        if not is_loud or situation.off_reason is not None or s.phase not in (Phase.ARMED, Phase.CONTACT):
             s.learn(f_x, f_y, elapsed_us)
             s.threshold_m_s2 = max(self._least_m_s2, NOISE_FACTOR * s.spread_m_s2)
-        return impact
+        return Reading(is_loud, (x, y, 0.0), size, self.free_until_us(s, now_us))
