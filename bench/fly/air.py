@@ -9,19 +9,9 @@ import math
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
-from bench.fly.packets import (
-    ARM,
-    COMMAND,
-    GROUND_STATION,
-    SET_MODE,
-    SETPOINT,
-    custom_mode,
-    decoded,
-    made,
-    outside,
-)
+from bench.fly.packets import ARM, COMMAND, SET_MODE, SETPOINT, custom_mode, decoded, outside
+from bench.fly.station import GroundStation
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
@@ -29,14 +19,13 @@ from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest
-from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
 # A clock that is read goes on.
 _READING_US = 4
 # A ground station's own rates; sticks come at 10 Hz or more.
 _STICKS_EVERY, _BEAT_EVERY = 20, 250
-# PX4's modes as DO_SET_MODE takes them: main and sub mode.
+# As its packets say it.
 POSCTL = 3 << 16
 COMPLETED, HANDED_OVER, FAILED, KILLED = "completed", "aborted", "failed", "killed"
 ENDS = {
@@ -144,7 +133,7 @@ class Air:
     """Whether the vehicle has left the pilot's mode."""
     _to_vehicle: list[bytes] = field(default_factory=list)
     _waiting: list[bytes] = field(default_factory=list)
-    _pilot: Link | None = None
+    _station: GroundStation | None = None
     _readings: int = 0
     _intervals: int = 0
 
@@ -229,8 +218,8 @@ class Air:
         self._fly_sticks()
         frames, self._to_vehicle = self._to_vehicle, []
         said = self.vehicle.step(b"".join(self.injector.to_vehicle(self, frames)))
-        if self._pilot is not None:
-            self._pilot.take()
+        if self._station is not None:
+            self._station.hear()
         if self.pilot_at_s is not None:
             self.is_overruled |= self.has_pilot and self.vehicle.mode != "Position"
             self.has_pilot |= self.vehicle.mode == "Position"
@@ -256,26 +245,22 @@ class Air:
 
     def add_pilot(self) -> None:
         """A ground station with centred sticks, on a link of its own."""
-        self._pilot = self.vehicle.add_link(LinkKind.GROUND)
+        self._station = GroundStation(self.vehicle, LinkKind.GROUND)
 
     def take_over(self) -> None:
         """The pilot takes position mode."""
-        assert self._pilot is not None, "there is a pilot from the beginning"
-        self._push("COMMAND_LONG", command=SET_MODE, param1=1.0, param2=3.0, target_system=1, target_component=1)
+        assert self._station is not None, "there is a pilot from the beginning"
+        self._station.set_mode("POSCTL")
         self.pilot_mode, self.pilot_at_s = POSCTL, self.now_s
 
     def _fly_sticks(self) -> None:
         self._intervals += 1
-        if self._pilot is None:
+        if self._station is None:
             return
         if self._intervals % _STICKS_EVERY == 0:
-            self._push("MANUAL_CONTROL", target=1, z=500)
+            self._station.move_sticks()
         if self._intervals % _BEAT_EVERY == 0:
-            self._push("HEARTBEAT", type=6, autopilot=8)
-
-    def _push(self, name: str, **fields: Any) -> None:
-        assert self._pilot is not None, "only with a pilot"
-        self._pilot.push(made(name, fields, GROUND_STATION, self._intervals % 256))
+            self._station.beat()
 
 
 def _takes_control(frame: bytes) -> bool:

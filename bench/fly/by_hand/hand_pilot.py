@@ -56,10 +56,10 @@ class Pilot:
         """What to ask for, and where the sticks are."""
         flight, status, now_s = self._flight, self._flight.status, self._flight.time_s
         if status.vehicle_mode != self._chosen and now_s >= self._ask_mode_s:
-            flight.ask_mode(self._chosen)
+            flight.station.set_mode(self._chosen)
             self._ask_mode_s = now_s + ASK_AGAIN_S
         if not status.armed and now_s >= self._arm_s:
-            flight.arm()
+            flight.station.arm()
             self._arm_s = now_s + ASK_AGAIN_S
         if self._next == self._idle and status.armed:
             self._next = self._rise

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, made
+from bench.fly.station import GroundStation
 from bench.fly.stepped import Stepped
 from companion.companion import Companion, StepResult
 from companion.guard.guard import Guard
@@ -20,15 +20,10 @@ from sim_vehicle.vehicle import SimulatedVehicle
 Row = dict[str, Any]
 
 IMU_HZ = (50, 100, 250)
-# Of PX4's modes, as DO_SET_MODE takes them: main and sub mode.
-MODES = {"ALTCTL": (2, 0), "POSCTL": (3, 0), "AUTO.RTL": (4, 5), "AUTO.LAND": (4, 6)}
-MODES |= {"STABILIZED": (7, 0)}
 # More than any drawn vehicle's thrust, with a hover at a third of it, and drag.
 STRONGEST_M_S2 = 45.0
 # A ground station's sticks come at 25 to 50 Hz, its heartbeat once a second.
 STICKS_S, BEAT_S = 0.02, 1.0
-# The middle of the throttle's way from 0 to 1000, and the other sticks' from -1000 to 1000.
-HALF_THROTTLE, FULL_STICK = 500, 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +52,11 @@ class GuardedFlight(Stepped):
     def __init__(self, vehicle: SimulatedVehicle, *programs: Companion | Guard) -> None:
         super().__init__(vehicle, *programs)
         self.watchers = [Watcher(program) for program in programs]
-        self._station = vehicle.add_link(LinkKind.NORMAL)
+        self.station = GroundStation(vehicle, LinkKind.NORMAL)
         for link in self.links:
             link.introduce()
         self._body, self._depth_m = vehicle.state.body, vehicle.state.depth_m
-        self._sent, self._sticks_s, self._beat_s = 0, 0.0, 0.0
+        self._sticks_s = self._beat_s = 0.0
         self._before = np.zeros(3)
         self.looks_for_ground = False
         self.touched_us: int | None = None  # first touch of the ground since the latest `watch_for_ground`
@@ -95,32 +90,20 @@ class GuardedFlight(Stepped):
         """From now on a touch of the ground counts: the vehicle is off it."""
         self.looks_for_ground, self.touched_us = True, None
 
-    def ask(self, command: int, *params: float) -> None:
-        """By a ground station."""
-        fields = {f"param{place}": value for place, value in enumerate(params, start=1)}
-        self._push("COMMAND_LONG", target_system=1, target_component=1, command=command, **fields)
-
-    def ask_mode(self, mode: str) -> None:
-        self.ask(SET_MODE, 1.0, *MODES[mode])
-
-    def arm(self) -> None:
-        self.ask(ARM, 1.0)
-
     def fly_sticks(self, sticks: Callable[[], Sticks]) -> None:
         """Send the sticks where they are due."""
         if self.time_s < self._sticks_s:
             return
         self._sticks_s, now = self._sticks_s + STICKS_S, sticks()
-        x, y, r = (round(FULL_STICK * limited(stick)) for stick in (now.pitch, now.roll, now.yaw))
-        self._push("MANUAL_CONTROL", target=1, x=x, y=y, z=round(HALF_THROTTLE * (1.0 + limited(now.throttle))), r=r)
+        self.station.move_sticks(now.roll, now.pitch, now.throttle, now.yaw)
 
     def step(self) -> list[StepResult]:
         if self.time_s >= self._beat_s:
             self._beat_s = self.time_s + BEAT_S
-            self._push("HEARTBEAT", type=6, autopilot=8)
+            self.station.beat()
         self._before[:] = self._body[3:6]
         results = super().step()
-        self._station.take()
+        self.station.hear()
         if self.looks_for_ground:
             self._note_ground()
         for watcher in self.watchers:
@@ -169,11 +152,3 @@ class GuardedFlight(Stepped):
                 "mode": self.status.vehicle_mode,
             }
         )
-
-    def _push(self, name: str, **fields: Any) -> None:
-        self._sent += 1
-        self._station.push(made(name, fields, GROUND_STATION, self._sent % 256))
-
-
-def limited(stick: float) -> float:
-    return min(max(stick, -1.0), 1.0)

@@ -152,7 +152,7 @@ def land(flight: GuardedFlight, way: str, airframe: Airframe, sink_m_s: float, r
         if way in BY_STICKS:
             flight.fly_sticks(sticks)
         if flight.time_s > asked_s and flight.touched_us is None and flight.status.vehicle_mode != way:
-            flight.ask_mode(way)
+            flight.station.set_mode(way)
             asked_s = flight.time_s + 0.5
         flight.step()
         if flight.touched_us is not None:
