@@ -59,6 +59,8 @@ class HitCase:
     """By name, of what the link to the companion does to packets; None: nothing."""
     is_drawn: bool = False
     """Whether the vehicle, too, is drawn from the seed: one of the airframe's kind, with other numbers."""
+    imu_hz: int | None = None
+    """The rate asked for of HIGHRES_IMU; None: each that there is."""
 
 
 def draw_case(family: str, seed: int, detectors: tuple[str, ...], **settings: Any) -> HitCase:

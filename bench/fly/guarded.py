@@ -4,13 +4,13 @@ What a mission's flight has besides, take-off, the way to the wall and the landi
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from bench.cases.hits import (
     HEIGHT_M,
     POLE_OFFSET_SHARES,
+    SPEEDS_M_S,
     Floats,
     HitCase,
     obstacle_before,
@@ -27,7 +27,6 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 # What is met sideways; each as often as the others.
 APPROACHES = ("wall", "slanted wall", "leaning wall", "pole")
-SPEEDS_M_S = (0.5, 5.0)
 # Asked for: every sample there is, and PX4's default onboard stream.
 IMU_HZ = (250, 50)
 # Until the obstacle is touched. The detector knows what a vehicle shakes after 1 s (`detection.floor`); meeting the
@@ -45,20 +44,11 @@ OVERTURNED_DEG = 90.0
 LOOK_EVERY = 5
 
 
-@dataclass(frozen=True, slots=True)
-class FlownHit:
-    """The hit, and the rate asked for of HIGHRES_IMU."""
-
-    hit: HitCase
-    imu_hz: int
-
-
-def draw_flown(seed: int, is_drawn: bool) -> FlownHit:
+def draw_flown(seed: int, is_drawn: bool) -> HitCase:
     """Airframes, rates and approaches in turn, speeds at random."""
-    speed_m_s = float(np.random.default_rng([seed, 0]).uniform(*SPEEDS_M_S))
-    approach = APPROACHES[seed // 4 % len(APPROACHES)]
-    hit = HitCase("flown", seed, AIRFRAMES[seed % 2], approach, round(speed_m_s, 3), (), is_drawn=is_drawn)
-    return FlownHit(hit, IMU_HZ[seed // 2 % 2])
+    speed_m_s = round(float(np.random.default_rng([seed, 0]).uniform(*SPEEDS_M_S)), 3)
+    approach, imu_hz = APPROACHES[seed // 4 % len(APPROACHES)], IMU_HZ[seed // 2 % 2]
+    return HitCase("flown", seed, AIRFRAMES[seed % 2], approach, speed_m_s, (), is_drawn=is_drawn, imu_hz=imu_hz)
 
 
 def velocity_of(hit: HitCase, rng: np.random.Generator) -> Floats:
@@ -67,15 +57,15 @@ def velocity_of(hit: HitCase, rng: np.random.Generator) -> Floats:
     return hit.speed_m_s * np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
 
 
-def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
+def fly(hit: HitCase) -> tuple[SimulatedVehicle, Guard, int | None]:
     """From HEIGHT_M, steadily on the way, to rest or as long as may be; the boot time from which it rested."""
-    hit, built, rng = case.hit, vehicle_of_hit(case.hit), np.random.default_rng([case.hit.seed, 1])
+    built, rng = vehicle_of_hit(hit), np.random.default_rng([hit.seed, 1])
     velocity, free_s = velocity_of(hit, rng), float(rng.uniform(*FREE_FLIGHT_S))
     at = np.array([0.0, 0.0, -HEIGHT_M]) + free_s * velocity
     scene = Scene.model_validate(obstacle_before(hit, built.airframe, at, velocity, rng, POLE_OFFSET_SHARES[0]))
     vehicle = SimulatedVehicle(built.airframe, scene, hit.seed)
     vehicle.begin_in_flight((0.0, 0.0, -HEIGHT_M), (float(velocity[0]), float(velocity[1]), 0.0))
-    streams = {"highres_imu_hz": float(case.imu_hz), "window_s": WINDOW_S}
+    streams = {"highres_imu_hz": hit.imu_hz, "window_s": WINDOW_S}
     guard = Guard(GuardConfig.model_validate({"companion": {**built.settings, "streams": streams}}))
     flight = Stepped(vehicle, guard)
     flight.links[0].introduce()

@@ -4,8 +4,9 @@ from time import process_time
 
 import numpy as np
 
+from bench.cases.hits import HitCase
 from bench.fly.campaign import Json
-from bench.fly.guarded import MOST_RECOVERY_S, FlownHit, fly
+from bench.fly.guarded import MOST_RECOVERY_S, fly
 from bench.fly.wire import FOUND_WITHIN_US
 from bench.rows.contacts import tilts_deg
 from bench.rows.recovered import CAME_BACK_M
@@ -16,7 +17,7 @@ from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
 
 
-def work_out_flown(case: FlownHit) -> Json:
+def work_out_flown(case: HitCase) -> Json:
     """Its row by the simulator's truth, and what it cost."""
     began_s = process_time()
     vehicle, guard, rest_us = fly(case)

@@ -126,8 +126,6 @@ def work_out_mission(case: MissionCase) -> Json:
         "outcome": flight.report.outcome,
         "seconds": round(1e-6 * (flight.report.ended_at_us - flight.report.started_at_us), 3),
         "failures": failures(flight),
-        "detours": sum(event.kind == "detour" for event in flight.events),
-        "unreachable": sum(event.kind == "unreachable" for event in flight.events),
         "hits": recoveries(flight, contacts),
     }
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from bench.fly.campaign import Json
 from bench.fly.lockstep import JudgedFlight
-from bench.rows.contacts import JudgedContact, Role, phases_of, tilts_deg
+from bench.rows.contacts import JudgedContact, Role, phases_of
 from companion.reflex.collision import CollisionReport
 from companion.reflex.surface import away_from
 from rebound_cli.results.summary import LONGEST_RECOVERY_S
@@ -95,7 +95,6 @@ def _recovery(flight: JudgedFlight, contact: JudgedContact, episode: Sequence[Ju
         "past_m": round(past_m, _DIGITS),
         "lost_m": round(max(0.0, lost_m), _DIGITS),
         "risen_m": round(max(0.0, risen_m), _DIGITS),
-        "leant_deg": round(float(tilts_deg(series["attitude_wxyz"][during]).max(initial=0.0)), 1),
         "clear_m": None if clear_m is None else round(clear_m, _DIGITS),
     }
 

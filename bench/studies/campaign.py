@@ -26,9 +26,6 @@ DRAWN_WANTED = {"foldable": 0.995, "rigid": 0.99}
 CLEAN_WANTED = 0.99
 OVERSHOOT_MOST_M = 0.05
 LOST_MOST_M, LOST_UP_TO_M_S = 0.10, 2.5
-RISEN_MOST_M = 0.05
-# A vehicle that leant by more hangs on the obstacle by its own thrust.
-PINNED_DEG = 60.0
 CLEAR_LEAST_M = 0.3
 # The hits that the bars are about: 1 to 5 m/s; heights of vehicles that fly level past something upright.
 HIT_SPEEDS_M_S = (1.0, 5.0)
@@ -36,7 +33,7 @@ LEVEL_M_S = 0.3
 UPRIGHT = 0.7
 # Of a hit that nobody answered, and of one after which nothing was touched, there are no such figures.
 OF_ANSWERED = ["seen", "again", "others", "returned"]
-OF_ANSWERED += ["past_m", "settled_s", "clear_m", "lost_m", "risen_m", "leant_deg"]
+OF_ANSWERED += ["past_m", "settled_s", "clear_m", "lost_m"]
 
 
 def run_missions(options: Namespace) -> int:
@@ -106,7 +103,6 @@ def speed_rows(hits: pd.DataFrame) -> pd.DataFrame:
             "touched again": ("again", lambda counts: (counts > 0).sum()),
             "other surface": ("others", lambda counts: (counts > 0).sum()),
             "lost, worst [m]": ("lost_m", "max"),
-            "gained, worst [m]": ("risen_m", "max"),
         }
     )
     return figures.round(4).reset_index()
@@ -159,16 +155,13 @@ def level(hits: pd.DataFrame) -> pd.DataFrame:
 def mission_bars(flights: pd.DataFrame, hits: pd.DataFrame, wanted: Mapping[str, float]) -> list[Bar]:
     bars: list[Bar] = []
     for name in AIRFRAMES:
-        bars += _endings(name, flights[flights["airframe"] == name], wanted[name])
+        flown = flights[flights["airframe"] == name]
+        bars.append(
+            share_bar(f"{name}: missions that end as they say, without a crash", flown["is_good"], wanted[name])
+        )
     for name in AIRFRAMES:
         bars += _hits(name, hits[hits["airframe"] == name])
     return bars
-
-
-def _endings(airframe: str, flown: pd.DataFrame, wanted: float) -> Iterator[Bar]:
-    yield share_bar(f"{airframe}: missions that end as they say, without a crash", flown["is_good"], wanted)
-    yield Bar(f"{airframe}: ways flown round what was known", "", str(flown["detours"].sum()), None)
-    yield Bar(f"{airframe}: goals reported as out of reach", "", str(flown["unreachable"].sum()), None)
 
 
 def _hits(airframe: str, hits: pd.DataFrame) -> Iterator[Bar]:
@@ -181,20 +174,15 @@ def _hits(airframe: str, hits: pd.DataFrame) -> Iterator[Bar]:
     yield share_bar(what, is_near & (answered["returned"] == 0))
     what = f"{where}: guards at rest {CLEAR_LEAST_M} m clear of what was hit"
     yield share_bar(what, fast["clear_m"].dropna() >= CLEAR_LEAST_M)
-    slow = level(hits[hits["speed_m_s"] < LOST_UP_TO_M_S])
-    yield _worst(f"{airframe}, level, up to 2.5 m/s: height lost", slow["lost_m"], LOST_MOST_M)
-    upright = slow[slow["leant_deg"] < PINNED_DEG]
-    yield _worst(f"{airframe}: the same, but for hits that tip it by {PINNED_DEG:g} deg", upright["lost_m"])
-    yield _worst(f"{airframe}, level: height gained", level(hits)["risen_m"], RISEN_MOST_M)
+    yield _lost_bar(airframe, level(hits[hits["speed_m_s"] < LOST_UP_TO_M_S])["lost_m"])
     into = hits[noticeable(hits)]
     yield share_bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", into["seen"])
 
 
-def _worst(what: str, values: "pd.Series[float]", most_m: float | None = None) -> Bar:
-    """The largest; reported only, without a limit."""
-    wanted = "" if most_m is None else f"≤ {100 * most_m:g} cm"
-    if not len(values):
+def _lost_bar(airframe: str, lost_m: "pd.Series[float]") -> Bar:
+    what, wanted = f"{airframe}, level, up to 2.5 m/s: height lost", f"≤ {100 * LOST_MOST_M:g} cm"
+    if not len(lost_m):
         return Bar(what, wanted, "-", None, "no hit")
-    measured = f"{100 * values.max():.1f} cm at most, {100 * values.median():.1f} in the median"
-    over = 0 if most_m is None else int((values > most_m).sum())
-    return Bar(what, wanted, measured, None if most_m is None else over == 0, f"{len(values)} hits, {over} beyond")
+    over = int((lost_m > LOST_MOST_M).sum())
+    measured = f"{100 * lost_m.max():.1f} cm at most, {100 * lost_m.median():.1f} in the median"
+    return Bar(what, wanted, measured, over == 0, f"{len(lost_m)} hits, {over} beyond")

@@ -31,16 +31,11 @@ def run_hits(options: Namespace) -> int:
 
 
 def shown(results: Results) -> Shown:
-    flights = flight_rows(results)
+    flights = pd.DataFrame(results.rows())
     if not flights["touched"].any():
         raise ConfigurationError("Nothing was touched: fly more hits (--hits).")
     hits = hit_rows(flights)
     return Shown({"": lead(hits, flights), **parts(hits)}, rows=hits)
-
-
-def flight_rows(results: Results) -> pd.DataFrame:
-    """One a flight."""
-    return pd.DataFrame([{**row.pop("hit"), **row} for row in results.rows()])
 
 
 def hit_rows(flights: pd.DataFrame) -> pd.DataFrame:

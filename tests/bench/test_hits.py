@@ -1,13 +1,14 @@
 """Hits alone: judged as whole flights are, the same bits twice, and honest bounds."""
 
+import pandas as pd
 import pytest
 
 from bench.cases.hits import HitCase
 from bench.fly.campaign import Results
-from bench.fly.guarded import FlownHit, draw_flown
+from bench.fly.guarded import draw_flown
 from bench.rows.hits import work_out_flown
 from bench.rows.tables import at_most, at_most_of_groups
-from bench.studies.hits import flight_rows, hit_rows, lead, parts
+from bench.studies.hits import hit_rows, lead, parts
 from tests.bench.test_recoveries import flown as flown_whole
 
 pytestmark = pytest.mark.slow
@@ -15,7 +16,7 @@ pytestmark = pytest.mark.slow
 BY_CELL = "By airframe, rate and speed"
 
 
-def judged(case: FlownHit) -> dict:
+def judged(case: HitCase) -> dict:
     return {name: value for name, value in work_out_flown(case).items() if name != "processor_s"}
 
 
@@ -26,7 +27,7 @@ def test_a_hit_alone_is_judged_as_the_hit_of_a_whole_mission(airframe, speed_m_s
     # Given a square hit on a wall after a take-off and a way to it
     outcome, whole = flown_whole(airframe, speed_m_s)
     # When the same hit is flown alone
-    alone = judged(FlownHit(HitCase("flown", 1, airframe, "wall", speed_m_s, ()), 250))
+    alone = judged(HitCase("flown", 1, airframe, "wall", speed_m_s, (), imu_hz=250))
     # Then both were found, neither came back or fell, and both came to rest: by the truth before the estimate shows it
     assert outcome == "completed" and alone["found"] and not alone["false"]
     assert alone["closing_m_s"] == pytest.approx(speed_m_s, abs=0.15)
@@ -42,7 +43,7 @@ def test_the_same_seed_gives_the_same_hit():
 
 
 def test_a_hit_on_a_vehicle_that_shakes_too_much_is_missed():
-    shaken = judged(FlownHit(HitCase("flown", 5, "foldable", "wall", 1.0, (), vibration_m_s2=40.0), 250))
+    shaken = judged(HitCase("flown", 5, "foldable", "wall", 1.0, (), vibration_m_s2=40.0, imu_hz=250))
     assert not shaken["found"] and shaken["rest_s"] is None
 
 
@@ -63,13 +64,13 @@ def test_a_page_counts_misses_by_cell_and_names_them():
     results = [dict(found) for _ in cases]
     results[2] |= {"latency_ms": None, "found": False, "rest_s": None}
     results[3] = {"touched": False, "false": 1, "seconds": 3.0, "processor_s": 0.1}
-    flights = flight_rows(Results([*zip(cases, results, strict=True)]))
+    flights = pd.DataFrame(Results([*zip(cases, results, strict=True)]).rows())
     rows = hit_rows(flights)
     page, case = parts(rows), cases[2]
     # Then the cell says so, is named as one that shows nothing, and the hit can be looked for
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page[BY_CELL].splitlines()]
-    name = f"{case.hit.airframe}, {case.imu_hz} Hz, [1.0, 2.0) m/s"
+    name = f"{case.airframe}, {case.imu_hz} Hz, [1.0, 2.0) m/s"
     assert [name, "16", "16", "1", "6.250"] in [row[:5] for row in cells]
     assert name in page[BY_CELL].partition("Not shown")[2]
     assert "63 hits, 1 missed; 1 false alarms in 0.05 h" in lead(rows, flights)
-    assert page["Missed at 0.5 m/s and more"] == f"{case.hit.seed}/{case.hit.approach}\n"
+    assert page["Missed at 0.5 m/s and more"] == f"{case.seed}/{case.approach}\n"
