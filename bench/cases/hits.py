@@ -55,8 +55,6 @@ class HitCase:
     """Standard deviation of an IMU sample on each axis; None: the airframe's own."""
     is_struck: bool = False
     """The vehicle hovers, and the obstacle comes at it with the speed."""
-    link: str | None = None
-    """By name, of what the link to the companion does to packets; None: nothing."""
     is_drawn: bool = False
     """Whether the vehicle, too, is drawn from the seed: one of the airframe's kind, with other numbers."""
     imu_hz: int | None = None

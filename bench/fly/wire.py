@@ -1,12 +1,12 @@
-"""What a companion hears of a recorded flight of the plant alone, at other rates, over a bad link; what detectors find.
+"""What a companion hears of a recorded flight of the plant alone, at other rates; what detectors find.
 
 The simulated vehicle's own streams and encoders send it, the companion's decoder reads it.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +22,6 @@ from companion.reflex.monitor import advance, start_monitor
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.estimator.estimate import Estimate
-from sim_vehicle.faults.spec import WireFault
-from sim_vehicle.faults.wire import Wire as FaultyWire
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.streams.streams import KINDS, LateLoops, Stream, interval_from_request
 from sim_vehicle.mavlink.streams.topics import Topic
@@ -36,13 +34,6 @@ Vector3 = tuple[float, float, float]
 Packets = tuple[int, int, Sequence[bytes]]
 """The interval's number, the boot time, and what is on the wire then."""
 VEHICLE = Identity(1, 1)
-# Wi-Fi with others on the channel: up to 10 ms of waiting for the air, now and then a packet gone or overtaken.
-JITTERY: Final = "jitter 10 ms, 1 % lost, 1 % overtaken"
-LINKS: dict[str, WireFault] = {
-    JITTERY: WireFault(kind="wire", at_s=0.0, jitter_s=0.01, loss=0.01, reorder=0.01),
-}
-# The companion hears a packet when it arrives; finer than an IMU interval of 4 ms, or latencies came in steps of it.
-LOOK_EVERY_US = 1000
 
 
 @dataclass(slots=True)
@@ -92,14 +83,11 @@ class HeardStep:
     samples: tuple[Sample, ...]
 
 
-def heard(
-    recording: VehicleRecording, asked_hz: Mapping[MessageId, float], seed: int, fault: WireFault | None = None
-) -> list[HeardStep]:
-    """All that arrives on a link that is asked for these rates when the recording begins, and that has this fault."""
+def heard(recording: VehicleRecording, asked_hz: Mapping[MessageId, float], seed: int) -> list[HeardStep]:
+    """All that arrives on a link that is asked for these rates when the recording begins."""
     decoder, arrived = Decoder(), []
     decoder.listen_to(VEHICLE.system, VEHICLE.component)
-    sent = _sent(recording, asked_hz, seed)
-    for index, now_us, packets in sent if fault is None else _carried(sent, recording, fault, seed):
+    for index, now_us, packets in _sent(recording, asked_hz, seed):
         samples = tuple(sample for _, sample in decoder.feed(b"".join(packets)) if sample is not None)
         if samples:
             arrived.append(HeardStep(index, now_us, samples))
@@ -129,16 +117,6 @@ def _sent(recording: VehicleRecording, asked_hz: Mapping[MessageId, float], seed
                     stream.sent(now_us)
                     packets.append(encoder.packet(stream.kind.build(state)))
         yield index, now_us, packets
-
-
-def _carried(sent: Iterable[Packets], recording: VehicleRecording, fault: WireFault, seed: int) -> Iterator[Packets]:
-    """What arrives of it, and when."""
-    wire, times_us = FaultyWire([fault], seed), [sample.time_boot_us for sample in recording.samples]
-    ends_us = [*times_us[1:], times_us[-1] + LOOK_EVERY_US]
-    for index, begins_us, packets in sent:
-        for now_us in range(begins_us, ends_us[index], LOOK_EVERY_US):
-            yield index, now_us, wire.carry(packets, now_us)
-            packets = []
 
 
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.

@@ -12,7 +12,6 @@ from bench.fly.cruise import fly_healthy, hit_of, hover_in_hand
 from bench.fly.wire import (
     ASKED_HZ,
     FOUND_WITHIN_US,
-    LINKS,
     Found,
     HeardStep,
     VehicleRecording,
@@ -51,9 +50,9 @@ def first_possible(
     recording: VehicleRecording, arrived: Sequence[HeardStep], touch_boot_us: float, floor_m_s2: float
 ) -> Possible:
     """By the truth: the first received sample whose averaging window holds the contact's force above the floor."""
-    # A sample's own interval: over a bad link it may arrive in a later one.
-    stamps = (sample.time_boot_us for sample in recording.samples)
-    contact_m_s2 = dict(zip(stamps, recording.contact_m_s2, strict=True))
+    contact_m_s2 = {
+        sample.time_boot_us: force for sample, force in zip(recording.samples, recording.contact_m_s2, strict=True)
+    }
     times, first = [], None
     for step in arrived:
         stamps_heard = [sample.time_boot_us for sample in step.samples if isinstance(sample, ImuSample)]
@@ -81,12 +80,9 @@ def work_out_hit(case: HitCase) -> Json:
     floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
     truth = {
         "true_speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
-        "true_off_head_on_deg": angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
-        "true_clipped": _clipped(recording, hit),
-        "true_contact_s": hit.contact_duration_s,
     }
     rows = []
-    for rate, arrived in _heard(recording, case.seed, case.link):
+    for rate, arrived in _heard(recording, case.seed):
         possible = first_possible(recording, arrived, touch_us, floor_m_s2)
         possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
         for name, (found, touches) in _watched(case.detectors, vehicle, recording, arrived):
@@ -127,11 +123,10 @@ def work_out_flight(case: FlightCase) -> Json:
     return {"rows": rows}
 
 
-def _heard(recording: VehicleRecording, seed: int, link: str | None = None) -> Iterator[tuple[int, list[HeardStep]]]:
-    """By rate: what comes over the link."""
-    fault = None if link is None else LINKS[link]
+def _heard(recording: VehicleRecording, seed: int) -> Iterator[tuple[int, list[HeardStep]]]:
+    """By rate."""
     for rate in ASKED_HZ:
-        yield rate, heard(recording, streams_asked_hz(rate), seed + rate, fault)
+        yield rate, heard(recording, streams_asked_hz(rate), seed + rate)
 
 
 def _watched(
@@ -160,22 +155,6 @@ def _entry(found: Sequence[Found], hit: Hit, possible: Possible) -> Json:
         "speed_error_m_s": math.hypot(*velocity) - math.hypot(*true_velocity),
         "normal_error_deg": angle_deg(first.final.normal.direction_ned, hit.normal_ned),
     }
-
-
-def _clipped(recording: VehicleRecording, hit: Hit) -> bool:
-    """Whether the accelerometer reached its range during the contact."""
-    before = after = recording.samples[0].clipping_counts
-    for sample in recording.samples:
-        if sample.time_boot_us <= hit.contact_at_boot_us:
-            before = sample.clipping_counts
-        after = sample.clipping_counts
-        if sample.time_boot_us > hit.ended_at_boot_us:
-            break
-    return before != after
-
-
-def _minus(vector: Vector3) -> Vector3:
-    return -vector[0], -vector[1], -vector[2]
 
 
 def angle_deg(one: Vector3, other: Vector3) -> float:
