@@ -15,16 +15,6 @@ from bench.studies.rules import RULES
 from rebound_cli.arguments import count, number, runs
 from rebound_cli.main import run
 
-# Studies that were, and what shows now what they showed.
-GONE = {
-    "campaign page": "`bench campaign` writes the page, and the rows beside it",
-    "campaign recoveries": "`bench hits` and `bench ablation` measure recoveries",
-    "corpus": "`bench hits` and `bench detectors` judge a version on the same seeds",
-    "paper results": "`bench paper` has the flight tests by speed and airframe",
-    "soak": "hours as a service are no study any more",
-}
-# Options that were, of every study.
-NO_MORE = {"--scheduler": "`--jobs` has all cores of this machine"}
 # What the file names, and what it cannot know.
 TYPES = {
     "count": count,
@@ -34,10 +24,13 @@ TYPES = {
 KNOWN_HERE = {"cores": os.cpu_count() or 1, "rules": tuple(rule.name for rule in RULES)}
 
 
+STUDIES = yaml.safe_load(Path(__file__).with_name("studies.yaml").read_text("utf-8"))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one study and return its exit code."""
     words = sys.argv[1:] if arguments is None else arguments
-    for gone, instead in GONE.items():
+    for gone, instead in STUDIES["gone"].items():
         if [*words][: len(gone.split())] == gone.split():
             print(f"bench: `{gone}` is no more: {instead}.", file=sys.stderr)
             return 2
@@ -54,10 +47,9 @@ def build_parser() -> ArgumentParser:
         prog="python -m bench", description="Studies of Rebound and their tables; needs a checkout and its environment."
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
-    written = yaml.safe_load(Path(__file__).with_name("studies.yaml").read_text("utf-8"))
-    for name, study in written["commands"].items():
+    for name, study in STUDIES["commands"].items():
         command = commands.add_parser(name, help=study["does"], description=study["more"])
-        gone = NO_MORE | study.get("gone", {})
+        gone = STUDIES["gone_options"] | study.get("gone", {})
         command.set_defaults(run=runs(study["run"]), gone=gone)
         for option, settings in study["options"].items():
             command.add_argument(option, **_settings(settings))

@@ -22,24 +22,29 @@ RUN_UP_M_S2 = 3.0
 STEADY_S = 1.0
 
 
+def across(north_m: float, slant_rad: float, width_m: float, height_m: float) -> dict[str, Any]:
+    """A wall that stands on the ground across the way north, its face turned by so much."""
+    normal = [-math.cos(slant_rad), -math.sin(slant_rad), 0]
+    place = [north_m, 0, -height_m / 2]
+    return {"point_ned_m": place, "normal_ned": normal, "width_m": width_m, "height_m": height_m}
+
+
+def there(height_m: float, go_to: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Up, to a place, down."""
+    return [{"takeoff": {"height_m": height_m}}, {"go_to": dict(go_to)}, {"land": {}}]
+
+
 def into_a_wall(name: str, speed_m_s: float, slant_deg: float, height_m: float) -> dict[str, Any]:
     """Up, and at the speed into a wall; the target is so far behind it that braking has not begun there."""
     wall_m = round(0.5 * speed_m_s**2 / RUN_UP_M_S2 + STEADY_S * speed_m_s + 1.0, 3)
     beyond_m = wall_m + speed_m_s**2 / RUN_UP_M_S2 + 2.0
-    slant = math.radians(slant_deg)
     go_to = {"position_ned_m": [beyond_m, 0, -height_m], "speed_m_s": speed_m_s, "acceleration_m_s2": RUN_UP_M_S2}
-    wall = {
-        "point_ned_m": [wall_m, 0, -4],
-        "normal_ned": [-math.cos(slant), -math.sin(slant), 0],
-        "width_m": 40,
-        "height_m": 8,
-    }
     return {
         "name": name,
-        "items": [{"takeoff": {"height_m": height_m}}, {"go_to": go_to}, {"land": {}}],
+        "items": there(height_m, go_to),
         "companion": {"flight": {"speeding_up_m_s2": RUN_UP_M_S2}},
         "fence": {"radius_m": 40, "max_height_m": 8},
-        "sim": {"walls": [wall]},
+        "sim": {"walls": [across(wall_m, math.radians(slant_deg), 40, 8)]},
     }
 
 
@@ -89,7 +94,7 @@ def approach(
     return pinned(
         {
             "name": "approach",
-            "items": [{"takeoff": {"height_m": height_m}}, {"go_to": go_to}, {"land": {}}],
+            "items": there(height_m, go_to),
             "on_collision": {"then": "land"},
             "fence": {"radius_m": target_m + FENCE_MARGIN_M, "max_height_m": height_m + 4.0},
             "companion": settings,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.cases.vehicles import AIRFRAMES
+from bench.cases.walls import across, there
 from bench.fly.air import COMPLETED, KILLED, Air, Fault, Hung, Injector, Killed, Landing
 from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
@@ -53,20 +54,14 @@ def mission_of(number: int) -> Mission:
     chance = random.Random(number)
     speed, slant = round(chance.uniform(*SPEEDS_M_S), 2), math.radians(chance.uniform(-MOST_SLANT_DEG, MOST_SLANT_DEG))
     go_to = {"position_ned_m": [7, 0, -HEIGHT_M], "speed_m_s": speed, "acceleration_m_s2": 2.0}
-    wall = {
-        "point_ned_m": [WALL_M, 0, -2.5],
-        "normal_ned": [-math.cos(slant), -math.sin(slant), 0],
-        "width_m": 20,
-        "height_m": 5,
-    }
     data: dict[str, Any] = {
         "name": "faults",
-        "items": [{"takeoff": {"height_m": HEIGHT_M}}, {"go_to": go_to}, {"land": {}}],
+        "items": there(HEIGHT_M, go_to),
         "on_collision": {"then": "land"},
         "on_interrupt": "hold",
         "fence": {"radius_m": 12, "max_height_m": 4},
         "companion": {"streams": {"window_s": 0.5}},
-        "sim": {"walls": [wall], "airframe": AIRFRAMES[number % 2], "seed": 1 + number},
+        "sim": {"walls": [across(WALL_M, slant, 20, 5)], "airframe": AIRFRAMES[number % 2], "seed": 1 + number},
     }
     return Mission.model_validate(with_guards(data, load_built_in(AIRFRAMES[number % 2])))
 

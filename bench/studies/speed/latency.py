@@ -3,14 +3,16 @@
 import contextlib
 import io
 import math
-import os
-import signal
+import multiprocessing
 import socket
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
@@ -37,6 +39,7 @@ LEAD = 30
 # Intervals after the hit in which a setpoint is waited for: half a second.
 AFTER = 125
 _FLIGHTS = 5
+SHARES = (0.5, 0.99, 0.999)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,14 +89,20 @@ def timed(flight: Recorded, times: int) -> Iterator[float | None]:
         ours.bind(("127.0.0.1", 0))
         for trial in range(times):
             (place := Path(folder) / str(trial)).mkdir()
-            child = os.fork()
-            if child == 0:
-                with contextlib.suppress(BaseException):
-                    _fly_on(flight, ours.getsockname()[1], place)
-                os._exit(0)
-            yield exchanged(flight, flight.hit - LEAD, ours, _address_of_child(ours))
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
+            with beside(_fly_on, flight, ours.getsockname()[1], place):
+                yield exchanged(flight, flight.hit - LEAD, ours, _address_of_child(ours))
+
+
+@contextlib.contextmanager
+def beside(run: Callable[..., None], *arguments: Any) -> Iterator[None]:
+    """A process of the same priority, killed in the end."""
+    child = multiprocessing.get_context("fork").Process(target=run, args=arguments)
+    child.start()
+    try:
+        yield
+    finally:
+        child.kill()
+        child.join()
 
 
 def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
@@ -141,31 +150,18 @@ def _address_of_child(ours: socket.socket) -> tuple[str, int]:
     return sender
 
 
-@contextlib.contextmanager
-def busy(loops: int) -> Iterator[None]:
-    """Processes of the same priority that do nothing but reckon."""
-    children = []
-    for _ in range(loops):
-        child = os.fork()
-        if child == 0:
-            while True:
-                math.fsum(range(1000))
-        children.append(child)
-    try:
-        yield
-    finally:
-        for child in children:
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
+def reckon() -> None:
+    """For ever."""
+    while True:
+        math.fsum(range(1000))
 
 
 def spread(taken: Sequence[float | None]) -> Json:
     """Milliseconds; one that did not come in time is without bound, and counts. One before the hit is below none."""
-    sizes = sorted(math.inf if seconds is None else 1e3 * seconds for seconds in taken)
-    early = sum(size < 0.0 for size in sizes)
-    at = [sizes[math.ceil(share * len(sizes)) - 1] for share in (0.5, 0.99, 0.999)]
+    sizes = [math.inf if seconds is None else 1e3 * seconds for seconds in taken]
+    early, (p50, p99, p999) = sum(size < 0.0 for size in sizes), np.quantile(sizes, SHARES, method="inverted_cdf")
     found = sum(map(math.isfinite, sizes)) - early
-    return {"found": found, "early": early, "p50": at[0], "p99": at[1], "p999": at[2], "most": sizes[-1]}
+    return {"found": found, "early": early, "p50": p50, "p99": p99, "p999": p999, "most": max(sizes)}
 
 
 def measured(hits: int) -> dict[str, Json]:
@@ -176,5 +172,7 @@ def measured(hits: int) -> dict[str, Json]:
         return spread([taken for flight in flights for taken in timed(flight, times)])
 
     quiet = spread_of_all()
-    with busy(BUSY_LOOPS):
+    with contextlib.ExitStack() as loops:
+        for _ in range(BUSY_LOOPS):
+            loops.enter_context(beside(reckon))
         return {"quiet": quiet, "busy": spread_of_all()}
