@@ -27,6 +27,8 @@ from sim_vehicle.truth import Hit
 # A force counts as above the noise floor from this many standard deviations of an IMU sample on: of ten hours at
 # 250 Hz on three axes, 2.7e7 numbers, noise alone takes one above six with a probability of 0.05.
 NOISE_FLOOR_SIGMAS = 6.0
+# None of a hit that was not found.
+OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "normal_error_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,19 +138,16 @@ def _watched(
         yield name, watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
 
 
-def _first_of(found: Sequence[Found], touch_us: float) -> Found | None:
-    return next((f for f in found if touch_us <= f.time_boot_us <= touch_us + FOUND_WITHIN_US), None)
-
-
 def _entry(found: Sequence[Found], hit: Hit, possible: Possible) -> Json:
     """One detector's report on one hit."""
     touch_us = hit.contact_at_boot_us
-    entry: Json = {"false": sum(f.time_boot_us < touch_us for f in found)}
-    first = _first_of(found, touch_us)
+    false = sum(f.time_boot_us < touch_us for f in found)
+    first = next((f for f in found if touch_us <= f.time_boot_us <= touch_us + FOUND_WITHIN_US), None)
     if first is None:
-        return entry
+        return {"false": false, "evidence": None, **dict.fromkeys(OF_FOUND)}
     velocity, true_velocity = first.final.velocity_ned_m_s, hit.impact_velocity_ned_m_s
-    return entry | {
+    return {
+        "false": false,
         "latency_ms": 1e-3 * (first.time_boot_us - touch_us),
         "samples_late": possible.samples_late(first.time_boot_us),
         "evidence": first.first.impact.evidence.value,

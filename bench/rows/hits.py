@@ -43,6 +43,8 @@ def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us
         "tilt_deg": round(float(tilts_deg(series["attitude_wxyz"][after]).max()), 1),
         "lost_m": round(max(0.0, float(series["position_ned_m"][after, 2].max()) - first.contact_position_ned_m[2]), 3),
         "rest_s": None if rest_us is None else round(1e-6 * (rest_us - touched_us), 3),
+        "latency_ms": None,
+        "again": None,
     }
     if is_found:
         until_s = MOST_RECOVERY_S if rest_us is None else 1e-6 * (rest_us - touched_us)

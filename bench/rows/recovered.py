@@ -29,6 +29,8 @@ MOVED_M = 1e-3
 # A vehicle at rest moves by a millimetre in so many rows of truth.
 _LOOK_EVERY = 10
 _DIGITS = 4
+# Of a hit that nobody answered.
+UNANSWERED: Json = dict.fromkeys(("settled_s", "past_m", "lost_m", "risen_m", "clear_m"))
 
 
 def recoveries(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> list[Json]:
@@ -58,12 +60,8 @@ def _figures(flight: JudgedFlight, episode: Sequence[JudgedContact]) -> Json:
         "others": sum(contact.role is Role.NEXT for contact in episode),
         "returned": sum(_returned(flight, first, before, touch) for before, touch in pairwise(episode)),
     }
-    if first.collision is not None:
-        collision = flight.report.collisions[first.collision]
-        detected_boot_us = collision.detected_at_us - flight.truth.epoch_at_boot_us
-        found["latency_ms"] = round(1e-3 * (detected_boot_us - first.hit.contact_at_boot_us), 3)
     seen = [contact for contact in episode if contact.collision is not None]
-    return found | (_recovery(flight, seen[-1], episode) if seen else {})
+    return found | (_recovery(flight, seen[-1], episode) if seen else UNANSWERED)
 
 
 def _recovery(flight: JudgedFlight, contact: JudgedContact, episode: Sequence[JudgedContact]) -> Json:

@@ -86,11 +86,11 @@ def verdict(flight: JudgedFlight) -> Json:
 
 
 def _of_one(flight: JudgedFlight, figures: Json, contact: JudgedContact) -> Json:
-    found = {name: figures.get(name) for name in ("past_m", "lost_m", "risen_m", "returned", "closing_m_s")}
+    found = {name: figures[name] for name in ("past_m", "lost_m", "risen_m", "returned", "closing_m_s")}
     rest_s = found["rest_s"] = _rests_after_s(flight, contact.hit)
     found["recovered"] = False
     # Of a hit that nobody answered there is no setpoint to be past.
-    if rest_s is not None and "past_m" in figures:
+    if rest_s is not None and figures["past_m"] is not None:
         is_near = figures["past_m"] <= PAST_M and figures["lost_m"] <= LOST_M
         found["recovered"] = is_near and rest_s <= REST_S and not figures["returned"]
     if contact.collision is not None:

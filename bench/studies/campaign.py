@@ -12,6 +12,7 @@ from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Results
 from bench.fly.lockstep import NOTICED_M_S, fly
 from bench.rows.judge import failures, work_out_mission
+from bench.rows.recovered import UNANSWERED
 from bench.rows.tables import Bar, bars_text, share_bar, summary_text, table
 from bench.studies.study import Shown, run_study, seeds_of
 from companion.errors import ConfigurationError
@@ -31,9 +32,6 @@ CLEAR_LEAST_M = 0.3
 HIT_SPEEDS_M_S = (1.0, 5.0)
 LEVEL_M_S = 0.3
 UPRIGHT = 0.7
-# Of a hit that nobody answered, and of one after which nothing was touched, there are no such figures.
-OF_ANSWERED = ["seen", "again", "others", "returned"]
-OF_ANSWERED += ["past_m", "settled_s", "clear_m", "lost_m"]
 
 
 def run_missions(options: Namespace) -> int:
@@ -67,13 +65,8 @@ def mission_rows(results: Results) -> pd.DataFrame:
 
 def hit_rows(results: Results) -> pd.DataFrame:
     """One a hit, with its flight's own numbers."""
-    found = [
-        {**asdict(case), "hit": number, **hit}
-        for case, flight in results.found
-        for number, hit in enumerate(flight["hits"])
-    ]
-    frame = pd.DataFrame(found)
-    return frame.reindex(columns=[*frame.columns, *(name for name in OF_ANSWERED if name not in frame.columns)])
+    hits = ({**asdict(case), **hit} for case, flight in results.found for hit in flight["hits"])
+    return pd.DataFrame(hits).astype(dict.fromkeys(UNANSWERED, float))
 
 
 def tables(flights: pd.DataFrame, hits: pd.DataFrame) -> dict[str, str]:

@@ -14,7 +14,7 @@ from bench.cases.vehicles import AIRFRAMES
 from bench.detectors.config import BaselineConfig
 from bench.fly.campaign import Results
 from bench.fly.wire import ASKED_HZ, FLOWN_WITH
-from bench.rows.heard import work_out_heard
+from bench.rows.heard import OF_FOUND, work_out_heard
 from bench.rows.tables import Bar, bars_text, per_cent, rms, share_bar, summary_text, table, text_of
 from bench.studies.study import Shown, run_study
 
@@ -41,7 +41,6 @@ FAST_M_S, SPEED_ERROR_BAR_M_S, SPEED_ERROR_BAR = 2.0, 0.05, 0.03
 SPEED_BINS_M_S = [0.3, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0]
 USUAL = ("airframe", "rate")
 Frames = Mapping[type[object], pd.DataFrame]
-OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "normal_error_deg")
 
 
 def run_detectors(options: Namespace) -> int:
@@ -67,8 +66,7 @@ def rows(results: Results, kind: type) -> pd.DataFrame:
         for row in heard["rows"]
     ]
     frame = pd.DataFrame(found).drop(columns="detectors")
-    # A detector that finds nothing tells nothing of it.
-    return frame.reindex(columns=[*frame.columns, *(name for name in OF_FOUND if name not in frame.columns)])
+    return frame.astype(dict.fromkeys(OF_FOUND, float)) if kind is HitCase else frame
 
 
 def hit_cases(hits: int, first: int) -> list[HitCase]:

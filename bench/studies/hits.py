@@ -20,8 +20,6 @@ BOUND = 0.01
 NAMED_SEEDS = 12
 # An hour on two cores, in seconds.
 TWO_CORES_S = 2 * 3600.0
-# Of a hit that was missed there are no such figures.
-OF_FOUND = ("latency_ms", "again", "rest_s")
 
 
 def run_hits(options: Namespace) -> int:
@@ -41,9 +39,8 @@ def shown(results: Results) -> Shown:
 def hit_rows(flights: pd.DataFrame) -> pd.DataFrame:
     """Those in which something was touched, with a column for the band of speed."""
     hits = flights[flights["touched"]].drop(columns=["touched", "processor_s"])
-    hits = hits.reindex(columns=[*hits.columns, *(name for name in OF_FOUND if name not in hits.columns)])
     bands = pd.cut(hits["closing_m_s"], BANDS_M_S, right=False).astype(str)
-    return hits.astype({"found": bool}).assign(band=bands)
+    return hits.astype({"found": bool, **dict.fromkeys(("latency_ms", "again", "rest_s"), float)}).assign(band=bands)
 
 
 def lead(hits: pd.DataFrame, flights: pd.DataFrame) -> str:

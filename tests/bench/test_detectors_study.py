@@ -35,8 +35,7 @@ def bars(count=200, hours=10.0, alarms=0, collisions=(), **changes):
     hits = []
     for case in cases:
         ours = {**FOUND, **(changes if case.seed < 2 else {})}
-        ours = {name: value for name, value in ours.items() if value is not None}
-        theirs = {"false": 0, "touches": 0} if case.seed < 4 else FOUND | {"latency_ms": 40.0}
+        theirs = FOUND | {"latency_ms": None if case.seed < 4 else 40.0}
         hits.append(at_each_rate({**truth, "detector": "fused", **ours}, {**truth, "detector": "threshold", **theirs}))
     hands = [draw_hand(seed, ("fused",)) for seed in range(4)]
     held = at_each_rate({"detector": "fused", "collisions": list(collisions), "told_after_ms": 40.0})

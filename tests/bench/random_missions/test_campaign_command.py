@@ -28,10 +28,10 @@ HIT = {
     "again": 0,
     "returned": 0,
     "others": 0,
-    "latency_ms": 3.0,
     "settled_s": 1.4,
     "past_m": 0.01,
     "lost_m": 0.02,
+    "risen_m": 0.0,
     "clear_m": 0.5,
 }
 
