@@ -11,10 +11,10 @@ from bench.cases.hits import (
     HEIGHT_M,
     POLE_OFFSET_SHARES,
     SPEEDS_M_S,
-    Floats,
     HitCase,
     obstacle_before,
     vehicle_of_hit,
+    velocity_towards,
 )
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.cruise import FOLLOWED_S, PATIENCE_S
@@ -51,16 +51,10 @@ def draw_flown(seed: int, is_drawn: bool) -> HitCase:
     return HitCase("flown", seed, AIRFRAMES[seed % 2], approach, speed_m_s, (), is_drawn=is_drawn, imu_hz=imu_hz)
 
 
-def velocity_of(hit: HitCase, rng: np.random.Generator) -> Floats:
-    """The first that is drawn of a hit."""
-    heading_rad = rng.uniform(-math.pi, math.pi)
-    return hit.speed_m_s * np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
-
-
 def fly(hit: HitCase) -> tuple[SimulatedVehicle, Guard, int | None]:
     """From HEIGHT_M, steadily on the way, to rest or as long as may be; the boot time from which it rested."""
     built, rng = vehicle_of_hit(hit), np.random.default_rng([hit.seed, 1])
-    velocity, free_s = velocity_of(hit, rng), float(rng.uniform(*FREE_FLIGHT_S))
+    velocity, free_s = velocity_towards(hit, built.airframe, rng), float(rng.uniform(*FREE_FLIGHT_S))
     at = np.array([0.0, 0.0, -HEIGHT_M]) + free_s * velocity
     scene = Scene.model_validate(obstacle_before(hit, built.airframe, at, velocity, rng, POLE_OFFSET_SHARES[0]))
     vehicle = SimulatedVehicle(built.airframe, scene, hit.seed)

@@ -97,6 +97,7 @@ REACHED_WITHIN_S = 60.0
 LANDS_WITHIN_S = 12.0
 # How long a vehicle that keeps its companion is followed after the last instant: what follows then is the next item's.
 WITH_IT_S = 1.5
+# A tenth of a second.
 BIN_S = 0.1
 
 
@@ -173,13 +174,10 @@ def shown(results: Results) -> Shown:
 def kills_table(kills: pd.DataFrame) -> str:
     """By the instant of the kill after the touch."""
     first, last = (round(edge / BIN_S) for edge in KILLED_S)
-    edges = [
-        (f"{1e3 * n * BIN_S:.0f} to {1e3 * (n + 1) * BIN_S:.0f} ms", n * BIN_S, (n + 1) * BIN_S)
-        for n in range(first, last)
-    ]
-    edges += [("**before the touch**", -math.inf, 0.0), ("**after it**", 0.0, math.inf)]
-    since_s = kills["kill_s"]
-    return table([{"killed": name, **_cells(kills[(low <= since_s) & (since_s < high)])} for name, low, high in edges])
+    spans = {f"{100 * n} to {100 * (n + 1)} ms": (n * BIN_S, (n + 1) * BIN_S) for n in range(first, last)}
+    spans |= {"**before the touch**": (-math.inf, 0.0), "**after it**": (0.0, math.inf)}
+    some = {name: kills[kills["kill_s"].between(*span, inclusive="left")] for name, span in spans.items()}
+    return table([{"killed": name, **_cells(of)} for name, of in some.items()])
 
 
 def _cells(kills: pd.DataFrame) -> dict[str, Any]:
