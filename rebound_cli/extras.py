@@ -1,7 +1,7 @@
 """What a drone does without, and the extra that brings it."""
 
 EXTRAS = dict.fromkeys(("numba", "pygeomag", "matplotlib"), "sim")
-EXTRAS |= {"pyulog": "logs", "mcap": "logs", "mavsdk": "mavsdk", "distributed": "bench"}
+EXTRAS |= {"pyulog": "logs", "mcap": "logs", "mavsdk": "mavsdk", "pandas": "bench"}
 
 
 def needed_text(error: ModuleNotFoundError) -> str:

@@ -8,7 +8,7 @@ ROOT = Path(__file__).parent.parent
 # Everything that only an extra brings.
 # rich is for a terminal: there is none here.
 LEFT_OUT = (
-    *("numba", "filterpy", "scipy", "matplotlib", "distributed", "dask"),
+    *("numba", "filterpy", "scipy", "matplotlib", "pandas", "tabulate"),
     *("mavsdk", "pyulog", "mcap", "pygeomag", "pytest", "rich"),
 )
 WITHOUT = f"import sys\nsys.modules.update(dict.fromkeys({LEFT_OUT!r}))\n"

@@ -16,7 +16,7 @@ WHEEL = Path(os.environ["WHEEL"])
 # Root may write everywhere; without its capabilities it is a user like any other.
 POWERLESS = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"] if os.geteuid() == 0 else []
 # A drone needs none of them; rich, which is installed, is for a terminal.
-NOT_IMPORTED = ("numba", "filterpy", "scipy", "matplotlib", "dask", "distributed", "mavsdk", "rich", "pytest")
+NOT_IMPORTED = ("numba", "filterpy", "scipy", "matplotlib", "pandas", "tabulate", "mavsdk", "rich", "pytest")
 REBOUND = f"""
 import sys
 from rebound_cli.main import main
