@@ -23,7 +23,7 @@ def imports():
 
 @pytest.mark.parametrize(
     "work_out",
-    [work_out_mission, work_out_hit, work_out_flown, work_out_fault, kills.work_out_companion],
+    [work_out_mission, work_out_hit, work_out_flown, work_out_fault, kills.work_out],
     ids=lambda function: function.__module__,
 )
 def test_all_code_that_a_row_follows_from_is_in_its_version(work_out, imports):

@@ -7,27 +7,18 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bench.studies.kills import (
-    KILLED_S,
-    SPEEDS_M_S,
-    between_table,
-    companion_cases,
-    companion_killed,
-    guard_cases,
-    kills_table,
-    work_out_companion,
-    work_out_guard,
-)
+from bench.studies import kills_between
+from bench.studies.kills import KILLED_S, SPEEDS_M_S, cases, killed, kills_table, work_out
 from tests.bench.random_missions.made_up import hit
 
 
 def test_so_many_kills_are_drawn_within_the_bounds_and_the_same_each_time():
-    drawn = companion_cases(45, first_seed=3)
+    drawn = cases(45, first_seed=3)
     instants = [kill_s for case in drawn for kill_s in case.kills_s]
     assert len(instants) == 45 and len(drawn) == 5
     assert all(KILLED_S[0] <= kill_s <= KILLED_S[1] for kill_s in instants)
     assert all(SPEEDS_M_S[0] <= case.speed_m_s <= SPEEDS_M_S[1] for case in drawn)
-    assert drawn == companion_cases(45, first_seed=3)
+    assert drawn == cases(45, first_seed=3)
     assert {(case.airframe, case.imu_hz) for case in drawn[:4]} == {
         ("foldable", 250),
         ("rigid", 250),
@@ -39,8 +30,8 @@ def test_so_many_kills_are_drawn_within_the_bounds_and_the_same_each_time():
 @pytest.mark.slow
 def test_a_brake_that_nobody_ends_does_not_lead_back_to_the_wall():
     """Held, the brake of 0.6 s after the hit led the vehicle back at 1 m/s."""
-    case = companion_cases(50, first_seed=1)[4]
-    flight = work_out_companion(replace(case, kills_s=(-0.1, 0.6, 0.87)))
+    case = cases(50, first_seed=1)[4]
+    flight = work_out(replace(case, kills_s=(-0.1, 0.6, 0.87)))
     assert flight["touch_m_s"] > 2.5 and flight["again_m_s"] == 0.0
     unanswered, *braked = flight["kills"]
     for kill, at_s in zip(braked, (0.6, 0.87), strict=True):
@@ -62,7 +53,7 @@ def test_a_second_contact_is_the_hardest_after_the_kill_the_touch_itself_apart(k
     on_the_ground = SimpleNamespace(body=[0.0, 0.0, -0.08])
     vehicle = SimpleNamespace(time_boot_us=killed_at_s * 1e6, truth=truth, state=on_the_ground)
     flight: Any = SimpleNamespace(vehicle=vehicle, step_alone=lambda: b"")
-    kill = companion_killed(flight, touch)
+    kill = killed(flight, touch)
     assert kill["again_m_s"] == pytest.approx(again_m_s) and kill["ground_m_s"] == pytest.approx(0.5)
 
 
@@ -76,8 +67,8 @@ def test_the_table_counts_the_hard_contacts_by_the_instant_of_the_kill():
 
 @pytest.mark.slow
 def test_a_guard_in_between_that_dies_in_a_recovery_leaves_the_vehicle_to_px4s_failsafe_which_lands():
-    case = replace(guard_cases(10, first_seed=1)[0], kills_s=(0.5,))
-    flight = work_out_guard(case)
+    case = replace(kills_between.cases(10, first_seed=1)[0], kills_s=(0.5,))
+    flight = kills_between.work_out(case)
     (kill,) = flight["kills"]
     assert kill["again_m_s"] == 0.0 and kill["mode"] == "POSCTL"
     assert kill["ground_m_s"] == pytest.approx(0.7, abs=0.2), "MPC_LAND_SPEED"
@@ -94,7 +85,7 @@ def test_the_table_of_the_guard_has_a_row_for_each_program_before_and_after_the_
             "loss_s": [0.3] * 3,
         }
     )
-    lines = between_table(kills).splitlines()[2:]
+    lines = kills_between.kills_table(kills).splitlines()[2:]
     before, after = ([cell.strip() for cell in line.split("|")[1:-1]] for line in lines)
     assert before[3:] == ["1", "1 (100.0 %)", "0.90", "1", "0.70", "0.70", "POSCTL 1"]
     assert after[3:] == ["2", "0 (0.0 %)", "–", "1", "1.10", "1.10", "POSCTL 1, AUTO.LOITER 1"]
