@@ -24,7 +24,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 SET_MODE, ARM, TAKEOFF = 176, 400, 22
 # From the wall's face to the centre of a vehicle that touches it with guards unfolded: 0.24 m.
 FACE_NORTH_M = 4.0
-VELOCITY_ONLY, PLACE_ONLY, ATTITUDE_ONLY = 0xDC7, 0xDF8, 0x07
+VELOCITY_ONLY, PLACE_ONLY = 0xDC7, 0xDF8
 MANUAL_POSITION, OFFBOARD, HOLD, MISSION, LAND = (3, 0), (6, 0), (4, 3), (4, 4), (4, 6)
 # MAVSDK's Offboard repeats its last setpoint every 50 ms, for ever; in whole intervals of 4 ms.
 REPEATED_EVERY_S = 0.052
@@ -220,22 +220,6 @@ def by_places(air: BetweenFlight) -> None:
     """Along the first side of a square, which the wall crosses: the place moves on at 1 m/s and waits for nobody."""
     began_s = air.time_s
     air.every(REPEATED_EVERY_S, lambda: air.place(min(air.time_s - began_s, 5.0)))
-    air.run_for(0.3)
-    air.set_mode(OFFBOARD)
-
-
-def by_attitudes(air: BetweenFlight) -> None:
-    """Nose down by 3 degrees, the height held by the thrust."""
-    hover = air.others_last["ATTITUDE_TARGET"].thrust
-    nose_down = [math.cos(math.radians(1.5)), 0.0, -math.sin(math.radians(1.5)), 0.0]
-
-    def attitude() -> None:
-        position = air.others_last["LOCAL_POSITION_NED"]
-        thrust = hover + 0.1 * (position.z + 2.5) + 0.1 * position.vz
-        boot_ms = round(1e3 * air.time_s)
-        air.send(dialect.MAVLink_set_attitude_target_message(boot_ms, 1, 1, ATTITUDE_ONLY, nose_down, 0, 0, 0, thrust))
-
-    air.every(0.02, attitude)
     air.run_for(0.3)
     air.set_mode(OFFBOARD)
 

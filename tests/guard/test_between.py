@@ -17,7 +17,6 @@ from bench.fly.commanded import (
     OFFBOARD,
     REPEATED_EVERY_S,
     BetweenFlight,
-    by_attitudes,
     by_places,
     by_sticks,
     fly_a_mission,
@@ -33,7 +32,25 @@ from companion.mavlink.signing import Signing
 
 TOO_LATE_S = 0.15
 LINK_BYTES_S = 2_000_000
+# A type mask.
+ATTITUDE_ONLY = 0x07
 MODES = (dialect.MAVLINK_MSG_ID_HEARTBEAT, dialect.MAVLINK_MSG_ID_CURRENT_MODE)
+
+
+def by_attitudes(air: BetweenFlight) -> None:
+    """Nose down by 3 degrees, the height held by the thrust."""
+    hover = air.others_last["ATTITUDE_TARGET"].thrust
+    nose_down = [math.cos(math.radians(1.5)), 0.0, -math.sin(math.radians(1.5)), 0.0]
+
+    def attitude() -> None:
+        position = air.others_last["LOCAL_POSITION_NED"]
+        thrust = hover + 0.1 * (position.z + 2.5) + 0.1 * position.vz
+        boot_ms = round(1e3 * air.time_s)
+        air.send(dialect.MAVLink_set_attitude_target_message(boot_ms, 1, 1, ATTITUDE_ONLY, nose_down, 0, 0, 0, thrust))
+
+    air.every(0.02, attitude)
+    air.run_for(0.3)
+    air.set_mode(OFFBOARD)
 
 
 def hit(flies: Callable[[BetweenFlight], None], parameters: dict[str, float] | None = None, **changes) -> BetweenFlight:
