@@ -1,6 +1,7 @@
 """The judge on flights made up by hand: each cause of a failure is found, and a good flight has none."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from bench.rows.contacts import Role, contacts_of
 from bench.rows.judge import failures
 from bench.rows.obedience import disobediences
 from bench.rows.recovered import recoveries
+from sim_vehicle.world import Wall
 from tests.bench.random_missions.made_up import (
     DONE_S,
     collision,
@@ -198,6 +200,35 @@ def _held_at(north_m):
     """At 1.5 m when the hold begins, there when it ends."""
     up = ((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 2, 0, 2), (12, 1.5, 0, 2))
     return path(*up, (14, north_m, 0, 2), (16.5, north_m, 0, 0), (17, north_m, 0, 0))
+
+
+def test_the_same_place_hit_twice_is_a_failure_unless_it_was_tried_again_on_purpose():
+    touched = (2.2, 0.1, -2.0)
+    twice = [replace(hit(), contact_point_ned_m=touched), replace(hit(at_s=12.6), contact_point_ned_m=touched)]
+    seen = [collision(), collision(at_s=12.604)]
+    again = [event(12, "item", step=2), event(12.61, "detection"), event(13.6, "recovered"), *LANDS_LATER]
+    items = [{"takeoff": {"height_m": 2}}, *[{"go_to": {"position_ned_m": [4, 0, -2]}}] * 2, {"land": {}}]
+    policy = {"then": "continue", "max_hits": 2}
+    judged = bounced(*again, policy=policy, items=items, hits=twice, collisions=seen)
+    assert causes(judged) == ["flew into a known surface"]
+    # half a metre beside is not known
+    beside = [twice[0], replace(twice[1], contact_point_ned_m=(2.2, 0.6, -2.0))]
+    assert causes(bounced(*again, policy=policy, items=items, hits=beside, collisions=seen)) == []
+    # nor is a place that a vehicle that has lost its position takes for another
+    drifted = [twice[0], replace(twice[1], frame_offset_ned_m=(0.0, 0.6, 0.0))]
+    assert causes(bounced(*again, policy=policy, items=items, hits=drifted, collisions=seen)) == []
+    retried = [event(12, "item", step=1), *again[1:]]
+    retry = {"then": "retry", "max_hits": 2}
+    assert causes(bounced(*retried, policy=retry, hits=twice, collisions=seen)) == []
+
+
+def test_a_goal_called_out_of_reach_is_one_behind_something():
+    told = [event(12, "item", step=1), event(12, "unreachable", item="2", then="land"), *LANDS_THERE]
+    judged = bounced(*told, policy=DETOUR)
+    assert causes(judged) == []
+    # with the wall 2 m beside the straight way, which is the line east = 0
+    beside = Wall("wall", (2.2, 2.0, -2.0), (0.0, -1.0, 0.0), 10.0, 10.0, 0.1)
+    assert causes(replace(judged, obstacles={"wall": beside})) == ["gave up a goal in the open"]
 
 
 def test_contacts_in_a_recovery_are_the_same_surface_again_or_another():
