@@ -8,6 +8,7 @@ from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Identity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.hil.slow_sensors import SlowSensors
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
@@ -23,7 +24,6 @@ from sim_vehicle.physics.layout import PlantState
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
-from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
 
 # A signature has one byte for the link.

@@ -23,10 +23,10 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.autopilot.offboard import STATUS_PERIOD_US, OffboardControl
+from sim_vehicle.control.setpoint import Setpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate, yaw_of
 from sim_vehicle.parameters.airframe_values import origin_of
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint
 
 # PX4's estimator publishes position and velocity, and its position control runs, every 8 ms.
 POSITION_PERIOD_US = 8_000

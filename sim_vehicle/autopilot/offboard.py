@@ -7,10 +7,10 @@ offboardCheck.cpp and PositionControl::_inputValid; the delays are measured.
 import math
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, Severity, StatusText
+from sim_vehicle.control.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Axis3, Quaternion
-from sim_vehicle.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 
 FRAME_LOCAL_NED = 1
 FRAME_BODY_NED = 8

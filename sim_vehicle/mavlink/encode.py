@@ -13,13 +13,13 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText
 from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
+from sim_vehicle.control.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.quantities import Axis3
-from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 
 # One of pymavlink's, which carry no types, or a `framing.Packed`; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any

@@ -10,9 +10,9 @@ from sim_vehicle.autopilot.flight_tasks.smoothing import towards
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import StickInput
 from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.control.setpoint import AttitudeSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Axis3
-from sim_vehicle.setpoint import AttitudeSetpoint, Setpoint, TrajectorySetpoint
 
 GRAVITY_M_S2 = 9.80665
 # Sticks::getPositionExpo: MPC_XY_MAN_EXPO and its like were replaced by this figure.

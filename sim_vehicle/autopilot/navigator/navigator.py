@@ -21,10 +21,10 @@ from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.autopilot.navigator.mission import MissionFlight, problem_of
 from sim_vehicle.autopilot.navigator.rtl import Return
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 # The navigator listens to the position at 20 Hz.
 PERIOD_US = 50_000

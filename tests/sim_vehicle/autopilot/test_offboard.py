@@ -8,7 +8,7 @@ from sim_vehicle.autopilot import offboard
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
-from sim_vehicle.setpoint import FREE
+from sim_vehicle.control.setpoint import FREE
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, attitude_of_yaw, target
 
 NORTH = attitude_of_yaw(0.0)

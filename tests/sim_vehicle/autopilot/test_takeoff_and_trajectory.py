@@ -10,8 +10,8 @@ from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.flight_tasks.takeoff import wants_takeoff
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.flying import hovering
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 

@@ -7,12 +7,12 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Identity, Severity, StatusText
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.services.texts import TextLink
 from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, STANDING, attitude_of_yaw
 
 SECOND = 1_000_000
