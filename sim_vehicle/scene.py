@@ -10,7 +10,7 @@ from sim_vehicle.errors import SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.obstacles import BoxSpec, Point, PoleSpec, WallSpec
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.world import Obstacle, Wall, World, build_world
+from sim_vehicle.world import Obstacle, World, build_world
 from sim_vehicle.written import Finite, Part
 
 
@@ -54,10 +54,6 @@ class Scene(Part):
         if problem is not None:
             raise ValueError(problem)
         return self
-
-    def walls_built(self) -> tuple[Wall, ...]:
-        """The walls as values, in the file's order."""
-        return tuple(spec.built(number) for number, spec in enumerate(self.walls, start=1))
 
     def obstacles(self) -> tuple[tuple[str, Obstacle], ...]:
         """Everything that the vehicle can run into but the ground, each with its place in the file."""

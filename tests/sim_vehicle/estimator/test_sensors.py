@@ -12,7 +12,7 @@ from sim_vehicle.estimator.optics import distance_below
 from sim_vehicle.estimator.samples import NO_QUALITY
 from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, FlowSensor, RangeSensor
 from sim_vehicle.physics.rotation import matrix_from_quaternion
-from sim_vehicle.world import Wall, build_world
+from sim_vehicle.world import build_world, plate
 from tests.sim_vehicle.estimator.flying import filtered
 
 INTERVAL_US = 4_000
@@ -94,8 +94,8 @@ def distance(state, faces=GROUND) -> float:
 
 def test_the_beam_meets_what_is_nearest_along_the_bodys_down_axis():
     # Given a roof 1 m up that reaches from 1 m north on, and a wall 3 m south of which the face looks north
-    roof = Wall("roof", (2.0, 0.0, -1.0), (0.0, 0.0, -1.0), 4.0, 2.0, 0.1)
-    wall = Wall("wall", (-3.0, 0.0, -1.5), (1.0, 0.0, 0.0), 4.0, 3.0, 0.1)
+    roof = plate("roof", (2.0, 0.0, -1.0), (0.0, 0.0, -1.0), (4.0, 2.0), 0.1)
+    wall = plate("wall", (-3.0, 0.0, -1.5), (1.0, 0.0, 0.0), (4.0, 3.0), 0.1)
     faces = build_world((roof, wall)).faces
     # Then a level vehicle beside the roof sees the ground, above it the roof, below it the ground
     assert distance(body(north=0.5, down=-1.5), faces) == pytest.approx(1.5)

@@ -4,15 +4,15 @@ import numpy as np
 
 from sim_vehicle.physics.touching.proximity import IN_FRONT, INSIDE, PASSED
 from sim_vehicle.physics.touching.surroundings import Surroundings
-from sim_vehicle.world import Motion, Obstacle, Pole, Wall, build_world
+from sim_vehicle.world import Box, Motion, Obstacle, Pole, build_world, plate
 
 STEP_US = 4000
 HERE = (0.0, 0.0, -2.0)
 MAST = Pole("mast", (2.0, 0.0, 0.0), (0.0, 0.0, -1.0), 5.0, 0.1)
 
 
-def wall(north_m: float, motion: Motion | None = None) -> Wall:
-    return Wall("wall", (north_m, 0.0, -2.0), (-1.0, 0.0, 0.0), 4.0, 4.0, 0.1, motion)
+def wall(north_m: float, motion: Motion | None = None) -> Box:
+    return plate("wall", (north_m, 0.0, -2.0), (-1.0, 0.0, 0.0), (4.0, 4.0), 0.1, motion)
 
 
 def rows_of(around: Surroundings, obstacle: Obstacle) -> np.ndarray:
