@@ -90,25 +90,6 @@ def test_of_two_failsafes_the_later_in_the_order_wins():
     assert Failsafe().update(0, returning, Parameters({**parameters, "NAV_DLL_ACT": 2})).action is Action.WARN
 
 
-@pytest.mark.parametrize(
-    ("missing", "action"),
-    [
-        ({Mode.LOITER}, Action.RETURN),
-        ({Mode.LOITER, Mode.RETURN}, Action.LAND),
-        ({Mode.LOITER, Mode.RETURN, Mode.LAND}, Action.DESCEND),
-    ],
-)
-def test_an_action_that_cannot_be_flown_gives_way_to_the_next(missing, action):
-    now = situation(
-        intended=Mode.OFFBOARD,
-        sticks_lost=False,
-        fence_breached=True,
-        offboard_lost=False,
-        cannot_run=frozenset(missing),
-    )
-    assert Failsafe().update(0, now, Parameters()).action is action
-
-
 # --- flown ---------------------------------------------------------------------------------------------------------
 
 

@@ -90,6 +90,12 @@ def test_what_a_hovering_vehicle_says_of_itself(hovering):
     target = hovering.last("ATTITUDE_TARGET")
     assert math.hypot(*target.q) == pytest.approx(1.0) and target.q[0] == pytest.approx(1.0, abs=0.05)
     assert 100 * target.thrust == pytest.approx(hovering.last("VFR_HUD").throttle, abs=10)
+    asked = hovering.last("POSITION_TARGET_LOCAL_NED")
+    # Every axis is asked for, and the heading; no turning
+    assert (asked.coordinate_frame, asked.type_mask) == (1, 0x800)
+    assert (asked.x, asked.y, asked.z) == pytest.approx(hovering.position(), abs=0.2) and asked.vz == 0.0
+    # The mean distance of successive samples, whose noise is 0.25 m/s2 on each of three axes
+    assert hovering.last("VIBRATION").vibration_z == pytest.approx(0.25 * 4 / math.sqrt(math.pi), rel=0.3)
     field = hovering.last("HIGHRES_IMU")
     # The field of Zurich: 0.2 gauss north, 0.43 down; the nose points north
     assert (field.xmag, field.zmag) == (pytest.approx(0.21, abs=0.03), pytest.approx(0.43, abs=0.03))
@@ -160,7 +166,10 @@ def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiti
     assert abs(alike) == pytest.approx(1.0, abs=1e-3)
     told = orbiting.last("ATTITUDE")
     yaw_rad = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+    roll_rad, pitch_rad = math.atan2(2 * (qw * qx + qy * qz), 1 - 2 * (qx * qx + qy * qy)), 2 * (qw * qy - qz * qx)
     assert math.remainder(told.yaw - yaw_rad, 2 * math.pi) == pytest.approx(0.0, abs=0.05)
+    # It leans inward, which is ahead, by 4 degrees: the nose is down
+    assert (told.roll, told.pitch) == pytest.approx((roll_rad, pitch_rad), abs=0.03) and told.pitch < -0.04
     assert (told.rollspeed, told.pitchspeed, told.yawspeed) == pytest.approx((p, q, r), abs=0.06)
     assert (turned.rollspeed, turned.pitchspeed, turned.yawspeed) == pytest.approx((p, q, r), abs=0.06)
     felt = orbiting.last("HIGHRES_IMU")

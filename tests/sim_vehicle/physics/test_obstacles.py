@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.errors import SceneError
 from sim_vehicle.physics.trim import _quaternion
 from sim_vehicle.plant.plant import Plant
-from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.scene import Scene
 from tests.sim_vehicle.physics.throwing import quiet
 
 HEIGHT_M = 8.0
@@ -162,15 +161,3 @@ def test_a_moving_obstacle_hits_as_a_standing_one_is_hit(name: str, kind: str) -
     assert run_over.energy_after_j / run_over.energy_before_j == pytest.approx(
         at_rest.energy_after_j / at_rest.energy_before_j, rel=0.01
     )
-
-
-@pytest.mark.parametrize(
-    "part",
-    [
-        {"poles": [{"point_ned_m": [0.25, 0, 0], "radius_m": 0.1}]},
-        {"boxes": [{"centre_ned_m": [0.5, 0, 0], "size_m": [0.6, 0.6, 0.6]}]},
-    ],
-)
-def test_a_start_inside_an_obstacle_is_refused(part: dict) -> None:
-    with pytest.raises(SceneError, match=r"sim\.(poles|boxes)\.0: .* passes through"):
-        check_start_is_free(Scene.model_validate(part), load_built_in("foldable"))

@@ -36,15 +36,6 @@ def hovering(airframe: Airframe, seed: int = 1, **scene: object) -> Plant:
     return plant
 
 
-@pytest.mark.parametrize("yaw_deg", [0, 90, -135])
-def test_it_holds_a_setpoint_and_a_heading(yaw_deg: float) -> None:
-    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
-    flown(plant, at(1.0, -0.5, -2.0, math.radians(yaw_deg)), 12)
-    assert plant.state.body[0:3] == pytest.approx([1.0, -0.5, -2.0], abs=0.02)
-    half = math.radians(yaw_deg) / 2
-    assert abs(plant.state.body[6:10] @ [math.cos(half), 0, 0, math.sin(half)]) > 0.9999
-
-
 def test_a_tipped_vehicle_thrusts_as_it_would_to_hover() -> None:
     """As PX4: the thrust is what holds the height once the vehicle leans as asked, not what does so now."""
     plant = hovering(quiet(load_built_in("foldable")))
