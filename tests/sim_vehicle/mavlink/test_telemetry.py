@@ -179,3 +179,19 @@ def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiti
     assert math.hypot(vx, vy) == pytest.approx(2.0, abs=0.2) and r == pytest.approx(-1 / 3, abs=0.1)
     for stamp_us in (felt.time_usec, orbiting.last("ODOMETRY").time_usec, 1000 * told.time_boot_ms):
         assert orbiting.time_s - 1e-6 * stamp_us < 0.05
+
+
+def test_a_vehicle_with_a_filter_says_how_sure_it_is_of_itself():
+    # Given a vehicle that sees the ground pass, and nothing that stays
+    client = Client(airframe=filtered())
+    client.run(3.0)
+    stands = client.last("ODOMETRY")
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(30.0)
+    flies, body = client.last("ODOMETRY"), client.vehicle.state.body
+    # Then it is less and less sure of its place, and rightly so; of its speed and its tilt it stays as sure
+    assert flies.pose_covariance[0] > 20 * stands.pose_covariance[0] > 0.0
+    assert math.dist((flies.x, flies.y), body[:2]) < 3 * math.sqrt(2 * flies.pose_covariance[0])
+    assert math.dist((flies.vx, flies.vy), body[3:5]) < 3 * math.sqrt(2 * flies.velocity_covariance[0]) < 0.2
+    assert 0.0 < flies.pose_covariance[15] < 0.01**2 and flies.velocity_covariance[0] > stands.velocity_covariance[0]
