@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_vehicle.quantities import Floats, Ints, Vector3
+from sim_vehicle.quantities import Floats, Ints, Vector3, vector
 
 GROUND = "ground"
 
@@ -87,8 +87,8 @@ def plate(
     across, along = _face_axes(normal)
     return Box(
         name,
-        _vector(np.array(point_ned_m) - 0.5 * thickness_m * normal),
-        (normal_ned, _vector(across), _vector(along)),
+        vector(np.array(point_ned_m) - 0.5 * thickness_m * normal),
+        (normal_ned, vector(across), vector(along)),
         (thickness_m, *size_m),
         EDGE_RADIUS_M,
         motion,
@@ -122,6 +122,13 @@ class Pole:
 
 
 Obstacle = Pole | Box
+
+
+def distance_m(obstacle: Obstacle, position_ned_m: Vector3, time_s: float) -> float:
+    """From a point to the nearest point of an obstacle where it is at that time; 0 inside."""
+    (x, y, z), motion = position_ned_m, obstacle.motion
+    dx, dy, dz = (0.0, 0.0, 0.0) if motion is None else motion.offset_ned_m(time_s)
+    return obstacle.distance_m((x - dx, y - dy, z - dz))
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,7 +277,3 @@ def _face_axes(normal_ned: Floats) -> tuple[Floats, Floats]:
     # Below a thousandth of a radian a face counts as level: its horizontal direction is noise.
     across = np.array([0.0, 1.0, 0.0]) if length < 1e-3 else across / length
     return across, np.cross(normal_ned, across)
-
-
-def _vector(row: Floats) -> Vector3:
-    return float(row[0]), float(row[1]), float(row[2])

@@ -7,7 +7,7 @@ import numpy as np
 from sim_vehicle.physics.layout import FEET, Constants, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 from sim_vehicle.physics.touching.meeting import deepest_point, is_absent
-from sim_vehicle.quantities import Floats
+from sim_vehicle.quantities import Floats, vector
 from sim_vehicle.world import Box, Motion, plate
 
 # From appearing to touching: short, so that a vehicle that brakes by 7 m/s2 is met within 0.15 m/s of the speed.
@@ -40,9 +40,9 @@ def strike(
     retreat = swing + (velocity + RETREAT_M_S * out) * RETREAT_S
     now_s = state.time_us / 1e6
     motion = Motion(
-        (now_s, now_s + LEAD_S + FOLLOW_S, now_s + DURATION_S), ((0.0, 0.0, 0.0), _tuple(swing), _tuple(retreat))
+        (now_s, now_s + LEAD_S + FOLLOW_S, now_s + DURATION_S), ((0.0, 0.0, 0.0), vector(swing), vector(retreat))
     )
-    return plate(name, _tuple(start), _tuple(-out), (_SIZE_M, _SIZE_M), _THICKNESS_M, motion)
+    return plate(name, vector(start), vector(-out), (_SIZE_M, _SIZE_M), _THICKNESS_M, motion)
 
 
 def _extent_m(state: PlantState, constants: Constants, direction_ned: Floats) -> float:
@@ -55,7 +55,3 @@ def _extent_m(state: PlantState, constants: Constants, direction_ned: Floats) ->
         _, further_m = deepest_point(point, -direction_ned, rotation, state.body, constants, where)
         furthest_m = max(furthest_m, float((where - state.body[0:3]) @ direction_ned) + further_m)
     return furthest_m
-
-
-def _tuple(vector: Floats) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])

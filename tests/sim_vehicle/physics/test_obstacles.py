@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.physics.trim import _quaternion
+from sim_vehicle.physics.rotation import quaternion_from_matrix
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.physics.throwing import quiet
@@ -47,7 +47,8 @@ def thrown(
     cp, sp = math.cos(lean_rad[0]), math.sin(lean_rad[0])
     cr, sr = math.cos(lean_rad[1]), math.sin(lean_rad[1])
     turn = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    plant.state.body[6:10] = _quaternion(turn @ np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]]))
+    rolled = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    plant.state.body[6:10] = quaternion_from_matrix((turn @ rolled).tolist())
     plant.state.body[10:13] = rates
     for _ in range(round(duration_s / 0.004)):
         plant.step(None, armed=False)
