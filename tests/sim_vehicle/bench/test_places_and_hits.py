@@ -1,6 +1,5 @@
 """Obstacles that come and go, plates that strike, and the truth of it, in lockstep."""
 
-import hashlib
 import math
 from typing import Any
 
@@ -129,19 +128,3 @@ def test_bad_setups_are_one_sentence() -> None:
         LockstepVehicle(parameters={"MPC_XY_CRUSE": 3})
     with pytest.raises(SceneError, match=r"faults\.0\.motor_failure"):
         LockstepVehicle(faults=[{"kind": "motor_failure", "at_s": 1, "motor": 9}])
-
-
-def test_time_goes_by_whole_intervals_and_the_same_calls_give_the_same_bytes() -> None:
-    def flown() -> tuple[float, str]:
-        vehicle, digest = LockstepVehicle(seed=4), hashlib.sha256()
-        for seconds in (0.001, 0.0, 0.5):
-            digest.update(vehicle.advance(seconds))
-        vehicle.place(approaching(3.0))
-        vehicle.hit(1.0)
-        digest.update(vehicle.advance(1.0))
-        digest.update(repr(vehicle.truth).encode())
-        return vehicle.time_s, digest.hexdigest()
-
-    time_s, digest = flown()
-    assert time_s == pytest.approx(0.004 + 0.004 + 0.004 + 0.5 + 1.0)
-    assert (time_s, digest) == flown()

@@ -173,19 +173,6 @@ def test_a_bias_and_a_stuck_axis_show_in_the_mean_sample() -> None:
 # --- estimate ----------------------------------------------------------------------------------------------
 
 
-def test_a_reset_jumps_says_so_and_the_velocity_finds_back() -> None:
-    cruise = hover(
-        {"kind": "estimator_reset", "at_s": 0.2, "position_jump_ned_m": [0.5, 0, 0],
-         "velocity_jump_ned_m_s": [0, 0.4, 0], "settles_s": 0.1}
-    )  # fmt: skip
-    outputs = fly(cruise, 0.24)
-    assert {output.reset_counter for output in outputs[:49]} == {0} and outputs[-1].reset_counter == 1
-    assert outputs[51].position_ned_m[0] - outputs[48].position_ned_m[0] == pytest.approx(0.5, abs=0.01)
-    assert outputs[50].velocity_ned_m_s[1] == pytest.approx(0.4, abs=0.03)
-    late = fly(cruise, 0.8)[-1]
-    assert late.velocity_ned_m_s[1] - cruise.plant.state.body[4] == pytest.approx(0.0, abs=0.03)
-
-
 @pytest.mark.parametrize(("name", "disturbed"), [("rigid", True), ("foldable", False)])
 def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: str, disturbed: bool) -> None:
     """The rigid vehicle's hit at 2 m/s hides most of its 3.8 m/s from the sensor; the foldable's at 1 m/s nothing."""

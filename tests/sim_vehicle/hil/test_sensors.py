@@ -1,13 +1,12 @@
 """Sensors that PX4 gets: right in direction, unit and size."""
 
 import math
-import random
 
 import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, HilState, MotionCapture
-from sim_vehicle.hil.sensors import Cameras, air_at, to_body
+from sim_vehicle.hil.sensors import air_at, to_body
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 
@@ -52,16 +51,6 @@ def test_pressure_is_the_standard_atmospheres_and_falls_with_height():
     assert air_at(500.0).pressure_hpa - air_at(501.0).pressure_hpa == pytest.approx(0.115, abs=0.002)
     assert air_at(924.0).temperature_c == pytest.approx(9.0, abs=0.1)
     assert air_at(500.0).altitude_m == pytest.approx(500.0)
-
-
-def test_cameras_see_where_the_body_is_and_how_it_is_turned():
-    cameras = Cameras(random.Random(1))
-    seen = [cameras.sample(0, (1.0, 2.0, -3.0), NOSE_EAST) for _ in range(500)]
-    mean = [sum(one.position_ned_m[i] for one in seen) / len(seen) for i in range(3)]
-    assert mean == pytest.approx([1, 2, -3], abs=0.001)
-    assert rms([one.position_ned_m[0] - 1 for one in seen]) ** 2 == pytest.approx(seen[0].position_variance_m2, rel=0.2)
-    assert seen[0].attitude_wxyz == pytest.approx(NOSE_EAST, abs=0.02)
-    assert math.hypot(*seen[0].attitude_wxyz) == pytest.approx(1)
 
 
 def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():

@@ -69,16 +69,6 @@ def test_a_poles_normal_is_radial_where_the_guard_touches_it(offset_m: float) ->
     assert np.abs(guard - centre) == pytest.approx(np.array([arm_m, arm_m]), abs=2e-4)
 
 
-def test_a_pole_hit_through_the_hub_rebounds_as_the_hub_does() -> None:
-    """A pole that fits between the front guards meets the hub, a ball: straight back at its restitution."""
-    thin = {"poles": [{"point_ned_m": [2, 0, 0], "radius_m": 0.02, "height_m": 30}]}
-    plant = thrown(smooth("rigid"), thin, duration_s=0.3)
-    (hit,) = plant.truth.hits
-    assert hit.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
-    assert hit.contact_position_ned_m[0] == pytest.approx(2.0 - 0.02 - 0.05, abs=1e-3)
-    assert hit.rebound_speed_m_s / 2.0 == pytest.approx(0.9, abs=0.01)
-
-
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("name", ["foldable", "rigid"])
 def test_no_obstacle_returns_more_energy_than_it_took(name: str, scene: str) -> None:
