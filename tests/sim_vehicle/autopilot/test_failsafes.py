@@ -100,7 +100,7 @@ def test_lost_setpoints_do_what_com_obl_rc_act_says(value):
     assert until_it_acts(flight, 2.0) == pytest.approx(1.07, abs=0.05)
     assert flown(flight) is MODE_OF[action]
     assert flight.autopilot.modes.intended is Mode.OFFBOARD
-    assert flight.texts()[-1] == "Failsafe activated"
+    assert "Failsafe activated" in flight.texts()
 
 
 @pytest.mark.parametrize(("value", "mode"), [(0, None), (1, Mode.LOITER), (2, Mode.RETURN), (3, Mode.LAND), (5, None)])
