@@ -54,10 +54,10 @@ def yaw_of(body: Floats) -> float:
 
 
 def quaternion_from_matrix(rows: list[list[float]]) -> Quaternion:
-    """Of a rotation matrix; no division is by a small number."""
+    """Of a rotation matrix; the largest component is found first, so that no division is by a small number."""
     (a, b, c), (d, e, f), (g, h, i) = rows
-    squares = (1 + a + e + i, 1 + a - e - i, 1 + e - a - i, 1 + i - a - e)
-    largest = 0 if squares[0] > 1.0 else max(range(4), key=squares.__getitem__)
+    squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
+    largest = max(range(4), key=squares.__getitem__)
     n = 2 * math.sqrt(max(squares[largest], 1e-12))
     if largest == 0:
         return n / 4, (h - f) / n, (c - g) / n, (d - b) / n
