@@ -24,7 +24,7 @@ from rebound_cli.report.content import finite
 from rebound_cli.report.scene import surfaces
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.run_folder import HIT_KINDS
-from sim_vehicle.physics.rotation import quaternion_from_matrix
+from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
 from sim_vehicle.world import Obstacle, Pole
 
 Json: TypeAlias = dict[str, Any]

@@ -7,7 +7,7 @@ whole array costs a kernel less than cutting a slice.
 import math
 
 from sim_vehicle.physics.jit import inlined, njit
-from sim_vehicle.quantities import Floats, Quaternion
+from sim_vehicle.quantities import Floats
 
 
 @inlined
@@ -51,18 +51,3 @@ def yaw_of(body: Floats) -> float:
     """Heading of a body's nose from north, right positive, radians."""
     w, x, y, z = body[6], body[7], body[8], body[9]
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-
-
-def quaternion_from_matrix(rows: list[list[float]]) -> Quaternion:
-    """Of a rotation matrix; the largest component is found first, so that no division is by a small number."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
-    largest = max(range(4), key=squares.__getitem__)
-    n = 2 * math.sqrt(max(squares[largest], 1e-12))
-    if largest == 0:
-        return n / 4, (h - f) / n, (c - g) / n, (d - b) / n
-    if largest == 1:
-        return (h - f) / n, n / 4, (b + d) / n, (c + g) / n
-    if largest == 2:
-        return (c - g) / n, (b + d) / n, n / 4, (f + h) / n
-    return (d - b) / n, (c + g) / n, (f + h) / n, n / 4
