@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from pydantic import Field, model_validator
 
-from sim_vehicle.aiding import Estimator, Sensors
+from sim_vehicle.airframes.aiding import Estimator, Sensors
 from sim_vehicle.errors import AirframeError
 from sim_vehicle.written import NotNegative, Part, Positive
 

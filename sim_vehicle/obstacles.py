@@ -7,7 +7,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.world import Box, Motion, Pole, Wall
+from sim_vehicle.world import Box, Motion, Pole, plate
 from sim_vehicle.written import Finite, NotNegative, Part
 
 Point = tuple[Finite, Finite, Finite]
@@ -88,17 +88,10 @@ class WallSpec(ObstacleSpec):
             raise ValueError("normal_ned has no direction; give the way the face looks, e.g. [-1, 0, 0]")
         return self
 
-    def built(self, number: int) -> Wall:
+    def built(self, number: int) -> Box:
         """The same as a value, with its normal made unit and a name if it had none."""
-        return Wall(
-            name=self.name or f"wall {number}",
-            point_ned_m=self.point_ned_m,
-            normal_ned=unit(self.normal_ned),
-            width_m=self.width_m,
-            height_m=self.height_m,
-            thickness_m=self.thickness_m,
-            motion=self._motion(),
-        )
+        name, size_m = self.name or f"wall {number}", (self.width_m, self.height_m)
+        return plate(name, self.point_ned_m, unit(self.normal_ned), size_m, self.thickness_m, self._motion())
 
 
 class PoleSpec(ObstacleSpec):

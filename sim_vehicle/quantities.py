@@ -11,3 +11,8 @@ Axis3 = tuple[float | None, float | None, float | None]
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+
+def vector(row: Floats) -> Vector3:
+    """Three numbers of an array as a value."""
+    return float(row[0]), float(row[1]), float(row[2])

@@ -10,7 +10,7 @@ from sim_vehicle.errors import SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.obstacles import BoxSpec, Point, PoleSpec, WallSpec
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.world import Obstacle, Wall, World, build_world
+from sim_vehicle.world import Obstacle, World, build_world, distance_m
 from sim_vehicle.written import Finite, Part
 
 
@@ -55,10 +55,6 @@ class Scene(Part):
             raise ValueError(problem)
         return self
 
-    def walls_built(self) -> tuple[Wall, ...]:
-        """The walls as values, in the file's order."""
-        return tuple(spec.built(number) for number, spec in enumerate(self.walls, start=1))
-
     def obstacles(self) -> tuple[tuple[str, Obstacle], ...]:
         """Everything that the vehicle can run into but the ground, each with its place in the file."""
         specs: list[tuple[str, tuple[WallSpec | PoleSpec | BoxSpec, ...]]]
@@ -80,12 +76,11 @@ def check_start_is_free(scene: Scene, airframe: Airframe) -> None:
     standing: Vector3 = (x, y, -airframe.geometry.foot_depth_m)
     reach_m = airframe.geometry.reach_m
     for place, obstacle in scene.obstacles():
-        moved = (0.0, 0.0, 0.0) if obstacle.motion is None else obstacle.motion.offset_ned_m(0.0)
-        distance_m = obstacle.distance_m((standing[0] - moved[0], standing[1] - moved[1], standing[2] - moved[2]))
-        if distance_m < reach_m:
+        away_m = distance_m(obstacle, standing, 0.0)
+        if away_m < reach_m:
             raise SceneError(
                 f"{place}: '{obstacle.name}' passes through the vehicle's start position "
-                f"({distance_m:.2f} m from its centre, which needs {reach_m:.2f} m); "
+                f"({away_m:.2f} m from its centre, which needs {reach_m:.2f} m); "
                 "move it or sim.start.position_ned_m"
             )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics import layout
-from sim_vehicle.quantities import Floats, Vector3
+from sim_vehicle.quantities import Floats, Vector3, vector
 from sim_vehicle.world import World
 
 # Columns of one row of the path: time, position, velocity, attitude, contact force, folds.
@@ -105,19 +105,19 @@ class TruthRecorder:
                 obstacle=world.names[int(row[layout.HIT_FACE])],
                 contact_at_boot_us=float(row[layout.HIT_START_US]),
                 ended_at_boot_us=float(row[layout.HIT_LAST_US]),
-                contact_position_ned_m=_vector(row[layout.HIT_POSITION]),
-                impact_velocity_ned_m_s=_vector(row[layout.HIT_VELOCITY]),
-                normal_ned=_vector(row[layout.HIT_NORMAL]),
+                contact_position_ned_m=vector(row[layout.HIT_POSITION]),
+                impact_velocity_ned_m_s=vector(row[layout.HIT_VELOCITY]),
+                normal_ned=vector(row[layout.HIT_NORMAL]),
                 max_fold_m=float(row[layout.HIT_FOLD_M]),
                 peak_force_n=float(row[layout.HIT_PEAK_N]),
-                rebound_velocity_ned_m_s=_vector(row[layout.HIT_EXIT_VELOCITY]),
-                impulse_ned_n_s=_vector(row[layout.HIT_IMPULSE]),
+                rebound_velocity_ned_m_s=vector(row[layout.HIT_EXIT_VELOCITY]),
+                impulse_ned_n_s=vector(row[layout.HIT_IMPULSE]),
                 energy_before_j=float(row[layout.HIT_ENERGY_BEFORE_J]),
                 energy_after_j=float(row[layout.HIT_ENERGY_AFTER_J]),
                 kind=world.kinds[int(row[layout.HIT_FACE])],
-                contact_point_ned_m=_vector(row[layout.HIT_POINT]),
-                surface_velocity_ned_m_s=_vector(row[layout.HIT_SURFACE_VELOCITY]),
-                frame_offset_ned_m=_vector(row[layout.HIT_FRAME_OFFSET]),
+                contact_point_ned_m=vector(row[layout.HIT_POINT]),
+                surface_velocity_ned_m_s=vector(row[layout.HIT_SURFACE_VELOCITY]),
+                frame_offset_ned_m=vector(row[layout.HIT_FRAME_OFFSET]),
             )
         )
 
@@ -137,7 +137,3 @@ class TruthRecorder:
             "arm_fold_m": rows[:, 12 : 12 + self.rotors],
             "peak_contact_force_n": rows[:, 11],
         }
-
-
-def _vector(row: Floats) -> Vector3:
-    return float(row[0]), float(row[1]), float(row[2])

@@ -8,9 +8,13 @@ from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Identity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.autopilot.mode_numbers import NUMBERS
+from sim_vehicle.control.setpoint import TrajectorySetpoint
+from sim_vehicle.errors import FaultError, SceneError
 from sim_vehicle.estimator.estimate import Estimate
+from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.hil.slow_sensors import SlowSensors
-from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
+from sim_vehicle.mavlink.faulty_link import FaultyLink, check_messages, needs_faulty_link
 from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.services.service import Board
 from sim_vehicle.mavlink.signing import Signing
@@ -19,12 +23,12 @@ from sim_vehicle.mavlink.streams.topics import Topics
 from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.physics.layout import PlantState
+from sim_vehicle.physics.layout import Constants, PlantState
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
-from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.world import Obstacle, build_world, distance_m
 
 # A signature has one byte for the link.
 _LINK_NUMBERS = 256
@@ -46,12 +50,14 @@ class SimulatedVehicle:
         epoch_at_boot_us: int = 0,
         parameters: Mapping[str, float] | None = None,
         signing: Signing | None = None,
+        links_may_fail: bool = False,
     ) -> None:
         """``keeps_path`` off: the truth holds the hits but no path, for a simulation without an end.
 
         ``epoch_at_boot_us``: Unix time when the vehicle's clock was at zero, which it tells who asks for the time.
         ``parameters``: values in place of PX4's defaults and the airframe's.
         ``signing``: the key that it has.
+        ``links_may_fail``: faults of the wire may come later, which costs a link some microseconds an interval.
 
         Raises SceneError where a wall passes through the start position, or the wind is too strong.
         """
@@ -60,6 +66,7 @@ class SimulatedVehicle:
         self._airframe, self._scene, self._seed, self._keeps_path = airframe, scene, seed, keeps_path
         self._epoch_at_boot_us = epoch_at_boot_us
         self._links: list[Link] = []
+        self._links_may_fail, self._faults = links_may_fail, list(scene.faults)
         self.texts: tuple[StatusText, ...] = ()
         self._links_so_far = 0
         self._companion_link: Link | None = None
@@ -142,19 +149,87 @@ class SimulatedVehicle:
     def add_link(self, kind: LinkKind) -> Link:
         """One more connection, from now on."""
         number, seed = self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far
-        link = self._new_link(kind, number, seed)
+        link: Link
+        if self._links_may_fail or needs_faulty_link(self._faults):
+            link = FaultyLink(kind, self._board, number, seed, self._faults)
+        else:
+            link = Link(kind, self._board, number, seed)
         self._links_so_far += 1
         self._links.append(link)
         return link
 
-    def _new_link(self, kind: LinkKind, number: int, seed: int) -> Link:
-        if needs_faulty_link(self._scene.faults):
-            return FaultyLink(kind, self._board, number, seed, self._scene.faults)
-        return Link(kind, self._board, number, seed)
-
     def remove_link(self, link: Link) -> None:
         """The connection has ended."""
         self._links.remove(link)
+
+    # --- what may be changed between two intervals ---------------------------------------------------------
+
+    @property
+    def constants(self) -> Constants:
+        """What does not change in a flight."""
+        return self._plant.constants
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Everything that the vehicle can run into but the ground."""
+        return self._plant.world.obstacles
+
+    @property
+    def is_armed(self) -> bool:
+        return self._autopilot.arming.armed
+
+    @property
+    def may_arm(self) -> bool:
+        """Whether its checks would let it be armed now."""
+        return self._autopilot.commander.checks_pass
+
+    @property
+    def mode(self) -> str:
+        """What flies, by PX4's name."""
+        return NUMBERS[self._autopilot.modes.flown].title
+
+    def place(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Put obstacles where they are described. Raises SceneError, and places none, if one is in the vehicle."""
+        reach_m = self._airframe.geometry.reach_m
+        x, y, z = self.state.body[:3].tolist()
+        for obstacle in obstacles:
+            if distance_m(obstacle, (x, y, z), self.time_boot_us / 1e6) < reach_m:
+                raise SceneError(
+                    f"'{obstacle.name}' would pass through the vehicle, which is at "
+                    f"({x:.2f}, {y:.2f}, {z:.2f}) m and needs {reach_m:.2f} m around it; place it further away."
+                )
+        self.put(obstacles)
+
+    def put(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """The same for obstacles that are known to be clear of the vehicle, however near."""
+        self._plant.change_world(build_world((*self.obstacles, *obstacles)))
+
+    def remove(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take away what was placed."""
+        gone = {id(obstacle) for obstacle in obstacles}
+        self._plant.change_world(build_world(tuple(kept for kept in self.obstacles if id(kept) not in gone)))
+
+    def add_fault(self, fault: Fault) -> None:
+        """One more fault from now on. Raises FaultError for one that does not fit those that are there."""
+        check_messages(fault)
+        problem = overlapping((*self._faults, fault))
+        if problem is not None:
+            raise FaultError(f"{problem}.")
+        self._faults.append(fault)
+        self._plant.add_fault(fault)
+        for link in self._links:
+            if isinstance(link, FaultyLink):
+                link.add(fault)
+
+    def remove_fault(self, fault: Fault) -> None:
+        """End or cancel a fault: the same object that was added."""
+        self._faults = [kept for kept in self._faults if kept is not fault]
+        self._plant.remove_fault(fault)
+        for link in self._links:
+            if isinstance(link, FaultyLink):
+                link.remove(fault)
+
+    # --- an interval ---------------------------------------------------------------------------------------
 
     def step(self, received: bytes) -> tuple[bytes, ...]:
         """One interval for a lone companion: apply the bytes received since the last, return the packets to send."""

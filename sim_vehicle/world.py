@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_vehicle.quantities import Floats, Ints, Vector3
+from sim_vehicle.quantities import Floats, Ints, Vector3, vector
 
 GROUND = "ground"
 
@@ -65,48 +65,34 @@ class Box:
     edge_radius_m: float = BOX_EDGE_RADIUS_M
     motion: Motion | None = None
 
-    def box(self) -> "Box":
-        """Itself: every solid but a pole is drawn and touched as a box."""
-        return self
-
     def distance_m(self, position_ned_m: Vector3) -> float:
         """From a point to the nearest point of the solid, its edges taken as sharp; 0 inside."""
         local = np.abs(np.array(self.axes_ned) @ (np.array(position_ned_m) - np.array(self.centre_ned_m)))
         return float(np.linalg.norm(np.maximum(local - 0.5 * np.array(self.sizes_m), 0.0)))
 
 
-@dataclass(frozen=True, slots=True)
-class Wall:
-    """A solid plate of finite extent; its front face is what a mission file describes."""
+def plate(
+    name: str,
+    point_ned_m: Vector3,
+    normal_ned: Vector3,
+    size_m: tuple[float, float],
+    thickness_m: float,
+    motion: Motion | None = None,
+) -> Box:
+    """A wall, ceiling or floor by its front face: the centre, the unit vector out of it, width and height.
 
-    name: str
-    point_ned_m: Vector3
-    """Centre of the front face."""
-    normal_ned: Vector3
-    """Unit vector out of the front face."""
-    width_m: float
-    """Extent across: horizontal for an upright wall, along east for a ceiling or a floor."""
-    height_m: float
-    """Extent along the face at right angles to the width."""
-    thickness_m: float
-    motion: Motion | None = None
-
-    def box(self) -> Box:
-        """The same solid as a box: thickness, width, height."""
-        normal = np.array(self.normal_ned)
-        across, along = _face_axes(normal)
-        return Box(
-            self.name,
-            _vector(np.array(self.point_ned_m) - 0.5 * self.thickness_m * normal),
-            (self.normal_ned, _vector(across), _vector(along)),
-            (self.thickness_m, self.width_m, self.height_m),
-            EDGE_RADIUS_M,
-            self.motion,
-        )
-
-    def distance_m(self, position_ned_m: Vector3) -> float:
-        """From a point to the nearest point of the solid plate; 0 inside."""
-        return self.box().distance_m(position_ned_m)
+    The width is level; of a ceiling or a floor it goes along east.
+    """
+    normal = np.array(normal_ned)
+    across, along = _face_axes(normal)
+    return Box(
+        name,
+        vector(np.array(point_ned_m) - 0.5 * thickness_m * normal),
+        (normal_ned, vector(across), vector(along)),
+        (thickness_m, *size_m),
+        EDGE_RADIUS_M,
+        motion,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +121,14 @@ class Pole:
         return max(float(np.linalg.norm(offset - nearest)) - self.radius_m, 0.0)
 
 
-Obstacle = Wall | Pole | Box
+Obstacle = Pole | Box
+
+
+def distance_m(obstacle: Obstacle, position_ned_m: Vector3, time_s: float) -> float:
+    """From a point to the nearest point of an obstacle where it is at that time; 0 inside."""
+    (x, y, z), motion = position_ned_m, obstacle.motion
+    dx, dy, dz = (0.0, 0.0, 0.0) if motion is None else motion.offset_ned_m(time_s)
+    return obstacle.distance_m((x - dx, y - dy, z - dz))
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,8 +197,7 @@ def _rows_of(obstacle: Obstacle) -> list[tuple[str, Floats]]:
         half_m = 0.5 * float(np.linalg.norm(top - foot))
         axis = np.array(obstacle.axis_ned)
         return [("pole", _round(0.5 * (foot + top), axis, half_m, obstacle.radius_m, np.zeros(3), np.zeros(3), True))]
-    box = obstacle.box()
-    return _sides(box) + _edges(box)
+    return _sides(obstacle) + _edges(obstacle)
 
 
 def _halves(box: Box) -> tuple[Floats, Floats, float]:
@@ -285,7 +277,3 @@ def _face_axes(normal_ned: Floats) -> tuple[Floats, Floats]:
     # Below a thousandth of a radian a face counts as level: its horizontal direction is noise.
     across = np.array([0.0, 1.0, 0.0]) if length < 1e-3 else across / length
     return across, np.cross(normal_ned, across)
-
-
-def _vector(row: Floats) -> Vector3:
-    return float(row[0]), float(row[1]), float(row[2])

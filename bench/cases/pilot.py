@@ -13,9 +13,9 @@ import numpy as np
 from companion.messages import LandedState
 from companion.mission.trajectory import LineProfile
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.control.setpoint import FREE, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.setpoint import FREE, RatesSetpoint, Setpoint, TrajectorySetpoint
 
 # A companion's setpoints come at 50 Hz: one in five intervals of 4 ms.
 SETPOINT_EVERY = 5

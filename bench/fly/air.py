@@ -17,9 +17,9 @@ from companion.mavlink.packet import message_id_of
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.simulation.lockstep import EPOCH_US
-from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.vehicle import SimulatedVehicle
 
 # A clock that is read goes on.
 _READING_US = 4
@@ -104,7 +104,7 @@ class Landing(BaseException):
 class Air:
     """One flight's wire, clock and vehicle."""
 
-    vehicle: ChangeableVehicle
+    vehicle: SimulatedVehicle
     companion: Companion
     interrupts: Interrupts
     injector: Injector

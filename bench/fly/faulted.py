@@ -21,8 +21,8 @@ from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
 
 SPEEDS_M_S, MOST_SLANT_DEG = (1.0, 2.0), 30.0
 HEIGHT_M, WALL_M = 1.0, 2.0
@@ -75,7 +75,7 @@ class FaultedFlight:
         self.scene = Scene.model_validate(self.mission.sim or {})
         self.airframe = load_built_in(self.scene.airframe)
         self.injector = fault.inject(self._chance())
-        vehicle = ChangeableVehicle(self.airframe, self.scene, self.scene.seed, 0, {})
+        vehicle = SimulatedVehicle(self.airframe, self.scene, self.scene.seed, links_may_fail=True)
         self.interrupts, self.companion = Interrupts(), Companion(self.mission)
         self.air = Air(vehicle, self.companion, self.interrupts, Injector(), self._chance(), LIMIT_S)
         self.air.to_the_ground = number < TO_THE_GROUND

@@ -167,7 +167,7 @@ def _track(report: FlightReport, truth: FlightTruth, log: FlightLog, scene: Scen
     into_wall = -np.array(hit.normal_ned)
     # What the vehicle was told lies in its own frame, and is drawn where that was at the first touch.
     offset, origin = np.array(hit.frame_offset_ned_m), np.array(report.origin_ned_m or (0.0, 0.0, 0.0))
-    wall = next(wall for wall in scene.walls_built() if wall.name == hit.obstacle)
+    wall = next(wall for number, wall in enumerate(scene.walls, 1) if wall.built(number).name == hit.obstacle)
     zero_us = hit.contact_at_boot_us
 
     def along_m(places_ned_m: Any) -> Any:

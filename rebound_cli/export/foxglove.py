@@ -216,9 +216,9 @@ def _obstacle(at_us: float, obstacle: Obstacle, moved_ned_m: Vector3) -> Json:
         pose = {"position": _enu(middle.tolist()), "orientation": _along(obstacle.axis_ned, 2)}
         size = _xyz(2 * obstacle.radius_m, 2 * obstacle.radius_m, obstacle.height_m)
         return _entity(at_us, name, cylinders=[_cylinder(pose, size, _ORANGE)])
-    box = obstacle.box()
-    pose = {"position": _enu((np.array(box.centre_ned_m) + moved_ned_m).tolist()), "orientation": _turn(box.axes_ned)}
-    return _entity(at_us, name, cubes=[{"pose": pose, "size": _xyz(*box.sizes_m), "color": _ORANGE}])
+    centre = np.array(obstacle.centre_ned_m) + moved_ned_m
+    pose = {"position": _enu(centre.tolist()), "orientation": _turn(obstacle.axes_ned)}
+    return _entity(at_us, name, cubes=[{"pose": pose, "size": _xyz(*obstacle.sizes_m), "color": _ORANGE}])
 
 
 def _cylinder(pose: Json, size: Json, color: Json) -> Json:

@@ -26,9 +26,9 @@ def footprint(obstacle: Obstacle) -> Floats:
     if isinstance(obstacle, Pole):
         shape = MultiPoint([end[:2] for end in obstacle.ends()]).convex_hull.buffer(obstacle.radius_m)
     else:
-        box = obstacle.box()
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-        places = np.array(box.centre_ned_m) + (signs * 0.5 * np.array(box.sizes_m)) @ np.array(box.axes_ned)
+        corners_m = signs * 0.5 * np.array(obstacle.sizes_m)
+        places = np.array(obstacle.centre_ned_m) + corners_m @ np.array(obstacle.axes_ned)
         shape = MultiPoint(places[:, :2]).convex_hull
     corners: Floats = get_coordinates(shape)
     return corners

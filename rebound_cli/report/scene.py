@@ -43,8 +43,7 @@ def _obstacle(flight: ShownFlight, obstacle: Obstacle) -> dict[str, Any]:
     if isinstance(obstacle, Pole):
         shape = {"foot": obstacle.foot_ned_m, "axis": obstacle.axis_ned, "radius": obstacle.radius_m}
         return {"name": obstacle.name, "kind": "pole", "height": obstacle.height_m, **shape, "motion": motion}
-    box = obstacle.box()
-    shape = {"centre": box.centre_ned_m, "axes": box.axes_ned, "sizes": box.sizes_m}
+    shape = {"centre": obstacle.centre_ned_m, "axes": obstacle.axes_ned, "sizes": obstacle.sizes_m}
     return {"name": obstacle.name, "kind": "box", **shape, "motion": motion}
 
 

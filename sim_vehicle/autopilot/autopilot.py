@@ -16,17 +16,17 @@ from sim_vehicle.autopilot.messages import (
     PositionTarget,
     Result,
     Severity,
-    StatusText,
     StickInput,
+    Texts,
 )
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.autopilot.offboard import STATUS_PERIOD_US, OffboardControl
+from sim_vehicle.control.setpoint import Setpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate, yaw_of
 from sim_vehicle.parameters.airframe_values import origin_of
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint
 
 # PX4's estimator publishes position and velocity, and its position control runs, every 8 ms.
 POSITION_PERIOD_US = 8_000
@@ -64,15 +64,15 @@ class Autopilot:
             home_ned_m=first.position_ned_m,
             home_yaw_rad=yaw_of(first.attitude_wxyz),
         )
-        self.navigator = Navigator(parameters, self.origin, self.missions, view)
-        self.commander = Commander(parameters, self.navigator, self.detector)
+        self.texts = Texts()
+        self.navigator = Navigator(parameters, self.origin, self.missions, view, self.texts)
+        self.commander = Commander(parameters, self.navigator, self.detector, self.texts)
         self.modes, self.arming = self.commander.modes, self.commander.arming
         self.signal, self.battery = self.commander.signal, self.commander.battery
         self.wants_reboot = False
         """To be done by whoever switches the software on and off, once the answer is out."""
         self._offboard = OffboardControl(self.signal)
         self.applied: Setpoint | None = None
-        self.texts: list[StatusText] = []
         self._manual = ManualFlight(parameters, hover_thrust_fraction)
         self._takeoff = Takeoff(parameters)
         self._estimate = first
@@ -126,7 +126,7 @@ class Autopilot:
         self._look()
         self.commander.arm()
         self.navigator.set_home(*home)
-        self.commander.texts.clear()
+        self.texts.clear()
         self.navigator.hold_at(goal)
         self._demanded_us = self._now_us - POSITION_PERIOD_US
 
@@ -148,9 +148,6 @@ class Autopilot:
             acks = [ack for command in queue if (ack := self._execute(command)) is not None]
         if self.modes.flown is not self._flown:
             self._notice_mode()
-        if self.commander.texts:
-            self.texts += self.commander.texts
-            self.commander.texts.clear()
         return acks
 
     def _execute(self, command: Command) -> CommandAck | None:
@@ -166,7 +163,7 @@ class Autopilot:
 
     def say(self, severity: Severity, text: str) -> None:
         """Tell the ground stations."""
-        self.texts.append(StatusText(severity, text))
+        self.texts.say(severity, text)
 
     def _notice_mode(self) -> None:
         previous, self._flown = self._flown, self.modes.flown
@@ -190,9 +187,6 @@ class Autopilot:
         self._demanded_us = self._now_us
         self._detect_landing()
         self.navigator.update()
-        texts = self.navigator.take_texts()
-        if texts:
-            self.texts += texts
         self._demand = demand = self._demand_of_mode(1e-6 * elapsed_us)
         down_m, armed = self._estimate.position_ned_m[2], self.arming.armed
         if demand is not None and not isinstance(demand, TrajectorySetpoint):

@@ -94,6 +94,14 @@ class StatusText:
     """Without PX4's closing tab, which the encoder adds."""
 
 
+class Texts(list[StatusText]):
+    """What is to be told to the ground stations, by whichever part of the autopilot, in the order in which it came."""
+
+    def say(self, severity: Severity, text: str) -> None:
+        """One more."""
+        self.append(StatusText(severity, text))
+
+
 @dataclass(frozen=True, slots=True)
 class AttitudeTarget:
     """SET_ATTITUDE_TARGET with the ignored fields as None."""

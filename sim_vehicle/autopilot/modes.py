@@ -201,22 +201,6 @@ class ModeState:
             self._after_disarming = mode
 
 
-def mode_diagram() -> str:
-    """The table as a mermaid state diagram."""
-    lines = ["stateDiagram-v2", f"    [*] --> {ModeState().intended.name}"]
-    for row in TRANSITIONS:
-        sources = [mode.name for mode in row.sources] if row.sources else ["ANY_MODE"]
-        target = row.target.name if row.target is not None else "MODE_BEFORE"
-        lines += [f"    {source} --> {target}: {row.event}{_condition(row)}" for source in sources]
-    return "\n".join(lines) + "\n"
-
-
-def _condition(row: Transition) -> str:
-    if row.guard is ModeCondition.CAN_RUN and row.target is not None:
-        return f" [disarmed, or {', '.join(sorted(NEEDS[row.target]))}]"
-    return f" [{row.guard}]" if row.guard else ""
-
-
 @cache
 def available(
     has_local: bool, has_global: bool, has_sticks: bool, has_setpoints: bool, has_mission: bool

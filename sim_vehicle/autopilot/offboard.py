@@ -7,10 +7,10 @@ offboardCheck.cpp and PositionControl::_inputValid; the delays are measured.
 import math
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, Severity, StatusText
-from sim_vehicle.estimator.estimate import yaw_of
+from sim_vehicle.control.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
+from sim_vehicle.estimator.estimate import level_to_north_east, to_ned, yaw_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Axis3, Quaternion
-from sim_vehicle.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 
 FRAME_LOCAL_NED = 1
 FRAME_BODY_NED = 8
@@ -135,22 +135,13 @@ def _turned_by_yaw(vector: Axis3, attitude_wxyz: Quaternion) -> Axis3:
     forward, right, down = vector
     if forward is None or right is None:
         return FREE
-    yaw = yaw_of(attitude_wxyz)
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return cos * forward - sin * right, sin * forward + cos * right, down
+    return *level_to_north_east(forward, right, yaw_of(attitude_wxyz)), down
 
 
 def _turned(vector: Axis3, attitude_wxyz: Quaternion) -> Axis3:
     """Body FRD to NED by the whole attitude."""
     x, y, z = vector
-    if x is None or y is None or z is None:
-        return FREE
-    qw, qx, qy, qz = attitude_wxyz
-    return (
-        (1 - 2 * (qy * qy + qz * qz)) * x + 2 * (qx * qy - qw * qz) * y + 2 * (qx * qz + qw * qy) * z,
-        2 * (qx * qy + qw * qz) * x + (1 - 2 * (qx * qx + qz * qz)) * y + 2 * (qy * qz - qw * qx) * z,
-        2 * (qx * qz - qw * qy) * x + 2 * (qy * qz + qw * qx) * y + (1 - 2 * (qx * qx + qy * qy)) * z,
-    )
+    return FREE if x is None or y is None or z is None else to_ned(attitude_wxyz, (x, y, z))
 
 
 class OffboardControl:

@@ -10,7 +10,6 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest, opposite
 from sim_vehicle.bench.strike import DURATION_S, strike
 from sim_vehicle.bench.truth import Timeline, TimelineEntry, Truth, truth_of
@@ -21,6 +20,7 @@ from sim_vehicle.obstacles import BoxSpec, PoleSpec, WallSpec
 from sim_vehicle.parameters.store import definitions
 from sim_vehicle.scene import Scene, Start
 from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle
 
 ObstacleSpec = WallSpec | PoleSpec | BoxSpec
@@ -101,8 +101,13 @@ class Bench:
     def __init__(self, setup: Setup, epoch_at_boot_us: int = 0) -> None:
         """Raises AirframeError, SceneError and ParameterError."""
         self.setup = setup
-        self.vehicle = ChangeableVehicle(
-            setup.airframe_loaded(), setup.scene(), setup.seed, epoch_at_boot_us, setup.parameters_checked()
+        self.vehicle = SimulatedVehicle(
+            setup.airframe_loaded(),
+            setup.scene(),
+            setup.seed,
+            epoch_at_boot_us=epoch_at_boot_us,
+            parameters=setup.parameters_checked(),
+            links_may_fail=True,
         )
         self._timeline = Timeline(self.vehicle)
         self._placed = len(setup.obstacles)

@@ -7,8 +7,8 @@ import numpy as np
 from sim_vehicle.physics.layout import FEET, Constants, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 from sim_vehicle.physics.touching.meeting import deepest_point, is_absent
-from sim_vehicle.quantities import Floats
-from sim_vehicle.world import Motion, Wall
+from sim_vehicle.quantities import Floats, vector
+from sim_vehicle.world import Box, Motion, plate
 
 # From appearing to touching: short, so that a vehicle that brakes by 7 m/s2 is met within 0.15 m/s of the speed.
 LEAD_S = 0.02
@@ -24,7 +24,7 @@ DURATION_S = LEAD_S + FOLLOW_S + RETREAT_S
 
 def strike(
     state: PlantState, constants: Constants, speed_m_s: float, bearing_deg: float, elevation_deg: float, name: str
-) -> Wall:
+) -> Box:
     """The plate; its motion begins now and takes DURATION_S.
 
     ``speed_m_s``: against the vehicle as it moves now. ``bearing_deg``: where it comes from, clockwise from the nose;
@@ -39,17 +39,10 @@ def strike(
     swing = (velocity - speed_m_s * out) * (LEAD_S + FOLLOW_S)
     retreat = swing + (velocity + RETREAT_M_S * out) * RETREAT_S
     now_s = state.time_us / 1e6
-    return Wall(
-        name=name,
-        point_ned_m=_tuple(start),
-        normal_ned=_tuple(-out),
-        width_m=_SIZE_M,
-        height_m=_SIZE_M,
-        thickness_m=_THICKNESS_M,
-        motion=Motion(
-            (now_s, now_s + LEAD_S + FOLLOW_S, now_s + DURATION_S), ((0.0, 0.0, 0.0), _tuple(swing), _tuple(retreat))
-        ),
+    motion = Motion(
+        (now_s, now_s + LEAD_S + FOLLOW_S, now_s + DURATION_S), ((0.0, 0.0, 0.0), vector(swing), vector(retreat))
     )
+    return plate(name, vector(start), vector(-out), (_SIZE_M, _SIZE_M), _THICKNESS_M, motion)
 
 
 def _extent_m(state: PlantState, constants: Constants, direction_ned: Floats) -> float:
@@ -62,7 +55,3 @@ def _extent_m(state: PlantState, constants: Constants, direction_ned: Floats) ->
         _, further_m = deepest_point(point, -direction_ned, rotation, state.body, constants, where)
         furthest_m = max(furthest_m, float((where - state.body[0:3]) @ direction_ned) + further_m)
     return furthest_m
-
-
-def _tuple(vector: Floats) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])

@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.truth import FaultSpan, Hit
+from sim_vehicle.vehicle import SimulatedVehicle
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Truth:
         return math.hypot(*self.velocity_ned_m_s)
 
 
-def truth_of(vehicle: ChangeableVehicle) -> Truth:
+def truth_of(vehicle: SimulatedVehicle) -> Truth:
     """The truth at the end of the last interval."""
     x, y, z, vx, vy, vz, w, qx, qy, qz, p, q, r = vehicle.state.body.tolist()
     return Truth(
@@ -74,7 +74,7 @@ class TimelineEntry:
 class Timeline:
     """Modes, arming, the vehicle's words, hits and faults, looked at after each interval."""
 
-    def __init__(self, vehicle: ChangeableVehicle) -> None:
+    def __init__(self, vehicle: SimulatedVehicle) -> None:
         self._vehicle = vehicle
         self._events: list[TimelineEntry] = []
         self._mode, self._is_armed = vehicle.mode, vehicle.is_armed

@@ -36,6 +36,23 @@ def yaw_of(attitude_wxyz: Quaternion) -> float:
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
+def to_ned(attitude_wxyz: Quaternion, vector_frd: Vector3) -> Vector3:
+    """A vector of the body's in NED."""
+    w, x, y, z = attitude_wxyz
+    forward, right, down = vector_frd
+    return (
+        (1 - 2 * (y * y + z * z)) * forward + 2 * (x * y - w * z) * right + 2 * (x * z + w * y) * down,
+        2 * (x * y + w * z) * forward + (1 - 2 * (x * x + z * z)) * right + 2 * (y * z - w * x) * down,
+        2 * (x * z - w * y) * forward + 2 * (y * z + w * x) * right + (1 - 2 * (x * x + y * y)) * down,
+    )
+
+
+def level_to_north_east(forward: float, right: float, yaw_rad: float) -> tuple[float, float]:
+    """A level vector ahead and to the right of a heading."""
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    return cos * forward - sin * right, sin * forward + cos * right
+
+
 def roll_pitch_of(attitude_wxyz: Quaternion) -> tuple[float, float]:
     """Both lean angles in radians."""
     w, x, y, z = attitude_wxyz

@@ -38,16 +38,6 @@ FIRST_POSITION_M = 0.01
 FIRST_VELOCITY_M_S = 0.01
 
 
-class ErrorFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types
-    """filterpy's filter over an error that is put into the nominal state as soon as it is known."""
-
-    def predict(self, u: float = 0) -> None:
-        """filterpy's own F P F' + Q. The error expected before a measurement stays zero; nobody reads the copies that
-        filterpy keeps of both.
-        """
-        self.P: Floats = np.dot(self.F, self.P).dot(self.F.T) + self.Q
-
-
 class NavigationFilter:
     """State and covariance at the time of the last inertial sample used."""
 
@@ -73,7 +63,7 @@ class NavigationFilter:
         self.nominal[POSITION : POSITION + 3] = position_ned_m
         self.nominal[VELOCITY : VELOCITY + 3] = velocity_ned_m_s
         self.nominal[QUATERNION : QUATERNION + 4] = attitude_wxyz
-        self._ekf = ekf = ErrorFilter(ERROR_ROWS, 1)
+        self._ekf = ekf = ExtendedKalmanFilter(ERROR_ROWS, 1)
         ekf.x = np.zeros(ERROR_ROWS)
         ekf.Q = np.zeros((ERROR_ROWS, ERROR_ROWS))
         first = np.zeros(ERROR_ROWS)
@@ -134,13 +124,13 @@ class NavigationFilter:
 
     def _fuse(self, innovation: Floats, h: Floats, variance: float, gate: float) -> bool:
         """Correct by ``innovation`` = h error + noise, unless one of its values lies beyond the gate."""
-        ekf, size = self._ekf, len(innovation)
-        r = variance * _UNIT[size]
+        ekf = self._ekf
+        r = variance * _UNIT[len(innovation)]
         s = h @ ekf.P @ h.T + r
         farthest = [gate**2 * expected for expected in s.diagonal().tolist()]
         accepted = all(value * value <= most for value, most in zip(innovation.tolist(), farthest, strict=True))
         if accepted:
-            ekf.update(innovation, lambda _: h, lambda _: _NOTHING[size], R=r)
+            ekf.update(innovation, lambda _: h, lambda error: h @ error, R=r)
             correct(self.nominal, ekf.x)
         return accepted
 
@@ -183,8 +173,7 @@ def _pick(start: int, size: int) -> Floats:
     return np.eye(ERROR_ROWS)[start : start + size].copy()
 
 
-# What is expected of a measurement of 1 to 3 values, and the shape of its noise.
-_NOTHING = {size: np.zeros(size) for size in (1, 2, 3)}
+# The shape of the noise of 1 to 3 values.
 _UNIT = {size: np.eye(size) for size in (1, 2, 3)}
 _PICK_FLOW = _pick(D_FLOW, 2)
 _PICK_POSITION = _pick(D_POSITION, 3)

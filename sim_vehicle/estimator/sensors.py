@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from sim_vehicle.aiding import Aid, Compass, MotionCapture, OpticalFlow, RangeFinder, Sensors
+from sim_vehicle.airframes.aiding import Aid, Compass, MotionCapture, OpticalFlow, RangeFinder, Sensors
 from sim_vehicle.estimator import optics
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.estimator.samples import (

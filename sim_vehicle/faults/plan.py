@@ -1,6 +1,6 @@
 """All faults of a flight but the wire's: before each interval they write what disturbs it."""
 
-from bisect import insort
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -43,10 +43,10 @@ class Faults:
             ((spec.EstimatorReset, spec.EstimatorAfterClipping, spec.AidingLoss), self._estimate),
         )
         self._acts: list[Callable[[float, PlantState, Disturbance], None]] = []
-        self._faults: dict[int, Fault] = {}
-        self._count = 0
-        self._ahead: list[tuple[float, int]] = []
-        self._spans: dict[int, int] = {}
+        self._faults: list[Fault] = []
+        self._turns_at_s = math.inf
+        """When the next of them begins or ends."""
+        self._span_of: dict[int, int] = {}
         self.spans: list[FaultSpan] = []
         for fault in faults:
             self.add(fault)
@@ -54,10 +54,8 @@ class Faults:
     def add(self, fault: Fault) -> None:
         """Add a fault. It acts in its own window of the boot clock. Raises FaultError for a motor that is not there."""
         spec.check_motor(fault, self._rotors)
-        number, self._count = self._count, self._count + 1
-        self._faults[number] = fault
-        for time_s in _turns_s(fault):
-            insort(self._ahead, (time_s, number))
+        self._faults.append(fault)
+        self._turns_at_s = min(self._turns_at_s, fault.window_s[0])
         for kinds, group in self._groups:
             if isinstance(fault, kinds):
                 group.add(fault)
@@ -66,11 +64,10 @@ class Faults:
 
     def remove(self, fault: Fault, time_us: int) -> None:
         """The very fault that was added is over, or never comes."""
-        number = next(number for number, known in self._faults.items() if known is fault)
-        del self._faults[number]
-        self._ahead = [(time_s, other) for time_s, other in self._ahead if other != number]
-        if number in self._spans:
-            self._end(self._spans[number], time_us)
+        self._faults = [kept for kept in self._faults if kept is not fault]
+        self._end(fault, time_us)
+        # Another may get the number that Python knew it by.
+        self._span_of.pop(id(fault), None)
         for kinds, group in self._groups:
             if isinstance(fault, kinds):
                 group.remove(fault)
@@ -93,8 +90,8 @@ class Faults:
         """Write what holds for the interval that begins now, and note what has begun and ended."""
         time_us = int(state.time_us)
         time_s = time_us / 1e6
-        while self._ahead and self._ahead[0][0] <= time_s:
-            self._note(self._ahead.pop(0)[1], time_us)
+        if time_s >= self._turns_at_s:
+            self._note(time_s, time_us)
         for act in self._acts:
             act(time_s, state, disturbance)
 
@@ -102,24 +99,22 @@ class Faults:
         """At that time."""
         return any(
             isinstance(fault, spec.AidingLoss) and fault.window_s[0] <= time_s < fault.window_s[1]
-            for fault in self._faults.values()
+            for fault in self._faults
         )
 
-    def _note(self, number: int, time_us: int) -> None:
-        if number in self._spans:
-            self._end(self._spans[number], time_us)
-            return
-        fault = self._faults[number]
-        self._spans[number] = len(self.spans)
-        ended_us = time_us if isinstance(fault, spec.Moment) else None
-        details = fault.model_dump(mode="json", exclude={"kind", "at_s", "between_s"}, exclude_none=True)
-        self.spans.append(FaultSpan(fault.kind, time_us, ended_us, details))
+    def _note(self, time_s: float, time_us: int) -> None:
+        for fault in self._faults:
+            start_s, end_s = fault.window_s
+            if start_s <= time_s and id(fault) not in self._span_of:
+                self._span_of[id(fault)] = len(self.spans)
+                details = fault.model_dump(mode="json", exclude={"kind", "at_s", "between_s"}, exclude_none=True)
+                self.spans.append(FaultSpan(fault.kind, time_us, None, details))
+            if end_s <= time_s or (start_s <= time_s and isinstance(fault, spec.Moment)):
+                self._end(fault, time_us)
+        ahead = (turn_s for fault in self._faults for turn_s in fault.window_s if turn_s > time_s)
+        self._turns_at_s = min(ahead, default=math.inf)
 
-    def _end(self, index: int, time_us: int) -> None:
-        if self.spans[index].ended_at_boot_us is None:
+    def _end(self, fault: Fault, time_us: int) -> None:
+        index = self._span_of.get(id(fault))
+        if index is not None and self.spans[index].ended_at_boot_us is None:
             self.spans[index] = replace(self.spans[index], ended_at_boot_us=time_us)
-
-
-def _turns_s(fault: Fault) -> tuple[float, ...]:
-    """When a fault begins and, if it does, ends."""
-    return fault.window_s[:1] if isinstance(fault, spec.Moment) else fault.window_s

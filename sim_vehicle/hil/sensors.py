@@ -4,6 +4,7 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator.estimate import to_ned
 from sim_vehicle.geography import HOME, Origin, Place
 from sim_vehicle.hil.messages import Air, HilGps, MotionCapture
 from sim_vehicle.quantities import Quaternion, Vector3
@@ -138,14 +139,9 @@ def turned(attitude_wxyz: Quaternion, angle_frd_rad: Vector3) -> Quaternion:
 
 
 def to_body(attitude_wxyz: Quaternion, vector_ned: Vector3) -> Vector3:
-    """A NED vector in the body's FRD frame: the transpose of the attitude's rotation."""
+    """A NED vector in the body's FRD frame."""
     w, x, y, z = attitude_wxyz
-    north, east, down = vector_ned
-    return (
-        (1 - 2 * (y * y + z * z)) * north + 2 * (x * y + w * z) * east + 2 * (x * z - w * y) * down,
-        2 * (x * y - w * z) * north + (1 - 2 * (x * x + z * z)) * east + 2 * (y * z + w * x) * down,
-        2 * (x * z + w * y) * north + 2 * (y * z - w * x) * east + (1 - 2 * (x * x + y * y)) * down,
-    )
+    return to_ned((w, -x, -y, -z), vector_ned)
 
 
 def _sum(a: Vector3, b: Vector3) -> Vector3:

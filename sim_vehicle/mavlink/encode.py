@@ -13,13 +13,13 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText
 from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
+from sim_vehicle.control.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.geography import Place
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.quantities import Axis3
-from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 
 # One of pymavlink's, which carry no types, or a `framing.Packed`; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any
@@ -27,8 +27,9 @@ Message: TypeAlias = Any
 NAN = math.nan
 _NO_OFFSET = (0.0, 0.0, 0.0, 0.0)
 _TEXT_BYTES = 50
-# HIGHRES_IMU.fields_updated: accelerometer and gyroscope; magnetometer; pressure, its altitude and temperature.
-_INERTIAL_FIELDS, _MAGNETIC_FIELDS, _AIR_FIELDS = 0x3F, 0x1C0, 0x1A00
+# HIGHRES_IMU's and HIL_SENSOR's fields_updated: accelerometer and gyroscope; magnetometer; pressure, its altitude and
+# temperature.
+INERTIAL_FIELDS, MAGNETIC_FIELDS, AIR_FIELDS = 0x3F, 0x1C0, 0x1A00
 
 
 class Encoder:
@@ -103,15 +104,15 @@ def heartbeat(state: Telemetry) -> Message:
 
 def highres_imu(state: Telemetry) -> Message:
     sample, air = state.sample, state.air
-    fields = _INERTIAL_FIELDS
+    fields = INERTIAL_FIELDS
     field_is_new, air_is_new = state.renewed
     if field_is_new:
-        fields |= _MAGNETIC_FIELDS
+        fields |= MAGNETIC_FIELDS
     pressure_hpa = altitude_m = temperature_c = 0.0
     if air is not None:
         pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
         if air_is_new:
-            fields |= _AIR_FIELDS
+            fields |= AIR_FIELDS
     return framing.HIGHRES_IMU, framing.HIGHRES_IMU.pack(
         sample.time_boot_us,
         *sample.specific_force_frd_m_s2,

@@ -14,16 +14,19 @@ from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.decode import Decoder
-from sim_vehicle.mavlink.encode import Encoder, Message, diagonal_covariance, units_of
+from sim_vehicle.mavlink.encode import (
+    AIR_FIELDS,
+    INERTIAL_FIELDS,
+    MAGNETIC_FIELDS,
+    Encoder,
+    Message,
+    diagonal_covariance,
+    units_of,
+)
 from sim_vehicle.mavlink.streams import aiding
 
 # PX4 reads neither of them.
 _SIMULATOR = Identity(1, 51)
-
-# HIL_SENSOR.fields_updated; PX4 takes a group only with all of its bits.
-_ACCELEROMETER, _GYROSCOPE, _MAGNETOMETER = 0x7, 0x38, 0x1C0
-# Pressure, pressure altitude and temperature.
-_BAROMETER = 0x1A00
 
 _ARMED_FLAG = 0x80
 _LOCKSTEP_FLAG = 0x1
@@ -59,13 +62,13 @@ class HilDecoder:
 
 
 def _sensor(sample: HilSensor) -> Message:
-    fields = _ACCELEROMETER | _GYROSCOPE
+    fields = INERTIAL_FIELDS
     mag_x = mag_y = mag_z = pressure_hpa = altitude_m = temperature_c = 0.0
     if sample.magnetic_field_frd_gauss is not None:
-        fields |= _MAGNETOMETER
+        fields |= MAGNETIC_FIELDS
         mag_x, mag_y, mag_z = sample.magnetic_field_frd_gauss
     if sample.air is not None:
-        fields |= _BAROMETER
+        fields |= AIR_FIELDS
         air = sample.air
         pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
     return framing.HIL_SENSOR, framing.HIL_SENSOR.pack(

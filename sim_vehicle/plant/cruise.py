@@ -1,11 +1,11 @@
 """A flight that begins in the air, for studies of single hits: steady, straight, towards something."""
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 
 class Cruise:

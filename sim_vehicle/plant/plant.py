@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.control.asked import AskedSetpoint
+from sim_vehicle.control.setpoint import Setpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.faults.plan import Faults
 from sim_vehicle.faults.spec import Fault
-from sim_vehicle.physics.asked import AskedSetpoint
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.record import boxed, new_record
@@ -23,7 +24,6 @@ from sim_vehicle.plant import interval
 from sim_vehicle.plant.interval import advance_interval
 from sim_vehicle.quantities import Floats, Vector3
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import Setpoint
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import World
 

@@ -19,27 +19,31 @@ from sim_vehicle.vehicle import SimulatedVehicle
 COMPANION_LISTEN_PORT, COMPANION_PORT = 14580, 14540
 GROUND_LISTEN_PORT, GROUND_PORT = 18570, 14550
 
-_ADDRESS = re.compile(r"^(?P<scheme>\w+)://(?P<rest>[^?]+)(\?set=(?P<set>\w+))?$")
+_ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<where>[^?]+):(?P<number>[0-9]+)(\?set=(?P<set>\w+))?")
 _HIGHEST_PORT = 65_535
 _FORMS = "udpout://HOST:PORT, udpin://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
 def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
     """The port at ``address``. Raises LinkAddressError for one that is none, PortInUse for one that cannot be had."""
-    found = _ADDRESS.match(address)
+    found = _ADDRESS.fullmatch(address)
     if found is None:
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
-    scheme, rest = found["scheme"], found["rest"]
+    scheme, where, number = found["scheme"], found["where"], int(found["number"])
+    try:
+        kind = link_kind(found["set"] or ("onboard" if scheme == "serial" else "ground"))
+    except LinkAddressError as problem:
+        raise LinkAddressError(f"{address!r}: {problem}") from problem
     if scheme == "serial":
-        return SerialPort(vehicle, _kind(address, found["set"], LinkKind.ONBOARD), *_split(address, rest))
-    kind = _kind(address, found["set"], LinkKind.GROUND)
-    host, port = _host_and_port(address, rest)
+        return SerialPort(vehicle, kind, where, number)
+    if number > _HIGHEST_PORT:
+        raise LinkAddressError(f"{address!r} names no port: give one from 0 to {_HIGHEST_PORT}.")
     if scheme == "udpout":
-        return UdpPeerPort(vehicle, kind, 0, (host, port))
+        return UdpPeerPort(vehicle, kind, 0, (where, number))
     if scheme == "udpin":
-        return UdpServerPort(vehicle, kind, host, port)
+        return UdpServerPort(vehicle, kind, where, number)
     if scheme == "tcpin":
-        return TcpServerPort(vehicle, kind, host, port)
+        return TcpServerPort(vehicle, kind, where, number)
     raise LinkAddressError(f"{address!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
 
 
@@ -62,24 +66,3 @@ def px4_ports(
             port.close()
         raise
     return ports
-
-
-def _kind(address: str, name: str | None, default: LinkKind) -> LinkKind:
-    try:
-        return default if name is None else link_kind(name)
-    except LinkAddressError as problem:
-        raise LinkAddressError(f"{address!r}: {problem}") from problem
-
-
-def _split(address: str, rest: str) -> tuple[str, int]:
-    name, separator, number = rest.rpartition(":")
-    if not separator or not name or not number.isdecimal():
-        raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
-    return name, int(number)
-
-
-def _host_and_port(address: str, rest: str) -> tuple[str, int]:
-    host, port = _split(address, rest)
-    if port > _HIGHEST_PORT:
-        raise LinkAddressError(f"{address!r} names no port: give one from 0 to {_HIGHEST_PORT}.")
-    return host, port

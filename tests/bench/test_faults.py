@@ -16,9 +16,9 @@ from bench.rows.faulted import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
 from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import motor_failure, other
 from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
 from tests.companion.hostile import flight_in
 from tests.rebound_cli.command import ROOT
 
@@ -66,7 +66,7 @@ def test_each_flight_has_its_own_fault() -> None:
 @pytest.fixture
 def air() -> Air:
     """Around a companion that flies a mission, and a vehicle with a pilot."""
-    vehicle = ChangeableVehicle(load_built_in("foldable"), Scene(), 1, 0, {})
+    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, links_may_fail=True)
     companion = flight_in("mission").companion
     air = Air(vehicle, companion, Interrupts(), Injector(), random.Random(1), 60.0)
     air.add_pilot()

@@ -1,4 +1,4 @@
-"""Random packets: of every kind that there is, with senseless content, damaged, or no packets at all."""
+"""Random packets: of every kind that there is, with senseless content."""
 
 import random
 from typing import Any
@@ -45,16 +45,3 @@ def addressed_to(kind: type, payload: bytes, system: int, component: int) -> byt
             values[place] = value
     packed: bytes = kind.unpacker.pack(*values)
     return packed
-
-
-def damaged(raw: bytes, chance: random.Random) -> bytes:
-    """One bit, one byte, or the end of it gone."""
-    spoilt = bytearray(raw)
-    kind = chance.randrange(3)
-    if kind == 0:
-        spoilt[chance.randrange(len(spoilt))] ^= 1 << chance.randrange(8)
-    elif kind == 1:
-        spoilt[chance.randrange(len(spoilt))] = chance.randrange(256)
-    else:
-        del spoilt[chance.randrange(1, len(spoilt)) :]
-    return bytes(spoilt)

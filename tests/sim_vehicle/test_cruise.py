@@ -6,7 +6,6 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.scene import Scene
-from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import quiet
 
 
@@ -25,18 +24,3 @@ def test_it_goes_on_as_it_was(velocity, wind) -> None:
         np.tile(velocity, (250, 1)), abs=1e-3
     )
     assert np.array(outputs[-1].position_ned_m) == pytest.approx(body[0:3] - 0.02 * np.array(velocity), abs=1e-3)
-
-
-def test_it_hits_what_is_in_its_way_at_the_speed_it_cruised() -> None:
-    scene = Scene.model_validate({"walls": [{"point_ned_m": [2, 0, -3], "normal_ned": [-1, 0, 0]}]})
-    airframe = filtered(changes={"estimate": {"kind": "markov"}})
-    cruise = Cruise(airframe, scene, (0.0, 0.0, -3.0), (2.0, 0.0, 0.0), seed=5)
-    truth, told = cruise.plant.truth, []
-    truth.on_hit = told.append
-    while not truth.hits:
-        assert told == []
-        cruise.step()
-    # Whoever wants to know of it is told when it is over.
-    (hit,) = truth.hits
-    assert told == [hit]
-    assert hit.impact_velocity_ned_m_s[0] == pytest.approx(2.0, abs=0.05)

@@ -9,11 +9,11 @@ import pytest
 from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.hil.parameters import as_airframe_file, px4_parameters
 from sim_vehicle.physics.layout import allocation, arms_of
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.simulated import simulated
 
 # Vehicles, each flown in a thirtieth of a second.

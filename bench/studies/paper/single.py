@@ -24,9 +24,9 @@ from bench.studies.paper.figures import (
 from bench.studies.paper.study import Findings, Study, claim, safety_text
 from rebound_cli.results.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 # The paper, section IV.
 DAMPING_PER_S, STIFFNESS_PER_S2, FOLD_MAX_M = 30.0, 500.0, 0.03

@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.commander.failsafe import Failsafe
 from sim_vehicle.autopilot.commander.failsafe_table import FailsafeSituation
 from sim_vehicle.autopilot.commander.watching import GroundStation, ManualInput, Positioning
 from sim_vehicle.autopilot.land_detector import LandDetector
-from sim_vehicle.autopilot.messages import Result, Severity, StatusText
+from sim_vehicle.autopilot.messages import Result, Severity, StatusText, Texts
 from sim_vehicle.autopilot.modes import (
     NEEDS,
     NOT_ARMABLE,
@@ -49,7 +49,7 @@ class SystemStatus(IntEnum):
 class Commander:
     """Requests and the time in; the mode to fly, texts out."""
 
-    def __init__(self, parameters: Parameters, navigator: Navigator, detector: LandDetector) -> None:
+    def __init__(self, parameters: Parameters, navigator: Navigator, detector: LandDetector, texts: Texts) -> None:
         self.modes = ModeState()
         self.arming = Arming(parameters)
         self.failsafe = Failsafe()
@@ -58,7 +58,7 @@ class Commander:
         self.ground_station = GroundStation(parameters)
         self.battery = Battery(parameters)
         self.positioning = Positioning(parameters)
-        self.texts: list[StatusText] = []
+        self._texts = texts
         self._parameters = parameters
         self._navigator = navigator
         self._detector = detector
@@ -82,14 +82,14 @@ class Commander:
         was_armed = self.arming.armed
         refusal = None if was_armed else self._stick_refusal()
         if refusal is not None:
-            self._say(Severity.CRITICAL, f"Arming denied: {refusal}")
+            self._texts.say(Severity.CRITICAL, f"Arming denied: {refusal}")
             return Result.TEMPORARILY_REJECTED
         result = self.arming.arm(self._now_us, self.checks_pass)
         if result is not Result.ACCEPTED:
-            self.texts += self._problems
-            self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
+            self._texts += self._problems
+            self._texts.say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
         elif not was_armed:
-            self._say(Severity.INFO, f"Armed by {reason}")
+            self._texts.say(Severity.INFO, f"Armed by {reason}")
             self._sticks_lost_at_arming = self.sticks.sticks is None
             self._navigator.view.armed = True
             self._navigator.set_home_here()
@@ -111,13 +111,13 @@ class Commander:
         was_armed = self.arming.armed
         result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced)
         if result is not Result.ACCEPTED:
-            self._say(Severity.CRITICAL, "Disarming denied: not landed")
+            self._texts.say(Severity.CRITICAL, "Disarming denied: not landed")
         elif was_armed:
             self._disarmed(Reason.COMMAND)
         return result
 
     def _disarmed(self, reason: Reason) -> None:
-        self._say(Severity.INFO, f"Disarmed by {reason}")
+        self._texts.say(Severity.INFO, f"Disarmed by {reason}")
         self._navigator.view.armed = False
         self._navigator.disarmed()
         self.modes.apply(ModeEvent.DISARMED, self._conditions)
@@ -139,7 +139,7 @@ class Commander:
         if self.arming.armed:
             self._disarm_by_itself()
         if now_us - self._judged_us >= PERIOD_US or setpoints_changed:
-            self.texts += self.ground_station.update(now_us)
+            self._texts += self.ground_station.update(now_us)
             self.positioning.update(now_us)
             self._judge()
 
@@ -162,7 +162,7 @@ class Commander:
         if not self.sticks.moving or self.failsafe.acts or not self._sticks_override:
             return
         if self.modes.apply(ModeEvent.STICKS, self._conditions):
-            self._say(Severity.INFO, "Pilot took over using sticks")
+            self._texts.say(Severity.INFO, "Pilot took over using sticks")
             self._judge()
 
     @property
@@ -186,7 +186,7 @@ class Commander:
         decision = self.failsafe.update(self._now_us, self._situation(), self._parameters)
         self.modes.requested = False
         for text in decision.says:
-            self._say(Severity.CRITICAL, text)
+            self._texts.say(Severity.CRITICAL, text)
         if decision.intended is not self.modes.intended:
             self.modes.mean(decision.intended)
         if decision.flown is not self.modes.flown:
@@ -254,9 +254,6 @@ class Commander:
         if self.arming.armed:
             return SystemStatus.FAILSAFE if self.failsafe.acts else SystemStatus.ACTIVE
         return SystemStatus.STANDBY if self.checks_pass else SystemStatus.NOT_READY
-
-    def _say(self, severity: Severity, text: str) -> None:
-        self.texts.append(StatusText(severity, text))
 
 
 _ENDS_BY_ITSELF = (Mode.MISSION, Mode.TAKEOFF)

@@ -176,19 +176,3 @@ def mode_fallback(now: FailsafeSituation, parameters: Parameters, intended: Mode
     if mode is Mode.ALTCTL and mode in now.cannot_run:
         action, mode = Action.FALL_BACK_TO_STABILIZED, Mode.STABILIZED
     return Action.RETURN if mode in now.cannot_run else action
-
-
-def markdown_table() -> str:
-    """The rows as the document has them."""
-    lines = ["| trigger | parameter | does | ends |", "|---|---|---|---|"]
-    for row in ROWS:
-        does = ", ".join(f"{value}: {response.action.name.lower()}" for value, response in row.responses.items())
-        if row.otherwise.action is not Action.NONE:
-            does += f", else {row.otherwise.action.name.lower()}"
-        ends = sorted({r.clears.value for r in row.responses.values() if r.action > Action.WARN})
-        lines.append(f"| {row.trigger} | {row.parameter} | {does} | {', or '.join(ends)} |")
-    does = ", ".join(f"{value}: {action.name.lower()}" for value, (action, _) in OFFBOARD_LOSS.items())
-    lines.append(f"| setpoints stopped in OFFBOARD | COM_OBL_RC_ACT | {does} | with the trigger |")
-    does = "fall_back_to_altitude, fall_back_to_stabilized, return"
-    lines.append(f"| {FailsafeTrigger.MODE_CANNOT_RUN} | | {does} | with the trigger |")
-    return "\n".join(lines).replace("_", "\\_") + "\n"

@@ -4,9 +4,9 @@ import math
 
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 
 class AutoFlight:

@@ -9,9 +9,9 @@ import math
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import FollowTarget
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 # A target slower than this has no course: the vehicle keeps the side on which it is.
 _HAS_COURSE_M_S = 0.5

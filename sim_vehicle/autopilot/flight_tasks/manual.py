@@ -10,9 +10,10 @@ from sim_vehicle.autopilot.flight_tasks.smoothing import towards
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import StickInput
 from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.control.setpoint import AttitudeSetpoint, Setpoint, TrajectorySetpoint
+from sim_vehicle.estimator.estimate import level_to_north_east
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Axis3
-from sim_vehicle.setpoint import AttitudeSetpoint, Setpoint, TrajectorySetpoint
 
 GRAVITY_M_S2 = 9.80665
 # Sticks::getPositionExpo: MPC_XY_MAN_EXPO and its like were replaced by this figure.
@@ -64,7 +65,7 @@ class ManualFlight:
         yaw_rate = self._expo(sticks.yaw) * math.radians(self._parameters["MPC_MAN_Y_MAX"])
         yaw_rad = self._locked_yaw(yaw_rate, view)
         if mode not in BY_ALTITUDE:
-            return self._stabilised(sticks, yaw_rad, yaw_rate, view)
+            return self._stabilised(sticks, yaw_rate, view)
         down, v_down = self._height(sticks, view, step_s)
         if mode is Mode.ALTCTL:
             a_north, a_east = self._tilt(sticks, view)
@@ -83,7 +84,9 @@ class ManualFlight:
         parameters = self._parameters
         most_m_s, scale = parameters["MPC_VEL_MANUAL"], _DRAG_FACTOR * parameters["MPC_ACC_HOR"]
         forward, right = _within_circle(self._expo(sticks.pitch), self._expo(sticks.roll))
-        stick_north, stick_east = _turned(forward, right, self._yaw_rad if self._yaw_rad is not None else view.yaw_rad)
+        stick_north, stick_east = level_to_north_east(
+            forward, right, self._yaw_rad if self._yaw_rad is not None else view.yaw_rad
+        )
         is_free = forward == 0.0 and right == 0.0
         boost = max(2.0, math.sqrt(most_m_s)) if is_free else 1.0
         self._boost += (boost - self._boost) * step_s / (step_s + _BOOST_TIME_CONSTANT_S)
@@ -110,7 +113,7 @@ class ManualFlight:
         """ALTCTL: the stick leans the vehicle; how it moves is left to the wind."""
         most_m_s2 = GRAVITY_M_S2 * math.tan(math.radians(self._parameters["MPC_MAN_TILT_MAX"]))
         forward, right = _within_circle(sticks.pitch, sticks.roll)
-        north, east = _turned(forward, right, self._yaw_rad if self._yaw_rad is not None else view.yaw_rad)
+        north, east = level_to_north_east(forward, right, self._heading_rad(view))
         return most_m_s2 * north, most_m_s2 * east
 
     # --- height and heading ------------------------------------------------------------------------------------
@@ -138,6 +141,9 @@ class ManualFlight:
             self._yaw_rad = view.yaw_rad
         return self._yaw_rad
 
+    def _heading_rad(self, view: View) -> float:
+        return view.yaw_rad if self._yaw_rad is None else self._yaw_rad
+
     def _expo(self, stick: float) -> float:
         dead = self._parameters["MAN_DEADZONE"]
         if abs(stick) <= dead:
@@ -147,7 +153,7 @@ class ManualFlight:
 
     # --- by attitude -------------------------------------------------------------------------------------------
 
-    def _stabilised(self, sticks: StickInput, yaw_rad: float | None, yaw_rate: float, view: View) -> AttitudeSetpoint:
+    def _stabilised(self, sticks: StickInput, yaw_rate: float, view: View) -> AttitudeSetpoint:
         most_rad = math.radians(self._parameters["MPC_MAN_TILT_MAX"])
         roll, pitch = sticks.roll * most_rad, -sticks.pitch * most_rad
         tilt = math.hypot(roll, pitch)
@@ -155,7 +161,7 @@ class ManualFlight:
             roll, pitch, tilt = roll * most_rad / tilt, pitch * most_rad / tilt, most_rad
         sin = math.sin(tilt / 2) / tilt if tilt > 0.0 else 0.0
         lean = (math.cos(tilt / 2), roll * sin, pitch * sin)
-        half_yaw = (yaw_rad if yaw_rad is not None else view.yaw_rad) / 2
+        half_yaw = self._heading_rad(view) / 2
         c, s = math.cos(half_yaw), math.sin(half_yaw)
         attitude = (c * lean[0], c * lean[1] - s * lean[2], c * lean[2] + s * lean[1], s * lean[0])
         return AttitudeSetpoint(attitude, self._throttle(sticks.throttle, view), yaw_rate)
@@ -177,11 +183,6 @@ class ManualFlight:
 def _within_circle(x: float, y: float) -> tuple[float, float]:
     length = math.hypot(x, y)
     return (x / length, y / length) if length > 1.0 else (x, y)
-
-
-def _turned(forward: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    return cos * forward - sin * right, sin * forward + cos * right
 
 
 def _slewed(value: tuple[float, float], target: tuple[float, float], most: float) -> tuple[float, float]:

@@ -7,9 +7,9 @@ import math
 
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards
 from sim_vehicle.autopilot.flight_tasks.target import View
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 RADIUS_MIN_M = 1.0
 ACCELERATION_MAX_M_S2 = 2.0

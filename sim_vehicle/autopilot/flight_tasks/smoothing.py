@@ -5,9 +5,9 @@ Source: PX4's lib/motion_planning (PositionSmoothing) and its parameters, which 
 
 import math
 
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 # PX4 limits jerk too, and so brakes with about half of the greatest acceleration on average.
 BRAKE_SHARE = 0.5

@@ -6,8 +6,8 @@ every mode, offboard too: a vehicle leaves the ground some 2.4 s after it is arm
 
 from enum import IntEnum
 
+from sim_vehicle.control.setpoint import FREE, TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import FREE, TrajectorySetpoint
 
 _GRAVITY_M_S2 = 9.80665
 

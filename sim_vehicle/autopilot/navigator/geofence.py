@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sim_vehicle.autopilot.flight_tasks.target import View
-from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.messages import Severity, Texts
 from sim_vehicle.autopilot.mission_protocol import mission_items
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
 from sim_vehicle.geography import Origin
@@ -50,7 +50,7 @@ class Shape:
 class Geofence:
     """What is allowed where, judged five times a second."""
 
-    def __init__(self, parameters: Parameters, origin: Origin) -> None:
+    def __init__(self, parameters: Parameters, origin: Origin, texts: Texts) -> None:
         self._parameters = parameters
         self._origin = origin
         self._shapes: tuple[Shape, ...] = ()
@@ -58,16 +58,16 @@ class Geofence:
         self.breached = False
         self.breach_text = ""
         """What PX4 says about it when somebody tries to arm."""
-        self.texts: list[StatusText] = []
+        self._texts = texts
 
     def load(self, items: Sequence[StoredItem], view: View) -> None:
         """Take an uploaded fence; shapes that exclude home, or a flying vehicle, are left out."""
         shapes = []
         for shape in shapes_of(items, self._origin):
             if not shape.allows(*view.home_ned_m[:2]):
-                self._say("Geofence invalid, doesn't contain Home position")
+                self._texts.say(Severity.CRITICAL, "Geofence invalid, doesn't contain Home position")
             elif self._acts and not view.landed and not shape.allows(*view.position_ned_m[:2]):
-                self._say("Geofence invalid, doesn't contain current vehicle position")
+                self._texts.say(Severity.CRITICAL, "Geofence invalid, doesn't contain current vehicle position")
             else:
                 shapes.append(shape)
         self._shapes = tuple(shapes)
@@ -101,9 +101,6 @@ class Geofence:
     @property
     def _acts(self) -> bool:
         return self._parameters["GF_ACTION"] != 0
-
-    def _say(self, text: str) -> None:
-        self.texts.append(StatusText(Severity.CRITICAL, text))
 
 
 def shapes_of(items: Sequence[StoredItem], origin: Origin) -> list[Shape]:

@@ -17,7 +17,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     View,
     takeoff_acceptance,
 )
-from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.messages import Severity, Texts
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
@@ -38,7 +38,7 @@ class Work(Enum):
 class MissionFlight:
     """The run through the stored items."""
 
-    def __init__(self, store: MissionStore, parameters: Parameters, origin: Origin) -> None:
+    def __init__(self, store: MissionStore, parameters: Parameters, origin: Origin, texts: Texts) -> None:
         self._store = store
         self._parameters = parameters
         self._origin = origin
@@ -50,7 +50,7 @@ class MissionFlight:
         self.runs = False
         """An item is being flown."""
         self.target = NavigatorTarget(Kind.IDLE, (0.0, 0.0, 0.0))
-        self.texts: list[StatusText] = []
+        self._texts = texts
         self.commands: list[StoredItem] = []
         """Items that give a command; the commander and the navigator see to it."""
         self._given: list[StoredItem] = []
@@ -93,12 +93,12 @@ class MissionFlight:
         progress.reached, progress.finished = -1, False
         if self._store.mission.items and progress.valid:
             if not self.runs:
-                self._say("Executing Mission")
+                self._texts.say(Severity.INFO, "Executing Mission")
             self.runs = True
             return
         self.runs = False
         what = "refusing takeoff" if view.landed else "loitering"
-        self._say(f"No valid mission available, {what}", Severity.CRITICAL)
+        self._texts.say(Severity.CRITICAL, f"No valid mission available, {what}")
 
     def _replay_speed(self) -> None:
         """The last change of speed before the current item counts again."""
@@ -173,7 +173,7 @@ class MissionFlight:
     def _finish(self, view: View) -> None:
         self.runs = False
         self._store.progress.finished = True
-        self._say("Mission finished, landed" if view.landed else "Mission finished, loitering")
+        self._texts.say(Severity.INFO, "Mission finished, landed" if view.landed else "Mission finished, loitering")
         if view.landed:
             self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
         elif self.target.kind in (Kind.POSITION, Kind.HOLD):
@@ -207,7 +207,7 @@ class MissionFlight:
         if before is Work.ITEM and self._climb_down_m is not None:
             self._work = Work.CLIMB
             height_m = view.home_ned_m[2] - self._climb_down_m
-            self._say(f"Climb to {height_m:.1f} meters above home")
+            self._texts.say(Severity.INFO, f"Climb to {height_m:.1f} meters above home")
             kind = Kind.TAKEOFF if view.landed else Kind.HOLD
             self.target = NavigatorTarget(kind, (north, east, self._climb_down_m))
             self._climb_down_m = None
@@ -231,9 +231,6 @@ class MissionFlight:
 
     def _place(self, item: StoredItem, view: View) -> Vector3:
         return place_of(item, self._origin, view.home_ned_m)
-
-    def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
-        self.texts.append(StatusText(severity, text))
 
 
 def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, view: View) -> str | None:

@@ -15,16 +15,16 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     climbs_to,
     takeoff_acceptance,
 )
-from sim_vehicle.autopilot.messages import FollowTarget, Severity, StatusText
+from sim_vehicle.autopilot.messages import FollowTarget, Severity, Texts
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.autopilot.navigator.mission import MissionFlight, problem_of
 from sim_vehicle.autopilot.navigator.rtl import Return
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 # The navigator listens to the position at 20 Hz.
 PERIOD_US = 50_000
@@ -36,19 +36,21 @@ _MISSION_IS_ACTIVE = (Mode.MISSION, Mode.TAKEOFF, Mode.LAND)
 class Navigator:
     """The mode and the view in; targets, and setpoints towards them, out."""
 
-    def __init__(self, parameters: Parameters, origin: Origin, missions: MissionStore, view: View) -> None:
+    def __init__(
+        self, parameters: Parameters, origin: Origin, missions: MissionStore, view: View, texts: Texts
+    ) -> None:
         self.view = view
-        self.fence = Geofence(parameters, origin)
-        self.mission = MissionFlight(missions, parameters, origin)
+        self.fence = Geofence(parameters, origin, texts)
+        self.mission = MissionFlight(missions, parameters, origin, texts)
         self._parameters = parameters
         self._origin = origin
         self._missions = missions
         self._flight = AutoFlight(parameters)
-        self._return = Return(parameters, origin)
+        self._return = Return(parameters, origin, texts)
         self._orbit = Orbit(parameters)
         self._follow = Follow(parameters, origin)
         self._arrival = Arrival()
-        self._texts: list[StatusText] = []
+        self._texts = texts
         self._mode = Mode.LOITER
         self._target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
         self._takeoff_place: tuple[Vector3 | None, float | None] | None = None
@@ -164,10 +166,10 @@ class Navigator:
         if down_m is None:
             height_m = self._parameters["MIS_TAKEOFF_ALT"]
             down_m = here_down_m - height_m
-            self._say(Severity.INFO, f"Using default takeoff altitude: {height_m:.1f} m")
+            self._texts.say(Severity.INFO, f"Using default takeoff altitude: {height_m:.1f} m")
         if down_m > here_down_m:
             down_m = here_down_m
-            self._say(Severity.CRITICAL, "Already higher than takeoff altitude")
+            self._texts.say(Severity.CRITICAL, "Already higher than takeoff altitude")
         self._arrival.begin()
         self._target = NavigatorTarget(Kind.TAKEOFF, (north, east, down_m))
 
@@ -227,7 +229,7 @@ class Navigator:
         problem = problem_of(items, self._origin, self.fence, self.view)
         self._missions.progress.valid = bool(items) and problem is None
         if problem is not None:
-            self._say(Severity.CRITICAL, problem)
+            self._texts.say(Severity.CRITICAL, problem)
 
     def demand(self, step_s: float) -> TrajectorySetpoint | None:
         """The next setpoint of the mode; None lets the motors idle."""
@@ -302,17 +304,6 @@ class Navigator:
     def orbit_status(self) -> tuple[float, Vector3] | None:
         """Radius, positive for clockwise, and centre; None while no orbit is flown."""
         return self._orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
-
-    def take_texts(self) -> list[StatusText]:
-        """What there is to say since the last call."""
-        sources = (self._texts, self.mission.texts, self._return.texts, self.fence.texts)
-        texts = [text for source in sources for text in source]
-        for source in sources if texts else ():
-            source.clear()
-        return texts
-
-    def _say(self, severity: Severity, text: str) -> None:
-        self._texts.append(StatusText(severity, text))
 
 
 _FENCE_HOLDS = 2

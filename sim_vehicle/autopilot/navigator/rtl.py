@@ -8,7 +8,7 @@ import math
 from enum import Enum, auto
 
 from sim_vehicle.autopilot.flight_tasks.target import Acceptance, Arrival, Kind, NavigatorTarget, View
-from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.messages import Severity, Texts
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 
@@ -25,14 +25,14 @@ class ReturnLeg(Enum):
 class Return:
     """The stages of one return."""
 
-    def __init__(self, parameters: Parameters, origin: Origin) -> None:
+    def __init__(self, parameters: Parameters, origin: Origin, texts: Texts) -> None:
         self._parameters = parameters
         self._origin = origin
         self._arrival = Arrival()
         self._leg = ReturnLeg.DONE
         self._down_m = 0.0
         self.target = NavigatorTarget(Kind.IDLE, (0.0, 0.0, 0.0))
-        self.texts: list[StatusText] = []
+        self._texts = texts
 
     def begin(self, view: View) -> None:
         """Choose how high, and start."""
@@ -43,7 +43,8 @@ class Return:
         else:
             self._leg = ReturnLeg.CLIMB if view.height_m < return_height_m else ReturnLeg.GO
         altitude_m = self._origin.place.altitude_m - self._down_m
-        self._say(f"RTL: start return at {math.ceil(altitude_m)} m ({math.ceil(return_height_m)} m above destination)")
+        heights = f"{math.ceil(altitude_m)} m ({math.ceil(return_height_m)} m above destination)"
+        self._texts.say(Severity.INFO, f"RTL: start return at {heights}")
         self._enter(view)
 
     def update(self, view: View) -> None:
@@ -66,16 +67,13 @@ class Return:
             self.target = NavigatorTarget(Kind.POSITION, (north, east, self._down_m), yaw_rad)
         elif self._leg is ReturnLeg.LAND:
             self.target = NavigatorTarget(Kind.LAND, home, view.home_yaw_rad)
-            self._say("RTL: land at destination")
+            self._texts.say(Severity.INFO, "RTL: land at destination")
         else:
             self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
 
     def _acceptance(self) -> Acceptance:
         yaw_rad = None if self._leg is ReturnLeg.CLIMB else self.target.yaw_rad
         return Acceptance(self._parameters["NAV_ACC_RAD"], self._parameters["NAV_MC_ALT_RAD"], yaw_rad=yaw_rad)
-
-    def _say(self, text: str) -> None:
-        self.texts.append(StatusText(Severity.INFO, text))
 
 
 def return_height_over(height_m: float, distance_m: float, parameters: Parameters) -> float:

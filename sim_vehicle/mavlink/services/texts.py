@@ -7,12 +7,11 @@ announces itself as an onboard computer, on a link without a ground station, get
 from collections import deque
 from collections.abc import Iterator
 
+from sim_vehicle.autopilot.commander.watching import HEARTBEAT_TIMEOUT_US
 from sim_vehicle.autopilot.messages import StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.encode import Message
 
-# telemetry_status HEARTBEAT_TIMEOUT_US: two lost heartbeats and a half.
-GROUND_STATION_TIMEOUT_US = 2_500_000
 # A text that nobody could hear for this long is not worth sending any more.
 STALE_US = 5_000_000
 # The stream's rate is 20 Hz, one text each time.
@@ -39,7 +38,7 @@ class TextLink:
         """The messages of the next text, if it is time for one and somebody listens."""
         if not self._waiting or self.heard_us is None:
             return
-        if now_us - self.heard_us > GROUND_STATION_TIMEOUT_US or now_us - self._sent_us < TEXT_INTERVAL_US:
+        if now_us - self.heard_us > HEARTBEAT_TIMEOUT_US or now_us - self._sent_us < TEXT_INTERVAL_US:
             return
         while self._waiting:
             written_us, text = self._waiting.popleft()

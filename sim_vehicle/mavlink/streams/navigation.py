@@ -7,11 +7,11 @@ import math
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import NAN, Message, boot_ms, units_of
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 # What PX4's simulated receiver states (sensor_gps_sim).
 _HDOP_CENTI, _VDOP_CENTI, _SPEED_ACCURACY_MM_S = 70, 110, 400

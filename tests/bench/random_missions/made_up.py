@@ -8,7 +8,7 @@ from companion.reflex.collision import CollisionReport
 from companion.report import Event, FlightReport
 from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.truth import Hit
-from sim_vehicle.world import Wall
+from sim_vehicle.world import plate
 
 EPOCH_US = 1_000_000_000
 ARM_M, GUARD_M = 0.145, 0.1
@@ -126,7 +126,7 @@ def flight(
     )
     truth = FlightTruth(tuple(hits), series or plain_path(), EPOCH_US)
     events = tuple(plain_events() if events is None else events)
-    wall = Wall("wall", (2.2, 0.0, -2.0), (-1.0, 0.0, 0.0), 10.0, 10.0, 0.1)
+    wall = plate("wall", (2.2, 0.0, -2.0), (-1.0, 0.0, 0.0), (10.0, 10.0), 0.1)
     told = mission(**mission_changes)
     start = (0.0, 0.0, 0.0)
     return JudgedFlight(told, report, events, truth, start, STANDING_M, ARM_M, GUARD_M, {"wall": wall})

@@ -10,7 +10,7 @@ from bench.rows.contacts import Role, contacts_of
 from bench.rows.judge import failures
 from bench.rows.obedience import disobediences
 from bench.rows.recovered import recoveries
-from sim_vehicle.world import Wall
+from sim_vehicle.world import plate
 from tests.bench.random_missions.made_up import (
     DONE_S,
     collision,
@@ -227,7 +227,7 @@ def test_a_goal_called_out_of_reach_is_one_behind_something():
     judged = bounced(*told, policy=DETOUR)
     assert causes(judged) == []
     # with the wall 2 m beside the straight way, which is the line east = 0
-    beside = Wall("wall", (2.2, 2.0, -2.0), (0.0, -1.0, 0.0), 10.0, 10.0, 0.1)
+    beside = plate("wall", (2.2, 2.0, -2.0), (0.0, -1.0, 0.0), (10.0, 10.0), 0.1)
     assert causes(replace(judged, obstacles={"wall": beside})) == ["gave up a goal in the open"]
 
 

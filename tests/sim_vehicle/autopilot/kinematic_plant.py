@@ -4,10 +4,10 @@ import math
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result
+from sim_vehicle.control.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Axis3
-from sim_vehicle.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 
 STEP_US = 4_000
 HOVER = 0.5

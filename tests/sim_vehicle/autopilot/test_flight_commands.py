@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_TAKEOFF
 from sim_vehicle.autopilot.flight_commands import DO_ORBIT, DO_REPOSITION
 from sim_vehicle.autopilot.messages import FollowTarget, Result
 from sim_vehicle.autopilot.modes import Mode
@@ -115,25 +115,3 @@ def test_following_stays_behind_and_above_and_looks_at_the_target():
     # And without messages it stops
     flight.fly(8.0)
     assert math.hypot(*flight.state.velocity_ned_m_s) < 0.1
-
-
-def away(**parameters: float) -> Flight:
-    """Hovering 40 m north of home."""
-    flight = hovering(5.0, **parameters)
-    flight.ask(DO_REPOSITION, -1, 1, 0, NAN, *place(40.0, 0.0), NAN)
-    flight.fly(20.0)
-    return flight
-
-
-@pytest.mark.parametrize("height_m", [12.0, 20.0])
-def test_return_climbs_to_its_height_and_lands_at_home(height_m):
-    flight = away(RTL_RETURN_ALT=height_m)
-    flight.ask(NAV_RETURN_TO_LAUNCH)
-    highest = 0.0
-    while flight.autopilot.arming.armed:
-        flight.step()
-        highest = max(highest, flight.height_m)
-    assert highest == pytest.approx(height_m, abs=0.3)
-    assert math.hypot(*north_east(flight)) < 0.2
-    assert any(text.endswith(f"({math.ceil(height_m)} m above destination)") for text in flight.texts())
-    assert "RTL: land at destination" in flight.texts()

@@ -57,12 +57,6 @@ def test_what_shapes_allow(shape, inside, outside):
     assert not found.allows(*outside)
 
 
-def test_a_polygon_that_is_cut_short_is_none():
-    assert shapes_of(KEEP_IN[:3], ORIGIN) == []
-    both = shapes_of([*KEEP_IN, *circle(kinds.FENCE_CIRCLE_EXCLUSION, 9.0, 9.0, 2.0)], ORIGIN)
-    assert len(both) == 2
-
-
 @pytest.mark.parametrize(
     ("action", "mode"),
     [

@@ -62,18 +62,3 @@ def test_ground_contact_alone_is_no_landing(hinders):
     detection.feed(5.0, **{"thrust": NONE, **hinders})
     assert detection.detector.ground_contact
     assert not detection.detector.maybe_landed
-
-
-def test_turning_about_the_vertical_does_not_count_as_moving():
-    detection = Detection()
-    detection.feed(1.2, thrust=NONE, rate=(0.0, 0.0, 3.0))
-    assert detection.detector.landed
-
-
-def test_landed_lasts_without_a_demand_and_ends_with_thrust():
-    detection = Detection()
-    detection.feed(1.2, thrust=NONE)
-    detection.feed(5.0, thrust=NONE, asked_down=None, velocity=(0.0, 0.0, 0.5), rate=(0.8, 0.0, 0.0))
-    assert detection.detector.landed
-    detection.feed(0.008, thrust=0.2, asked_down=None)
-    assert not detection.detector.landed

@@ -99,15 +99,6 @@ def test_the_throttle_is_a_climb_and_centred_it_holds_the_height(mode):
     assert flight.height_m == pytest.approx(held_m, abs=0.05)
 
 
-def test_pulled_down_it_lands_and_disarms():
-    flight = flying(Mode.POSCTL)
-    for _ in range(200):
-        sticks(flight, 0.1, throttle=-1.0)
-        if not flight.autopilot.arming.armed:
-            break
-    assert "Disarmed by landing" in flight.texts()
-
-
 def test_in_altitude_mode_the_stick_leans_the_vehicle():
     flight = flying(Mode.ALTCTL)
     sticks(flight, 0.3, roll=0.5)

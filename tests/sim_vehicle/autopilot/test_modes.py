@@ -2,7 +2,6 @@
 
 import pytest
 
-from sim_vehicle.autopilot.mode_numbers import mode_from_request
 from sim_vehicle.autopilot.modes import (
     NEEDS,
     TRANSITIONS,
@@ -22,13 +21,6 @@ ASKED_FOR = [row.target for row in TRANSITIONS if row.event is ModeEvent.REQUEST
 
 def armed(*missing: Need) -> Conditions:
     return Conditions(True, EVERYTHING - set(missing))
-
-
-@pytest.mark.parametrize("mode", ASKED_FOR)
-@pytest.mark.parametrize("before", [Mode.LOITER, Mode.OFFBOARD, Mode.MANUAL, Mode.LAND])
-def test_disarmed_every_mode_is_accepted(before, mode):
-    row = find_transition(before, ModeEvent.REQUEST, DISARMED, mode)
-    assert row is not None and row.target is mode
 
 
 @pytest.mark.parametrize("mode", ASKED_FOR)
@@ -56,23 +48,3 @@ def test_after_disarming_the_mode_before_is_meant(ends_in):
 def test_every_row_can_happen_and_no_earlier_one_hides_it(row: Transition):
     source = row.sources[0] if row.sources else Mode.LOITER
     assert find_transition(source, row.event, armed(), row.target) is row
-
-
-@pytest.mark.parametrize(
-    ("base", "main", "sub", "mode"),
-    [
-        (1, 6, 0, Mode.OFFBOARD),
-        (1, 4, 0, Mode.MISSION),
-        (1, 4, 6, Mode.LAND),
-        (1, 4, 8, Mode.FOLLOW_TARGET),
-        (1, 3, 0, Mode.POSCTL),
-        (1, 3, 1, Mode.POSCTL),
-        (1, 10, 0, None),
-        (1, 4, 99, None),
-        (1, 0, 0, None),
-        (1, 77, 0, None),
-        (0, 6, 0, None),
-    ],
-)
-def test_what_do_set_mode_names(base, main, sub, mode):
-    assert mode_from_request(base, main, sub) is mode

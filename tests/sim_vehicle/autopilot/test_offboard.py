@@ -8,7 +8,7 @@ from sim_vehicle.autopilot import offboard
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
-from sim_vehicle.setpoint import FREE
+from sim_vehicle.control.setpoint import FREE
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, attitude_of_yaw, target
 
 NORTH = attitude_of_yaw(0.0)
@@ -88,25 +88,6 @@ def test_without_setpoints_offboard_can_be_chosen_but_not_armed():
     flight.fly(0.5, UP_THERE)
     assert flight.autopilot.commander.system_status == 3
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
-
-
-def test_in_the_air_offboard_without_setpoints_is_refused():
-    flight = hovering()
-    assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
-    flight.fly(2.0)
-    assert flight.ask(DO_SET_MODE, 1, 6) is Result.TEMPORARILY_REJECTED
-    assert flight.autopilot.modes.flown is Mode.LOITER
-
-
-def test_lost_setpoints_sink_land_and_disarm_and_offboard_is_shown_again():
-    flight = hovering()
-    flight.fly_until(lambda: flight.autopilot.commander.failsafe.acts, 2.0)
-    flight.fly(1.5)
-    assert flight.state.velocity_ned_m_s[2] == pytest.approx(0.7, abs=0.01)
-    assert flight.autopilot.modes.flown is Mode.POSCTL
-    flight.fly_until(lambda: not flight.autopilot.arming.armed, 10.0)
-    assert flight.height_m == 0.0
-    assert flight.autopilot.modes.flown is Mode.OFFBOARD
 
 
 def test_setpoints_that_come_back_put_it_into_offboard_again():

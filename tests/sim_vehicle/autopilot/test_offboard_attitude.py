@@ -10,9 +10,9 @@ from sim_vehicle.autopilot import offboard
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, RUN_PREARM_CHECKS
 from sim_vehicle.autopilot.messages import AttitudeTarget, Result
 from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.control.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 from tests.sim_vehicle.autopilot.flying import hovering, set_mode
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Flight, target
 

@@ -7,11 +7,9 @@ import pytest
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
 from sim_vehicle.autopilot.flight_tasks.auto_flight import land_speed_m_s
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
-from sim_vehicle.autopilot.flight_tasks.takeoff import wants_takeoff
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.flying import hovering
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
@@ -48,21 +46,6 @@ def test_armed_and_left_alone_it_stays_on_the_ground_and_disarms():
         assert waited_s == pytest.approx(11.0, abs=0.02)
         assert flight.height_m == 0.0
         assert flight.autopilot.texts[-1].text == "Disarmed by auto preflight disarming"
-
-
-@pytest.mark.parametrize(
-    ("demand", "wants"),
-    [
-        (None, False),
-        (TrajectorySetpoint(position_ned_m=(0.0, 0.0, -1.0)), True),
-        (TrajectorySetpoint(position_ned_m=(0.0, 0.0, 1.0)), False),
-        (TrajectorySetpoint(velocity_ned_m_s=(0.0, 0.0, -0.1)), True),
-        (TrajectorySetpoint(velocity_ned_m_s=(3.0, 0.0, 0.0)), False),
-        (TrajectorySetpoint(acceleration_ned_m_s2=(0.0, 0.0, -1.0)), True),
-    ],
-)
-def test_what_counts_as_wanting_to_take_off(demand, wants):
-    assert wants_takeoff(demand, down_m=0.0) is wants
 
 
 def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground():

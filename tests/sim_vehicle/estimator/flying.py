@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.onboard import OnboardEstimator
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 Floats = npt.NDArray[np.float64]
 

@@ -1,14 +1,10 @@
 """The filter's model: every derivative against small differences, every sign against a case everyone knows."""
 
-import math
-
 import numpy as np
 import pytest
 
 from sim_vehicle.estimator.strapdown import (
-    D_POSITION,
     ERROR_ROWS,
-    FLOW,
     NOMINAL_ROWS,
     SAMPLE_COLUMNS,
     advance,
@@ -82,49 +78,6 @@ def test_each_measurements_row_is_its_derivative(measure) -> None:
     for column in range(ERROR_ROWS):
         plus, minus = (measure(erred(tilted(), column, sign * 1e-6), unused) for sign in (1, -1))
         assert (plus - minus) / 2e-6 == pytest.approx(row[column], abs=1e-6)
-
-
-def test_a_level_vehicle_that_nothing_pushes_but_its_weight_stays() -> None:
-    nominal, sample = np.zeros(NOMINAL_ROWS), np.zeros(SAMPLE_COLUMNS)
-    nominal[6], nominal[2], sample[2] = 1.0, -2.0, -9.81
-    after, _, _ = advanced(nominal, sample)
-    assert after == pytest.approx(nominal)
-
-
-def test_forward_makes_the_ground_flow_about_right_and_right_about_back() -> None:
-    # Given a vehicle 2 m up, nose north, moving north, then east, at 1 m/s
-    sample = np.zeros(SAMPLE_COLUMNS)
-    sample[2] = -9.81
-    nominal = np.zeros(NOMINAL_ROWS)
-    nominal[6], nominal[2] = 1.0, -2.0
-    for axis, expected in ((3, (0.0, 0.5)), (4, (-0.5, 0.0))):
-        moving = nominal.copy()
-        moving[axis] = 1.0
-        # Then the flow over one step is speed over height, about the axis that OPTICAL_FLOW_RAD says
-        after, _, _ = advanced(moving, sample)
-        assert after[FLOW : FLOW + 2] / STEP_S == pytest.approx(expected)
-
-
-def test_a_tilted_beam_is_longer_and_the_heading_is_clockwise_from_north() -> None:
-    nominal, row = np.zeros(NOMINAL_ROWS), np.empty(ERROR_ROWS)
-    nominal[2] = -2.0
-    nominal[6:10] = [math.cos(0.15), math.sin(0.15), 0.0, 0.0]
-    assert down_range(nominal, row) == pytest.approx(2.0 / math.cos(0.3))
-    assert row[D_POSITION + 2] < 0
-    nominal[6:10] = [math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]
-    assert heading(nominal, row) == pytest.approx(math.pi / 2)
-
-
-def test_clipping_opens_the_velocity_along_the_clipped_axis_only() -> None:
-    # Given a vehicle whose nose points east, and ten raw samples clipped along its nose
-    nominal, sample = np.zeros(NOMINAL_ROWS), np.zeros(SAMPLE_COLUMNS)
-    nominal[2], nominal[6:10] = -2.0, [math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]
-    sample[2], sample[6] = -9.81, 10
-    _, _, q = advanced(nominal, sample)
-    # Then the east velocity may have lost ten times what one may lose, the others nothing
-    assert math.sqrt(q[4, 4]) == pytest.approx(1.0, rel=1e-3)
-    assert math.sqrt(q[3, 3]) == pytest.approx(1e-3, rel=1e-3)
-    assert math.sqrt(q[5, 5]) == pytest.approx(1e-3, rel=1e-3)
 
 
 def test_the_output_predictor_brings_the_state_through_the_samples_not_used_yet() -> None:

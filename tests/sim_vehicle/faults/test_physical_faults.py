@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.faults.wind import Dryden, risen, strengths_and_lengths
+from sim_vehicle.faults.wind import Dryden, strengths_and_lengths
 from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
@@ -32,16 +32,6 @@ def velocity(cruise: Cruise) -> np.ndarray:
 
 
 # --- air -------------------------------------------------------------------------------------------------
-
-
-def test_a_gust_rises_stays_and_falls_with_the_integral_of_its_shape() -> None:
-    """Two half cosines make one rise: amplitude times (length - rise)."""
-    times = np.arange(0.0, 5.0, 0.001)
-    shape = np.array([risen(time_s, 1.0, 4.0, 0.5) for time_s in times])
-    assert shape.sum() * 0.001 == pytest.approx(3.0 - 0.5, abs=1e-3)
-    assert shape[times < 1.0].max() == 0.0 and shape[times > 4.0].max() == 0.0
-    assert risen(1.25, 1.0, 4.0, 0.5) == pytest.approx(0.5)
-    assert (shape[(times > 1.5) & (times < 3.5)] == 1.0).all()
 
 
 def test_a_gust_pushes_by_the_drag_of_its_air() -> None:
@@ -181,19 +171,6 @@ def test_a_bias_and_a_stuck_axis_show_in_the_mean_sample() -> None:
 
 
 # --- estimate ----------------------------------------------------------------------------------------------
-
-
-def test_a_reset_jumps_says_so_and_the_velocity_finds_back() -> None:
-    cruise = hover(
-        {"kind": "estimator_reset", "at_s": 0.2, "position_jump_ned_m": [0.5, 0, 0],
-         "velocity_jump_ned_m_s": [0, 0.4, 0], "settles_s": 0.1}
-    )  # fmt: skip
-    outputs = fly(cruise, 0.24)
-    assert {output.reset_counter for output in outputs[:49]} == {0} and outputs[-1].reset_counter == 1
-    assert outputs[51].position_ned_m[0] - outputs[48].position_ned_m[0] == pytest.approx(0.5, abs=0.01)
-    assert outputs[50].velocity_ned_m_s[1] == pytest.approx(0.4, abs=0.03)
-    late = fly(cruise, 0.8)[-1]
-    assert late.velocity_ned_m_s[1] - cruise.plant.state.body[4] == pytest.approx(0.0, abs=0.03)
 
 
 @pytest.mark.parametrize(("name", "disturbed"), [("rigid", True), ("foldable", False)])

@@ -5,10 +5,8 @@ import pytest
 from sim_vehicle.errors import NotInLockstep
 from sim_vehicle.hil.exchange import (
     ANSWER_TIMEOUT_US,
-    MOVES,
     STARTING_TIMEOUT_US,
     Exchange,
-    ExchangeEvent,
     ExchangePhase,
 )
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls
@@ -81,37 +79,3 @@ def test_a_px4_with_a_clock_of_its_own_is_refused(wrong):
     exchange.sent(4_000, 0)
     with pytest.raises(NotInLockstep, match="lockstep"):
         exchange.received(wrong)
-
-
-REACHED = {
-    ExchangePhase.WAITING: Exchange,
-    ExchangePhase.STARTING: starting,
-    ExchangePhase.READY: in_lockstep,
-    ExchangePhase.AWAITING: lambda: with_a_sample_out(in_lockstep()),
-}
-DOES = {
-    ExchangeEvent.CONNECTED: lambda exchange: exchange.connected(0),
-    ExchangeEvent.SENT: lambda exchange: exchange.sent(8_000, 1_000),
-    ExchangeEvent.ANSWERED: lambda exchange: answered(exchange),
-    ExchangeEvent.OVERDUE: lambda exchange: exchange.look_at_clock(1_000 + ANSWER_TIMEOUT_US),
-    ExchangeEvent.CLOSED: lambda exchange: exchange.closed(),
-}
-
-
-def with_a_sample_out(exchange: Exchange) -> Exchange:
-    exchange.sent(8_000, 1_000)
-    return exchange
-
-
-def answered(exchange: Exchange) -> None:
-    if exchange.phase is ExchangePhase.STARTING:
-        exchange.sent(8_000, 1_000)
-    exchange.received(answer(8_000))
-
-
-@pytest.mark.parametrize(("phase", "event"), MOVES, ids=lambda value: value.name)
-def test_every_move_of_the_table_happens(phase, event):
-    exchange = REACHED[phase]()
-    assert exchange.phase is phase
-    DOES[event](exchange)
-    assert exchange.phase is MOVES[phase, event]

@@ -159,33 +159,6 @@ def test_unsigned_packets_are_taken_where_the_parameter_says(guarded, sign_cfg, 
     assert bool(guarded.ends[1].all("COMMAND_ACK")) == heard
 
 
-def stamps(end: End) -> list[int]:
-    return [int.from_bytes(raw[-12:-6], "little") for raw in end.packets]
-
-
-def test_time_stamps_begin_at_the_cards_until_a_later_one_is_heard_on_that_link(guarded):
-    companion, other = guarded.ends
-    guarded.run(0.5)
-    assert stamps(companion)[:3] == [1, 2, 3]
-    # When the companion is heard with the clock's
-    companion.forget()
-    signed(companion, time_stamp=10**14)
-    companion.heartbeat()
-    guarded.run(0.5)
-    later = [stamp for stamp in stamps(companion) if stamp > 10**14]
-    assert later[:2] == [10**14 + 1, 10**14 + 2] and max(stamps(other)) < 10**6
-    # And after a restart it begins again, with no memory of what was heard
-    companion.command(246, 1)
-    guarded.run(3.0)
-    companion.forget()
-    guarded.run(0.5)
-    assert stamps(companion)[0] < 10**6
-    signed(companion, time_stamp=10**13)
-    companion.command(400, 0)
-    guarded.run(0.05)
-    assert companion.all("COMMAND_ACK")
-
-
 # As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)
 FILE_REQUESTS = [
     *[(3, b"/", 6), (3, b"", 6), (3, b"/nope", 10), (4, b"/nope", 10), (14, b"/nope", 10), (10, b"/nope", 10)],

@@ -90,6 +90,12 @@ def test_what_a_hovering_vehicle_says_of_itself(hovering):
     target = hovering.last("ATTITUDE_TARGET")
     assert math.hypot(*target.q) == pytest.approx(1.0) and target.q[0] == pytest.approx(1.0, abs=0.05)
     assert 100 * target.thrust == pytest.approx(hovering.last("VFR_HUD").throttle, abs=10)
+    asked = hovering.last("POSITION_TARGET_LOCAL_NED")
+    # Every axis is asked for, and the heading; no turning
+    assert (asked.coordinate_frame, asked.type_mask) == (1, 0x800)
+    assert (asked.x, asked.y, asked.z) == pytest.approx(hovering.position(), abs=0.2) and asked.vz == 0.0
+    # The mean distance of successive samples, whose noise is 0.25 m/s2 on each of three axes
+    assert hovering.last("VIBRATION").vibration_z == pytest.approx(0.25 * 4 / math.sqrt(math.pi), rel=0.3)
     field = hovering.last("HIGHRES_IMU")
     # The field of Zurich: 0.2 gauss north, 0.43 down; the nose points north
     assert (field.xmag, field.zmag) == (pytest.approx(0.21, abs=0.03), pytest.approx(0.43, abs=0.03))
@@ -160,7 +166,10 @@ def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiti
     assert abs(alike) == pytest.approx(1.0, abs=1e-3)
     told = orbiting.last("ATTITUDE")
     yaw_rad = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+    roll_rad, pitch_rad = math.atan2(2 * (qw * qx + qy * qz), 1 - 2 * (qx * qx + qy * qy)), 2 * (qw * qy - qz * qx)
     assert math.remainder(told.yaw - yaw_rad, 2 * math.pi) == pytest.approx(0.0, abs=0.05)
+    # It leans inward, which is ahead, by 4 degrees: the nose is down
+    assert (told.roll, told.pitch) == pytest.approx((roll_rad, pitch_rad), abs=0.03) and told.pitch < -0.04
     assert (told.rollspeed, told.pitchspeed, told.yawspeed) == pytest.approx((p, q, r), abs=0.06)
     assert (turned.rollspeed, turned.pitchspeed, turned.yawspeed) == pytest.approx((p, q, r), abs=0.06)
     felt = orbiting.last("HIGHRES_IMU")
@@ -170,3 +179,19 @@ def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiti
     assert math.hypot(vx, vy) == pytest.approx(2.0, abs=0.2) and r == pytest.approx(-1 / 3, abs=0.1)
     for stamp_us in (felt.time_usec, orbiting.last("ODOMETRY").time_usec, 1000 * told.time_boot_ms):
         assert orbiting.time_s - 1e-6 * stamp_us < 0.05
+
+
+def test_a_vehicle_with_a_filter_says_how_sure_it_is_of_itself():
+    # Given a vehicle that sees the ground pass, and nothing that stays
+    client = Client(airframe=filtered())
+    client.run(3.0)
+    stands = client.last("ODOMETRY")
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(30.0)
+    flies, body = client.last("ODOMETRY"), client.vehicle.state.body
+    # Then it is less and less sure of its place, and rightly so; of its speed and its tilt it stays as sure
+    assert flies.pose_covariance[0] > 20 * stands.pose_covariance[0] > 0.0
+    assert math.dist((flies.x, flies.y), body[:2]) < 3 * math.sqrt(2 * flies.pose_covariance[0])
+    assert math.dist((flies.vx, flies.vy), body[3:5]) < 3 * math.sqrt(2 * flies.velocity_covariance[0]) < 0.2
+    assert 0.0 < flies.pose_covariance[15] < 0.01**2 and flies.velocity_covariance[0] > stands.velocity_covariance[0]

@@ -113,27 +113,3 @@ def plain(message, name):
 
 
 HEARTBEAT, TARGET = packet(MESSAGES[0]), packet(MESSAGES[-1])
-
-
-@pytest.mark.parametrize(
-    "noise",
-    [
-        b"\x00\x01garbage",
-        b"\xfd",
-        b"\xfd\xff\x00",
-        b"\xfe\xff",
-        b"\xfd" * 20,
-        TARGET[:-1],
-        TARGET[:5],
-        TARGET[:-1] + bytes([TARGET[-1] ^ 1]),
-        b"\xfd\x09\xf0" + HEARTBEAT[3:],
-        b"\xfd\xff\x00" + TARGET[3:],
-        packet(MESSAGES[0], v1=True)[:-1],
-    ],
-    ids=repr,
-)
-def test_what_follows_noise_is_not_held_up(noise):
-    end = decoder()
-    assert end.push(noise) == []
-    assert ids(end.push(HEARTBEAT)) == [0]
-    assert ids(end.push(HEARTBEAT)) == [0]

@@ -1,80 +1,16 @@
 """What the messages contain, and the silent rule of STATUSTEXT."""
 
-import math
-
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Identity, Severity, StatusText
-from sim_vehicle.mavlink import encode, framing
+from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.services.texts import TextLink
-from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
-from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
-from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, STANDING, attitude_of_yaw
-
-SECOND = 1_000_000
-SAMPLE = STANDING._replace(
-    time_boot_us=12_345_678,
-    specific_force_frd_m_s2=(0.5, -0.25, -9.75),
-    angular_velocity_frd_rad_s=(0.125, 0.25, -0.5),
-    clipping_counts=(1, 2, 3),
-    position_ned_m=(1.5, -2.5, -3.25),
-    velocity_ned_m_s=(0.5, 0.75, -0.125),
-    attitude_wxyz=attitude_of_yaw(math.pi / 2),
-    thrust_fraction=0.5,
-)
-
-
-def telemetry() -> Telemetry:
-    return Telemetry(SAMPLE, SAMPLE, Autopilot(HOVER, SAMPLE, Parameters()), VibrationMetrics(), 1e-4, 4e-4, 9e-4)
 
 
 def read_back(message):
     return dialect.MAVLink(None).decode(bytearray(Encoder(Identity()).packet(message)))
-
-
-def test_pitching_up_is_positive_and_right_wing_down_rolls_positive():
-    nose_up = SAMPLE._replace(attitude_wxyz=(math.cos(0.1), 0.0, math.sin(0.1), 0.0))
-    right_down = SAMPLE._replace(attitude_wxyz=(math.cos(0.1), math.sin(0.1), 0.0, 0.0))
-    state = telemetry()
-    state.sample = nose_up
-    assert read_back(encode.attitude(state)).pitch == pytest.approx(0.2)
-    state.sample = right_down
-    assert read_back(encode.attitude(state)).roll == pytest.approx(0.2)
-
-
-@pytest.mark.parametrize(
-    ("applied", "mask", "fields"),
-    [
-        (None, 0xDFF, {}),
-        (TrajectorySetpoint(position_ned_m=(1.0, 2.0, -3.0)), 0xDF8, {"x": 1.0, "z": -3.0}),
-        (
-            TrajectorySetpoint((1.0, 2.0, None), (0.0, 0.0, 0.5), yaw_rad=0.25),
-            0x9C4,
-            {"y": 2.0, "vz": 0.5, "yaw": 0.25},
-        ),
-    ],
-)
-def test_the_position_target_says_what_is_flown(applied, mask, fields):
-    state = telemetry()
-    state.autopilot.applied = applied
-    message = read_back(encode.position_target_local_ned(state))
-    assert (message.coordinate_frame, message.type_mask) == (1, mask)
-    for field, value in fields.items():
-        assert getattr(message, field) == value
-    assert math.isnan(message.afx)
-
-
-def test_vibration_is_the_slow_mean_of_the_jumps():
-    metric = VibrationMetrics()
-    for number in range(2_000):
-        sign = 1.0 if number % 2 else -1.0
-        metric.update((0.0, sign, -9.81), (0.0, 0.0, 0.25 * sign))
-    assert metric.accelerometer_m_s2 == pytest.approx(2.0, rel=1e-3)
-    assert metric.gyroscope_rad_s == pytest.approx(0.5, rel=1e-3)
 
 
 # --- STATUSTEXT -------------------------------------------------------------------------------------------

@@ -4,27 +4,7 @@ import math
 
 import pytest
 
-from sim_vehicle.airframe import load_built_in
-from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
-from sim_vehicle.parameters.store import Parameters, definitions
-
-
-def test_names_are_px4s_and_their_defaults_lie_within_their_ranges():
-    rows = definitions()
-    assert len(rows) > 100
-    assert list(rows) == sorted(rows)
-    for row in rows.values():
-        assert len(row.name) <= 16 and row.name == row.name.upper()
-        assert isinstance(row.default, int) is row.is_whole
-        assert row.limited(row.default) == row.default, row.name
-
-
-def test_some_count_only_after_a_reboot():
-    parameters = Parameters()
-    parameters.set("MAV_SYS_ID", 7)
-    assert (parameters["MAV_SYS_ID"], parameters.stored("MAV_SYS_ID")) == (1, 7)
-    parameters.boot()
-    assert parameters["MAV_SYS_ID"] == 7
+from sim_vehicle.parameters.store import Parameters
 
 
 @pytest.mark.parametrize(("value", "counts"), [(100.0, 8.0), (-1.0, 0.5), (math.nan, 3.0), (math.inf, 8.0)])
@@ -33,21 +13,3 @@ def test_what_is_out_of_range_is_stored_but_does_not_count(value, counts):
     parameters.set("MPC_Z_VEL_MAX_UP", value)
     assert str(parameters.stored("MPC_Z_VEL_MAX_UP")) == str(value)
     assert parameters["MPC_Z_VEL_MAX_UP"] == counts
-
-
-def test_an_airframe_brings_its_own_gains_in_place_of_px4s():
-    airframe = load_built_in("foldable")
-    parameters = Parameters(defaults_from(airframe))
-    assert parameters["MPC_XY_VEL_P_ACC"] == airframe.control.velocity_p_per_s
-    assert parameters["IMU_INTEG_RATE"] == 250
-    gains = position_gains(parameters)
-    assert gains["tilt_max_rad"] == pytest.approx(airframe.control.tilt_max_rad)
-    assert gains["velocity_i"] == (airframe.control.velocity_i_per_s2,) * 3
-
-
-@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
-def test_a_value_without_end_does_not_count_where_px4_states_no_range(value):
-    parameters = Parameters()
-    for name in ("RTL_RETURN_ALT", "BAT1_V_CHARGED"):
-        parameters.set(name, value)
-        assert math.isfinite(parameters[name])

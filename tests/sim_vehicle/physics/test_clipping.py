@@ -74,12 +74,3 @@ def test_a_part_is_taken_for_a_tilt() -> None:
 
     # 15 degrees of 7.8 m/s; with constant gains half as much again.
     assert 1.0 < nose_up_rad / (np.radians(15.0) * hidden_m_s / 7.8) < 1.5
-
-
-def test_the_place_errs_by_what_the_velocity_has_missed() -> None:
-    """Given a hit to the north, then the estimate soon is inside the wall, and comes back."""
-    inside_m = error_after(throw(airframe("rigid"), 2.0, duration_s=0.3).plant)[0]
-    back_m = error_after(throw(airframe("rigid"), 2.0, duration_s=2.5).plant)[0]
-
-    assert 0.3 < inside_m < 1.0
-    assert abs(back_m) < 0.05 * inside_m

@@ -8,6 +8,7 @@ import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import (
     constants_from,
@@ -15,7 +16,6 @@ from sim_vehicle.physics.layout import (
 )
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import quiet
 
@@ -34,15 +34,6 @@ def hovering(airframe: Airframe, seed: int = 1, **scene: object) -> Plant:
     plant = Plant(airframe, Scene.model_validate(scene), seed)
     flown(plant, at(0, 0, -2), 8)
     return plant
-
-
-@pytest.mark.parametrize("yaw_deg", [0, 90, -135])
-def test_it_holds_a_setpoint_and_a_heading(yaw_deg: float) -> None:
-    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
-    flown(plant, at(1.0, -0.5, -2.0, math.radians(yaw_deg)), 12)
-    assert plant.state.body[0:3] == pytest.approx([1.0, -0.5, -2.0], abs=0.02)
-    half = math.radians(yaw_deg) / 2
-    assert abs(plant.state.body[6:10] @ [math.cos(half), 0, 0, math.sin(half)]) > 0.9999
 
 
 def test_a_tipped_vehicle_thrusts_as_it_would_to_hover() -> None:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from sim_vehicle.control.setpoint import AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.physics.layout import ASKED_ATTITUDE, ASKED_RATES, ASKED_TRAJECTORY, SetpointRows
 from sim_vehicle.physics.record import boxed, new_record
 from sim_vehicle.physics.rotation import matrix_from_quaternion
-from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 
 
 class AskedSetpoint:
