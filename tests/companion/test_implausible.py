@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.packets import made
 from companion.messages import (
     ImuSample,
+    LandedState,
     LocalPosition,
     Odometry,
     PositionSetpoint,
@@ -22,7 +22,6 @@ from tests.companion.fake_vehicle import LOITER, flight
 from tests.companion.hostile import attacked, flight_in
 
 STILL = (0.0, 0.0, 0.0)
-IMU_MS = 4
 
 
 def told(at_ms, north_m, counter=0, speed_m_s=0.0):
@@ -129,10 +128,9 @@ def test_a_landing_counts_where_the_height_does_not_speak_against_it(height_m, s
     # Given a vehicle on its way to its goal, when it is said five times to stand on the ground
     f = flight_in("mission")
     f.run_for(0.5)
-    landed = mav.MAVLink_extended_sys_state_message(0, mav.MAV_LANDED_STATE_ON_GROUND)
     for _ in range(10):
         f.vehicle.position[2] = -height_m
-        attacked(f, [bytes(landed.pack(mav.MAVLink(None, 1, 1)))])
+        attacked(f, [made("EXTENDED_SYS_STATE", {"landed_state": LandedState.ON_GROUND})])
     # Then a hit of that moment is answered up in the air, and not below the height from which hits count
     f.vehicle.push_m_s2 = (-60.0, 0.0)
     f.step()
@@ -200,7 +198,7 @@ def test_a_position_that_comes_late_or_from_before_a_reboot_is_no_fault(late_ms)
     """By as much as a mean's time or a second, for which what is learnt of drag and wind would be divided by zero."""
     f = flight_in("returning")
     for _ in range(200):
-        stamp_ms = f.vehicle.time_us // 1000
-        late = mav.MAVLink_local_position_ned_message(stamp_ms - late_ms, *f.vehicle.position, *f.vehicle.velocity)
-        attacked(f, [bytes(late.pack(mav.MAVLink(None, 1, 1)))])
+        motion = zip(("x", "y", "z", "vx", "vy", "vz"), [*f.vehicle.position, *f.vehicle.velocity], strict=True)
+        late = {"time_boot_ms": f.vehicle.time_us // 1000 - late_ms, **dict(motion)}
+        attacked(f, [made("LOCAL_POSITION_NED", late)])
     assert "fault" not in f.kinds(), f.texts()
