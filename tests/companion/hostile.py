@@ -3,24 +3,17 @@
 import math
 import random
 from collections.abc import Iterable
-from functools import cache
 
 from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.packets import decoded, made, outside
 from companion.mavlink.readers import READERS
-from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.companion.fake_vehicle import FakeVehicle
 from tests.flying import Flight
 
 HEARD = sorted(READERS)
-# The states of a flight, and a mission that passes them all: into a wall, home and down.
+# The states of a flight.
 STATES = ("connect", "takeoff", "mission", "recovering", "holding", "returning", "landing")
-ITEMS = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"return": {}},
-]
-POLICY = {"then": "hold", "hold_s": 1.0}
 
 FLOATS = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, -1e20, 1e-45, 0.0, -0.0, 1e6, -1e6)
 MILD = (-1000.0, -100.0, -40.0, -10.0, -3.0, -1.0, -0.1, 0.1, 1.0, 3.0, 10.0, 40.0, 100.0, 1000.0)
@@ -92,16 +85,3 @@ def assert_inside(f: Flight, frame: bytes) -> None:
     """What a setpoint asks for is finite, inside the fence, and within the limits; whatever it is not asked is NaN."""
     core = f.companion.core
     assert core is not None and outside(core, frame) is None, str(decoded(frame))
-
-
-def flight_in(state: str) -> Flight:
-    """A flight that has just come to the state; of a mission that flies into a wall."""
-    return _flight_in(state).copy()
-
-
-@cache
-def _flight_in(state: str) -> Flight:
-    vehicle = FakeVehicle(wall_north_m=3.0, battery_percent=80)
-    f = flight(vehicle, items=ITEMS, on_collision=POLICY)
-    f.run_to(state)
-    return f

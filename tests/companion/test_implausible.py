@@ -18,8 +18,8 @@ from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
 from companion.reflex.confirmation import Hypothesis
-from tests.companion.fake_vehicle import LOITER, flight
-from tests.companion.hostile import attacked, flight_in
+from tests.companion.fake_vehicle import LOITER, flight, flying_in
+from tests.companion.hostile import attacked
 
 STILL = (0.0, 0.0, 0.0)
 
@@ -126,7 +126,7 @@ def test_a_jump_of_the_velocity_that_fades_is_a_hit_where_one_velocity_shows_hal
 @pytest.mark.parametrize(("height_m", "state"), [(1.5, "recovering"), (0.3, "mission")])
 def test_a_landing_counts_where_the_height_does_not_speak_against_it(height_m, state):
     # Given a vehicle on its way to its goal, when it is said five times to stand on the ground
-    f = flight_in("mission")
+    f = flying_in("mission")
     f.run_for(0.5)
     for _ in range(10):
         f.vehicle.position[2] = -height_m
@@ -146,7 +146,7 @@ def place_in(sent):
 
 @pytest.mark.parametrize("state", ["takeoff", "mission", "returning"])
 def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_with_nothing(state):
-    f = flight_in(state)
+    f = flying_in(state)
     f.run_until(lambda: f.vehicle.armed)
     f.run_for(0.7)
     # When positions stop coming for longer than the detector may be without a sample
@@ -163,7 +163,7 @@ def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_
 
 
 def test_a_clock_that_jumps_is_no_silence_of_the_positions():
-    f = flight_in("mission")
+    f = flying_in("mission")
     f.run_for(0.7)
     # When the clock jumps, as of a suspended computer, and an IMU sample is the first that comes
     f.run_until(lambda: f.vehicle.ticks % 5 == 1)
@@ -181,7 +181,7 @@ def test_a_clock_that_jumps_is_no_silence_of_the_positions():
 
 @pytest.mark.slow
 def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
-    f = flight_in("recovering")
+    f = flying_in("recovering")
     began_us = f.now_us
     timeout_us = 10_000_000
     while f.state == "recovering" and f.now_us - began_us < 2 * timeout_us:
@@ -196,7 +196,7 @@ def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
 @pytest.mark.parametrize("late_ms", [200, 1000])
 def test_a_position_that_comes_late_or_from_before_a_reboot_is_no_fault(late_ms):
     """By as much as a mean's time or a second, for which what is learnt of drag and wind would be divided by zero."""
-    f = flight_in("returning")
+    f = flying_in("returning")
     for _ in range(200):
         motion = zip(("x", "y", "z", "vx", "vy", "vz"), [*f.vehicle.position, *f.vehicle.velocity], strict=True)
         late = {"time_boot_ms": f.vehicle.time_us // 1000 - late_ms, **dict(motion)}
