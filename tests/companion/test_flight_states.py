@@ -47,5 +47,5 @@ def test_each_state_is_reached_and_only_the_ends_have_no_way_out(table, start, e
         for target in set(table.rows[frontier.pop()].values()) - reached:
             reached.add(target)
             frontier.append(target)
-    assert reached == set(type(start)) == set(table.rows)
+    assert reached == set(start.__class__) == set(table.rows)
     assert {state for state in reached if not table.rows[state]} == ends
