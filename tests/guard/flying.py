@@ -40,7 +40,7 @@ class GuardedFlight(Commanded):
         self.others_last: dict[str, Any] = {}
         self.forward = 0.0
 
-    def send(self, message: Any, *_: object) -> None:
+    def send(self, message: Any) -> None:
         self._others.append(message.pack(dialect.MAVLink(None, *GROUND_STATION)))
 
     def has_pilot(self) -> None:
