@@ -12,13 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from pymavlink.dialects.v20 import development as mav
-
+from bench.fly.packets import decoded, number_of
 from bench.fly.virtual_time import EPOCH_US, INTERVAL_US, VirtualTime
 from companion.companion import Companion
+from companion.mavlink.packet import message_id_of
 from companion.report import Event, FlightReport
-
-SETPOINT_ID = 84
 
 
 @dataclass
@@ -64,10 +62,14 @@ class Flight(VirtualTime):
     def report(self) -> FlightReport:
         return self.companion.report()
 
+    def messages(self, name: str, since_us: int = 0) -> list[tuple[int, Any]]:
+        """What the companion has sent by that name after `now_us` = since_us, each with its time."""
+        number = number_of(name)
+        return [(t, decoded(frame)) for t, frame in self.sent if t > since_us and message_id_of(frame) == number]
+
     def setpoints_since(self, time_us: int) -> list[tuple[int, Any]]:
-        """Setpoints by place sent after `now_us` = time_us."""
-        frames = [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == SETPOINT_ID]
-        return [(t, mav.MAVLink(None).decode(bytearray(frame))) for t, frame in frames]
+        """Setpoints by place."""
+        return self.messages("SET_POSITION_TARGET_LOCAL_NED", time_us)
 
 
 def in_a_child(work: Callable[[], Any]) -> Any:

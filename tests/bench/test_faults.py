@@ -19,7 +19,7 @@ from sim_vehicle.airframe import load_built_in
 from sim_vehicle.bench.faults import motor_failure, other
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.companion.hostile import flight_in
+from tests.companion.fake_vehicle import flying_in
 from tests.rebound_cli.command import ROOT
 
 SETPOINT = {"x": 1.0, "z": -1.5, "type_mask": 0xDF8}
@@ -44,7 +44,7 @@ def test_every_group_has_rows_and_there_are_as_many_as_promised() -> None:
     ],
 )
 def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong: str | None) -> None:
-    core = flight_in("mission").companion.core
+    core = flying_in("mission").companion.core
     assert core is not None
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
 
@@ -67,7 +67,7 @@ def test_each_flight_has_its_own_fault() -> None:
 def air() -> Air:
     """Around a companion that flies a mission, and a vehicle with a pilot."""
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, links_may_fail=True)
-    companion = flight_in("mission").companion
+    companion = flying_in("mission").companion
     air = Air(vehicle, companion, Interrupts(), Injector(), random.Random(1), 60.0)
     air.add_pilot()
     return air

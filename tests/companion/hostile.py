@@ -3,24 +3,17 @@
 import math
 import random
 from collections.abc import Iterable
-from functools import cache
 
 from pymavlink.dialects.v20 import development as mav
 
-from bench.fly.packets import outside
+from bench.fly.packets import decoded, made, outside
 from companion.mavlink.readers import READERS
-from tests.companion.fake_vehicle import FakeVehicle, flight
+from tests.companion.fake_vehicle import FakeVehicle
 from tests.flying import Flight
 
 HEARD = sorted(READERS)
-# The states of a flight, and a mission that passes them all: into a wall, home and down.
+# The states of a flight.
 STATES = ("connect", "takeoff", "mission", "recovering", "holding", "returning", "landing")
-ITEMS = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"return": {}},
-]
-POLICY = {"then": "hold", "hold_s": 1.0}
 
 FLOATS = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, -1e20, 1e-45, 0.0, -0.0, 1e6, -1e6)
 MILD = (-1000.0, -100.0, -40.0, -10.0, -3.0, -1.0, -0.1, 0.1, 1.0, 3.0, 10.0, 40.0, 100.0, 1000.0)
@@ -49,26 +42,13 @@ class Attacker:
     def _true(self, message_id: int) -> mav.MAVLink_message:
         """As the vehicle would say it now."""
         v, kind = self._vehicle, mav.mavlink_map[message_id]
-        values = [self._plain(kind, index) for index in range(len(kind.fieldnames))]
-        message = kind(*values)
         now = {"time_usec": v.time_us, "time_boot_ms": v.time_us // 1000, "q1": 1.0, "fields_updated": 0x3F}
         now |= dict(zip(("x", "y", "z", "vx", "vy", "vz"), (*v.position, *v.velocity), strict=True))
         now |= dict(zip(("xacc", "yacc", "zacc"), v.specific_force, strict=True))
         now |= {"frame_id": 1, "child_frame_id": 1, "autopilot": v.autopilot, "type": v.vehicle_type}
         now |= {"custom_mode": v.mode, "base_mode": 0x9D if v.armed else 0x1D, "landed_state": v.landed, "thrust": 0.5}
         now["system_status"] = 4 if v.armed else 3
-        for name in message.fieldnames:
-            if name in now:
-                setattr(message, name, now[name])
-        return message
-
-    @staticmethod
-    def _plain(kind: type, index: int) -> object:
-        # the lengths are in the order of the wire, the names in that of the definition
-        length = kind.array_lengths[kind.ordered_fieldnames.index(kind.fieldnames[index])]
-        if kind.fieldtypes[index] == "char":
-            return b""
-        return [0] * length if length else 0
+        return decoded(made(kind.msgname, {name: now[name] for name in kind.fieldnames if name in now}))
 
     def _spoil(self, message: mav.MAVLink_message, name: str, value: object) -> None:
         kind = message.fieldtypes[message.fieldnames.index(name)]
@@ -104,17 +84,4 @@ def attacked(f: Flight, packets: Iterable[bytes]) -> None:
 def assert_inside(f: Flight, frame: bytes) -> None:
     """What a setpoint asks for is finite, inside the fence, and within the limits; whatever it is not asked is NaN."""
     core = f.companion.core
-    assert core is not None and outside(core, frame) is None, str(mav.MAVLink(None).decode(bytearray(frame)))
-
-
-def flight_in(state: str) -> Flight:
-    """A flight that has just come to the state; of a mission that flies into a wall."""
-    return _flight_in(state).copy()
-
-
-@cache
-def _flight_in(state: str) -> Flight:
-    vehicle = FakeVehicle(wall_north_m=3.0, battery_percent=80)
-    f = flight(vehicle, items=ITEMS, on_collision=POLICY)
-    f.run_to(state)
-    return f
+    assert core is not None and outside(core, frame) is None, str(decoded(frame))

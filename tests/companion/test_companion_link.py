@@ -3,10 +3,10 @@
 import itertools
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.virtual_time import EPOCH_US
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
+from tests.companion.test_old_news import heartbeat
 
 SET_MESSAGE_INTERVAL = 511
 
@@ -100,8 +100,7 @@ def test_a_vehicle_armed_by_someone_else_while_the_plan_is_read_is_not_taken():
 
 def test_of_two_vehicles_on_a_link_the_first_is_taken():
     f = flight()
-    first = bytes(mav.MAVLink_heartbeat_message(2, 12, 0, LOITER, 3, 3).pack(mav.MAVLink(None, 5, 1)))
-    other = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x80, LAND, 4, 3).pack(mav.MAVLink(None, 6, 1)))
+    first, other = heartbeat(LOITER, False, 5), heartbeat(LAND, True, 6)
     f.companion.step(first + other, f.now_us)
     f.companion.step(other, f.now_us + 4000)
     assert f.companion.status().vehicle_mode == "AUTO.LOITER"

@@ -8,8 +8,7 @@ import pytest
 from companion.flight.context import Target
 from companion.flight.progress import FlyItems
 from companion.reflex import reflex
-from tests.companion.fake_vehicle import LOITER, flight
-from tests.flying import Flight
+from tests.companion.fake_vehicle import LOITER, flight, flying_in
 
 
 class SumError(Exception):
@@ -20,16 +19,9 @@ def breaks(*arguments):
     raise SumError("the sum is not the sum")
 
 
-def in_mission() -> Flight:
-    f = flight()
-    f.run_to("mission")
-    f.run_for(0.5)
-    return f
-
-
 @pytest.mark.parametrize(("place", "name"), [(FlyItems, "step"), (FlyItems, "target"), (reflex, "advance")])
 def test_whatever_breaks_in_the_air_the_vehicle_is_handed_over(monkeypatch, place, name):
-    f = in_mission()
+    f = flying_in("mission")
     broken_at_us = f.now_us
     monkeypatch.setattr(place, name, breaks)
     f.run_to_end(3.0)
@@ -58,7 +50,7 @@ def broken_target(self, now_us):
     ],
 )
 def test_what_breaks_on_the_way_out_hands_the_vehicle_over_by_setpoints_that_are_safe_to_hold(monkeypatch, place, does):
-    f = in_mission()
+    f = flying_in("mission")
     safe = f.setpoints_since(0)[-1][1]
     monkeypatch.setattr(place, does)
     broken_at_us = f.now_us
@@ -82,7 +74,7 @@ def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
 
 
 def test_when_even_the_hand_over_breaks_silence_leaves_the_vehicle_to_its_failsafe(monkeypatch):
-    f = in_mission()
+    f = flying_in("mission")
     monkeypatch.setattr(FlyItems, "step", breaks)
     monkeypatch.setattr("companion.flight.ending.HandOver.step", breaks)
     f.run_to_end(1.0)

@@ -3,6 +3,7 @@
 import pytest
 
 from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
+from companion.guard import states as guard_states
 
 BEFORE_THE_FLIGHT = {State.CONNECT, State.READY}
 IN_THE_AIR = set(State) - FINAL_STATES - BEFORE_THE_FLIGHT - {State.CRASHED}
@@ -32,11 +33,19 @@ def test_before_and_after_a_flight_there_is_no_hit_to_answer(state):
     assert TABLE.next_state(state, Trigger.COLLISION) is state
 
 
-def test_each_state_is_reached_and_only_the_ends_have_no_way_out():
-    reached, frontier = {State.CONNECT}, [State.CONNECT]
+@pytest.mark.parametrize(
+    ("table", "start", "ends"),
+    [
+        (TABLE, State.CONNECT, FINAL_STATES),
+        (guard_states.TABLE, guard_states.State.CONNECTING, {guard_states.State.ENDED}),
+    ],
+    ids=["flight", "guard"],
+)
+def test_each_state_is_reached_and_only_the_ends_have_no_way_out(table, start, ends):
+    reached, frontier = {start}, [start]
     while frontier:
-        for target in set(TABLE.rows[frontier.pop()].values()) - reached:
+        for target in set(table.rows[frontier.pop()].values()) - reached:
             reached.add(target)
             frontier.append(target)
-    assert reached == set(State) == set(TABLE.rows)
-    assert {state for state in State if not TABLE.rows[state]} == FINAL_STATES == {State.DONE, State.ABORTED}
+    assert reached == set(start.__class__) == set(table.rows)
+    assert {state for state in reached if not table.rows[state]} == ends

@@ -25,7 +25,7 @@ from companion.mission.policy import SetpointLimits
 from companion.reflex.attitude_law import Belief, Lean
 from companion.reflex.config import HELD_S, MOST_HELD_S, NOTICED_S
 from companion.reflex.laws import MotionState
-from tests.companion.hostile import flight_in
+from tests.companion.fake_vehicle import flying_in
 
 DOCS = Path(__file__).parents[2] / "bench" / "notes" / "px4.md"
 ORIGIN = (0.0, 0.0, 0.0)
@@ -91,7 +91,7 @@ def test_a_lean_that_is_held_leads_no_nearer_to_the_wall_than_can_be_braked(off_
 
 def test_a_flights_setpoints_keep_off_what_it_has_just_hit_and_off_what_it_remembers():
     # Given a vehicle that comes off a wall 3 m north
-    f = flight_in("recovering")
+    f = flying_in("recovering")
     f.run_for(0.2)
     flown, record = f.companion.core.flight, f.companion.core.flight.collisions[-1]
     # When something asks for 2 m/s back into it, in the recovery and after it

@@ -5,8 +5,8 @@ import random
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from tests.companion.fake_vehicle import INTO_WALL, at_wall
-from tests.companion.hostile import HEARD, STATES, Attacker, attacked, flight_in
+from tests.companion.fake_vehicle import INTO_WALL, at_wall, flying_in
+from tests.companion.hostile import HEARD, STATES, Attacker, attacked
 
 # These say in whose hands the vehicle is: forged, they end most flights before anything else is tried.
 AUTHORITY = (
@@ -21,7 +21,7 @@ GYROSCOPES = ("xgyro", "ygyro", "zgyro")
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize(("seed", "kinds"), [(1, HEARD), (2, sorted({*HEARD} - {*AUTHORITY}))])
 def test_no_sequence_of_hostile_messages_breaks_a_step_or_the_envelope(state, seed, kinds):
-    f, chance = flight_in(state), random.Random(seed)
+    f, chance = flying_in(state), random.Random(seed)
     attacker = Attacker(f.vehicle, seed)
     for _ in range(250):
         attacked(f, [attacker.packet(chance.choice(kinds)) for _ in range(chance.choice((0, 0, 1, 1, 2)))])
@@ -30,7 +30,7 @@ def test_no_sequence_of_hostile_messages_breaks_a_step_or_the_envelope(state, se
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 3e38])
 def test_every_field_of_every_message_alone_broken_in_a_recovery_changes_no_setpoint_to_nonsense(value):
-    f = flight_in("recovering")
+    f = flying_in("recovering")
     attacker = Attacker(f.vehicle, 1)
     for message_id in HEARD:
         kind = mav.mavlink_map[message_id]
@@ -53,7 +53,7 @@ def test_one_gyroscope_that_is_not_a_number_before_a_hit_costs_one_sample():
 
 
 def test_gyroscopes_that_are_never_a_number_are_no_hits_but_told_and_end_the_mission():
-    f = flight_in("mission")
+    f = flying_in("mission")
     f.vehicle.no_imu = True
     attacker = Attacker(f.vehicle, 1)
     for _ in range(3000):

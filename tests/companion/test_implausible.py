@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.packets import made
 from companion.messages import (
     ImuSample,
+    LandedState,
     LocalPosition,
     Odometry,
     PositionSetpoint,
@@ -18,11 +18,10 @@ from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
 from companion.reflex.confirmation import Hypothesis
-from tests.companion.fake_vehicle import LOITER, flight
-from tests.companion.hostile import attacked, flight_in
+from tests.companion.fake_vehicle import LOITER, flight, flying_in
+from tests.companion.hostile import attacked
 
 STILL = (0.0, 0.0, 0.0)
-IMU_MS = 4
 
 
 def told(at_ms, north_m, counter=0, speed_m_s=0.0):
@@ -127,12 +126,11 @@ def test_a_jump_of_the_velocity_that_fades_is_a_hit_where_one_velocity_shows_hal
 @pytest.mark.parametrize(("height_m", "state"), [(1.5, "recovering"), (0.3, "mission")])
 def test_a_landing_counts_where_the_height_does_not_speak_against_it(height_m, state):
     # Given a vehicle on its way to its goal, when it is said five times to stand on the ground
-    f = flight_in("mission")
+    f = flying_in("mission")
     f.run_for(0.5)
-    landed = mav.MAVLink_extended_sys_state_message(0, mav.MAV_LANDED_STATE_ON_GROUND)
     for _ in range(10):
         f.vehicle.position[2] = -height_m
-        attacked(f, [bytes(landed.pack(mav.MAVLink(None, 1, 1)))])
+        attacked(f, [made("EXTENDED_SYS_STATE", {"landed_state": LandedState.ON_GROUND})])
     # Then a hit of that moment is answered up in the air, and not below the height from which hits count
     f.vehicle.push_m_s2 = (-60.0, 0.0)
     f.step()
@@ -148,7 +146,7 @@ def place_in(sent):
 
 @pytest.mark.parametrize("state", ["takeoff", "mission", "returning"])
 def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_with_nothing(state):
-    f = flight_in(state)
+    f = flying_in(state)
     f.run_until(lambda: f.vehicle.armed)
     f.run_for(0.7)
     # When positions stop coming for longer than the detector may be without a sample
@@ -165,7 +163,7 @@ def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_
 
 
 def test_a_clock_that_jumps_is_no_silence_of_the_positions():
-    f = flight_in("mission")
+    f = flying_in("mission")
     f.run_for(0.7)
     # When the clock jumps, as of a suspended computer, and an IMU sample is the first that comes
     f.run_until(lambda: f.vehicle.ticks % 5 == 1)
@@ -183,7 +181,7 @@ def test_a_clock_that_jumps_is_no_silence_of_the_positions():
 
 @pytest.mark.slow
 def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
-    f = flight_in("recovering")
+    f = flying_in("recovering")
     began_us = f.now_us
     timeout_us = 10_000_000
     while f.state == "recovering" and f.now_us - began_us < 2 * timeout_us:
@@ -198,9 +196,9 @@ def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
 @pytest.mark.parametrize("late_ms", [200, 1000])
 def test_a_position_that_comes_late_or_from_before_a_reboot_is_no_fault(late_ms):
     """By as much as a mean's time or a second, for which what is learnt of drag and wind would be divided by zero."""
-    f = flight_in("returning")
+    f = flying_in("returning")
     for _ in range(200):
-        stamp_ms = f.vehicle.time_us // 1000
-        late = mav.MAVLink_local_position_ned_message(stamp_ms - late_ms, *f.vehicle.position, *f.vehicle.velocity)
-        attacked(f, [bytes(late.pack(mav.MAVLink(None, 1, 1)))])
+        motion = zip(("x", "y", "z", "vx", "vy", "vz"), [*f.vehicle.position, *f.vehicle.velocity], strict=True)
+        late = {"time_boot_ms": f.vehicle.time_us // 1000 - late_ms, **dict(motion)}
+        attacked(f, [made("LOCAL_POSITION_NED", late)])
     assert "fault" not in f.kinds(), f.texts()

@@ -70,14 +70,7 @@ def test_the_documented_mission_is_accepted():
         (["items", 1, "go_to", "position_ned_m"], [2, 0, -7], "above fence.max_height_m", ()),
         (["items", 1, "go_to", "position_ned_m"], [2, 0, 1.5], "up is negative", ()),
         (["items", 0, "takeoff", "height_m"], 9, "item 1 (takeoff)", ()),
-        (
-            ["on_collision", "then"],
-            "panic",
-            "'retry', 'detour', 'return' or 'land'",
-            ("on_collision", "then"),
-        ),
         (["on_interrupt"], "dance", "'hold' or 'land'", ("on_interrupt",)),
-        (["recovery", "law"], "magic", "'adaptive', 'normal' or 'paper'", ("recovery", "law")),
         (["companion", "detector"], "magic", "no detector 'magic'", ("companion", "detector")),
         (
             ["companion", "flight"],

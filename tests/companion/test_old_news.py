@@ -1,8 +1,8 @@
 """The pilot takes over while nothing is heard, at any instant, or seems to: first it is learnt who has the vehicle."""
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.packets import made
 from bench.fly.virtual_time import INTERVAL_US
 from tests.companion.fake_vehicle import LOITER, OFFBOARD, POSCTL, FakeVehicle, flight, flying_in
 from tests.companion.test_companion_authority import ON_SETPOINTS, assert_silent_from_now
@@ -102,9 +102,9 @@ def test_a_takeover_at_any_instant_stops_the_setpoints_with_the_report_that_show
     assert tried >= 10
 
 
-def heartbeat(mode: int, armed: bool, vehicle_type: int = 2, autopilot: int = 12) -> bytes:
-    message = mav.MAVLink_heartbeat_message(vehicle_type, autopilot, 0x80 if armed else 0, mode, 4, 3)
-    return bytes(message.pack(mav.MAVLink(None, 1, 1)))
+def heartbeat(mode: int, armed: bool, system: int = 1) -> bytes:
+    of_a_quadrotor = {"type": 2, "autopilot": 12, "system_status": 4}
+    return made("HEARTBEAT", {**of_a_quadrotor, "base_mode": 0x80 * armed, "custom_mode": mode}, (system, 1))
 
 
 @pytest.mark.parametrize("state", ON_SETPOINTS)

@@ -3,30 +3,20 @@
 import itertools
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.packets import decoded
 from bench.fly.virtual_time import EPOCH_US
 from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
 from companion.report import Event
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight
-from tests.flying import Flight
-
-
-def decoded(packets) -> list:
-    parser = mav.MAVLink(None)
-    return parser.parse_buffer(b"".join(packets)) or []
-
-
-def sent(f: Flight, kind: str) -> list:
-    return [(t, message) for t, frame in f.sent for message in decoded([frame]) if message.get_type() == kind]
 
 
 @pytest.mark.parametrize("length", [0, 1, 49, 50, 51, 100, 137])
 def test_a_text_of_any_length_arrives_whole(length):
     text = ("0123456789" * 20)[:length]
-    messages = decoded(Encoder().packets(StatusText(Severity.WARNING, text)))
+    messages = [decoded(packet) for packet in Encoder().packets(StatusText(Severity.WARNING, text))]
     assert "".join(message.text for message in messages) == text
     assert [message.chunk_seq for message in messages] == list(range(len(messages)))
     assert len({message.id for message in messages}) == 1 and (messages[0].id == 0) is (length <= 50)
@@ -38,7 +28,7 @@ def test_a_text_of_any_length_arrives_whole(length):
 def test_the_operator_reads_hit_recovery_and_outcome():
     f = at_wall(INTO_WALL)
     f.run_to_end()
-    texts = [message.text for _, message in sent(f, "STATUSTEXT")]
+    texts = [message.text for _, message in f.messages("STATUSTEXT")]
     hit, collision = next(text for text in texts if text.startswith("Hit")), f.report.collisions[0]
     assert hit.startswith(f"Hit 1: at {collision.impact_speed_m_s:.2f} m/s going north, ")
     recovered = next(text for text in texts if text.startswith("Recovered"))
@@ -53,20 +43,20 @@ def test_a_vehicle_hit_while_it_hovers_is_pushed():
     f.run_for(1.0)
     f.vehicle.push_m_s2 = (0.0, -12.0)
     f.step()
-    assert sent(f, "STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
+    assert f.messages("STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
 
 
 def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_the_end():
     f = at_wall(INTO_WALL)
     f.run_to_end()
     f.run_for(2.0)
-    phases = [(t, m.value) for t, m in sent(f, "NAMED_VALUE_FLOAT") if m.name == "rb_phase"]
+    phases = [(t, m.value) for t, m in f.messages("NAMED_VALUE_FLOAT") if m.name == "rb_phase"]
     gaps = [b - a for (a, _), (b, _) in itertools.pairwise(phases)]
     assert min(gaps) >= 500_000 and max(gaps) <= 560_000
     assert {value for _, value in phases} >= {0.0, 2.0}
-    hits = [m.value for _, m in sent(f, "NAMED_VALUE_FLOAT") if m.name == "rb_hits"]
+    hits = [m.value for _, m in f.messages("NAMED_VALUE_FLOAT") if m.name == "rb_hits"]
     assert hits == sorted(hits) and hits[-1] == 1.0
-    v_c = [m for _, m in sent(f, "DEBUG_VECT") if m.name == "rb_v_c"]
+    v_c = [m for _, m in f.messages("DEBUG_VECT") if m.name == "rb_v_c"]
     assert v_c[0].x == pytest.approx(2.0, abs=0.1)
     assert phases[-1][0] <= f.report.ended_at_us
 
@@ -119,11 +109,11 @@ def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_e
         f.companion.note("late", text)
         f.step()
     f.run_for(1.5)
-    times = {message.text: t for t, message in sent(f, "STATUSTEXT")}
+    times = {message.text: t for t, message in f.messages("STATUSTEXT")}
     assert times["Second"] - times["First"] == 1_000_000
     for text in ("third", "fourth"):
         f.companion.note("late", text)
         f.step()
     f.companion.stop("Ctrl-C")
     f.run_to_end(0.5)
-    assert "Fourth" in [message.text for _, message in sent(f, "STATUSTEXT")]
+    assert "Fourth" in [message.text for _, message in f.messages("STATUSTEXT")]

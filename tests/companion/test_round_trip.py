@@ -3,7 +3,6 @@
 import itertools
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.virtual_time import EPOCH_US
 from companion.link.round_trip import RoundTrip
@@ -11,7 +10,6 @@ from companion.messages import TimeSyncAnswer, TimeSyncAsk
 from companion.report import RoundTripReport
 from rebound_cli.live.console import state_fields
 from tests.companion.fake_vehicle import FakeVehicle, flight
-from tests.flying import Flight
 
 TICK_US = 4_000
 
@@ -65,12 +63,6 @@ def test_the_alarm_is_given_once_while_it_lasts_and_again_after_five_short_ones(
 # --- in a flight
 
 
-def texts(f: Flight) -> list[str]:
-    parser = mav.MAVLink(None)
-    messages = parser.parse_buffer(b"".join(frame for _, frame in f.sent)) or []
-    return [message.text for message in messages if message.get_type() == "STATUSTEXT"]
-
-
 @pytest.mark.parametrize(
     ("vehicle", "in_the_plan", "in_the_line", "report"),
     [
@@ -118,5 +110,6 @@ def test_a_round_trip_that_grows_in_flight_is_told_once_and_the_flight_goes_on()
     assert report.outcome == "completed"
     assert f.kinds().count("round_trip") == 1
     assert f.event("round_trip").data["round_trip_us"] == 400_000
-    assert texts(f).count("Round trip 400 ms: hits are answered late") == 1
+    texts = [message.text for _, message in f.messages("STATUSTEXT")]
+    assert texts.count("Round trip 400 ms: hits are answered late") == 1
     assert report.round_trip.worst_us == 400_000

@@ -13,8 +13,8 @@ from bench.fly.packets import made
 from companion.fence import Fence
 from companion.flight.context import Target
 from companion.flight.envelope import SetpointError, Surroundings, bounded
+from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.policy import SetpointLimits
-from companion.mission.trajectory import LineProfile
 from companion.motion.config import GRAVITY_M_S2
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.hostile import attacked
@@ -110,11 +110,13 @@ def in_mission(*items, vehicle=None, **changes):
 
 
 def test_the_stream_is_held_back_and_it_is_told():
-    go_to = {"go_to": {"position_ned_m": [6, 0, -1.5], "speed_m_s": 2.0}}
-    f = in_mission(go_to, {"hold": {"duration_s": 3}}, limits={"max_speed_m_s": 2.0})
-    # as if something in the flight forgot the limit
-    f.companion._core.machine.handler._trajectory = LineProfile((0.0, 0.0, -1.5), (6.0, 0.0, -1.5), 4.0, 4.0)
-    f.run_for(2.5)
+    # Given a flight that has forgotten the limit
+    go_to = {"go_to": {"position_ned_m": [6, 0, -1.5]}}
+    f = flight(items=[TAKEOFF, go_to, {"hold": {"duration_s": 3}}, {"land": {}}], limits={"max_speed_m_s": 2.0})
+    f.run_to("takeoff")
+    f.companion.core.flight.speeds = SpeedLimits(4.0, 4.0)
+    f.run_to("mission")
+    f.run_for(2.7)
     places = [(t, m.x) for t, m in f.vehicle.setpoints]
     assert max((b - a) / ((u - t) * 1e-6) for (t, a), (u, b) in itertools.pairwise(places)) == pytest.approx(2, 0.02)
     assert f.event("envelope").text.startswith("setpoint held back: moves faster than 2 m/s")

@@ -11,7 +11,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from bench.fly.commanded import MANUAL_POSITION, OFFBOARD, REPEATED_EVERY_S, SOCKET_HOLDS, Commanded
+from bench.fly.commanded import MANUAL_POSITION, OFFBOARD, REPEATED_EVERY_S, Commanded
+from bench.fly.packets import GROUND_STATION, decoded
 from bench.fly.virtual_time import EPOCH_US
 from companion.guard.attached import AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
@@ -22,92 +23,74 @@ from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
 
 class GuardedFlight(Commanded):
-    """The guard on one link, the pilot or the program on another; `others_last` is what that one has heard."""
+    """The guard on one link, the pilot or the program on another; `others_last` is what that one has heard.
+
+    `forward` is where a pilot holds the stick, once there is one.
+    """
 
     def __init__(
-        self,
-        config: GuardConfig | None = None,
-        parameters: dict[str, float] | None = None,
-        airframe: str = "foldable",
-        **scene: Any,
+        self, config: GuardConfig | None = None, parameters: dict[str, float] | None = None, **scene: Any
     ) -> None:
-        super().__init__(airframe, parameters, **scene)
+        super().__init__("foldable", parameters, **scene)
         self.guard = Guard(config or GuardConfig())
-        self._guard_link = self.vehicle.add_link(LinkKind.ONBOARD)
-        self._other_link = self.vehicle.add_link(LinkKind.NORMAL)
-        self._other = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
-        self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
-        self._guards_bytes = self._others_bytes = b""
+        self._guards_link = self.vehicle.add_link(LinkKind.ONBOARD)
+        self._others_link = self.vehicle.add_link(LinkKind.NORMAL)
+        self._guards: list[bytes] = []
+        self._others: list[bytes] = []
         self.others_last: dict[str, Any] = {}
+        self.forward = 0.0
 
     def send(self, message: Any) -> None:
-        self._others_bytes += message.pack(self._other)
-        self._other.seq = (self._other.seq + 1) % 256
+        self._others.append(message.pack(dialect.MAVLink(None, *GROUND_STATION)))
 
-    def sticks(self, forward: float) -> None:
-        self.send(dialect.MAVLink_manual_control_message(1, round(1000 * forward), 0, 500, 0, 0))
+    def has_pilot(self) -> None:
+        self.every(
+            0.05, lambda: self.send(dialect.MAVLink_manual_control_message(1, round(1000 * self.forward), 0, 500, 0, 0))
+        )
 
-    def pilot(self) -> list[float]:
-        """Sticks twenty times a second; the list's only number is the forward one."""
-        forward = [0.0]
-        self.every(0.05, lambda: self.sticks(forward[0]))
-        return forward
-
-    def flown_by_sticks(self) -> list[float]:
+    def flown_by_sticks(self, forward: float = 0.0) -> None:
         """In the air and in position mode."""
-        stick = self.pilot()
+        self.has_pilot()
         self.take_off()
         self.run_until(lambda: self.mode == "AUTO.LOITER", 20.0)
         self.set_mode(MANUAL_POSITION)
         self.run_until(lambda: self.mode == "POSCTL", 2.0)
-        return stick
+        self.forward = forward
 
-    def pushed_into_the_wall(self, recovers: bool = True) -> list[float]:
-        """By sticks, until the guard takes over; then they are let go, and it recovers."""
-        stick = self.flown_by_sticks()
-        stick[0] = 0.3
+    def pushed_into_the_wall(self) -> None:
+        """By sticks, until the guard takes over; then they are let go."""
+        self.flown_by_sticks(0.3)
         self.run_until(lambda: self.state in (State.TAKING_OVER, State.RECOVERING), 20.0)
-        stick[0] = 0.0
-        if recovers:
-            self.run_to(State.RECOVERING, 1.0)
-        return stick
+        self.forward = 0.0
 
     def _exchange(self) -> None:
-        for sender, sent in (("guard", self._guards_bytes), ("other", self._others_bytes)):
-            messages = self._parser.parse_buffer(bytearray(sent)) if sent else []
-            self.on_wire += [(self.time_s, sender, message) for message in messages or []]
-        self._guard_link.push(self._guards_bytes)
-        self._other_link.push(self._others_bytes)
-        self._others_bytes = b""
+        for sender, packets, link in (
+            ("guard", self._guards, self._guards_link),
+            ("other", self._others, self._others_link),
+        ):
+            self.on_wire += [(self.time_s, sender, decoded(packet)) for packet in packets]
+            link.push(b"".join(packets))
+        self._guards, self._others = [], []
         self.vehicle.advance()
-        for packet in self._other_link.take():
-            message = self._reader.decode(bytearray(packet))
-            self.others_last[message.get_type()] = message
-        self._guards_bytes = b""
-        self._unread = [*self._unread, *self._guard_link.take()][:SOCKET_HOLDS]
-        if not self.is_late:
-            received, self._unread = b"".join(self._unread), []
-            self.guard_hears(received)
+        self.others_last |= {
+            message.get_type(): message for message in map(decoded, self._others_link.take()) if message
+        }
+        self.guard_hears(b"".join(self._guards_link.take()))
 
     def guard_hears(self, received: bytes) -> list[Event]:
         """Alone, what somebody sends in the vehicle's name."""
         result = self.guard.step(received, self.now_us)
-        self._guards_bytes += b"".join(result.sent_frames)
+        self._guards += result.sent_frames
         self.events += result.events
         return list(result.events)
-
-    @property
-    def position(self) -> tuple[float, float, float]:
-        return self.guard.status().position_ned_m
 
 
 class AttachedFlight(Commanded):
     """What the program sends goes through the guard's gate, as MAVSDK's does; `sender` is "guard" or "program"."""
 
-    def __init__(self, config: GuardConfig | None = None, airframe: str = "foldable") -> None:
-        super().__init__(airframe, None)
+    def __init__(self, config: GuardConfig | None = None) -> None:
+        super().__init__("foldable", None)
         self.guard = AttachedGuard(config or GuardConfig(), 1, EPOCH_US)
-        self._mavlink, self._parser = dialect.MAVLink(None, 245, 190), dialect.MAVLink(None)
         self.outgoing: list[tuple[str, str, dict[str, Any]]] = []
 
     @property
@@ -135,11 +118,10 @@ class AttachedFlight(Commanded):
         packets, self.outgoing, outgoing = b"", [], self.outgoing
         for sender, name, fields in outgoing:
             if self.guard.lets_pass(name, fields, self.now_us):
-                message = message_of(name, fields)
-                self.on_wire.append((self.time_s, sender, message))
-                packets += message.pack(self._mavlink)
+                packets += packet_of(name, fields)
+                self.on_wire.append((self.time_s, sender, decoded(packet_of(name, fields))))
         for packet in self.vehicle.step(packets):
-            self.hear(self._parser.decode(bytearray(packet)), self.now_us)
+            self.hear(decoded(packet), self.now_us)
 
     def hear(self, message: Any, now_us: int) -> None:
         self.take(self.guard.hear(message.get_type(), (1, 1), fields_of(message), now_us))
@@ -156,7 +138,9 @@ def fields_of(message: Any) -> dict[str, Any]:
     return json.loads(json.dumps({name: None if is_unset[name] else value for name, value in values.items()}))
 
 
-def message_of(name: str, fields: dict[str, Any]) -> Any:
+def packet_of(name: str, fields: dict[str, Any]) -> bytes:
     kind = getattr(dialect, f"MAVLink_{name.lower()}_message")
     values = [math.nan if fields[field] is None else fields[field] for field in kind.fieldnames]
-    return kind(*[value.encode() if isinstance(value, str) else value for value in values])
+    message = kind(*[value.encode() if isinstance(value, str) else value for value in values])
+    packet: bytes = message.pack(dialect.MAVLink(None, 245, 190))
+    return packet

@@ -1,12 +1,14 @@
 """The guard on a program's own connection: none of the program's setpoints reaches the vehicle while it holds."""
 
 import json
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
+from bench.fly.packets import decoded
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.core import POLL_INTERVAL_US
 from companion.guard.attached import Gate
@@ -21,7 +23,7 @@ from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.guard.flying import AttachedFlight, fields_of, message_of
+from tests.guard.flying import AttachedFlight, fields_of, packet_of
 
 RUN_CHECKS = 401
 STALL_S = 1.6  # more than the silence after which the guard lets go (link.silence_s)
@@ -129,13 +131,13 @@ def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
 
 def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
-    decoder, parser = Decoder(GUARD_READERS), dialect.MAVLink(None)
+    decoder = Decoder(GUARD_READERS)
     decoder.listen_to(1, 1)
     kinds = set()
     for _ in range(1000):
         for packet in vehicle.step(b""):
             sample = decoder.feed(packet)[0][1]
-            message = parser.decode(bytearray(packet))
+            message = decoded(packet)
             by_fields = sample_from(message.get_type(), (1, 1), fields_of(message))
             assert by_fields == sample, message.get_type()
             kinds.add(type(sample).__name__)
@@ -159,13 +161,13 @@ def test_after_a_stall_all_that_has_arrived_is_heard_before_silence_is_judged():
     land, packets = dialect.MAVLink_command_long_message(1, 1, SET_MODE, 0, 1, 4, 6, 0, 0, 0, 0), []
     for number in range(round(STALL_S * 250)):
         packets += air.vehicle.step(land.pack(dialect.MAVLink(None, 255, 190)) if number == 100 else b"")
-    since, reader = len(air.events), dialect.MAVLink(None)
+    since = len(air.events)
     air.outgoing.clear()
     # When the guard's own thread wakes first, and what arrived is heard one message after the other
     air.take(air.guard.step((), air.now_us))
     assert air.guard.next_deadline_us() == air.now_us + POLL_INTERVAL_US, "its thread waits meanwhile"
     for number, packet in enumerate(packets):
-        air.hear(reader.decode(bytearray(packet)), air.now_us + number * POLL_INTERVAL_US // len(packets))
+        air.hear(decoded(packet), air.now_us + number * POLL_INTERVAL_US // len(packets))
     # Then nothing has been judged or sent by what was old; then the guard stands down for the pilot, not for a silence
     assert len(air.events) == since and air.outgoing == []
     air.run_for(0.3)
@@ -185,34 +187,24 @@ class Linked:
         self.sent.append((name, json.loads(json.dumps(dict(fields)))))
 
 
-class Clocked:
-    def __init__(self, air):
-        self._air = air
-
-    def now_us(self):
-        return self._air.now_us
-
-
 class Joined:
     """A `CollisionGuard` that holds, without its threads: the test takes its turns, on virtual time."""
 
     def __init__(self, monkeypatch):
         self.air = holding()
         monkeypatch.setattr(mavsdk_guard, "MavsdkLink", Linked)
-        monkeypatch.setattr(mavsdk_guard, "Clock", lambda: Clocked(self.air))
+        monkeypatch.setattr(mavsdk_guard, "Clock", lambda: SimpleNamespace(now_us=lambda: self.air.now_us))
         monkeypatch.setattr(mavsdk_guard, "TRIED_AGAIN_S", 0.0)
         self.guard = CollisionGuard(None, None)
         self.guard._guard = self.air.guard
         self.link: Any = self.guard._link
-        self._mavlink, self._parser = dialect.MAVLink(None, 245, 190), dialect.MAVLink(None)
 
     def step(self):
         """One interval of the vehicle's; whether there is to be another turn."""
         goes_on = self.guard._turn()
         sent, self.link.sent = self.link.sent, []
-        packets = b"".join([message_of(name, fields).pack(self._mavlink) for name, fields in sent])
-        for packet in self.air.vehicle.step(packets):
-            message = self._parser.decode(bytearray(packet))
+        for packet in self.air.vehicle.step(b"".join(packet_of(*one) for one in sent)):
+            message = decoded(packet)
             name, fields = message.get_type(), json.dumps(fields_of(message)).encode()
             assert self.guard._incoming(name, (1, 1), fields)
         return goes_on

@@ -6,6 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.commanded import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, fly_a_mission
+from bench.fly.packets import made
 from companion.autopilot.px4.modes import AUTO_LAND
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
@@ -21,15 +22,11 @@ CLEAR_M = 0.3
 REBOOT = 246
 
 
-def mission_into_the_wall(air: Air) -> None:
-    air.take_off()
-    fly_a_mission(air)
-
-
 def recovering(**changes) -> Air:
     """In the hands of the guard, after a hit that a pilot flew it into."""
     air = Air(GuardConfig(**changes))
     air.pushed_into_the_wall()
+    air.run_to(State.RECOVERING, 1.0)
     return air
 
 
@@ -86,7 +83,8 @@ def test_offboard_is_confirmed_at_once_because_setpoints_lead(hit_in_posctl):
 
 def test_a_mission_is_not_given_back_to_that_would_go_on_into_what_was_hit():
     air = Air(GuardConfig(then="previous"))
-    mission_into_the_wall(air)
+    air.take_off()
+    fly_a_mission(air)
     air.run_to(State.RECOVERING, 30.0)
     air.run_to(State.WATCHING, 10.0)
     air.run_for(2.0)
@@ -97,15 +95,15 @@ def test_a_mission_is_not_given_back_to_that_would_go_on_into_what_was_hit():
 def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
     # Given a pilot who does not open the hand after a hit
     air = Air(GuardConfig(then="previous"))
-    stick = air.pushed_into_the_wall(recovers=False)
-    stick[0] = 0.3
+    air.pushed_into_the_wall()
+    air.forward = 0.3
     # When the vehicle has recovered
     air.run_to(State.GIVING_BACK, 10.0)
     air.run_for(3.0)
     # Then it is held, and told why, until the stick is released
     assert air.state is State.GIVING_BACK
     assert air.told("not_back") == ["not given back: the sticks push on into what was hit: release them"]
-    stick[0] = 0.0
+    air.forward = 0.0
     air.run_to(State.WATCHING, 1.0)
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
     assert len(air.told("detection")) == 1
@@ -113,8 +111,8 @@ def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
 
 def test_sticks_that_are_heard_no_more_are_not_waited_for():
     air = Air(GuardConfig(then="previous"))
-    stick = air.pushed_into_the_wall(recovers=False)
-    stick[0] = 0.3
+    air.pushed_into_the_wall()
+    air.forward = 0.3
     air.run_to(State.GIVING_BACK, 10.0)
     air.stop_all()
     air.run_until(lambda: air.state is not State.GIVING_BACK, 3.0)
@@ -153,7 +151,7 @@ def test_a_mode_that_a_person_chose_just_before_the_vehicle_is_given_back_is_not
 
 def test_the_next_flight_is_guarded_again_and_its_hits_are_counted_anew():
     air = Air()
-    air.pushed_into_the_wall(recovers=False)
+    air.pushed_into_the_wall()
     air.run_for(0.8)
     air.set_mode(LAND)
     air.run_to(State.STOOD_DOWN, 1.0)
@@ -164,7 +162,7 @@ def test_the_next_flight_is_guarded_again_and_its_hits_are_counted_anew():
 
 def test_a_mode_that_is_not_allowed_is_left_alone_and_nothing_is_streamed_in_it():
     air = Air(GuardConfig(modes=("AUTO.MISSION",)))
-    stick = air.pilot()
+    air.has_pilot()
     air.run_to(State.STANDING_BY, 10.0)
     air.run_for(2.0)
     air.command(400, 1)
@@ -173,7 +171,7 @@ def test_a_mode_that_is_not_allowed_is_left_alone_and_nothing_is_streamed_in_it(
     air.run_for(5.0)
     air.set_mode(MANUAL_POSITION)
     air.run_for(0.2)
-    stick[0] = 0.3
+    air.forward = 0.3
     air.run_for(8.0)
     assert air.state is State.STANDING_BY and air.told("detection") == [] and air.setpoints("guard") == []
 
@@ -192,7 +190,7 @@ def test_a_vehicle_that_refuses_offboard_is_asked_to_hold():
         return type(result)(result.received_frames, kept, result.events)
 
     air.guard.step = without_setpoints
-    air.pushed_into_the_wall(recovers=False)
+    air.pushed_into_the_wall()
     air.run_to(State.WATCHING, 5.0)
     assert "OFFBOARD" in air.told("refused")[0] and air.mode == "AUTO.LOITER"
 
@@ -232,13 +230,11 @@ def test_a_position_that_ends_while_the_guard_holds_has_the_vehicle_given_back_t
 
 def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back():
     air = Air(GuardConfig(then="previous"))
-    stick = air.flown_by_sticks()
-    stick[0] = 0.1
+    air.flown_by_sticks(0.1)
     air.run_for(1.0)
-    stick[0] = 0.0
-    values = (-40.0, 0.0, -9.8, *[0.0] * 10)
-    forged = dialect.MAVLink_highres_imu_message(air.vehicle.time_boot_us + 2_000, *values, 0x3F)
-    heard = air.guard_hears(bytes(forged.pack(dialect.MAVLink(None, 1, 1))))
+    air.forward = 0.0
+    when = {"time_usec": air.vehicle.time_boot_us + 2_000, "fields_updated": 0x3F}
+    heard = air.guard_hears(made("HIGHRES_IMU", {**when, "xacc": -40.0, "zacc": -9.8}))
     assert air.state is State.TAKING_OVER and [event.kind for event in heard].count("detection") == 1
     assert air.run_to(State.WATCHING, 3.0) < 1.0
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
@@ -248,8 +244,8 @@ def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back():
 @pytest.mark.parametrize(("armed", "main_mode"), [(0, 6), (0x80, 3)])
 def test_one_forged_heartbeat_does_not_end_a_recovery(armed, main_mode):
     air = recovering()
-    forged = dialect.MAVLink_heartbeat_message(2, 12, armed | 1, main_mode << 16, 4, 3)
-    air.guard_hears(bytes(forged.pack(dialect.MAVLink(None, 1, 1))))
+    forged = {"type": 2, "autopilot": 12, "base_mode": armed | 1, "custom_mode": main_mode << 16, "system_status": 4}
+    air.guard_hears(made("HEARTBEAT", forged))
     # PX4 repeats CURRENT_MODE twice a second, whatever it is asked for
     air.run_for(0.6)
     assert air.state in (State.RECOVERING, State.GIVING_BACK)
@@ -259,18 +255,12 @@ def test_one_forged_heartbeat_does_not_end_a_recovery(armed, main_mode):
 # --- a program on another link
 
 
-def flown_by_a_program(**changes) -> Air:
-    """North by velocities in OFFBOARD."""
-    air = Air(GuardConfig(**changes))
+def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_nothing():
+    air = Air()
     air.take_off()
     air.every(0.05, lambda: air.velocity(1.0))
     air.run_for(0.3)
     air.set_mode(OFFBOARD)
-    return air
-
-
-def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_nothing():
-    air = flown_by_a_program()
     air.run_until(lambda: air.told("left_alone") != [], 20.0)
     hit_s = air.time_s
     air.run_for(0.5)
@@ -292,15 +282,15 @@ def test_a_second_stream_that_appears_while_the_guard_holds_is_noticed_and_not_f
 def test_a_pilot_whose_setpoints_are_told_before_his_mode_is_no_second_stream():
     """The vehicle tells its own setpoints fifty times a second, and its mode with the next report."""
     # Given a guard that holds, and a pilot's mode that flies elsewhere
-    air, vehicle = recovering(), dialect.MAVLink(None, 1, 1)
+    air = recovering()
     air.run_for(0.3)
-    elsewhere = dialect.MAVLink_position_target_local_ned_message(0, 1, 0xDF8, 9.0, 9.0, -2.0, *[0.0] * 8)
+    elsewhere = {"coordinate_frame": 1, "type_mask": 0xDF8, "x": 9.0, "y": 9.0, "z": -2.0}
     for _ in range(6):
-        air.guard_hears(elsewhere.pack(vehicle))
+        air.guard_hears(made("POSITION_TARGET_LOCAL_NED", elsewhere))
     assert air.state is State.RECOVERING
     # When the reports say so
     for _ in range(2):
-        air.guard_hears(dialect.MAVLink_current_mode_message(0, AUTO_LAND, AUTO_LAND).pack(vehicle))
+        air.guard_hears(made("CURRENT_MODE", {"custom_mode": AUTO_LAND, "intended_custom_mode": AUTO_LAND}))
     # Then it is his, and no program's; where they say that OFFBOARD goes on it is a program's
     assert air.state is State.STOOD_DOWN and air.told("crossed") == []
     assert not air.guard.core.flight.program_elsewhere
@@ -321,9 +311,8 @@ def test_a_failsafe_that_flies_is_not_taken_over_from():
 
 def test_below_the_height_of_the_ground_nothing_is_a_hit():
     air = Air(GuardConfig(companion=CompanionConfig(min_detection_height_m=4.0)))
-    stick = air.flown_by_sticks()
-    stick[0] = 0.3
-    air.run_until(lambda: air.position[0] > 3.6, 20.0)
+    air.flown_by_sticks(0.3)
+    air.run_until(lambda: air.guard.status().position_ned_m[0] > 3.6, 20.0)
     air.run_for(1.0)
     assert air.state is State.WATCHING and air.told("detection") == []
 

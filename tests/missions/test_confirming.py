@@ -6,8 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.packets import changed, made, number_of
+from companion.mavlink.packet import message_id_of
 from tests.flying import Flight, in_a_child
 from tests.simulated import simulated, wall
 
@@ -21,14 +22,10 @@ ITEMS = [
 AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro")
 
 
-def packed(message: mav.MAVLink_message) -> bytes:
-    return bytes(message.pack(mav.MAVLink(None, 1, 1)))
-
-
 def imu(air: Flight, force_m_s2: float, rate_rad_s: float = 0.0) -> bytes:
     """Between two of the vehicle's own samples: a push against the way, or a turn about the nose."""
-    values = (force_m_s2, 0, -9.8, rate_rad_s, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-    return packed(mav.MAVLink_highres_imu_message(air.vehicle.time_boot_us + 2000, *values, 0x3F))
+    when = {"time_usec": air.vehicle.time_boot_us + 2000, "fields_updated": 0x3F}
+    return made("HIGHRES_IMU", {**when, "xacc": force_m_s2, "zacc": -9.8, "xgyro": rate_rad_s})
 
 
 def motion(air: Flight) -> tuple[float, ...]:
@@ -37,28 +34,29 @@ def motion(air: Flight) -> tuple[float, ...]:
     return (*latest.position_ned_m, *latest.velocity_ned_m_s)
 
 
+def moved(air: Flight, *jump: float) -> dict[str, float]:
+    pairs = zip(("x", "y", "z", "vx", "vy", "vz"), motion(air), jump, strict=True)
+    return {name: was + by for name, was, by in pairs}
+
+
 def local_position(air: Flight, *jump: float) -> bytes:
-    moved = [was + by for was, by in zip(motion(air), jump, strict=True)]
-    return packed(mav.MAVLink_local_position_ned_message((air.vehicle.time_boot_us + 2000) // 1000, *moved))
+    stamp = {"time_boot_ms": (air.vehicle.time_boot_us + 2000) // 1000}
+    return made("LOCAL_POSITION_NED", stamp | moved(air, *jump))
 
 
 def odometry(air: Flight, *jump: float) -> bytes:
     """With the reset counter of a vehicle that has never reset its estimate."""
-    x, y, z, *velocity = (was + by for was, by in zip(motion(air), jump, strict=True))
-    values = (1, 1, x, y, z, [1, 0, 0, 0], *velocity, 0, 0, 0, [math.nan] * 21, [math.nan] * 21, 0)
-    return packed(mav.MAVLink_odometry_message(air.vehicle.time_boot_us + 2000, *values))
+    frames = {"time_usec": air.vehicle.time_boot_us + 2000, "frame_id": 1, "child_frame_id": 1, "q": [1, 0, 0, 0]}
+    return made("ODOMETRY", frames | moved(air, *jump))
 
 
 def spoil(air: Flight, kind: str, change: Callable[[Any], None], seconds: float) -> None:
     """Let the vehicle say otherwise for a while, in its messages of this kind."""
-    step, until_us, reader = air.vehicle.step, air.vehicle.time_boot_us + round(seconds * 1e6), mav.MAVLink(None)
+    step, until_us, number = air.vehicle.step, air.vehicle.time_boot_us + round(seconds * 1e6), number_of(kind)
 
     def spoilt(frame: bytes) -> bytes:
-        message = reader.decode(bytearray(frame))
-        if message.get_type() != kind or air.vehicle.time_boot_us >= until_us:
-            return frame
-        change(message)
-        return packed(message)
+        is_meant = message_id_of(frame) == number and air.vehicle.time_boot_us < until_us
+        return changed(frame, change) if is_meant else frame
 
     air.vehicle.step = lambda received: [spoilt(frame) for frame in step(received)]
 

@@ -3,8 +3,8 @@
 from typing import Any
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, custom_mode, decoded, made
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, POSCTL
 from tests.flying import Flight, in_a_child
 from tests.missions.test_confirming import ITEMS
@@ -12,12 +12,10 @@ from tests.simulated import simulated, wall
 
 pytestmark = pytest.mark.flight
 
-GROUND_STATION = mav.MAVLink(None, srcSystem=255, srcComponent=190)
 # CURRENT_MODE comes twice a second, as from PX4; the vehicle takes an interval to obey, and the packet one to arrive.
 REPORTED_WITHIN = 125 + 2
 # A heartbeat alone pauses the setpoints; the next report ends the flight.
 WATCHED = REPORTED_WITHIN + 125
-SET_MODE, ARM = 176, 400
 
 
 def flies(message: Any) -> bool:
@@ -28,15 +26,16 @@ def flies(message: Any) -> bool:
 
 def taken_over(air: Flight, mode: int) -> dict[str, Any]:
     """After how many intervals the vehicle reported the pilot's mode, and what the companion sent from then on."""
-    fields = (1, 1, SET_MODE, 0, 1.0, float(mode >> 16 & 0xFF), float(mode >> 24), 0, 0, 0, 0)
-    asks = bytes(mav.MAVLink_command_long_message(*fields).pack(GROUND_STATION))
-    sticks = bytes(mav.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0).pack(GROUND_STATION))
-    reported, sent, reader, step = None, [], mav.MAVLink(None), air.vehicle.step
+    to = {"target_system": 1, "target_component": 1, "command": SET_MODE}
+    wish = {"param1": 1.0, "param2": float(mode >> 16 & 0xFF), "param3": float(mode >> 24)}
+    asks = made("COMMAND_LONG", to | wish, GROUND_STATION)
+    sticks = made("MANUAL_CONTROL", {"target": 1, "z": 500}, GROUND_STATION)
+    reported, sent, step = None, [], air.vehicle.step
     heard: list[int | None] = []
 
     def listened(received: bytes) -> list[bytes]:
         packets = step(received)
-        heard[:] = [getattr(reader.decode(bytearray(packet)), "custom_mode", None) for packet in packets]
+        heard[:] = map(custom_mode, packets)
         return packets
 
     air.vehicle.step = listened
@@ -45,7 +44,7 @@ def taken_over(air: Flight, mode: int) -> dict[str, Any]:
         if reported is None and mode in heard:
             reported = interval
         if reported is not None:
-            messages = mav.MAVLink(None).parse_buffer(bytearray(air.pending)) or []
+            messages = (decoded(frame) for at_us, frame in air.sent if at_us == air.now_us)
             sent += [message.get_type() for message in messages if flies(message)]
     return {"reported": reported, "sent": sent, "state": air.state, "mode": air.companion.status().vehicle_mode}
 
