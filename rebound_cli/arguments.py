@@ -358,14 +358,14 @@ def add_replay(commands: Commands) -> None:
 
 def add_tune(commands: Commands) -> None:
     text = "Noise floor, margins, the smallest hit that shows, settings; see docs/how-to/recorded-flights.md."
-    tune = _command(commands, "tune", "tune.command:run_tune", "settings for a vehicle from its healthy flights", text)
+    tune = _command(commands, "tune", "tune:run_tune", "settings for a vehicle from its healthy flights", text)
     text = "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders"
     _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
     _gone(tune, "--airframe", "the smallest hit that shows is the detector's own promise, whatever the arms")
     _option(tune, "--companion", "settings to begin with (default: the defaults)", "FILE")
     _option(tune, "--out", "write the settings, for rebound fly --companion FILE", "FILE")
-    _add_json(tune, "figures")
+    _gone(tune, "--json", "the settings are YAML, which a program reads as well")
 
 
 def add_identify(commands: Commands) -> None:
