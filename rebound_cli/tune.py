@@ -22,7 +22,7 @@ from rebound_cli.documents import parse_document, refuse_existing, validated, wr
 from rebound_cli.inputs import companion_settings
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
-from rebound_cli.logs.shaking import FLYING, Stage, clipped
+from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
 from rebound_cli.replay.recording import log_file
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import watch_log
@@ -66,14 +66,14 @@ def run_tune(options: Namespace) -> int:
     refuse_existing(out)
     config = companion_settings(options.companion, (), options.detector)
     flights = [read_healthy(path, config) for path in options.logs]
-    logs = [flight.log for flight in flights]
+    logs = [flight.log for flight, _ in flights]
     found = margins(logs, config)
     advice = advise(logs, config, found)
     text = settings_text(advice, ", ".join(path.name for path in options.logs))
     # Read as `rebound fly` will read it before anybody has it.
     document = parse_document(text, str(out or "the settings"))
     validated(CompanionConfig, document, document.data["companion"], ("companion",))
-    parts = [*map(_flight_rows, flights), _margin_rows(found, advice)]
+    parts = [*(_flight_rows(*flight) for flight in flights), _margin_rows(found, advice)]
     print("\n\n".join("\n".join(part) for part in parts) + f"\n\n{text}", end="")
     if out is not None:
         write_text(out, text)
@@ -81,8 +81,8 @@ def run_tune(options: Namespace) -> int:
     return 0
 
 
-def read_healthy(path: Path, config: CompanionConfig) -> Replay:
-    """A flight without a collision, and what the detector made of it.
+def read_healthy(path: Path, config: CompanionConfig) -> tuple[Replay, Shaking]:
+    """A flight without a collision: what the detector made of it, and how it shakes.
 
     Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing.
     """
@@ -93,26 +93,24 @@ def read_healthy(path: Path, config: CompanionConfig) -> Replay:
         wrong = f"it crashed at {log.seconds(crash.at_us):.1f} s"
     if wrong:
         raise LogError(f"{path}: not a healthy flight, {wrong}; tune learns from flights without a hit or a crash.")
-    flying_s = flight.shaking.lasted_s(*FLYING)
+    shakes = shaking(log)
+    flying_s = shakes.lasted_s(*FLYING)
     if not flying_s:
         raise LogError(f"{path}: no flight in it, only the ground, a take-off and a landing.")
     if flying_s < _LEAST_FLYING_S:
         raise LogError(f"{path}: too short a flight to learn from; a minute in the air is a good one.")
-    return flight
+    return flight, shakes
 
 
-def _in_air_s(flight: Replay) -> float:
-    return flight.shaking.lasted_s(*(stage for stage in Stage if stage is not Stage.GROUND))
-
-
-def _flight_rows(flight: Replay) -> Iterator[str]:
-    log, found, shaking = flight.log, flight.findings, flight.shaking
+def _flight_rows(flight: Replay, shakes: Shaking) -> Iterator[str]:
+    log, found = flight.log, flight.findings
+    in_air_s = shakes.lasted_s(*(stage for stage in Stage if stage is not Stage.GROUND))
     rows = [
-        f"{log.path}: {log.vehicle}, {_in_air_s(flight):.0f} s in the air, IMU at {shaking.rate_hz:.0f} Hz",
+        f"{log.path}: {log.vehicle}, {in_air_s:.0f} s in the air, IMU at {flight.imu_rate_hz:.0f} Hz",
         f"  {'':<16}{'noise x, y, z, RMS':<26}{'largest departure sideways, along z':<36}[m/s^2]",
     ]
-    for stage, noise in shaking.noise_m_s2().items():
-        x, y, z = shaking.during(stage).T
+    for stage, noise in shakes.noise_m_s2().items():
+        x, y, z = shakes.during(stage).T
         values = ", ".join(f"{value:.2f}" for value in noise)
         rows.append(f"  {stage.value:<16}{values:<26}{np.hypot(x, y).max():.1f}, {np.abs(z).max():.1f}")
     count, how = clipped(log)

@@ -88,8 +88,8 @@ def _topics(sample: Told) -> Iterator[tuple[str, Fields]]:
             unknown = dict.fromkeys(("voltage_v", "current_a", "discharged_mah"), math.nan)
             yield "battery_status", {**unknown, "remaining": 0.01 * sample.remaining_percent}
         case Demand():
-            asked = _path(sample.position_ned_m or _UNSET, sample.velocity_ned_m_s or _UNSET)
-            yield "vehicle_local_position_setpoint", asked
+            path = _path(sample.position_ned_m or _UNSET, sample.velocity_ned_m_s or _UNSET)
+            yield "vehicle_local_position_setpoint", path
 
 
 def boot_us(log: Log, at_us: Sequence[float] | Floats) -> npt.NDArray[np.int64]:

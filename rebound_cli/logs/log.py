@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self, TypeAlias
 
+import numpy as np
+
 from companion import messages
 from companion.autopilot.px4.firmware import PX4
 from companion.errors import ReboundError
@@ -97,6 +99,13 @@ class Log:
     def imu(self) -> list[tuple[int, ImuSample]]:
         """All IMU samples with the time each was heard at."""
         return [(heard.at_us, heard.sample) for heard in self.heard if isinstance(heard.sample, ImuSample)]
+
+    @property
+    def imu_interval_us(self) -> float:
+        """Between two IMU samples, by the vehicle's clock; gaps count for nothing."""
+        intervals_us = np.diff([sample.time_boot_us for _, sample in self.imu()])
+        intervals_us = intervals_us[intervals_us > 0]
+        return float(np.median(intervals_us)) if len(intervals_us) else 1e6
 
     @property
     def duration_s(self) -> float:

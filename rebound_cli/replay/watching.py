@@ -1,6 +1,6 @@
 """A log through the watch: the same detector code as in flight, at the recorded or at a requested rate."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -19,6 +19,7 @@ from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
 from companion.reflex.reflex import start_reflex
 from rebound_cli.logs.log import Demand, Log, LoggedSample, Told
+from rebound_cli.replay.listening import Listener
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
@@ -110,7 +111,7 @@ class Span:
 
 @dataclass(slots=True)
 class Findings:
-    """Grows step by step."""
+    """Grows step by step. `listener` has heard what the detector made of each sample."""
 
     impacts: list[Finding] = field(default_factory=list)
     blind: list[Span] = field(default_factory=list)
@@ -121,6 +122,7 @@ class Findings:
     promised: float = 0.0  # false alarms in that time, by the detector's own statistic
     promise: Promise | None = None  # when it was last armed
     is_flying: bool = False  # armed and in the air at the end
+    listener: Listener = field(default_factory=Listener)
     _open: dict[str, tuple[int, str]] = field(default_factory=dict)
     _noted_us: int | None = None
 
@@ -181,22 +183,13 @@ class Findings:
         self._note_span("off", None, at_us)
 
 
-def watch_log(
-    log: Log,
-    config: CompanionConfig,
-    listen: Callable[[CollisionMonitor], None] | None = None,
-    modes: Sequence[str] | None = None,
-) -> Findings:
-    """Everything heard, in its order.
-
-    `listen` is told of the watch before its first sample. `modes`: see `Circumstances`.
-    """
+def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = None) -> Findings:
+    """Everything heard, in its order. `modes`: see `Circumstances`."""
     circumstances, findings = Circumstances(config, modes), Findings()
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in log.heard if isinstance(item.sample, messages.ImuSample))
     monitor = start_monitor(_sampled_as(log, config), start_us)
-    if listen is not None:
-        listen(monitor)
+    findings.listener.listen(monitor)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
         situation = circumstances.situation
