@@ -12,8 +12,8 @@ from rebound_cli.live.console import Console, console_for
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.recording import is_run_folder, log_file, read_recording, settings_file
 from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
+from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
-from rebound_cli.report.writer import write_page
 from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
 
 

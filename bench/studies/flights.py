@@ -22,8 +22,8 @@ from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import Finding
+from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import replayed_flight
-from rebound_cli.report.writer import write_page
 
 SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
 LABELS = Path(__file__).with_name("flights.yaml")

@@ -133,10 +133,7 @@ class Reproduction:
     """What became of it; `first_difference` is None when every packet sent and every event is the same to the bit."""
 
     findings: Findings
-    steps: int
-    packets_received: int
-    packets_sent: int
-    events: int
+    extent: Mapping[str, int]  # how many steps, packets and events were compared
     is_cut: bool
     first_difference: str | None
 
@@ -194,15 +191,13 @@ def reproduce(recording: Recording) -> Reproduction:
             _tell(stepped, record)
     differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
     followed.close()
-    return Reproduction(
-        findings=followed.findings,
-        steps=len(recording.steps),
-        packets_received=sum(len(step.received) for step in recording.steps),
-        packets_sent=sum(len(step.sent) for step in recording.steps),
-        events=len(expected),
-        is_cut=recording.is_cut,
-        first_difference=differences[0] if differences else None,
-    )
+    extent = {
+        "steps": len(recording.steps),
+        "packets_received": sum(len(step.received) for step in recording.steps),
+        "packets_sent": sum(len(step.sent) for step in recording.steps),
+        "events": len(expected),
+    }
+    return Reproduction(followed.findings, extent, recording.is_cut, differences[0] if differences else None)
 
 
 def _vector(values: Sequence[float] | None) -> Vector3 | None:

@@ -172,10 +172,8 @@ def _facts(replay: Replay) -> Iterator[str]:
 
 def _reproduction_text(again: Reproduction) -> str:
     """Whether the flight was decided again to the bit."""
-    extent = (
-        f"{again.steps} steps, {again.packets_received} packets in, {again.packets_sent} packets out, "
-        f"{again.events} events"
-    )
+    extent = "{steps} steps, {packets_received} packets in, {packets_sent} packets out, {events} events"
+    extent = extent.format_map(again.extent)
     if again.is_cut:
         extent += "; the program was ended at once, and what came after its last packet is not known"
     if again.first_difference is None:
@@ -192,8 +190,6 @@ def report_data(replay: Replay) -> dict[str, Any]:
     """The same for a program; vectors NED unless named FRD, SI units, times in seconds since the log's start."""
     log, findings, again = replay.log, replay.findings, replay.reproduction
     count, how = clipped(log)
-    names = ("first_difference", "steps", "packets_received", "packets_sent", "events")
-    extent = {name: getattr(again, name) for name in names if again is not None}
     return {
         "schema": SCHEMA,
         "log": str(log.path),
@@ -212,8 +208,13 @@ def report_data(replay: Replay) -> dict[str, Any]:
         "clipping_known_by": how,
         "peak_specific_force_m_s2": round(replay.peak_m_s2, 3),
         "notes": list(replay.losses),
-        "reproduction": again and {"identical": again.first_difference is None, **extent, "cut": again.is_cut},
+        "reproduction": again and _reproduction_data(again),
     }
+
+
+def _reproduction_data(again: Reproduction) -> dict[str, Any]:
+    told = {"identical": again.first_difference is None, "first_difference": again.first_difference}
+    return {**told, **again.extent, "cut": again.is_cut}
 
 
 def _finding_data(replay: Replay, finding: Finding) -> dict[str, Any]:

@@ -120,16 +120,6 @@ def test_the_estimate_is_of_the_core_that_flies(tmp_path):
     assert (second.velocity_ned_m_s, second.position_ned_m) == ((2.0, 2.0, 3.0), (4.0, 5.0, -7.0))
 
 
-@pytest.mark.parametrize(("velocity_down", "taken"), [(-0.5, -0.5), (0.0, -0.45), (300.0, -0.45)])
-def test_an_old_estimator_counts_where_it_works(tmp_path, velocity_down, taken):
-    # Given a climb at 0.45 m/s by what the vehicle flies by, and an EKF that was running beside it
-    rows = [OLD_COPTER, *OLD_IMU]
-    rows += [("CTUN", 1000, 500, 0.0, 7.0, 0, 45), ("EKF1", 1001, 0.0, 0.0, 0.0, 1.0, 2.0, velocity_down, 0, 0, -7.1)]
-    (position,) = of(read(tmp_path, rows, OLD), LocalPosition)
-    # Then one that agrees is taken, and not one that never started or went astray
-    assert position.velocity_ned_m_s[2] == pytest.approx(taken)
-
-
 def test_without_an_estimator_the_way_is_the_satellites(tmp_path):
     # Given a climb at 0.5 m/s, and a GPS with a fix from 1.1 s on, that goes east at 2 m/s
     rows = [OLD_COPTER, *OLD_IMU]
