@@ -19,8 +19,8 @@ def prepare_vehicle(console: Console, world: "SimulatedWorld") -> None:
     from sim_vehicle.physics.jit import NOT_KEPT
     from sim_vehicle.vehicle import SimulatedVehicle
 
-    # The folder is of this version of the kernels alone: where there is nothing in it, all are compiled now.
-    if NOT_KEPT is not None or not any(Path(numba.config.CACHE_DIR).iterdir()):
+    # The folder is of this version of the kernels alone: where none is in it, all are compiled now.
+    if NOT_KEPT is not None or not any(Path(numba.config.CACHE_DIR).rglob("*.nbc")):
         often = "once for this machine" if NOT_KEPT is None else "at every start"
         console.print(f"{COMPILING} the simulated vehicle's physics, which takes half a minute, {often}")
     if NOT_KEPT is not None:

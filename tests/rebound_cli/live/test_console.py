@@ -87,10 +87,11 @@ def test_who_waits_for_kernels_to_be_compiled_is_told_and_nobody_else(tmp_path, 
         prepare_vehicle(Console(stream), world)
         return stream.getvalue()
 
-    # Given the folder of this version's kernels, with nothing in it at first
+    # Given the folder of this version's kernels, with a folder for each file of them and none in it at first
+    (tmp_path / "physics").mkdir()
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     assert "half a minute, once for this machine" in told()
-    (tmp_path / "kernel.nbc").touch()
+    (tmp_path / "physics" / "kernel.nbc").touch()
     assert told() == ""
     # And where nothing can be kept
     monkeypatch.setattr("sim_vehicle.physics.jit.NOT_KEPT", "a disk that is read-only")
