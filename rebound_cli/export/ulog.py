@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion import messages
-from rebound_cli.logs.log import QUADROTOR, Demand, Log, LoggedSample, Told
+from rebound_cli.logs.log import QUADROTOR, Log, LoggedSample
 from rebound_cli.logs.ulog import NAV_STATES
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.shown_flight import ShownFlight
@@ -50,7 +50,7 @@ def _path(position_ned_m: Sequence[float], velocity_ned_m_s: Sequence[float]) ->
     return dict(zip(("x", "y", "z", "vx", "vy", "vz"), (*position_ned_m, *velocity_ned_m_s), strict=True))
 
 
-def _topics(sample: Told) -> Iterator[tuple[str, Fields]]:
+def _topics(sample: messages.Sample) -> Iterator[tuple[str, Fields]]:
     """As PX4 logs it. What the link does not carry is NaN; a place and a velocity that it carries are valid."""
     match sample:
         case messages.ImuSample(_, force, rates):
@@ -87,9 +87,9 @@ def _topics(sample: Told) -> Iterator[tuple[str, Fields]]:
         case messages.Battery():
             unknown = dict.fromkeys(("voltage_v", "current_a", "discharged_mah"), math.nan)
             yield "battery_status", {**unknown, "remaining": 0.01 * sample.remaining_percent}
-        case Demand():
-            path = _path(sample.position_ned_m or _UNSET, sample.velocity_ned_m_s or _UNSET)
-            yield "vehicle_local_position_setpoint", path
+        case messages.PositionTarget(position, down_m_s):
+            velocity = (math.nan, math.nan, math.nan if down_m_s is None else down_m_s)
+            yield "vehicle_local_position_setpoint", _path(position or _UNSET, velocity)
 
 
 def boot_us(log: Log, at_us: Sequence[float] | Floats) -> npt.NDArray[np.int64]:

@@ -24,7 +24,6 @@ from companion import messages
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
 from rebound_cli.logs.log import (
     QUADROTOR,
-    Demand,
     Log,
     LogError,
     LoggedSample,
@@ -444,7 +443,7 @@ def _demand(topic: Topic) -> Iterator[LoggedSample]:
     if down is None and up is not None:
         down = -up
     for _, time_us, (speed_m_s,) in topic.rows(None if down is None else down[:, None]):
-        yield LoggedSample(time_us, Demand(time_us, None, None, speed_m_s))
+        yield LoggedSample(time_us, messages.PositionTarget(None, speed_m_s))
 
 
 def _marks(topic: Topic) -> Iterator[tuple[int, str]]:

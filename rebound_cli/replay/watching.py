@@ -18,7 +18,7 @@ from companion.reflex.health import Promise
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
 from companion.reflex.reflex import start_reflex
-from rebound_cli.logs.log import Demand, Log, LoggedSample, Told
+from rebound_cli.logs.log import Log, LoggedSample
 from rebound_cli.replay.listening import Listener
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
@@ -44,13 +44,12 @@ class Circumstances:
         self._guard = GuardContext(mission, Vehicle(), streams, reflex, config=settings, keeps_others_out=False)
         self._now_us = 0
 
-    def hear(self, told: Sequence[Told], now_us: int) -> Sequence[str]:
+    def hear(self, told: Sequence[messages.Sample], now_us: int) -> Sequence[str]:
         """Take-offs, landings, arming and modes, as the samples report them."""
         guard, self._now_us = self._guard, now_us
         vehicle = guard.vehicle
         armed, landed = vehicle.armed, vehicle.landed
-        samples = [_setpoint(sample) if isinstance(sample, Demand) else sample for sample in told]
-        observe(guard, samples, now_us)
+        observe(guard, told, now_us)
         note_height(guard)
         happened = [event.text for event in guard.events if event.kind in _TOLD]
         if vehicle.armed and armed is not True:
@@ -71,10 +70,6 @@ class Circumstances:
         """Now."""
         guard = self._guard
         return situation_of(guard, self._why_not(guard), guard.descent.is_meant(guard.vehicle, self._now_us))
-
-
-def _setpoint(demand: Demand) -> messages.PositionTarget:
-    return messages.PositionTarget(demand.position_ned_m, demand.velocity_down_m_s)
 
 
 @dataclass(slots=True)
@@ -209,8 +204,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
             findings.tell(at_us, text)
         # One by one: two impacts of one instant would otherwise be one.
         for sample in told:
-            if not isinstance(sample, Demand):
-                step((sample,), at_us)
+            step((sample,), at_us)
         last_us = at_us
     findings.close(last_us)
     return findings

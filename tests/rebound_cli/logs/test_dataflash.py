@@ -14,11 +14,12 @@ from companion.messages import (
     ImuSample,
     LandedState,
     LocalPosition,
+    PositionTarget,
     Sticks,
     Vibration,
 )
 from companion.motion.rotation import body_to_ned
-from rebound_cli.logs.log import Demand, LogError
+from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from tests.rebound_cli.logs.dataflash_file import NEW, OLD, dataflash, new_imu, old_imu, text
 
@@ -198,9 +199,9 @@ def test_sticks_go_by_the_radios_calibration(tmp_path, parameters, named, deflec
 
 def test_the_climb_rate_that_is_asked_for(tmp_path):
     slow = read(tmp_path, [COPTER, *IMU, ("CTUN", 1_000_000, 0.4, 0.0, -50, 0)])
-    assert of(slow, Demand) == [Demand(1_000_000, None, None, 0.5)]
+    assert of(slow, PositionTarget) == [PositionTarget(None, 0.5)]
     whole = read(tmp_path, [COPTER, *IMU, ("CTUN", 1_000_000, 0.4, 0.0, -50, 0), ("PSCD", 1_000_000, -3.0, 0.25, 9.0)])
-    assert of(whole, Demand) == [Demand(1_000_000, None, None, 0.25)]
+    assert of(whole, PositionTarget) == [PositionTarget(None, 0.25)]
 
 
 def test_clipped_samples_are_counted(tmp_path):

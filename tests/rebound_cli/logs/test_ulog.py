@@ -14,9 +14,10 @@ from companion.messages import (
     LandedState,
     LocalPosition,
     Odometry,
+    PositionTarget,
     Vibration,
 )
-from rebound_cli.logs.log import Demand, LogError
+from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 
@@ -178,7 +179,7 @@ def test_landed_state_is_what_px4_would_send(tmp_path):
 )
 def test_what_was_asked_for_in_the_words_of_two_versions(tmp_path, fields, row):
     log = read(tmp_path, {**IMU, "trajectory_setpoint": (fields, [(START + 5, *row)])})
-    assert of(log, Demand) == [Demand(START + 5, (1.0, 2.0, 3.0), None, 0.5)]
+    assert of(log, PositionTarget) == [PositionTarget((1.0, 2.0, 3.0), 0.5)]
 
 
 def test_the_vehicle_is_named(tmp_path):
