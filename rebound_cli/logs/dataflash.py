@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from pymavlink.DFReader import DFReader_binary, DFReader_text
 from pymavlink.mavutil import mode_mapping_acm
+from pymavlink.quaternion import QuaternionBase
 
 from companion import messages
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
@@ -339,18 +340,7 @@ def _attitude(topic: Topic) -> Iterator[LoggedSample]:
 
 def _quaternions(angles_deg: Floats | None) -> Floats | None:
     """Body to NED, of roll, pitch and yaw."""
-    if angles_deg is None:
-        return None
-    half_rad = np.radians(angles_deg) / 2.0
-    (cr, cp, cy), (sr, sp, sy) = np.cos(half_rad).T, np.sin(half_rad).T
-    return np.column_stack(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
+    return None if angles_deg is None else np.array([QuaternionBase(row).q for row in np.radians(angles_deg)])
 
 
 def _attitude_targets(throttle: Topic, attitude: Topic) -> Iterator[LoggedSample]:
