@@ -58,7 +58,7 @@ def test_a_contact_that_no_sample_resolves_has_a_restitution_and_no_spring():
 
 
 def test_the_guards_that_meet_the_wall():
-    assert [guards_at(np.radians(degrees)) for degrees in (0, 20, 45, 70, 90, -45, 180)] == [2, 2, 1, 2, 2, 1, 2]
+    assert [guards_at(np.radians(degrees)) for degrees in (0, 20, 25, 45, 70, 90, -45, 180)] == [2, 2, 1, 1, 2, 2, 1, 2]
 
 
 def test_a_flight_becomes_an_airframe(wall_flight, tmp_path):
