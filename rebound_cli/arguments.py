@@ -224,8 +224,7 @@ def add_sim(commands: Commands) -> None:
     _option(sim, "--link", text, "URL", action="append", default=[])
     _option(sim, "--instance", "adds N to the UDP ports and to the system's number", "N", type=instance, default=0)
     _option(sim, "--truth", "write what really happened to this .npz file at the end", "FILE")
-    # Of earlier versions.
-    _option(sim, "--signing", argparse.SUPPRESS, choices=("any-link", "px4-1.17"))
+    _gone(sim, "--signing", "with --signing-key the vehicle signs as PX4 1.17 does")
     _option(sim, "--signing-key", "it has this key and signs as PX4 1.17 does; MAV_SIGN_CFG is 1", "FILE")
     _flag(sim, "--stop-with-stdin", "end when standard input ends")
 
@@ -276,7 +275,7 @@ def add_logs(commands: Commands) -> None:
 
 def add_report(commands: Commands) -> None:
     text = "One file that any browser opens, without a network; see docs/how-to/report.md."
-    report = _command(commands, "report", "report.writer:run_report", "a recorded flight as a page to look at", text)
+    report = _command(commands, "report", "report.page:run_report", "a recorded flight as a page to look at", text)
     _option(report, "flight", "a run's folder, or a flight's name (default: last)", "RUN", nargs="?", default="last")
     _add_runs(report)
     _option(report, "--out", "the page (default: report.html in the run's folder)", "FILE")
@@ -358,14 +357,14 @@ def add_replay(commands: Commands) -> None:
 
 def add_tune(commands: Commands) -> None:
     text = "Noise floor, margins, the smallest hit that shows, settings; see docs/how-to/recorded-flights.md."
-    tune = _command(commands, "tune", "tune.command:run_tune", "settings for a vehicle from its healthy flights", text)
+    tune = _command(commands, "tune", "tune:run_tune", "settings for a vehicle from its healthy flights", text)
     text = "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders"
     _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
     _gone(tune, "--airframe", "the smallest hit that shows is the detector's own promise, whatever the arms")
     _option(tune, "--companion", "settings to begin with (default: the defaults)", "FILE")
     _option(tune, "--out", "write the settings, for rebound fly --companion FILE", "FILE")
-    _add_json(tune, "figures")
+    _gone(tune, "--json", "the settings are YAML, which a program reads as well")
 
 
 def add_identify(commands: Commands) -> None:

@@ -22,7 +22,6 @@ from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
 from rebound_cli.live.signed_connection import open_signed, refused_packets
 from rebound_cli.live.status import StatusServer, served
-from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import Followed
 from rebound_cli.results import run_folder
 from rebound_cli.results.ending import ending_text
@@ -89,7 +88,7 @@ def run_fly(options: Namespace) -> int:
             folder, None if options.lockstep else Background("log"), ring.make_room if ring else None
         )
         with Interrupts() as interrupts:
-            followed = Followed(Listener()) if is_simulated else None
+            followed = Followed() if is_simulated else None
             flight = Flight(mission, world, folder, recorder, console, interrupts, followed)
             try:
                 flown = _fly(flight, connection, options)

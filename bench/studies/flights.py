@@ -20,11 +20,10 @@ from bench.studies.landings import CRASH_WITHIN_S
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
-from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import Finding
+from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import replayed_flight
-from rebound_cli.report.writer import write_page
 
 SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
 LABELS = Path(__file__).with_name("flights.yaml")
@@ -100,7 +99,7 @@ def row_of(name: str, replay: Replay, labels: Mapping[float, str]) -> Json:
         "vehicle": replay.log.vehicle,
         "flown_h": findings.flown_us / 3.6e9,
         "watched_h": findings.watched_us / 3.6e9,
-        "imu_hz": replay.shaking.rate_hz,
+        "imu_hz": replay.imu_rate_hz,
         "collisions": told["collision"],
         "touchdowns": told["touchdown"],
         "crashes": told["crash"],
@@ -129,16 +128,16 @@ def run_flights(options: Namespace) -> int:
     files = (path for folder in options.folders for path in folder.rglob("*"))
     for path in sorted(path for path in files if path.suffix.lower() in SUFFIXES):
         name = f"{path.parent.name}/{path.name}"
-        config, listener = CompanionConfig(), Listener()
+        config = CompanionConfig()
         try:
-            replay = replay_log(read_log(path), config, None, listener.listen)
+            replay = replay_log(read_log(path), config, None)
         except LogError as error:
             refused.append(str(error))
             continue
         rows.append(row_of(name, replay, labels.get(name, {})))
         if replay.findings.collisions:
             shown = page.folder / f"{path.parent.name}-{path.stem}.html"
-            write_page(replayed_flight(replay, config, listener), shown)
+            write_page(replayed_flight(replay, config), shown)
         print(f"{name}: {rows[-1]['watched_h'] * 60:.1f} min watched, {rows[-1]['collisions']} collisions")
     seen = [row for row in rows if row["watched_h"] > 0.0]
     idle = "\n".join(row["log"] for row in rows if row not in seen) or "None."

@@ -14,8 +14,8 @@ from rebound_cli.results.run_folder import FIGURE_NAME, REPORT_NAME, TLOG_NAME
 def show_flight(folder: Path, followed: Followed | None = None) -> None:
     """The picture is of simulated flights. One that was followed is not decided again. Raises ReboundError, OSError."""
     # A drone that only offers the page never loads what makes it.
+    from rebound_cli.report.page import write_page
     from rebound_cli.report.shown_flight import followed_flight, recorded_flight
-    from rebound_cli.report.writer import write_page
 
     # Where nothing was heard, that is what reading it says.
     is_followed = followed is not None and followed.started_at_us

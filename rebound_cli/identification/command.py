@@ -7,8 +7,7 @@ from pathlib import Path
 
 from rebound_cli.documents import load_document, parse_document, refuse_existing, validated, write_text
 from rebound_cli.identification.fit import Identified, Number, Spring, identify
-from rebound_cli.identification.flight import flight_hit
-from rebound_cli.identification.hit import Hit, IdentificationError
+from rebound_cli.identification.hit import IdentificationError, flight_hit
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.recording import log_file
 from rebound_cli.results import run_folder
@@ -19,7 +18,7 @@ def run_identify(options: Namespace) -> int:
     """Print what the hits show and, with --out, write it as an airframe file. Raises IdentificationError."""
     out: Path | None = options.out
     refuse_existing(out)
-    found = identify([_hit(path) for path in options.data])
+    found = identify([flight_hit(read_log(log_file(path))) for path in options.data])
     mass_kg = _mass_kg(options)
     print(report_text(found), end="")
     if out is None:
@@ -34,13 +33,6 @@ def run_identify(options: Namespace) -> int:
     write_text(out, text)
     print(f"\nWritten to {out}. Fly it: rebound fly missions/wall.yaml --lockstep --airframe {out}")
     return 0
-
-
-def _hit(path: Path) -> Hit:
-    if path.suffix.lower() == ".csv":
-        text = "positions of motion capture are not read any more: give the same flight's log, with its IMU"
-        raise IdentificationError(f"{path}: {text}.")
-    return flight_hit(read_log(log_file(path)))
 
 
 def _mass_kg(options: Namespace) -> float | None:

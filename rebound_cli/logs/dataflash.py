@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from pymavlink.DFReader import DFReader_binary, DFReader_text
 from pymavlink.mavutil import mode_mapping_acm
+from pymavlink.quaternion import QuaternionBase
 
 from companion import messages
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
 from rebound_cli.logs.log import (
     QUADROTOR,
-    Demand,
     Log,
     LogError,
     LoggedSample,
@@ -45,19 +45,14 @@ _HEADER_SIZE = 3
 
 _NAMES = [
     *("MSG", "PARM", "IMU", "ATT", "CTUN", "VIBE", "GPS", "MODE", "EV", "ERR", "RCIN", "PSCN", "PSCE", "PSCD"),
-    *(f"{estimator}{number}" for estimator in ("XKF", "NKF", "EKF") for number in (1, 4)),
+    *(f"{estimator}{number}" for estimator in ("XKF", "NKF") for number in (1, 4)),
 ]
 # CTUN's climb rates are in cm/s where they are whole numbers.
 _CLIMB_RATES = ("DCRt", "CRt")
 # What a missing message costs, in the words of docs/how-to/recorded-flights.md.
 _COSTS = {
-    (
-        "XKF1",
-        "NKF1",
-        "EKF1",
-        "CTUN",
-    ): "height and velocity are not known: no v_c, and landings are told by the land detector",
-    ("ATT", "XKF1", "NKF1", "EKF1"): "the direction of a hit in the world is not known",
+    ("XKF1", "NKF1", "CTUN"): "height and velocity are not known: no v_c, and landings are told by the land detector",
+    ("ATT", "XKF1", "NKF1"): "the direction of a hit in the world is not known",
     ("CTUN",): "thrust is not known: hits along body z are judged by the force's own change alone",
     ("EV",): "neither arming nor landing is known: the whole log is taken for a flight",
 }
@@ -106,15 +101,12 @@ _TROUBLES = [
     *("terrain failsafe", "EKF primary", "thrust loss", "sensor failsafe", "leak", "pilot input"),
     *("vibration failsafe", "internal error", "dead reckoning failsafe"),
 ]
-# Two estimates of one climb rate that both work are nearer than this for more than half of the time: each is good to
-# 0.1 to 0.2 m/s by its barometer.
-_SAME_CLIMB_M_S = 0.3
 _EKF_CHECK = _TROUBLES.index("EKF check")
 # GPS.Status
 _FIX_3D = 3
 # On the mean sphere, 6371 km.
 _METRES_PER_DEGREE = math.radians(6_371_000.0)
-# AHRS_EKF_TYPE to that estimator's message; EKF1 is of the one before them.
+# AHRS_EKF_TYPE to that estimator's message. The one before them, EKF1, ran without being used until 3.2.
 _ESTIMATORS = {2: "NKF1", 3: "XKF1"}
 # The estimator's own word, SS (nav_filter_status): horizontal and vertical velocity are good.
 _GOOD = {"horizontal velocity": 2, "vertical velocity": 4}
@@ -167,7 +159,7 @@ def read_dataflash(path: Path) -> Log:
         *_vibration(topics["VIBE"]),
         *_heartbeats(topics["EV"], topics["MODE"]),
         *_landed_states(topics["EV"], int(imu.time_us[0])),
-        *(_sticks(topics["RCIN"], parameters) if topics["RCIN"] else _throttle_stick(topics["CTUN"])),
+        *_sticks(topics["RCIN"], parameters),
         *_demand(topics["PSCD"] or topics["CTUN"]),
     ]
     low_pass_hz = parameters.get("INS_ACCEL_FILTER", parameters.get("INS_MPU6K_FILTER", 0.0))
@@ -259,8 +251,6 @@ def _estimate(topics: _Topics, parameters: _Parameters) -> tuple[str, Topic]:
     for name in (flies, "XKF1", "NKF1"):
         if name is not None and topics[name]:
             return name, _of_primary(topics[name], topics[_status_of(name)])
-    if topics["EKF1"] and _is_flown_by(topics["EKF1"], topics["CTUN"]):
-        return "EKF1", topics["EKF1"]
     return "CTUN", _inertial_navigation(topics["CTUN"], topics["GPS"])
 
 
@@ -277,15 +267,6 @@ def _while_good(estimate: Topic, errors: Topic) -> Topic:
 def _status_of(name: str) -> str:
     """XKF4 of XKF1; CTUN has none beside it."""
     return name.replace("1", "4")
-
-
-def _is_flown_by(estimate: Topic, throttle: Topic) -> bool:
-    """Until 3.2 the EKF ran without being used: not started, it gave zeros, and gone astray, hundreds of m/s."""
-    down, up = estimate.column("VD"), throttle.column("CRt")
-    if down is None or up is None:
-        return down is not None
-    apart_m_s = np.abs(down + throttle.held(up, estimate.time_us)[0])
-    return bool(down.any()) and float(np.median(apart_m_s)) < _SAME_CLIMB_M_S
 
 
 def _of_primary(topic: Topic, status: Topic) -> Topic:
@@ -359,18 +340,7 @@ def _attitude(topic: Topic) -> Iterator[LoggedSample]:
 
 def _quaternions(angles_deg: Floats | None) -> Floats | None:
     """Body to NED, of roll, pitch and yaw."""
-    if angles_deg is None:
-        return None
-    half_rad = np.radians(angles_deg) / 2.0
-    (cr, cp, cy), (sr, sp, sy) = np.cos(half_rad).T, np.sin(half_rad).T
-    return np.column_stack(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
+    return None if angles_deg is None else np.array([QuaternionBase(row).q for row in np.radians(angles_deg)])
 
 
 def _attitude_targets(throttle: Topic, attitude: Topic) -> Iterator[LoggedSample]:
@@ -457,21 +427,13 @@ def _sticks(topic: Topic, parameters: _Parameters) -> Iterator[LoggedSample]:
         yield LoggedSample(time_us, messages.Sticks((pitch, roll, throttle, yaw)))
 
 
-def _throttle_stick(topic: Topic) -> Iterator[LoggedSample]:
-    """As the pilot's throttle was understood, until 3.4 in thousandths; nothing is known of the other sticks."""
-    thousandths = topic.column("ThrIn")
-    shares = topic.column("ThI") if thousandths is None else thousandths / 1000.0
-    for _, time_us, (share,) in topic.rows(None if shares is None else shares[:, None]):
-        yield LoggedSample(time_us, messages.Sticks((0.0, 0.0, max(-1.0, min(1.0, 2.0 * share - 1.0)), 0.0)))
-
-
 def _demand(topic: Topic) -> Iterator[LoggedSample]:
     """The climb rate that pilot or mission ask for: down in PSCD, up in CTUN."""
     down, up = topic.column("DVD"), topic.column("DCRt")
     if down is None and up is not None:
         down = -up
     for _, time_us, (speed_m_s,) in topic.rows(None if down is None else down[:, None]):
-        yield LoggedSample(time_us, Demand(time_us, None, None, speed_m_s))
+        yield LoggedSample(time_us, messages.PositionTarget(None, speed_m_s))
 
 
 def _marks(topic: Topic) -> Iterator[tuple[int, str]]:

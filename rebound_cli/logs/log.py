@@ -4,13 +4,14 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self, TypeAlias
+
+import numpy as np
 
 from companion import messages
 from companion.autopilot.px4.firmware import PX4
 from companion.errors import ReboundError
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, Identity, identify
-from companion.messages import Heartbeat, ImuSample, MessageId, Sample, Vector3
+from companion.messages import Heartbeat, ImuSample, MessageId, PositionTarget, Sample, Vector3
 
 # Without these a detector loses something.
 WANTED = {
@@ -35,35 +36,11 @@ class LogError(ReboundError):
 
 
 @dataclass(frozen=True, slots=True)
-class Demand:
-    """What the vehicle's position control was asked for; local NED, None where nothing was (wholly) asked.
-
-    The companion is told this by no message: in flight it knows what it sent. A log tells it of any pilot.
-    """
-
-    time_boot_us: int
-    position_ned_m: Vector3 | None
-    velocity_ned_m_s: Vector3 | None
-    velocity_down_m_s: float | None
-
-    @classmethod
-    def of(cls, time_boot_us: int, position_ned_m: Sequence[float], velocity_ned_m_s: Sequence[float]) -> Self:
-        """NaN where nothing was asked."""
-        position = vector(position_ned_m) if all(map(math.isfinite, position_ned_m)) else None
-        velocity = vector(velocity_ned_m_s) if all(map(math.isfinite, velocity_ned_m_s)) else None
-        down = velocity_ned_m_s[2] if math.isfinite(velocity_ned_m_s[2]) else None
-        return cls(time_boot_us, position, velocity, down)
-
-
-Told: TypeAlias = Sample | Demand
-
-
-@dataclass(frozen=True, slots=True)
 class LoggedSample:
     """A sample and when it was heard, in microseconds of the log's own clock."""
 
     at_us: int
-    sample: Told
+    sample: Sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +76,13 @@ class Log:
         return [(heard.at_us, heard.sample) for heard in self.heard if isinstance(heard.sample, ImuSample)]
 
     @property
+    def imu_interval_us(self) -> float:
+        """Between two IMU samples, by the vehicle's clock; gaps count for nothing."""
+        intervals_us = np.diff([sample.time_boot_us for _, sample in self.imu()])
+        intervals_us = intervals_us[intervals_us > 0]
+        return float(np.median(intervals_us)) if len(intervals_us) else 1e6
+
+    @property
     def duration_s(self) -> float:
         return self.seconds(self.heard[-1].at_us) - self.seconds(self.heard[0].at_us)
 
@@ -110,6 +94,12 @@ class Log:
 def vector(row: Sequence[float]) -> Vector3:
     """The first three."""
     return row[0], row[1], row[2]
+
+
+def position_target(position_ned_m: Sequence[float], velocity_down_m_s: float) -> PositionTarget:
+    """What the vehicle's position control was asked for; NaN where nothing was."""
+    position = vector(position_ned_m) if all(map(math.isfinite, position_ned_m)) else None
+    return PositionTarget(position, velocity_down_m_s if math.isfinite(velocity_down_m_s) else None)
 
 
 def in_order(heard: Iterable[LoggedSample], middle_us: float) -> tuple[LoggedSample, ...]:

@@ -1,23 +1,18 @@
 """Any log by its path. Telemetry logs (.tlog) of any program are read here, with any number of systems on them."""
 
-import math
-import struct
 from collections import Counter
 from pathlib import Path
 
 from companion.link.vehicle import Identity, identify, is_autopilot
 from companion.mavlink.decode import Decoder
-from companion.mavlink.packet import message_id_of, payload_of, source_of
+from companion.mavlink.packet import message_id_of, source_of
+from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.log import WANTED, Demand, Log, LogError, LoggedSample
+from rebound_cli.logs.log import WANTED, Log, LogError, LoggedSample
 
 _ULOG_MAGIC, _DATAFLASH_MAGIC = b"ULog", b"\xa3\x95"
 Packets = list[tuple[int, bytes]]
-
-# POSITION_TARGET_LOCAL_NED: time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros
-# at the end are left out. The mask's first six bits tell what of position and velocity is to be ignored.
-_TARGET = struct.Struct("<I11fHB")
 
 
 def read_log(path: Path) -> Log:
@@ -46,7 +41,7 @@ def read_telemetry(path: Path) -> Log:
     if not packets:
         raise LogError(f"{path}: not a telemetry log: no MAVLink packet with a time stamp in it.")
     vehicle, others = _vehicle(path, packets)
-    source, decoder = (vehicle.system_id, vehicle.component_id), Decoder()
+    source, decoder = (vehicle.system_id, vehicle.component_id), Decoder(GUARD_READERS)
     decoder.listen_to(*source)
     heard: list[LoggedSample] = []
     kinds: set[int] = set()
@@ -54,10 +49,7 @@ def read_telemetry(path: Path) -> Log:
         if source_of(packet) != source:
             continue
         kinds.add(message_id_of(packet))
-        if message_id_of(packet) == MessageId.POSITION_TARGET_LOCAL_NED:
-            heard.append(LoggedSample(at_us, _demand(packet)))
-        else:
-            heard.extend(LoggedSample(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
+        heard.extend(LoggedSample(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
     if MessageId.HIGHRES_IMU not in kinds:
         raise LogError(
             f"{path}: no HIGHRES_IMU from system {vehicle.system_id} in it; PX4 sends none to a ground station unless "
@@ -90,9 +82,3 @@ def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
         raise LogError(f"{path}: no PX4 multicopter speaks in it: {why}.")
     chosen = max(vehicles, key=lambda identity: imu[identity.system_id])
     return chosen, ", ".join(str(v.system_id) for v in vehicles if v is not chosen)
-
-
-def _demand(packet: bytes) -> Demand:
-    time_ms, *values, mask, _ = _TARGET.unpack_from(payload_of(packet).ljust(_TARGET.size, b"\0"))
-    asked = [math.nan if mask & 1 << bit else values[bit] for bit in range(6)]
-    return Demand.of(time_ms * 1000, asked[:3], asked[3:])

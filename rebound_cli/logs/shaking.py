@@ -50,11 +50,6 @@ class Shaking:
     stages: npt.NDArray[np.object_]
     interval_us: float
 
-    @property
-    def rate_hz(self) -> float:
-        """Samples a second; gaps count for nothing."""
-        return 1e6 / self.interval_us
-
     def lasted_s(self, *stages: Stage) -> float:
         """How long it was in these."""
         return sum(stage in stages for stage in self.stages) * self.interval_us * 1e-6
@@ -71,19 +66,13 @@ class Shaking:
             stage: np.sqrt((row**2).mean(axis=0)) for stage, row in rows.items() if len(row) * self.interval_us > 1e6
         }
 
-    def noise_data(self) -> dict[str, list[float]]:
-        """The same for a program."""
-        return {stage.value: [round(v, 3) for v in row.tolist()] for stage, row in self.noise_m_s2().items()}
-
 
 def shaking(log: Log) -> Shaking:
     """Of all IMU samples of the log."""
     imu = log.imu()
     at_us = np.array([time_us for time_us, _ in imu], dtype=np.int64)
     force = np.array([sample.specific_force_frd_m_s2 for _, sample in imu])
-    intervals_us = np.diff(np.array([sample.time_boot_us for _, sample in imu]))
-    interval_us = float(np.median(intervals_us[intervals_us > 0])) if (intervals_us > 0).any() else 1e6
-    return Shaking(at_us, _departures(force, interval_us), _stages(log, at_us), interval_us)
+    return Shaking(at_us, _departures(force, log.imu_interval_us), _stages(log, at_us), log.imu_interval_us)
 
 
 def _departures(force: Floats, interval_us: float) -> Floats:

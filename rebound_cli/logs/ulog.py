@@ -19,13 +19,13 @@ from companion import messages
 from companion.link.vehicle import MULTICOPTERS
 from rebound_cli.logs.log import (
     QUADROTOR,
-    Demand,
     Log,
     LogError,
     LoggedSample,
     heartbeat,
     in_order,
     multicopter,
+    position_target,
     slow_velocity,
     vector,
 )
@@ -274,7 +274,7 @@ def _demand(topic: Topic) -> Iterator[LoggedSample]:
     if positions is None or velocities is None:
         return
     for time_us, place, speed in zip(topic.time_us.tolist(), positions.tolist(), velocities.tolist(), strict=True):
-        yield LoggedSample(time_us, Demand.of(time_us, place, speed))
+        yield LoggedSample(time_us, position_target(place, speed[2]))
 
 
 def _landed_states(topics: _Topics) -> Iterator[LoggedSample]:

@@ -12,9 +12,6 @@ WAYPOINT, LOITER_TURNS, LOITER_TIME, RETURN_TO_LAUNCH, LAND, TAKEOFF = 16, 18, 1
 DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED = 93, 112, 115, 177, 178
 # Cameras, gimbals and regions of interest: they do not change where the vehicle flies.
 BESIDE_THE_WAY = (*range(195, 198), 200, 201, *range(203, 207), 214, *range(530, 533), 1000, 2000, 2001, 2500, 2501)
-# MAV_TYPE: what QGroundControl writes for any multicopter is a quadrotor.
-QUADROTOR = 2
-MULTICOPTERS = (QUADROTOR, 3, 4, 13, 14, 15, 29, 35, 43)
 # MAV_FRAME
 FRAME_ABOVE_SEA, FRAME_ABOVE_HOME = (0, 5), (3, 6)
 
@@ -72,7 +69,6 @@ Item: TypeAlias = Annotated[
 class MissionPart(_Part):
     plannedHomePosition: Annotated[list[Number], Field(min_length=2, max_length=3)]  # noqa: N815
     hoverSpeed: Number | None = None  # noqa: N815
-    vehicleType: Whole | None = None  # noqa: N815
     items: Annotated[list[Item], Field(min_length=1)]
 
 

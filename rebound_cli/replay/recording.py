@@ -25,7 +25,6 @@ from companion.shell.tlog import read_tlog
 from rebound_cli.documents import load_document, validated
 from rebound_cli.inputs import mission_from
 from rebound_cli.logs.log import LogError
-from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.watching import Findings
 from rebound_cli.results import run_folder
 
@@ -134,10 +133,7 @@ class Reproduction:
     """What became of it; `first_difference` is None when every packet sent and every event is the same to the bit."""
 
     findings: Findings
-    steps: int
-    packets_received: int
-    packets_sent: int
-    events: int
+    extent: Mapping[str, int]  # how many steps, packets and events were compared
     is_cut: bool
     first_difference: str | None
 
@@ -145,8 +141,8 @@ class Reproduction:
 class Followed:
     """What a companion's monitor finds, noted step by step: of a simulated flight, and of one that is flown again."""
 
-    def __init__(self, listener: Listener | None = None) -> None:
-        self.listener, self.findings = listener, Findings()
+    def __init__(self) -> None:
+        self.findings = Findings()
         self.started_at_us = self.ended_at_us = 0
         self._watch: CollisionMonitor | None = None
 
@@ -157,8 +153,8 @@ class Followed:
         result = stepped.step(received, now_us)
         assert stepped.core is not None, "the first step begins it"
         monitor = stepped.core.reflex.monitor
-        if monitor is not self._watch and self.listener is not None:
-            self.listener.listen(monitor)
+        if monitor is not self._watch:
+            self.findings.listener.listen(monitor)
         self._watch = monitor
         for event in result.events:
             self.findings.tell(event.time_us, event.text)
@@ -172,11 +168,11 @@ class Followed:
         self.findings.close(self.ended_at_us)
 
 
-def reproduce(recording: Recording, listener: Listener | None = None) -> Reproduction:
+def reproduce(recording: Recording) -> Reproduction:
     """Fly the recording to its end, whatever differs."""
     settings = recording.settings
     stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
-    followed, expected, differences = Followed(listener), list(recording.event_lines), []
+    followed, expected, differences = Followed(), list(recording.event_lines), []
     told: list[str] = []
     for step in recording.steps:
         result = followed.step(stepped, b"".join(step.received), step.time_us)
@@ -195,15 +191,13 @@ def reproduce(recording: Recording, listener: Listener | None = None) -> Reprodu
             _tell(stepped, record)
     differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
     followed.close()
-    return Reproduction(
-        findings=followed.findings,
-        steps=len(recording.steps),
-        packets_received=sum(len(step.received) for step in recording.steps),
-        packets_sent=sum(len(step.sent) for step in recording.steps),
-        events=len(expected),
-        is_cut=recording.is_cut,
-        first_difference=differences[0] if differences else None,
-    )
+    extent = {
+        "steps": len(recording.steps),
+        "packets_received": sum(len(step.received) for step in recording.steps),
+        "packets_sent": sum(len(step.sent) for step in recording.steps),
+        "events": len(expected),
+    }
+    return Reproduction(followed.findings, extent, recording.is_cut, differences[0] if differences else None)
 
 
 def _vector(values: Sequence[float] | None) -> Vector3 | None:

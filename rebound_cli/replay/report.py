@@ -2,17 +2,15 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Evidence, ImpactKind
-from companion.reflex.monitor import CollisionMonitor
 from rebound_cli.logs.log import WANTED, Log, LogError
-from rebound_cli.logs.shaking import Shaking, clipped, shaking
-from rebound_cli.replay.listening import Listener
+from rebound_cli.logs.shaking import clipped
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
 from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
 
@@ -33,10 +31,14 @@ class Replay:
     log: Log
     detector: str
     recorded_rate_hz: float
-    shaking: Shaking
     findings: Findings
     losses: tuple[str, ...]
     reproduction: Reproduction | None
+
+    @property
+    def imu_rate_hz(self) -> float:
+        """As the detector heard it."""
+        return 1e6 / self.log.imu_interval_us
 
     @property
     def peak_m_s2(self) -> float:
@@ -44,37 +46,28 @@ class Replay:
         return max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in self.log.imu())
 
 
-def replay_log(
-    log: Log,
-    config: CompanionConfig,
-    rate_hz: float | None,
-    listen: Callable[[CollisionMonitor], None] | None = None,
-    modes: Sequence[str] | None = None,
-) -> Replay:
+def replay_log(log: Log, config: CompanionConfig, rate_hz: float | None, modes: Sequence[str] | None = None) -> Replay:
     """What a guard's detector makes of the log. Raises LogError when the rate leaves nothing.
 
     `modes`: those in which the guard may take over; None: it watches whoever flies.
     """
-    shakes = shaking(log)
-    recorded_hz = shakes.rate_hz
+    recorded_hz = 1e6 / log.imu_interval_us
     if rate_hz is not None:
         log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
         if len(log.imu()) < 2:
             raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
-        shakes = shaking(log)
-    findings = watch_log(log, config, listen=listen, modes=modes)
-    return Replay(log, config.detector, recorded_hz, shakes, findings, _losses(log, config), None)
+    findings = watch_log(log, config, modes)
+    return Replay(log, config.detector, recorded_hz, findings, _losses(log, config), None)
 
 
-def replay_flight(log: Log, recording: Recording, listener: Listener | None = None) -> Replay:
+def replay_flight(log: Log, recording: Recording) -> Replay:
     """Our own flight decided again, from the first byte to the last."""
     config = recording.settings.companion
-    reproduction = reproduce(recording, listener)
+    reproduction = reproduce(recording)
     # The flight's own zero, so that times are those of its timeline.
     log = replace(log, started_at_us=recording.steps[0].time_us)
-    shown = shaking(log)
-    losses = _losses(log, config)
-    return Replay(log, config.detector, shown.rate_hz, shown, reproduction.findings, losses, reproduction)
+    recorded_hz, losses = 1e6 / log.imu_interval_us, _losses(log, config)
+    return Replay(log, config.detector, recorded_hz, reproduction.findings, losses, reproduction)
 
 
 def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
@@ -91,7 +84,7 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
 
 def report_text(replay: Replay) -> str:
     """The whole report; times in seconds since the log's start."""
-    log, rate_hz = replay.log, replay.shaking.rate_hz
+    log, rate_hz = replay.log, replay.imu_rate_hz
     recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
     headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
     told: list[tuple[int, list[str]]] = [(at_us, [text]) for at_us, text in replay.findings.happenings]
@@ -163,8 +156,6 @@ def _on_log(finding: Finding) -> float:
 
 
 def _facts(replay: Replay) -> Iterator[str]:
-    for stage, noise in replay.shaking.noise_m_s2().items():
-        yield f"noise floor, {stage.value}: {', '.join(f'{value:.2f}' for value in noise)} m/s^2 RMS (x, y, z)"
     count, how = clipped(replay.log)
     samples = f"{count or 'no'} sample{'' if count == 1 else 's'} ({how})"
     yield f"clipping: {samples}; largest sample {replay.peak_m_s2:.1f} m/s^2"
@@ -181,10 +172,8 @@ def _facts(replay: Replay) -> Iterator[str]:
 
 def _reproduction_text(again: Reproduction) -> str:
     """Whether the flight was decided again to the bit."""
-    extent = (
-        f"{again.steps} steps, {again.packets_received} packets in, {again.packets_sent} packets out, "
-        f"{again.events} events"
-    )
+    extent = "{steps} steps, {packets_received} packets in, {packets_sent} packets out, {events} events"
+    extent = extent.format_map(again.extent)
     if again.is_cut:
         extent += "; the program was ended at once, and what came after its last packet is not known"
     if again.first_difference is None:
@@ -201,15 +190,13 @@ def report_data(replay: Replay) -> dict[str, Any]:
     """The same for a program; vectors NED unless named FRD, SI units, times in seconds since the log's start."""
     log, findings, again = replay.log, replay.findings, replay.reproduction
     count, how = clipped(log)
-    names = ("first_difference", "steps", "packets_received", "packets_sent", "events")
-    extent = {name: getattr(again, name) for name in names if again is not None}
     return {
         "schema": SCHEMA,
         "log": str(log.path),
         "vehicle": log.vehicle,
         "duration_s": round(log.duration_s, 3),
         "detector": replay.detector,
-        "imu_rate_hz": round(replay.shaking.rate_hz, 2),
+        "imu_rate_hz": round(replay.imu_rate_hz, 2),
         "recorded_imu_rate_hz": round(replay.recorded_rate_hz, 2),
         "collisions": len(findings.collisions),
         "crashes": len(findings.crashes),
@@ -217,13 +204,17 @@ def report_data(replay: Replay) -> dict[str, Any]:
         "happenings": [{"at_s": _seconds(replay, at_us), "text": text} for at_us, text in findings.happenings],
         "watched_share": findings.watched_share,
         **{name: [_span_data(replay, span) for span in getattr(findings, name)] for name in ("blind", "off")},
-        "noise_rms_frd_m_s2": replay.shaking.noise_data(),
         "clipped_samples": count,
         "clipping_known_by": how,
         "peak_specific_force_m_s2": round(replay.peak_m_s2, 3),
         "notes": list(replay.losses),
-        "reproduction": again and {"identical": again.first_difference is None, **extent, "cut": again.is_cut},
+        "reproduction": again and _reproduction_data(again),
     }
+
+
+def _reproduction_data(again: Reproduction) -> dict[str, Any]:
+    told = {"identical": again.first_difference is None, "first_difference": again.first_difference}
+    return {**told, **again.extent, "cut": again.is_cut}
 
 
 def _finding_data(replay: Replay, finding: Finding) -> dict[str, Any]:

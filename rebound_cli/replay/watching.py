@@ -1,6 +1,6 @@
 """A log through the watch: the same detector code as in flight, at the recorded or at a requested rate."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -18,7 +18,8 @@ from companion.reflex.health import Promise
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
 from companion.reflex.reflex import start_reflex
-from rebound_cli.logs.log import Demand, Log, LoggedSample, Told
+from rebound_cli.logs.log import Log, LoggedSample
+from rebound_cli.replay.listening import Listener
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
@@ -43,13 +44,12 @@ class Circumstances:
         self._guard = GuardContext(mission, Vehicle(), streams, reflex, config=settings, keeps_others_out=False)
         self._now_us = 0
 
-    def hear(self, told: Sequence[Told], now_us: int) -> Sequence[str]:
+    def hear(self, told: Sequence[messages.Sample], now_us: int) -> Sequence[str]:
         """Take-offs, landings, arming and modes, as the samples report them."""
         guard, self._now_us = self._guard, now_us
         vehicle = guard.vehicle
         armed, landed = vehicle.armed, vehicle.landed
-        samples = [_setpoint(sample) if isinstance(sample, Demand) else sample for sample in told]
-        observe(guard, samples, now_us)
+        observe(guard, told, now_us)
         note_height(guard)
         happened = [event.text for event in guard.events if event.kind in _TOLD]
         if vehicle.armed and armed is not True:
@@ -70,10 +70,6 @@ class Circumstances:
         """Now."""
         guard = self._guard
         return situation_of(guard, self._why_not(guard), guard.descent.is_meant(guard.vehicle, self._now_us))
-
-
-def _setpoint(demand: Demand) -> messages.PositionTarget:
-    return messages.PositionTarget(demand.position_ned_m, demand.velocity_down_m_s)
 
 
 @dataclass(slots=True)
@@ -110,7 +106,7 @@ class Span:
 
 @dataclass(slots=True)
 class Findings:
-    """Grows step by step."""
+    """Grows step by step. `listener` has heard what the detector made of each sample."""
 
     impacts: list[Finding] = field(default_factory=list)
     blind: list[Span] = field(default_factory=list)
@@ -121,6 +117,7 @@ class Findings:
     promised: float = 0.0  # false alarms in that time, by the detector's own statistic
     promise: Promise | None = None  # when it was last armed
     is_flying: bool = False  # armed and in the air at the end
+    listener: Listener = field(default_factory=Listener)
     _open: dict[str, tuple[int, str]] = field(default_factory=dict)
     _noted_us: int | None = None
 
@@ -181,22 +178,13 @@ class Findings:
         self._note_span("off", None, at_us)
 
 
-def watch_log(
-    log: Log,
-    config: CompanionConfig,
-    listen: Callable[[CollisionMonitor], None] | None = None,
-    modes: Sequence[str] | None = None,
-) -> Findings:
-    """Everything heard, in its order.
-
-    `listen` is told of the watch before its first sample. `modes`: see `Circumstances`.
-    """
+def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = None) -> Findings:
+    """Everything heard, in its order. `modes`: see `Circumstances`."""
     circumstances, findings = Circumstances(config, modes), Findings()
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in log.heard if isinstance(item.sample, messages.ImuSample))
     monitor = start_monitor(_sampled_as(log, config), start_us)
-    if listen is not None:
-        listen(monitor)
+    findings.listener.listen(monitor)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
         situation = circumstances.situation
@@ -216,8 +204,7 @@ def watch_log(
             findings.tell(at_us, text)
         # One by one: two impacts of one instant would otherwise be one.
         for sample in told:
-            if not isinstance(sample, Demand):
-                step((sample,), at_us)
+            step((sample,), at_us)
         last_us = at_us
     findings.close(last_us)
     return findings

@@ -141,7 +141,7 @@ def _on_both_clocks(columns: Columns, boot_us: Floats) -> Columns:
 
 def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
     """What the detector made of each IMU sample of the log; NaN of those it never got."""
-    tested = flight.listener.tested
+    tested = flight.findings.listener.tested
     # Of a stamp that came twice, after a reboot, the last.
     row_of = {stamp_us: row for row, stamp_us in enumerate(np.ravel(tested.time_boot_us).tolist())}
     rows = [row_of.get(boot_us, -1) for boot_us in flight.log.imu_time_boot_us.tolist()]

@@ -109,7 +109,7 @@ def _normal(flight: ShownFlight, finding: Finding) -> Normal:
 def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iterator[str]:
     """Sign by sign, then what else it could have been."""
     impact, situation = finding.first.impact, finding.situation
-    shown = flight.listener.shown.get(impact.sample_time_boot_us)
+    shown = flight.findings.listener.shown.get(impact.sample_time_boot_us)
     if shown is not None:
         yield from _signs(shown, impact.evidence)
     if situation.descent_commanded:
@@ -203,28 +203,28 @@ def _why_missed(flight: ShownFlight, hit: "Hit") -> Iterator[str]:
             if span.start_us <= at_us <= span.end_us:
                 yield f"The detector was {word}: {span.reason}."
     until_us = hit.ended_at_boot_us + flight.config.estimate.imu_averaging_interval_s * 1e6
-    tested = flight.listener.tested
+    tested = flight.findings.listener.tested
     rows = np.flatnonzero((hit.contact_at_boot_us <= tested.time_boot_us) & (tested.time_boot_us <= until_us))
     if not len(rows):
         yield "No IMU sample came while it lasted."
     elif np.any(np.take(tested.phase, rows) == PHASES.index(Phase.CONTACT)):
         yield "It belonged to the contact before: one contact is told once."
     else:
-        loudest = flight.listener.one_tested(rows[_loudest(np.take(tested.ratio, rows))])
+        loudest = flight.findings.listener.one_tested(rows[_loudest(np.take(tested.ratio, rows))])
         yield _side_text(loudest)
         yield _thrust_text(loudest)
 
 
 def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Moment]:
     """The sample that came nearest to being taken for a hit, and was not; none where nothing was watched."""
-    tested = flight.listener.tested
+    tested = flight.findings.listener.tested
     watched = tested.phase == PHASES.index(Phase.ARMED)
     for boot_us in others_boot_us:
         watched &= np.abs(tested.time_boot_us - boot_us) >= _BESIDE_US
     ratios = np.where(watched, tested.ratio, np.nan)
     if np.all(np.isnan(ratios)):
         return []
-    loudest = flight.listener.one_tested(_loudest(ratios))
+    loudest = flight.findings.listener.one_tested(_loudest(ratios))
     row = int(np.argmax(flight.log.imu_time_boot_us == loudest.time_boot_us))
     at_us = float(flight.log.imu_at_us[row])
     return [

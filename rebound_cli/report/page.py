@@ -1,4 +1,4 @@
-"""The page: one file, from the flight's data, our own scripts and two libraries as their makers publish them.
+"""`rebound report`: a flight as one file, of its data, our own scripts and two libraries as their makers publish them.
 
 A browser runs nothing in it but the scripts named by their hashes, and loads nothing: the page forbids itself both.
 """
@@ -7,12 +7,17 @@ import base64
 import hashlib
 import html
 import json
+from argparse import Namespace
 from collections.abc import Sequence
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
+from companion.shell.files import write_whole
+from rebound_cli.flights.kept import flight_named, runs_folder
 from rebound_cli.report.content import as_text, content, live_content
-from rebound_cli.report.shown_flight import ShownFlight
+from rebound_cli.report.shown_flight import ShownFlight, recorded_flight
+from rebound_cli.results.run_folder import REPORT_NAME
 
 LIBRARIES = ("three.min.js", "uPlot.iife.min.js")
 STYLES = ("assets/uPlot.min.css", "page.css")
@@ -78,3 +83,17 @@ def file_text(name: str) -> str:
 
 def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def run_report(options: Namespace) -> int:
+    """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
+    folder = flight_named(runs_folder(options.runs), options.flight).folder
+    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME, options.no_position)
+    print(f"The report is in {path}")
+    return 0
+
+
+def write_page(flight: ShownFlight, path: Path, no_position: bool = False) -> Path:
+    """Raises OSError."""
+    write_whole(path, page(flight, no_position).encode())
+    return path

@@ -14,7 +14,6 @@ from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from rebound_cli.documents import load_document, validated
-from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import (
     Followed,
     Recording,
@@ -47,7 +46,6 @@ class ShownFlight:
     log: FlightLog
     config: CompanionConfig
     findings: Findings
-    listener: Listener
     events: Sequence[Mapping[str, Any]]
     summary: Mapping[str, Any] | None = None
     scene: Scene | None = None
@@ -92,14 +90,14 @@ class ShownFlight:
 
 def recorded_flight(folder: Path) -> ShownFlight:
     """Of a run's folder: what was recorded, decided again for all that the detector thought. Raises ReboundError."""
-    recording, listener = read_recording(folder), Listener()
-    return decided_again(folder, recording, reproduce(recording, listener), listener)
+    recording = read_recording(folder)
+    return decided_again(folder, recording, reproduce(recording))
 
 
-def decided_again(folder: Path, recording: Recording, again: Reproduction, listener: Listener) -> ShownFlight:
-    """The same where that was done already, with the listener. Raises ReboundError."""
+def decided_again(folder: Path, recording: Recording, again: Reproduction) -> ShownFlight:
+    """The same where that was done already. Raises ReboundError."""
     return replace(
-        _in_folder(folder, recording.settings, again.findings, listener, "".join(recording.event_lines)),
+        _in_folder(folder, recording.settings, again.findings, "".join(recording.event_lines)),
         started_at_us=recording.steps[0].time_us,
         log=read_flight_log(folder / run_folder.TLOG_NAME),
         versions=recording.versions,
@@ -109,11 +107,10 @@ def decided_again(folder: Path, recording: Recording, again: Reproduction, liste
 
 def followed_flight(folder: Path, followed: Followed) -> ShownFlight:
     """The same of one that was followed while it was flown: nothing is decided again. Raises ReboundError."""
-    assert followed.listener is not None, "nobody else asks for a page"
     followed.close()
     events = run_folder.read_text(folder / run_folder.EVENTS_NAME)
     return replace(
-        _in_folder(folder, read_settings(folder), followed.findings, followed.listener, events),
+        _in_folder(folder, read_settings(folder), followed.findings, events),
         started_at_us=followed.started_at_us,
         log=read_flight_log(folder / run_folder.TLOG_NAME),
         versions=run_folder.versions(),
@@ -122,12 +119,10 @@ def followed_flight(folder: Path, followed: Followed) -> ShownFlight:
 
 def unseen_flight(folder: Path) -> ShownFlight:
     """One that is still flown: what is known of it beforehand. Raises ReboundError."""
-    return _in_folder(folder, read_settings(folder), Findings(), Listener(), "")
+    return _in_folder(folder, read_settings(folder), Findings(), "")
 
 
-def _in_folder(
-    folder: Path, settings: Mission | GuardConfig, findings: Findings, listener: Listener, event_lines: str
-) -> ShownFlight:
+def _in_folder(folder: Path, settings: Mission | GuardConfig, findings: Findings, event_lines: str) -> ShownFlight:
     """All but the log."""
     summary = run_folder.read_summary(folder)
     return ShownFlight(
@@ -136,7 +131,6 @@ def _in_folder(
         log=flight_log_of(()),
         config=settings.companion,
         findings=findings,
-        listener=listener,
         events=list(run_folder.read_records(folder / run_folder.EVENTS_NAME, event_lines)),
         summary=summary,
         scene=_scene(folder),
@@ -145,7 +139,7 @@ def _in_folder(
     )
 
 
-def replayed_flight(replay: Replay, config: CompanionConfig, listener: Listener) -> ShownFlight:
+def replayed_flight(replay: Replay, config: CompanionConfig) -> ShownFlight:
     """Of any log: what it holds and what was found in it."""
     log = replay.log
     told = replay.findings.happenings
@@ -155,7 +149,6 @@ def replayed_flight(replay: Replay, config: CompanionConfig, listener: Listener)
         log=flight_log_of_log(log),
         config=config,
         findings=replay.findings,
-        listener=listener,
         events=[{"time_us": at_us, "kind": _kind(text), "text": text, "data": {}} for at_us, text in told],
     )
 

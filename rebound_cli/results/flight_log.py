@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
-from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, MessageId
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, MessageId, PositionTarget, Sample
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.log import Demand, Log, Told
+from rebound_cli.logs.log import Log, position_target
 
 Floats = npt.NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def read_flight_log(path: Path) -> FlightLog:
 def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
     """The same of packets with their stamps: what the companion hears of them, what it asked for, and all texts."""
     decoder = Decoder(is_packet=lambda *_: True)
-    heard, texts, wanted = list[tuple[int, Told]](), list[tuple[int, bytes]](), list[Any]()
+    heard, texts, wanted = list[tuple[int, Sample]](), list[tuple[int, bytes]](), list[Any]()
     for at_us, packet in packets:
         message_id = message_id_of(packet)
         if message_id in _MEASURED:
@@ -74,7 +74,7 @@ def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
             heard += ((at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
         elif message_id == _SET_POSITION_TARGET_LOCAL_NED:
             place = _PLACE.unpack_from(payload_of(packet).ljust(_PLACE.size, b"\0"))
-            heard.append((at_us, Demand.of(0, place, (math.nan,) * 3)))
+            heard.append((at_us, position_target(place, math.nan)))
         elif message_id == _SET_ATTITUDE_TARGET:
             wanted.append((at_us, *_ATTITUDE.unpack_from(payload_of(packet).ljust(_ATTITUDE.size, b"\0"))))
         elif message_id == _STATUSTEXT:
@@ -101,7 +101,7 @@ def flight_log_of_log(log: Log) -> FlightLog:
 
 
 def flight_log_of(
-    samples: Iterable[tuple[int, Told]], wanted: Sequence[Any] = (), texts: Iterable[tuple[int, str]] = ()
+    samples: Iterable[tuple[int, Sample]], wanted: Sequence[Any] = (), texts: Iterable[tuple[int, str]] = ()
 ) -> FlightLog:
     """The same of samples that were decoded already; setpoints as the vehicle tells them."""
     imu, moved, turned, asked, target = (list[Any]() for _ in range(5))
@@ -115,8 +115,8 @@ def flight_log_of(
                 turned.append((at_us, boot_us, *turn))
             case AttitudeTarget(_, thrust, turn):
                 target.append((at_us, *(turn or (np.nan,) * 4), thrust))
-            case Demand():
-                asked.append((at_us, *(sample.position_ned_m or (np.nan, np.nan, np.nan))))
+            case PositionTarget(position):
+                asked.append((at_us, *(position or (np.nan, np.nan, np.nan))))
     widths = ((imu, 8), (moved, 8), (turned, 6), (asked, 4), (target, 6), (wanted, 6))
     i, m, t, a, c, w = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
     return FlightLog(

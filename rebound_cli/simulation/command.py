@@ -4,7 +4,6 @@ import os
 import signal
 import threading
 import time
-import warnings
 from argparse import Namespace
 from functools import partial
 from pathlib import Path
@@ -59,8 +58,6 @@ def _check_place(truth: Path) -> None:
 
 
 def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:
-    if options.signing is not None:
-        warnings.warn("--signing is not needed: with --signing-key the vehicle signs as PX4 1.17 does", stacklevel=1)
     key = None if options.signing_key is None else read_key(options.signing_key)
     parameters = {"MAV_SYS_ID": options.instance + 1, **time_outs_at(options.speed)}
     parameters |= {} if key is None else {"MAV_SIGN_CFG": 1.0}

@@ -6,8 +6,8 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from bench.pictures.screens import ARGUMENTS, NoBrowserError, browser_path
+from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import recorded_flight
-from rebound_cli.report.writer import write_page
 from tests.browser.opened_page import OpenedPage
 from tests.rebound_cli.command import WALL, run_here
 

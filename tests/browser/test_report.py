@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rebound_cli.report import content as report_content
-from rebound_cli.report.page import page
-from rebound_cli.report.writer import write_page
+from rebound_cli.report.page import page, write_page
 from tests.browser.opened_page import drawn_share, line_share, pixels
 from tests.rebound_cli.report.test_page import HOSTILE
 

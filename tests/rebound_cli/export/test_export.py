@@ -221,6 +221,8 @@ def test_a_ulog_has_what_flight_review_draws_beside_the_path(exported, flight):
     turning = written.get_dataset("vehicle_angular_velocity").data
     told = [heard.sample for heard in log.heard if isinstance(heard.sample, Attitude)]
     assert turning["xyz[1]"] == pytest.approx([sample.angular_velocity_frd_rad_s[1] for sample in told])
+    # A thrust that carries the vehicle points up, which is against body z
+    assert -1.0 <= written.get_dataset("vehicle_attitude_setpoint").data["thrust_body[2]"].min() < -0.5
     # motors that turn in the air alone, and a battery that is less full than it was
     motors = written.get_dataset("actuator_outputs").data
     in_air = (motors["timestamp"] > 10e6) & (motors["timestamp"] < 20e6)

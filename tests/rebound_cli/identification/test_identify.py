@@ -9,7 +9,7 @@ from rebound_cli.documents import load_document, validated
 from rebound_cli.identification.fit import fit_restitution, fit_spring
 from rebound_cli.identification.hit import Hit, Push, guards_at
 from sim_vehicle.airframe import Airframe, with_base
-from tests.rebound_cli.command import WALL, assert_one_clear_sentence, run_here
+from tests.rebound_cli.command import WALL, run_here
 
 # The paper's eq. 2 of the foldable vehicle.
 STIFFNESS_PER_S2, DAMPING_PER_S = 500.0, 30.0
@@ -58,7 +58,7 @@ def test_a_contact_that_no_sample_resolves_has_a_restitution_and_no_spring():
 
 
 def test_the_guards_that_meet_the_wall():
-    assert [guards_at(np.radians(degrees)) for degrees in (0, 20, 45, 70, 90, -45, 180)] == [2, 2, 1, 2, 2, 1, 2]
+    assert [guards_at(np.radians(degrees)) for degrees in (0, 20, 25, 45, 70, 90, -45, 180)] == [2, 2, 1, 1, 2, 2, 1, 2]
 
 
 def test_a_flight_becomes_an_airframe(wall_flight, tmp_path):
@@ -84,9 +84,3 @@ def test_an_identified_airframe_flies_the_same_mission(wall_flight, tmp_path):
     again = run_here("fly", WALL, "--lockstep", "--airframe", tmp_path / "found.yaml", "--out", tmp_path / "again")
     assert again.returncode == 0, again.stderr
     assert json.loads((tmp_path / "again" / "summary.json").read_text())["recontacts"] == 0
-
-
-def test_a_table_of_motion_capture_is_one_clear_sentence(tmp_path):
-    file = tmp_path / "hit.csv"
-    file.write_text("time_s,position_x_m,position_y_m\n0,1,2\n")
-    assert_one_clear_sentence(run_here("identify", file), file, "log")

@@ -4,6 +4,8 @@ import io
 import os
 import subprocess
 import sys
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -11,7 +13,7 @@ from companion.report import Event, Status
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.timing import LinkRate
-from rebound_cli.simulation.compiling import compiling_told
+from rebound_cli.simulation.compiling import prepare_vehicle
 from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
 from tests.rebound_cli.command import ROOT
 
@@ -75,27 +77,25 @@ def test_a_terminal_that_is_gone_is_written_to_once_and_keeps_nothing_for_later(
     assert screen.tries == 1
 
 
-def test_what_is_compiled_is_told_once_and_only_of_ours():
+def test_who_waits_for_kernels_to_be_compiled_is_told_and_nobody_else(tmp_path, monkeypatch):
     numba = pytest.importorskip("numba")
+    monkeypatch.setattr("sim_vehicle.vehicle.SimulatedVehicle", lambda *_, **__: None)
+    world: Any = Mock()
 
-    def kernel(value):
-        return value + 1
+    def told():
+        stream = io.StringIO()
+        prepare_vehicle(Console(stream), world)
+        return stream.getvalue()
 
-    kernel.__module__ = "sim_vehicle.physics.touching.contact"
-    kernel = numba.njit(kernel)
-    stream = io.StringIO()
-    console = Console(stream)
-    with compiling_told(console, "Compiling"):
-        kernel(1)
-        kernel(1.0)
-    assert stream.getvalue() == "Compiling\n"
-    # When it is called again, or one is compiled that is not ours, then nothing is told
-    stream.truncate(0)
-    stream.seek(0)
-    with compiling_told(console, "Compiling"):
-        kernel(2)
-        numba.njit(lambda value: value - 1)(2)
-    assert stream.getvalue() == ""
+    # Given the folder of this version's kernels, with a folder for each file of them and none in it at first
+    (tmp_path / "physics").mkdir()
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    assert "half a minute, once for this machine" in told()
+    (tmp_path / "physics" / "kernel.nbc").touch()
+    assert told() == ""
+    # And where nothing can be kept
+    monkeypatch.setattr("sim_vehicle.physics.jit.NOT_KEPT", "a disk that is read-only")
+    assert "half a minute, at every start" in told() and "is not kept (a disk that is read-only)" in told()
 
 
 def test_kernels_are_kept_in_the_users_cache_and_without_a_place_there_is_a_reason_and_no_fault(tmp_path):

@@ -169,7 +169,7 @@ def test_a_reader_that_is_gone_ends_no_flight_and_is_told_and_replayed(tmp_path)
     with pytest.raises(BrokenPipeError), console:
         pass
     # And what was told is part of what is decided again
-    assert assert_comes_again(tmp_path).events == len(events_of(tmp_path))
+    assert assert_comes_again(tmp_path).extent["events"] == len(events_of(tmp_path))
     assert "lost" in [event["kind"] for event in events_of(tmp_path)]
 
 

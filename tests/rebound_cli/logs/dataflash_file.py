@@ -73,11 +73,9 @@ OLD = {
     "IMU": ("Iffffff", "TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"),
     "ATT": ("IccccCC", "TimeMS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw"),
     "CTUN": ("Ihffhh", "TimeMS,ThrOut,DAlt,Alt,DCRt,CRt"),
-    "EKF1": ("IccCffffff", "TimeMS,Roll,Pitch,Yaw,VN,VE,VD,PN,PE,PD"),
     "EV": ("B", "Id"),
     "ERR": ("BB", "Subsys,ECode"),
     "MODE": ("Mh", "Mode,ThrCrs"),
-    "RCIN": ("Ihhhh", "TimeMS,C1,C2,C3,C4"),
     "GPS": ("BIHLLffI", "Status,TimeMS,Week,Lat,Lng,Spd,GCrs,T"),
 }
 

@@ -17,9 +17,9 @@ from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 ULOG = ulog(
     {
         "sensor_combined": sensor_combined(every(5000, 0, 200_000)),
-        "vehicle_attitude": ([("float[4]", "q")], [(1000, (1.0, 0.0, 0.0, 0.0))]),
-        "vehicle_status": ([("uint8_t", "nav_state"), ("uint8_t", "arming_state")], [(0, 14, 2)]),
-        "vehicle_land_detected": ([("bool", "landed")], [(0, True), (50_000, False)]),
+        "vehicle_attitude": ("q", [(1000, (1.0, 0.0, 0.0, 0.0))]),
+        "vehicle_status": ("nav_state arming_state", [(0, 14, 2)]),
+        "vehicle_land_detected": ("landed", [(0, True), (50_000, False)]),
     },
     parameters=[("MPC_THR_HOVER", 0.5)],
 )

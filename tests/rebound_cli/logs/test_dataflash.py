@@ -14,11 +14,12 @@ from companion.messages import (
     ImuSample,
     LandedState,
     LocalPosition,
+    PositionTarget,
     Sticks,
     Vibration,
 )
 from companion.motion.rotation import body_to_ned
-from rebound_cli.logs.log import Demand, LogError
+from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from tests.rebound_cli.logs.dataflash_file import NEW, OLD, dataflash, new_imu, old_imu, text
 
@@ -120,16 +121,6 @@ def test_the_estimate_is_of_the_core_that_flies(tmp_path):
     assert (second.velocity_ned_m_s, second.position_ned_m) == ((2.0, 2.0, 3.0), (4.0, 5.0, -7.0))
 
 
-@pytest.mark.parametrize(("velocity_down", "taken"), [(-0.5, -0.5), (0.0, -0.45), (300.0, -0.45)])
-def test_an_old_estimator_counts_where_it_works(tmp_path, velocity_down, taken):
-    # Given a climb at 0.45 m/s by what the vehicle flies by, and an EKF that was running beside it
-    rows = [OLD_COPTER, *OLD_IMU]
-    rows += [("CTUN", 1000, 500, 0.0, 7.0, 0, 45), ("EKF1", 1001, 0.0, 0.0, 0.0, 1.0, 2.0, velocity_down, 0, 0, -7.1)]
-    (position,) = of(read(tmp_path, rows, OLD), LocalPosition)
-    # Then one that agrees is taken, and not one that never started or went astray
-    assert position.velocity_ned_m_s[2] == pytest.approx(taken)
-
-
 def test_without_an_estimator_the_way_is_the_satellites(tmp_path):
     # Given a climb at 0.5 m/s, and a GPS with a fix from 1.1 s on, that goes east at 2 m/s
     rows = [OLD_COPTER, *OLD_IMU]
@@ -208,9 +199,9 @@ def test_sticks_go_by_the_radios_calibration(tmp_path, parameters, named, deflec
 
 def test_the_climb_rate_that_is_asked_for(tmp_path):
     slow = read(tmp_path, [COPTER, *IMU, ("CTUN", 1_000_000, 0.4, 0.0, -50, 0)])
-    assert of(slow, Demand) == [Demand(1_000_000, None, None, 0.5)]
+    assert of(slow, PositionTarget) == [PositionTarget(None, 0.5)]
     whole = read(tmp_path, [COPTER, *IMU, ("CTUN", 1_000_000, 0.4, 0.0, -50, 0), ("PSCD", 1_000_000, -3.0, 0.25, 9.0)])
-    assert of(whole, Demand) == [Demand(1_000_000, None, None, 0.25)]
+    assert of(whole, PositionTarget) == [PositionTarget(None, 0.25)]
 
 
 def test_clipped_samples_are_counted(tmp_path):

@@ -5,8 +5,8 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState
-from rebound_cli.logs.log import Demand, LogError
+from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState, PositionTarget
+from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 
 EPOCH_US = 1_600_000_000_000_000
@@ -127,9 +127,9 @@ def test_a_clock_that_is_set_back_loses_nothing(path):
 @pytest.mark.parametrize(
     ("mask", "expected"),
     [
-        (0x000, Demand(7000, (1.0, 2.0, -3.0), (0.5, 0.0, 0.25), 0.25)),
-        (0x038, Demand(7000, (1.0, 2.0, -3.0), None, None)),
-        (0x007, Demand(7000, None, (0.5, 0.0, 0.25), 0.25)),
+        (0x000, PositionTarget((1.0, 2.0, -3.0), 0.25)),
+        (0x038, PositionTarget((1.0, 2.0, -3.0), None)),
+        (0x007, PositionTarget(None, 0.25)),
     ],
 )
 def test_what_the_position_control_was_asked_for(path, mask, expected):
@@ -143,4 +143,4 @@ def test_what_the_position_control_was_asked_for(path, mask, expected):
         )
     )
     path.write_bytes(log.content)
-    assert [heard.sample for heard in read_log(path).heard if isinstance(heard.sample, Demand)] == [expected]
+    assert [heard.sample for heard in read_log(path).heard if isinstance(heard.sample, PositionTarget)] == [expected]

@@ -14,19 +14,18 @@ from companion.messages import (
     LandedState,
     LocalPosition,
     Odometry,
+    PositionTarget,
     Vibration,
 )
-from rebound_cli.logs.log import Demand, LogError
+from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 
 START = 1_000_000
 IMU = {"sensor_combined": sensor_combined(every(5000, START, START + 500_000))}
-POSITION = [
-    *[("float", name) for name in ("x", "y", "z", "vx", "vy", "vz")],
-    *[("bool", name) for name in ("v_xy_valid", "v_z_valid")],
-    *[("uint8_t", f"{name}_reset_counter") for name in ("xy", "z", "vxy", "vz")],
-]
+PATH = "x y z vx vy vz"
+RESETS = "xy_reset_counter z_reset_counter vxy_reset_counter vz_reset_counter"
+POSITION = f"{PATH} v_xy_valid v_z_valid {RESETS}"
 
 
 def read(tmp_path, topics, **more):
@@ -50,14 +49,7 @@ def test_sensor_combined_is_the_mean_over_the_interval_that_ends_at_its_time(tmp
 
 def test_vehicle_imu_is_increments_over_the_time_they_took(tmp_path):
     # Given a log of vehicle_imu at full rate, as a logging profile for high rates has it, and sensor_combined beside it
-    fields = [
-        ("uint64_t", "timestamp_sample"),
-        ("float[3]", "delta_angle"),
-        ("float[3]", "delta_velocity"),
-        ("uint32_t", "delta_angle_dt"),
-        ("uint32_t", "delta_velocity_dt"),
-        ("uint8_t", "delta_velocity_clipping"),
-    ]
+    fields = "timestamp_sample delta_angle delta_velocity delta_angle_dt delta_velocity_dt delta_velocity_clipping"
     rows = [
         (t + 700, t, (0.0005, 0.0, 0.0), (0.01, 0.0, -0.049), 2500, 5000, 0) for t in every(5000, START, START + 50_000)
     ]
@@ -73,8 +65,7 @@ def test_vehicle_imu_is_increments_over_the_time_they_took(tmp_path):
 
 def test_the_estimators_bias_is_taken_off_as_highres_imu_does(tmp_path):
     # Given a bias of 0.5 m/s^2 that the estimator finds at 0.1 s
-    fields = [("uint32_t", "accel_device_id"), ("float[3]", "accel_bias"), ("float[3]", "gyro_bias")]
-    bias = (fields, [(START + 100_000, 7, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1))])
+    bias = ("accel_device_id accel_bias gyro_bias", [(START + 100_000, 7, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1))])
     log = read(tmp_path, {**IMU, "estimator_sensor_bias": bias})
     forces = [sample.specific_force_frd_m_s2[0] for sample in of(log, ImuSample)]
     assert forces[19:21] == pytest.approx([0.0, -0.5], abs=1e-6)
@@ -102,20 +93,16 @@ def test_an_invalid_velocity_is_said(tmp_path):
 def test_attitude_thrust_and_vibration(tmp_path):
     topics = {
         **IMU,
-        "vehicle_attitude": ([("float[4]", "q")], [(START + 10, (1.0, 0.0, 0.0, 0.0))]),
+        "vehicle_attitude": ("q", [(START + 10, (1.0, 0.0, 0.0, 0.0))]),
         "vehicle_attitude_setpoint": (
-            [("float[4]", "q_d"), ("float[3]", "thrust_body")],
+            "q_d thrust_body",
             [
                 (START + 20, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -0.6)),
                 (START + 30, (float("nan"),) * 4, (0.3, 0.0, -0.4)),
             ],
         ),
         "vehicle_imu_status": (
-            [
-                ("uint32_t[3]", "accel_clipping"),
-                ("float", "gyro_vibration_metric"),
-                ("float", "accel_vibration_metric"),
-            ],
+            "accel_clipping gyro_vibration_metric accel_vibration_metric",
             [(START + 40, (1, 2, 3), 0.25, 4.5)],
         ),
     }
@@ -128,7 +115,7 @@ def test_attitude_thrust_and_vibration(tmp_path):
 
 
 def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
-    fields = [("uint8_t", "nav_state"), ("uint8_t", "arming_state"), ("bool", "failsafe")]
+    fields = "nav_state arming_state failsafe"
     rows = [(START, 14, 1, False), (START + 10, 14, 2, False), (START + 20, 18, 2, True)]
     beats = of(read(tmp_path, {**IMU, "vehicle_status": (fields, rows)}), Heartbeat)
     seen = [(beat.custom_mode, beat.armed, beat.system_status) for beat in beats]
@@ -148,7 +135,7 @@ def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
 )
 def test_a_log_of_no_multicopter_is_refused_by_name(tmp_path, status, parameters, words):
     # vehicle_status.vehicle_type: 1 rotary wing, 2 fixed wing, 3 rover
-    topic = ([("uint8_t", name) for name in status], [(START, *status.values())])
+    topic = (" ".join(status), [(START, *status.values())])
     with pytest.raises(LogError, match=f"is not a multicopter but: {words}"):
         read(tmp_path, {**IMU, "vehicle_status": topic}, parameters=parameters)
 
@@ -156,13 +143,13 @@ def test_a_log_of_no_multicopter_is_refused_by_name(tmp_path, status, parameters
 def test_landed_state_is_what_px4_would_send(tmp_path):
     topics = {
         **IMU,
-        "vehicle_land_detected": ([("bool", "landed")], [(START, True), (START + 10, False), (START + 90, True)]),
+        "vehicle_land_detected": ("landed", [(START, True), (START + 10, False), (START + 90, True)]),
         "vehicle_control_mode": (
-            [("bool", "flag_control_auto_enabled")],
+            "flag_control_auto_enabled",
             [(START, False), (START + 30, True), (START + 70, False)],
         ),
         "position_setpoint_triplet": (
-            [("bool", "current.valid"), ("uint8_t", "current.type")],
+            "current.valid current.type",
             [(START + 20, True, 3), (START + 50, True, 4)],
         ),
     }
@@ -185,17 +172,14 @@ def test_landed_state_is_what_px4_would_send(tmp_path):
     ("fields", "row"),
     [
         # since v1.13
-        ([("float[3]", "position"), ("float[3]", "velocity")], ((1.0, 2.0, 3.0), (float("nan"),) * 2 + (0.5,))),
+        ("position velocity", ((1.0, 2.0, 3.0), (float("nan"),) * 2 + (0.5,))),
         # before
-        (
-            [("float", name) for name in ("x", "y", "z", "vx", "vy", "vz")],
-            (1.0, 2.0, 3.0, float("nan"), float("nan"), 0.5),
-        ),
+        (PATH, (1.0, 2.0, 3.0, float("nan"), float("nan"), 0.5)),
     ],
 )
 def test_what_was_asked_for_in_the_words_of_two_versions(tmp_path, fields, row):
     log = read(tmp_path, {**IMU, "trajectory_setpoint": (fields, [(START + 5, *row)])})
-    assert of(log, Demand) == [Demand(START + 5, (1.0, 2.0, 3.0), None, 0.5)]
+    assert of(log, PositionTarget) == [PositionTarget((1.0, 2.0, 3.0), 0.5)]
 
 
 def test_the_vehicle_is_named(tmp_path):
@@ -204,7 +188,7 @@ def test_the_vehicle_is_named(tmp_path):
 
 
 def test_what_is_missing_is_said_with_its_cost(tmp_path):
-    late = ([("float[4]", "q")], [(START + 2_000_000, (1.0, 0.0, 0.0, 0.0))])
+    late = ("q", [(START + 2_000_000, (1.0, 0.0, 0.0, 0.0))])
     log = read(tmp_path, {**IMU, "vehicle_attitude": late})
     said = "\n".join(log.losses)
     assert "no vehicle_local_position: height and velocity are not known" in said
@@ -214,7 +198,7 @@ def test_what_is_missing_is_said_with_its_cost(tmp_path):
 
 def test_a_log_without_inertial_samples_is_one_sentence(tmp_path):
     with pytest.raises(LogError, match=r"flight\.ulg: neither sensor_combined nor vehicle_imu"):
-        read(tmp_path, {"vehicle_attitude": ([("float[4]", "q")], [(START, (1.0, 0.0, 0.0, 0.0))])})
+        read(tmp_path, {"vehicle_attitude": ("q", [(START, (1.0, 0.0, 0.0, 0.0))])})
 
 
 def test_a_log_cut_short_in_its_data_is_read_to_there(tmp_path):

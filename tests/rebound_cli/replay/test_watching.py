@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from companion.messages import ExtendedState, LandedState, LocalPosition
+from companion.messages import ExtendedState, LandedState, LocalPosition, PositionTarget
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind, Situation
-from rebound_cli.logs.log import Demand, LoggedSample
+from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.shaking import Stage, shaking
 from rebound_cli.replay.watching import Circumstances, thinned, watch_log
 from tests.rebound_cli.replay.flying import HIT_US, LATERAL, SECOND, beat, flight, position
@@ -60,7 +60,7 @@ def test_a_hit_between_the_samples_of_a_slow_stream_is_not_seen_by_its_force():
     assert watch_log(replace(log, heard=tuple(thinned(log.heard, 25))), LATERAL).impacts == []
 
 
-DOWN = Demand(0, (0.0, 0.0, 0.0), None, 2.0)
+DOWN = PositionTarget((0.0, 0.0, 0.0), 2.0)
 
 
 def test_one_old_setpoint_does_not_make_a_crash_a_landing():

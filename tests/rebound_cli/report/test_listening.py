@@ -6,7 +6,7 @@ import numpy as np
 
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Phase
-from rebound_cli.replay.listening import PHASES, Listener
+from rebound_cli.replay.listening import PHASES
 from rebound_cli.replay.recording import Followed, read_recording, reproduce
 from rebound_cli.replay.report import replay_log
 from rebound_cli.replay.watching import Findings
@@ -20,33 +20,32 @@ from tests.rebound_cli.replay.flying import HIT_US, flight
 
 
 def test_a_flight_that_is_listened_to_comes_again_to_the_bit(wall_folder):
-    listener = Listener()
-    assert reproduce(read_recording(wall_folder), listener).first_difference is None
-    assert np.size(listener.tested.ratio) > 6000
+    again = reproduce(read_recording(wall_folder))
+    assert again.first_difference is None and np.size(again.findings.listener.tested.ratio) > 6000
 
 
 def test_a_sample_beyond_its_threshold_is_a_hit_and_no_other_is(wall):
     fired = {finding.first.impact.sample_time_boot_us for finding in wall.findings.impacts}
-    tested = wall.listener.tested
+    tested = wall.findings.listener.tested
     beyond = tested.time_boot_us[(tested.phase == PHASES.index(Phase.ARMED)) & (tested.ratio >= 1.0)]
     # The wall and the touchdown
     assert set(beyond) == fired and len(fired) == 2
-    assert all(shown.tested is not None for shown in wall.listener.shown.values())
+    assert all(shown.tested is not None for shown in wall.findings.listener.shown.values())
 
 
 def test_a_simulated_flight_has_its_page_without_being_flown_again(wall, wall_folder, tmp_path):
     # In lockstep
     assert (wall_folder / "report.html").read_text() == page(wall)
     # and by the loop of real flights
-    followed = Followed(Listener())
+    followed = Followed()
     fly(tmp_path, followed=followed, mission_file=WALL)
     shown = replace(followed_flight(tmp_path, followed), versions={})
     assert followed.findings.collisions and page(shown) == page(recorded_flight(tmp_path))
 
 
 def of_a_log(log):
-    listener, config = Listener(), CompanionConfig()
-    return replayed_flight(replay_log(log, config, None, listener.listen), config, listener)
+    config = CompanionConfig()
+    return replayed_flight(replay_log(log, config, None), config)
 
 
 def test_a_log_of_anybodys_has_a_page_too():
@@ -68,7 +67,7 @@ def test_a_healthy_flight_is_told_by_its_closest_call():
 def test_what_the_simulator_knows_and_nobody_saw_is_told_with_why(wall):
     # Given the same flight by a detector that has told nothing
     (off,) = [span for span in wall.findings.off if span.reason == "connect"]
-    blind = Findings(off=[replace(off, end_us=wall.started_at_us + 60_000_000)])
+    blind = Findings(off=[replace(off, end_us=wall.started_at_us + 60_000_000)], listener=wall.findings.listener)
     missed = [moment for moment in moments_of(replace(wall, findings=blind)) if moment.kind == "missed"]
     assert len(missed) == 1 and "a wall at 1.96 m/s" in missed[0].title
     assert missed[0].reasons[0] == "The detector was off: connect."
