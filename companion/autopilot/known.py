@@ -1,8 +1,9 @@
 """The autopilots that can be flown."""
 
+from companion.autopilot.ardupilot.firmware import ARDUPILOT
 from companion.autopilot.px4.firmware import PX4
 
-AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4,)}
+AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4, ARDUPILOT)}
 # Of a vehicle that has not announced itself yet.
 ASSUMED = PX4
 NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values())
