@@ -19,7 +19,7 @@ class GuardConfig(StrictModel):
     retired = frozenset({"beside_program"})
 
     modes: Annotated[tuple[str, ...], Field(min_length=1)] = GUARDED_MODES
-    """PX4's modes that the guard may take over."""
+    """Modes that the guard may take over, of each autopilot."""
     then: Literal["previous", "hold"] = "hold"
     """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
     on_crash: OnCrash = "tell"
