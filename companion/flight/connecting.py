@@ -49,7 +49,9 @@ class Meet(NoSetpoint, ABC, Generic[MoveT]):
             return None
         if self._requests is None:
             self._requests, flight.was_silent, self._is_told = iter(self._commands(flight)), False, False
-            text = f"connected to a {identity.autopilot.name} {identity.vehicle_type}, system {identity.system_id}"
+            name = identity.autopilot.name
+            article = "an" if name[0] in "AEIOU" else "a"
+            text = f"connected to {article} {name} {identity.vehicle_type}, system {identity.system_id}"
             flight.report(now_us, "connected", text, system_id=identity.system_id)
         if self._measuring_since_us is None:
             self._ask(flight, self._requests, inputs, now_us)
