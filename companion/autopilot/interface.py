@@ -74,7 +74,7 @@ class Autopilot:
     """Modes that end on the ground."""
     mode_names: frozenset[str]
     guarded_modes: tuple[str, ...]
-    """Names of the modes that a guard may take over by default."""
+    """Names of the modes that a guard may take over by default; none where no guard flies it."""
     mode_name: Callable[[int], str]
     """As the autopilot's own tools print it."""
     pilot: Callable[[int], Pilot | None]

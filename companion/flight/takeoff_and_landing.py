@@ -21,8 +21,8 @@ BOOT_CLOCK_SLACK_US = 3_000_000
 # The setpoint waits while the motors spin up: PX4 takes two seconds from arming to lift-off. A vehicle half a metre
 # behind its setpoint climbs 0.65 m/s faster than commanded, into whatever is above.
 MOST_AHEAD_M = 0.15
-# So far below the top a vehicle that was told to take off gets setpoints again: sooner one would end its take-off.
-TAKES_OVER_BELOW_M = 0.5
+# A vehicle that was told to take off has done so when it is at the top, and slower than this.
+ARRIVES_M_S = 0.2
 
 
 class TakeOff:
@@ -47,9 +47,7 @@ class TakeOff:
         if self._profile is None:
             return Target(self._ground_ned_m, self._yaw_rad)
         if self._is_told:
-            latest = self._flight.vehicle.history.latest()
-            below_m = math.inf if latest is None else latest.position_ned_m[2] - self._profile.target_m[2]
-            return Target(self._profile.target_m, self._yaw_rad) if below_m < TAKES_OVER_BELOW_M else None
+            return None  # a setpoint ends its take-off
         position, velocity, acceleration = self._profile.at(self._climbing_s)
         return self._flight.on_trajectory(position, self._yaw_rad, velocity, acceleration)
 
@@ -84,7 +82,7 @@ class TakeOff:
             return Transition(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
         self._now = self._climb
         if self._is_told:
-            self._now = self._leave_ground
+            self._now, flight.target = self._leave_ground, None
             flight.command_client.begin(TakeOffCommand(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us
@@ -117,7 +115,11 @@ class TakeOff:
             self._climbing_s += (flight.trajectory_us - self._climbed_until_us) * 1e-6
         self._climbed_until_us = flight.trajectory_us
         is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
-        if is_up and (self._is_told or self._climbing_s >= profile.duration_s):
+        if self._is_told and is_up and latest is not None and math.hypot(*latest.velocity_ned_m_s) < ARRIVES_M_S:
+            # The mission's first way begins here.
+            flight.target = Target(profile.target_m, self._yaw_rad)
+            return Transition(Trigger.TAKEN_OFF)
+        if not self._is_told and is_up and self._climbing_s >= profile.duration_s:
             return Transition(Trigger.TAKEN_OFF)
         if (now_us - self._started_us) * 1e-6 > profile.duration_s + limits.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)

@@ -37,8 +37,6 @@ MODE_NAMES = frozenset(_NAMES.values())
 _HAND = frozenset({"STABILIZE", "ACRO", "DRIFT", "SPORT", "FLIP", "SYSTEMID", "AUTOROTATE", "TURTLE"})
 _STICKS = frozenset({"ALT_HOLD", "LOITER", "POSHOLD", "FLOWHOLD", "ZIGZAG", "AUTOTUNE"})
 _SETPOINTS = frozenset({"GUIDED", "GUIDED_NOGPS"})
-# Modes in which Copter itself holds a position or a height, as of PX4. Not those that end on the ground at once.
-GUARDED = ("ALT_HOLD", "LOITER", "POSHOLD", "GUIDED", "AUTO", "RTL", "SMART_RTL", "BRAKE", "CIRCLE", "FOLLOW")
 
 
 def pilot(custom_mode: int) -> Pilot | None:

@@ -7,11 +7,15 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.virtual_time import EPOCH_US
 from companion.autopilot.ardupilot import modes, setup
 from companion.autopilot.ardupilot.firmware import ARDUPILOT
 from companion.autopilot.interface import Pilot
+from companion.autopilot.known import MODE_NAMES
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
+from companion.guard.config import GuardConfig
+from companion.guard.guard import Guard
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.messages import (
@@ -52,12 +56,12 @@ def test_a_mission_is_flown_in_guided_and_landed_in_its_land_mode():
     assert modes_seen[-2:] == [GUIDED, COPTER_LAND]
 
 
-def test_it_is_told_to_take_off_and_hears_no_setpoint_until_it_is_nearly_up():
+def test_it_is_told_to_take_off_and_hears_no_setpoint_until_it_is_up():
     f = flight(FakeCopter(), items=[TAKEOFF, LANDING])
     f.run_until(lambda: commanded(f, TAKE_OFF))
     ((told_us, message),) = commanded(f, TAKE_OFF)
     assert message.param7 == 1.5
-    f.run_until(lambda: f.vehicle.position[2] < -0.9)
+    f.run_until(lambda: f.vehicle.position[2] < -1.4)
     assert [t for t, _ in f.vehicle.setpoints if t > told_us] == []
     assert f.run_to_end().outcome == "completed"
     assert f.vehicle.setpoints[-1][0] > told_us
@@ -190,6 +194,16 @@ def test_arming_that_is_refused_ends_the_flight_in_one_sentence():
         )
     ).run_to_end()
     assert report.outcome == "failed" and report.reason.startswith("not armed: arm: the vehicle answered FAILED")
+
+
+def test_a_guard_refuses_what_it_does_not_fly():
+    guard, vehicle, pending = Guard(GuardConfig()), FakeCopter(), b""
+    while not guard.finished:
+        result = guard.step(vehicle.step(pending), EPOCH_US + vehicle.time_us)
+        pending = b"".join(result.sent_frames)
+        assert vehicle.time_us < 30_000_000
+    assert guard.outcome == "the vehicle's autopilot is ArduPilot: a guard flies PX4 alone"
+    assert "GUIDED" not in MODE_NAMES
 
 
 # --- preflight
