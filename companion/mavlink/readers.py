@@ -252,6 +252,11 @@ def _ekf_status(flags: int, velocity_variance: float, pos_horiz_variance: float,
     return messages.EstimatorStatus(ratios, bool(flags & EKF_VELOCITY_HORIZ), False)
 
 
+def _unbounded_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], thrust: float) -> Sample | None:
+    """What its height control asks for: at a landing less than none."""
+    return _attitude_target(time_boot_ms, type_mask, q, 0.0 if -1.0 <= thrust < 0.0 else thrust)
+
+
 def _cast_parameter(param_id: bytes | str, param_value: float, param_type: int) -> Sample | None:
     name = param_id if isinstance(param_id, str) else param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
     if not math.isfinite(param_value):
@@ -312,7 +317,13 @@ GUARD_READERS = READERS | _readers(
 )
 
 # Beside them, or in their place: of ArduPilot.
-ARDUPILOT_READERS = _readers({dialect.MAVLink_param_value_message: _cast_parameter, EkfStatusReport: _ekf_status})
+ARDUPILOT_READERS = _readers(
+    {
+        dialect.MAVLink_attitude_target_message: _unbounded_target,
+        dialect.MAVLink_param_value_message: _cast_parameter,
+        EkfStatusReport: _ekf_status,
+    }
+)
 
 _BY_NAME = {reader.name: reader for reader in GUARD_READERS.values()}
 # Names of the messages that become samples.

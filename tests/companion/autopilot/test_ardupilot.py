@@ -20,6 +20,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.messages import (
     AttitudeSetpoint,
+    AttitudeTarget,
     EstimatorStatus,
     Parameter,
     Refused,
@@ -152,6 +153,14 @@ def test_the_estimators_report_is_its_own_message():
     )
     assert heard(told(0, 0.1, 0.2, 0.3, 0.4, 0.0)).horizontal_velocity_is_good is False
     assert isinstance(heard(told(0, math.nan, 0.2, 0.3, 0.4, 0.0)), Refused)
+
+
+@pytest.mark.parametrize(("thrust", "heard_as"), [(-0.05, 0.0), (0.5, 0.5)])
+def test_a_thrust_below_none_is_none(thrust, heard_as):
+    message = mav.MAVLink_attitude_target_message(1, 0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, thrust)
+    assert heard(message) == AttitudeTarget(1000, heard_as, (1.0, 0.0, 0.0, 0.0))
+    message.thrust = math.nan
+    assert isinstance(heard(message), Refused)
 
 
 def test_modes_have_copters_names_and_numbers():
