@@ -61,8 +61,8 @@ class Stepped(ABC, Generic[CoreT]):
         if identity is not None and not self._is_addressed:
             # From now on the vehicle alone is listened to and spoken to.
             self._is_addressed = True
-            self._decoder.listen_to(identity.system_id, identity.component_id)
-            self._encoder.speak_to(identity.system_id, identity.component_id)
+            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot.wire)
+            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot.wire)
         sent = self._encoder.all_packets(outputs.messages, lambda error: core.fault(error, now_us))
         return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
 

@@ -26,7 +26,6 @@ from companion.messages import (
     LocalPosition,
     OnboardHeartbeat,
     Outgoing,
-    RunChecks,
     Sample,
     SendCommand,
     Vector3,
@@ -75,7 +74,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         self.started_at_us = self.now_us = now_us
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self._sample_boot_us = 0
-        self._leans: bool | None = None  # the kind of setpoint that PX4 flies by; None while another may send them
+        self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
 
@@ -186,7 +185,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not (moved or follows_imu) and now_us < self._setpoint_due_us:
             return
         interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
-        self._leans = self._leans if holds else None
+        if not holds:
+            self._change_law(None)
         due_us = self._setpoint_due_us + interval_us
         is_on_time = not (moved or follows_imu) and due_us > now_us
         self._setpoint_due_us = due_us if is_on_time else now_us + interval_us
@@ -213,17 +213,13 @@ class Core(ABC, Generic[FlightT, MachineT]):
             self._note_sent(sent, now_us)
         flight.outbox.append(self.resets.sent(setpoint))
         if holds:
-            self._change_kind(target.lean is not None)
+            self._change_law(target.lean is not None)
 
-    def _change_kind(self, leans: bool) -> None:
-        """Have PX4 change between its controllers of position and of attitude.
-
-        Within OFFBOARD it does so with its status, twice a second (Commander.cpp, updateControlMode): until then both
-        fly the vehicle, or neither does.
-        """
+    def _change_law(self, leans: bool | None) -> None:
+        """Tell the vehicle by what it is flown from now on; None: no more by this companion."""
         if leans != self._leans:
             self._leans = leans
-            self.flight.outbox.append(SendCommand(RunChecks(), 0))
+            self.flight.outbox += [SendCommand(told, 0) for told in self.flight.vehicle.autopilot.changed_law(leans)]
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         """Note a setpoint that was sent while the companion has the vehicle."""

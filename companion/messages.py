@@ -67,6 +67,7 @@ class MessageId(IntEnum):
     POSITION_TARGET_LOCAL_NED = 85
     HIGHRES_IMU = 105
     AUTOPILOT_VERSION = 148
+    EKF_STATUS_REPORT = 193
     ESTIMATOR_STATUS = 230
     VIBRATION = 241
     EXTENDED_SYS_STATE = 245
@@ -294,7 +295,26 @@ class RunChecks:
     command_id: ClassVar[int] = 401
 
 
-VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage | RunChecks
+@dataclass(frozen=True, slots=True)
+class TakeOff:
+    """MAV_CMD_NAV_TAKEOFF, upwards from here: of an autopilot that no setpoint lifts off the ground."""
+
+    command_id: ClassVar[int] = 22
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetAuxFunction:
+    """MAV_CMD_DO_AUX_FUNCTION: a switch of ArduPilot's, as a transmitter has it; level 0 is low, 2 is high."""
+
+    command_id: ClassVar[int] = 218
+    function: int
+    level: int
+
+
+VehicleCommand: TypeAlias = (
+    SetMode | SetArmed | SetMessageInterval | RequestMessage | RunChecks | TakeOff | SetAuxFunction
+)
 
 
 @dataclass(frozen=True, slots=True)

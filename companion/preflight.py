@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from companion import messages
 from companion.autopilot.known import NAMES
-from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, judged
+from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, Sight, judged
 from companion.link.round_trip import MOST_US as MOST_TRIP_US
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
@@ -29,10 +29,6 @@ HEARTBEAT_INTERVAL_US = 1_000_000
 # A lost question is asked again; PX4 answers a parameter within 50 ms.
 ASK_AGAIN_US = 500_000
 
-# A contact of a stiff frame (the paper's accelerometer shows 0.001 s), for the share of them that samples see.
-STIFF_CONTACT_S = 0.001
-# Eq. 2 of the paper: a foldable arm's push begins with b_s v_c, b_s = 30 /s.
-FOLDING_DAMPING_PER_S = 30.0
 # The position of a vehicle that stands: more than this and a recovery by half a metre is lost in it.
 MOST_WANDER_M, DOUBTFUL_WANDER_M = 0.5, 0.1
 # Innovation test ratios: at 1 the estimator turns its sensors down, and PX4 warns from 0.5 on.
@@ -137,6 +133,7 @@ def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> 
                 survey.refusal = identity
             else:
                 survey.vehicle.identity, survey.heard_since_us = identity, now_us
+                survey.vehicle.autopilot = identity.autopilot
         case messages.Parameter(name, value) if name in survey.asked:
             survey.parameters[name] = value
         case messages.EstimatorStatus():
@@ -162,11 +159,13 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
     survey.ask_due_us = survey.now_us + ASK_AGAIN_US
     outgoing += [messages.ReadParameter(name) for name in survey.asked if name not in survey.parameters]
     commands: list[messages.VehicleCommand] = []
+    autopilot = survey.vehicle.autopilot
     if survey.vehicle.version is None:
         commands.append(messages.RequestMessage(MessageId.AUTOPILOT_VERSION))
     if survey.listening_since_us is None:
         commands += [stream.request() for stream in survey.streams.streams]
-        commands.append(messages.SetMessageInterval(MessageId.ESTIMATOR_STATUS, 1_000_000))
+        commands += autopilot.streams
+        commands.append(messages.SetMessageInterval(autopilot.estimator_message, 1_000_000))
     outgoing += [SendCommand(command, 0) for command in commands]
 
 
@@ -242,7 +241,8 @@ def _estimate(survey: Survey) -> Iterator[PreflightItem]:
     remedies = survey.vehicle.autopilot.remedies
     worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
     if worst is None:
-        yield PreflightItem("estimator", DOUBTFUL, "no ESTIMATOR_STATUS", remedies.no_estimator)
+        name = MessageId(survey.vehicle.autopilot.estimator_message).name
+        yield PreflightItem("estimator", DOUBTFUL, f"no {name}", remedies.no_estimator)
     elif not survey.estimator[-1].horizontal_velocity_is_good:
         remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
         yield PreflightItem("estimator", BAD, "no horizontal velocity", remedy)
@@ -299,20 +299,13 @@ def _battery(survey: Survey) -> PreflightItem:
 
 
 def _sight(survey: Survey) -> Iterator[PreflightItem]:
-    """By force alone and in the quiet of standing: a flight's vibration is `rebound tune`'s to judge."""
     rate_hz = survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
-    if not rate_hz:
-        return
-    told_hz = survey.parameters.get(survey.vehicle.autopilot.integration_parameter)
-    integ_hz = told_hz or 1.0 / survey.config.estimate.imu_averaging_interval_s
-    threshold_m_s2 = survey.config.fused.side_threshold_m_s2
-    seen = min(1.0, rate_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
-    folding = f"arms that fold: from {threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
-    stiff = f"stiff frames: {100 * seen:.0f} % of 1 ms contacts fall into a sample"
-    remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
-    per_h = 3600.0 * rate_hz * math.exp(-0.5 * (EXCESS * survey.config.fused.noise_factor) ** 2)
-    noise = f"at most {per_h:.2g} false alarms an hour by Gaussian vibration"
-    yield judged("smallest hit", f"{folding}; {stiff}; {noise}", (seen <= 0.9, DOUBTFUL, remedy))
+    if rate_hz:
+        per_h = 3600.0 * rate_hz * math.exp(-0.5 * (EXCESS * survey.config.fused.noise_factor) ** 2)
+        noise = f"at most {per_h:.2g} false alarms an hour by Gaussian vibration"
+        config, autopilot = survey.config, survey.vehicle.autopilot
+        averaging_s, threshold_m_s2 = config.estimate.imu_averaging_interval_s, config.fused.side_threshold_m_s2
+        yield autopilot.sight(Sight(survey.parameters, rate_hz, averaging_s, threshold_m_s2, noise))
 
 
 class Preflight:
@@ -334,8 +327,8 @@ class Preflight:
         outgoing = advance(survey, samples, now_us)
         identity = survey.vehicle.identity
         if identity is not None and known is None:
-            self._decoder.listen_to(identity.system_id, identity.component_id)
-            self._encoder.speak_to(identity.system_id, identity.component_id)
+            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot.wire)
+            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot.wire)
         return tuple(packet for message in outgoing for packet in self._encoder.packets(message))
 
     def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:

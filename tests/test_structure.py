@@ -135,6 +135,7 @@ OF_PX4 = (
     re.compile(r"\bMAV_(?:[0-9nx]_[A-Z]+|PROTO_VER)\b"),
     re.compile(r"\b\d+ << (?:16|24)\b"),
 )
+OF_ARDUPILOT = re.compile(r"\b(?:ARMING|ATC|BATT|GUID|INS|MOT|PSC|SERIAL[0-9n]|WP)_[A-Z][A-Z0-9_]+\b")
 # MAVLink's message; reasons of the numbers of motion are still where the numbers are.
 NO_PARAMETER = {"SYS_STATUS"}
 ROOMS_OF_NUMBERS = ("companion/autopilot/px4/", "companion/reflex/", "companion/motion/")
@@ -151,13 +152,23 @@ def test_one_folder_names_what_is_px4s() -> None:
     assert found == []
 
 
+def test_another_folder_names_what_is_ardupilots() -> None:
+    found = [
+        f"{name(path)}: {word}"
+        for path in sources("companion")
+        for word in OF_ARDUPILOT.findall(path.read_text())
+        if not name(path).startswith("companion/autopilot/ardupilot/")
+    ]
+    assert found == []
+
+
 def test_an_autopilots_folder_is_known_to_the_table_of_autopilots_alone() -> None:
     assert [
         module
         for module, names in imports_of_all().items()
         if module.startswith("companion.")
         and not module.startswith("companion.autopilot.")
-        and any(name.startswith("companion.autopilot.px4") for name in names)
+        and any(name.startswith(("companion.autopilot.px4", "companion.autopilot.ardupilot")) for name in names)
     ] == []
 
 

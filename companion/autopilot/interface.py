@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from companion.autopilot.setup import PreflightItem, SerialLine, Setup
-from companion.messages import SetMode
+from companion.autopilot.setup import PreflightItem, SerialLine, Setup, Sight
+from companion.messages import SetMessageInterval, SetMode, VehicleCommand
 
 
 class Pilot(Enum):
@@ -48,6 +48,16 @@ class Defaults:
 
 
 @dataclass(frozen=True, slots=True)
+class Wire:
+    """What of MAVLink it reads, or writes, in its own way."""
+
+    casts_whole_numbers: bool
+    """A parameter that is a whole number travels as a float of its value, and not as the bytes of the number."""
+    attitude_mask: int
+    """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
+
+
+@dataclass(frozen=True, slots=True)
 class Autopilot:
     """Tables and functions of one autopilot; nothing else of the companion names its modes and parameters."""
 
@@ -64,18 +74,33 @@ class Autopilot:
     """Modes that end on the ground."""
     mode_names: frozenset[str]
     guarded_modes: tuple[str, ...]
-    """Names of the modes that a guard may take over by default."""
+    """Names of the modes that a guard may take over by default; none where no guard flies it."""
     mode_name: Callable[[int], str]
     """As the autopilot's own tools print it."""
     pilot: Callable[[int], Pilot | None]
     """None of a mode that is not known."""
     set_mode: Callable[[int], SetMode]
+    wire: Wire
+    least_version: tuple[int, int, int]
+    """Older ones are refused."""
+    streams: tuple[SetMessageInterval, ...]
+    """Asked for beside those that all autopilots have."""
+    estimator_message: int
+    """In which it tells how good its estimate is."""
+    is_told_to_take_off: bool
+    """Its setpoints do not lift it off the ground: a command does."""
+    changed_law: Callable[[bool | None], tuple[VehicleCommand, ...]]
+    """What it is told when it is flown by attitude from now on (True), by position (False), or no more (None)."""
+    attitude_parameters: tuple[str, ...]
+    """Read before it is flown by attitude."""
+    attitude_held_s: Callable[[Mapping[str, int | float]], float]
+    """From these: for so long an attitude is flown on; infinite where no attitude with a thrust can be asked for."""
     loss_parameter: str
     """For so many seconds the last setpoint is flown on."""
     rate_parameter: str
     """Of a link's share for streams, for people."""
-    integration_parameter: str
-    """With so many Hz samples of the IMU are integrated."""
+    sight: Callable[[Sight], PreflightItem]
+    """The smallest hit that shows."""
     asked: Callable[[SerialLine | None], tuple[str, ...]]
     """Parameters that preflight reads."""
     judge_vehicle: Callable[[Setup], Iterable[PreflightItem]]

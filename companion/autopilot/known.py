@@ -1,10 +1,15 @@
 """The autopilots that can be flown."""
 
+from companion.autopilot.ardupilot.firmware import ARDUPILOT
 from companion.autopilot.px4.firmware import PX4
 
-AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4,)}
+AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4, ARDUPILOT)}
 # Of a vehicle that has not announced itself yet.
 ASSUMED = PX4
 NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values())
-MODE_NAMES = frozenset(name for autopilot in AUTOPILOTS.values() for name in autopilot.mode_names)
+# Of the autopilots that a guard flies.
+MODE_NAMES = frozenset(
+    name for autopilot in AUTOPILOTS.values() if autopilot.guarded_modes for name in autopilot.mode_names
+)
+GUARDED_NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values() if autopilot.guarded_modes)
 GUARDED_MODES = tuple(mode for autopilot in AUTOPILOTS.values() for mode in autopilot.guarded_modes)

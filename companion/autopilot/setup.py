@@ -28,6 +28,18 @@ class Setup:
     """For so long an attitude is safe to hold, if the companion dies."""
 
 
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What the smallest hit follows from that the samples of the IMU show."""
+
+    parameters: Mapping[str, int | float]
+    rate_hz: float
+    imu_averaging_interval_s: float
+    threshold_m_s2: float
+    false_alarms: str
+    """By noise, for people."""
+
+
 class Verdict(Enum):
     GOOD = "ok"
     DOUBTFUL = "look"

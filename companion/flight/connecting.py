@@ -32,7 +32,8 @@ class Meet(NoSetpoint, ABC, Generic[MoveT]):
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
         """What is asked of a vehicle that has just been met."""
-        return [RequestMessage(MessageId.AUTOPILOT_VERSION), *[stream.request() for stream in flight.streams.streams]]
+        requested = [stream.request() for stream in flight.streams.streams]
+        return [RequestMessage(MessageId.AUTOPILOT_VERSION), *requested, *flight.vehicle.autopilot.streams]
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> MoveT | None:
         identity, companion = flight.vehicle.identity, flight.mission.companion
@@ -48,7 +49,9 @@ class Meet(NoSetpoint, ABC, Generic[MoveT]):
             return None
         if self._requests is None:
             self._requests, flight.was_silent, self._is_told = iter(self._commands(flight)), False, False
-            text = f"connected to a {identity.autopilot.name} {identity.vehicle_type}, system {identity.system_id}"
+            name = identity.autopilot.name
+            article = "an" if name[0] in "AEIOU" else "a"
+            text = f"connected to {article} {name} {identity.vehicle_type}, system {identity.system_id}"
             flight.report(now_us, "connected", text, system_id=identity.system_id)
         if self._measuring_since_us is None:
             self._ask(flight, self._requests, inputs, now_us)
@@ -91,7 +94,9 @@ class Connect(Meet[Transition]):
         return Transition(Trigger.REFUSED, text)
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
-        too_slow = flight.streams.too_slow(flight.vehicle.autopilot)
+        too_old, too_slow = flight.vehicle.version_complaint(), flight.streams.too_slow(flight.vehicle.autopilot)
+        if too_old is not None:
+            return self._refused(too_old)
         if too_slow is not None and flight.mission.companion.link.wait:
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None

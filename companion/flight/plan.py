@@ -2,6 +2,7 @@
 
 import math
 
+from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED
 from companion.fence import Fence
 from companion.flight.context import FlightContext, as_text
@@ -115,7 +116,7 @@ def describe_abort(abort_when: AbortWhen) -> str:
     return ", ".join(words[name].format(value) for name, value in given.items()) or "never"
 
 
-def mission_lines(mission: Mission) -> list[str]:
+def mission_lines(mission: Mission, autopilot: Autopilot = ASSUMED) -> list[str]:
     """Items, fence and policies. Positions: NED from the arming position, metres."""
     lines = []
     for number, item in enumerate(mission.items, start=1):
@@ -129,7 +130,7 @@ def mission_lines(mission: Mission) -> list[str]:
         *_obstacle_lines(mission.obstacles),
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
-        f"Unattended {unattended_text(ASSUMED, _fastest_m_s(mission))}",
+        f"Unattended {unattended_text(autopilot, _fastest_m_s(mission))}",
     ]
     if mission.recovery.law != "adaptive" and max(mission.recovery.gamma_per_axis) > LARGE_GAMMA_S:
         lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
@@ -199,7 +200,7 @@ def plan_text(flight: FlightContext) -> str:
         + (f"{identity.vehicle_type}, system {identity.system_id}" if identity else "not connected"),
         f"Checks     disarmed, on the ground, round trip {trip}, streams: {rates}",
         *_resume_lines(flight),
-        *mission_lines(mission),
+        *mission_lines(mission, flight.vehicle.autopilot),
         "Pilot      any mode change or disarm by the pilot ends the flight; the companion does not come back",
     ]
     return "\n".join(lines)

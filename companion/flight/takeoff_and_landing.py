@@ -5,6 +5,7 @@ import math
 from companion.flight.context import FlightContext, Inputs, StateHandler, Target, Transition, as_text
 from companion.flight.states import Trigger
 from companion.messages import SetArmed, Vector3
+from companion.messages import TakeOff as TakeOffCommand
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
 from companion.motion.rotation import yaw_rad
@@ -20,6 +21,8 @@ BOOT_CLOCK_SLACK_US = 3_000_000
 # The setpoint waits while the motors spin up: PX4 takes two seconds from arming to lift-off. A vehicle half a metre
 # behind its setpoint climbs 0.65 m/s faster than commanded, into whatever is above.
 MOST_AHEAD_M = 0.15
+# A vehicle that was told to take off has done so when it is at the top, and slower than this.
+ARRIVES_M_S = 0.2
 
 
 class TakeOff:
@@ -29,6 +32,7 @@ class TakeOff:
         self._flight, self._item = flight, item
         # Streaming setpoints, switching to OFFBOARD, arming, climbing: one after the other.
         self._now = self._lead
+        self._is_told = flight.vehicle.autopilot.is_told_to_take_off
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
@@ -42,6 +46,8 @@ class TakeOff:
     def target(self, now_us: int) -> Target | None:
         if self._profile is None:
             return Target(self._ground_ned_m, self._yaw_rad)
+        if self._is_told:
+            return None  # a setpoint ends its take-off
         position, velocity, acceleration = self._profile.at(self._climbing_s)
         return self._flight.on_trajectory(position, self._yaw_rad, velocity, acceleration)
 
@@ -75,6 +81,9 @@ class TakeOff:
         if not outcome.succeeded:
             return Transition(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
         self._now = self._climb
+        if self._is_told:
+            self._now, flight.target = self._leave_ground, None
+            flight.command_client.begin(TakeOffCommand(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us
         self._ground_ned_m = mean_position(flight)
@@ -89,6 +98,15 @@ class TakeOff:
         flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
 
+    def _leave_ground(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        """Until the vehicle has agreed to take off by itself."""
+        outcome = flight.command_outcome(inputs, False, now_us)
+        if outcome is not None and not outcome.succeeded:
+            return Transition(Trigger.REFUSED, f"no take-off: {outcome.text}", hand_over=True)
+        if outcome is not None:
+            self._now = self._climb
+        return None
+
     def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         profile, latest = self._profile, flight.vehicle.history.latest()
         assert profile is not None
@@ -97,7 +115,11 @@ class TakeOff:
             self._climbing_s += (flight.trajectory_us - self._climbed_until_us) * 1e-6
         self._climbed_until_us = flight.trajectory_us
         is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
-        if is_up and self._climbing_s >= profile.duration_s:
+        if self._is_told and is_up and latest is not None and math.hypot(*latest.velocity_ned_m_s) < ARRIVES_M_S:
+            # The mission's first way begins here.
+            flight.target = Target(profile.target_m, self._yaw_rad)
+            return Transition(Trigger.TAKEN_OFF)
+        if not self._is_told and is_up and self._climbing_s >= profile.duration_s:
             return Transition(Trigger.TAKEN_OFF)
         if (now_us - self._started_us) * 1e-6 > profile.duration_s + limits.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)

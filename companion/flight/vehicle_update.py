@@ -39,11 +39,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             if text is not None:
                 flight.report(now_us, "implausible", text, message=sample.message)
             continue
-        elif isinstance(sample, messages.Parameter) and sample.name == vehicle.autopilot.loss_parameter:
-            if flight.reflex.loss_s is None and sample.value > HELD_S:
-                text = longer_loss_text(vehicle.autopilot, sample.value)
-                flight.report(now_us, "unattended", text, loss_s=sample.value)
-            flight.reflex.loss_s = round(sample.value, 3)  # single precision on the wire
+        elif isinstance(sample, messages.Parameter) and sample.name in vehicle.autopilot.attitude_parameters:
+            _note_attitude_parameter(flight, sample, now_us)
         elif isinstance(sample, messages.TimeSyncRequest):
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, messages.TimeSyncAnswer):
@@ -86,10 +83,22 @@ def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
         return
     flight.outbox.append(asked)
     if flight.reflex.loss_s is None:
-        flight.outbox.append(messages.ReadParameter(flight.vehicle.autopilot.loss_parameter))
+        autopilot, told = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
+        flight.outbox += [messages.ReadParameter(name) for name in autopilot.attitude_parameters if name not in told]
     text = flight.round_trip.alarm() if flight.vehicle.armed else None
     if text is not None:
         flight.report(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)
+
+
+def _note_attitude_parameter(flight: FlightContext, told: messages.Parameter, now_us: int) -> None:
+    """For how long an attitude is flown on, once all is told that it follows from."""
+    autopilot, parameters = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
+    parameters[told.name] = told.value
+    if told.name == autopilot.loss_parameter and flight.reflex.loss_s is None and told.value > HELD_S:
+        text = longer_loss_text(autopilot, told.value)
+        flight.report(now_us, "unattended", text, loss_s=told.value)
+    if all(name in parameters for name in autopilot.attitude_parameters):
+        flight.reflex.loss_s = round(autopilot.attitude_held_s(parameters), 3)  # single precision on the wire
 
 
 def _report_conflict(flight: FlightContext, now_us: int) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from companion.autopilot.known import GUARDED_NAMES
 from companion.flight.connecting import Meet
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target
 from companion.flight.envelope import unattended_text
@@ -88,6 +89,9 @@ class GuardConnect(Meet[GuardTransition]):
         return GuardTransition(Trigger.REFUSED, text)
 
     def _judge(self, flight: FlightContext, now_us: int) -> GuardTransition | None:
+        autopilot = flight.vehicle.autopilot
+        if not autopilot.guarded_modes:
+            return self._refused(f"the vehicle's autopilot is {autopilot.name}: a guard flies {GUARDED_NAMES} alone")
         complaint = flight.streams.too_slow(flight.vehicle.autopilot) or flight.round_trip.complaint()
         if complaint is not None and (flight.mission.companion.link.wait or not self._is_first):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)

@@ -52,6 +52,10 @@ def describe(command: messages.VehicleCommand) -> str:
             return f"message {message_id}"
         case messages.RunChecks():
             return "run checks"
+        case messages.TakeOff(height_m):
+            return f"take-off to {height_m:g} m"
+        case messages.SetAuxFunction(function, level):
+            return f"auxiliary function {function} at {level}"
 
 
 def needs_confirmation(command: messages.VehicleCommand) -> bool:

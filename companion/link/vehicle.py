@@ -22,7 +22,7 @@ OTHER_TYPES = {
     11: "boat",
     12: "submarine",
 } | dict.fromkeys(range(19, 23), "VTOL aircraft")
-OTHER_AUTOPILOTS = {0: "generic autopilot", 3: "ArduPilot", 8: "component without an autopilot"}
+OTHER_AUTOPILOTS = {0: "generic autopilot", 8: "component without an autopilot"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +79,7 @@ class Vehicle:
     identity: Identity | None = None
     autopilot: Autopilot = ASSUMED  # the identity's, once there is one
     version: tuple[int, int, int] | None = None
+    attitude_parameters: dict[str, int | float] = field(default_factory=dict)  # see interface.Autopilot
     armed: bool | None = None
     mode: ModeReport | None = None
     failsafe: bool = False
@@ -186,6 +187,15 @@ class Vehicle:
     @property
     def flies_setpoints(self) -> bool:
         return self.custom_mode == self.autopilot.setpoints
+
+    def version_complaint(self) -> str | None:
+        """Why this version cannot be flown; None where it can, or has not said which it is."""
+        least = self.autopilot.least_version
+        if self.version is None or self.version >= least:
+            return None
+        return (
+            f"{self.autopilot_text()} is too old: {self.autopilot.name} {least[0]}.{least[1]} is the oldest that flies"
+        )
 
     def autopilot_text(self) -> str:
         """For people and the report, for example "PX4 1.15.0"; empty before there is a vehicle."""

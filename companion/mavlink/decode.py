@@ -9,6 +9,7 @@ from dataclasses import replace
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
+from companion.autopilot.interface import Wire
 from companion.mavlink.packet import (
     HEADER_V1,
     HEADER_V2,
@@ -18,7 +19,7 @@ from companion.mavlink.packet import (
     opened,
     packet_length,
 )
-from companion.mavlink.readers import READERS, Reader
+from companion.mavlink.readers import ARDUPILOT_READERS, READERS, EkfStatusReport, Reader
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 
 Frame = tuple[bytes, Sample | None]
@@ -29,7 +30,10 @@ WRAP_US = (1 << 32) * 1000
 SAME_BOOT_US = 3_600_000_000
 # What the checksum counts beside the packet: CRC_EXTRA, by message id. Packets with other ids have one that cannot be
 # checked.
-_CRC_EXTRA = {number: bytes((message.crc_extra,)) for number, message in dialect.mavlink_map.items()}
+_CRC_EXTRA = {
+    number: bytes((message.crc_extra,))
+    for number, message in (dialect.mavlink_map | {EkfStatusReport.id: EkfStatusReport}).items()
+}
 KNOWN_IDS = frozenset(_CRC_EXTRA)
 
 
@@ -50,8 +54,11 @@ class Decoder:
         self._vehicle: tuple[int, int] | None = None
         self._boot_us = 0  # newest 64-bit stamp
 
-    def listen_to(self, system_id: int, component_id: int) -> None:
+    def listen_to(self, system_id: int, component_id: int, wire: Wire | None = None) -> None:
+        """`wire` None: as PX4 writes it."""
         self._vehicle = (system_id, component_id)
+        if wire is not None and wire.casts_whole_numbers:
+            self._readers = {**self._readers, **ARDUPILOT_READERS}
 
     def feed(self, received: bytes) -> list[Frame]:
         """All packets complete by now, with their samples; bytes that are no packet come as `Stray`, with None."""

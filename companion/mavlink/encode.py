@@ -10,6 +10,8 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
+from companion.autopilot.interface import Wire
+from companion.autopilot.known import ASSUMED
 from companion.mavlink.packet import MAGIC_V2
 from companion.messages import (
     AttitudeSetpoint,
@@ -29,14 +31,13 @@ IGNORE_VELOCITY = 0x038
 IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
-# ATTITUDE_TARGET_TYPEMASK.
-IGNORE_ROLL_AND_PITCH_RATE = 0x03
 
 NAN = math.nan
 
 # ONBOARD_COMPUTER_STATUS: the largest number of a field says that it is not used.
 _UNUSED_INT8, _UNUSED_UINT8, _UNUSED_INT16, _UNUSED_UINT32 = 0x7F, 0xFF, 0x7FFF, 0xFFFFFFFF
 _CORES = 8
+_REAL = dialect.MAV_PARAM_TYPE_REAL32
 # ARM_DISARM's parameter 2, by MAVLink's definition of the command.
 _FORCE = 21196.0
 
@@ -57,11 +58,12 @@ class Encoder:
 
     def __init__(self) -> None:
         self._mavlink = dialect.MAVLink(None, DEFAULT_SYSTEM_ID, COMPONENT_ID)
-        self._text_number = 0
+        self._text_number, self._wire = 0, ASSUMED.wire
         self._target = (DEFAULT_SYSTEM_ID, dialect.MAV_COMP_ID_AUTOPILOT1)
 
-    def speak_to(self, system_id: int, component_id: int) -> None:
+    def speak_to(self, system_id: int, component_id: int, wire: Wire = ASSUMED.wire) -> None:
         """Address the vehicle, and become a component of its system."""
+        self._wire = wire
         self._mavlink.srcSystem = system_id
         self._target = (system_id, component_id)
 
@@ -150,7 +152,8 @@ class Encoder:
             case messages.ReadParameter(name):
                 return dialect.MAVLink_param_request_read_message(*self._target, name.encode(), -1)
             case messages.SetParameter(name, value):
-                return dialect.MAVLink_param_set_message(*self._target, name.encode(), *_as_float(value))
+                told = (float(value), _REAL) if self._wire.casts_whole_numbers else _as_float(value)
+                return dialect.MAVLink_param_set_message(*self._target, name.encode(), *told)
 
     def _position_fields(self, setpoint: PositionSetpoint) -> tuple[Any, ...]:
         """The fields as pymavlink orders them."""
@@ -169,8 +172,8 @@ class Encoder:
         return (*head, *setpoint.position_ned_m, *velocity, *acceleration, yaw, NAN)
 
     def _attitude_fields(self, setpoint: AttitudeSetpoint) -> tuple[Any, ...]:
-        """The same. PX4's attitude loop makes the rates of roll and pitch."""
-        head = (_time_ms(setpoint.time_us), *self._target, IGNORE_ROLL_AND_PITCH_RATE)
+        """The same."""
+        head = (_time_ms(setpoint.time_us), *self._target, self._wire.attitude_mask)
         rates_rad_s = (0.0, 0.0, setpoint.yaw_rate_rad_s)
         return (*head, list(setpoint.attitude_wxyz), *rates_rad_s, setpoint.thrust_fraction)
 
@@ -225,7 +228,7 @@ def _as_float(value: int | float) -> tuple[float, int]:
     """PARAM_SET's value and type: a whole number's bytes travel in the float's place."""
     if isinstance(value, int):
         return struct.unpack("<f", struct.pack("<i", value))[0], dialect.MAV_PARAM_TYPE_INT32
-    return value, dialect.MAV_PARAM_TYPE_REAL32
+    return value, _REAL
 
 
 def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
@@ -239,6 +242,10 @@ def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
             used = (message_id, interval_us)
         case messages.RequestMessage(message_id):
             used = (message_id,)
+        case messages.TakeOff(height_m):
+            used = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m)
+        case messages.SetAuxFunction(function, level):
+            used = (function, level)
         case messages.RunChecks():
             used = ()
     return used + (0.0,) * (7 - len(used))

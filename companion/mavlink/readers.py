@@ -228,6 +228,43 @@ def _estimator_status(flags: int, vel_ratio: float, pos_horiz_ratio: float, pos_
     )
 
 
+class EkfStatusReport:
+    """ArduPilot's message of that name, which is in none of the dialects that PX4 speaks."""
+
+    id, msgname, crc_extra = 193, "EKF_STATUS_REPORT", 71
+    unpacker = struct.Struct("<fffffHf")
+    ordered_fieldnames = (
+        *("velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance", "terrain_alt_variance"),
+        *("flags", "airspeed_variance"),
+    )
+    lengths = (1,) * len(ordered_fieldnames)
+
+
+# EKF_STATUS_FLAGS.
+EKF_VELOCITY_HORIZ = 1 << 1
+
+
+def _ekf_status(flags: int, velocity_variance: float, pos_horiz_variance: float, pos_vert_variance: float) -> Sample:
+    """Ratios, too, in spite of their names: at 1 the sensor is turned down."""
+    ratios = (velocity_variance, pos_horiz_variance, pos_vert_variance)
+    if not all(map(math.isfinite, ratios)):
+        return Refused(EkfStatusReport.msgname, f"ratios {_text(*ratios)}")
+    return messages.EstimatorStatus(ratios, bool(flags & EKF_VELOCITY_HORIZ), False)
+
+
+def _unbounded_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], thrust: float) -> Sample | None:
+    """What its height control asks for: at a landing less than none."""
+    return _attitude_target(time_boot_ms, type_mask, q, 0.0 if -1.0 <= thrust < 0.0 else thrust)
+
+
+def _cast_parameter(param_id: bytes | str, param_value: float, param_type: int) -> Sample | None:
+    name = param_id if isinstance(param_id, str) else param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
+    if not math.isfinite(param_value):
+        return None
+    is_real = param_type == dialect.MAV_PARAM_TYPE_REAL32
+    return messages.Parameter(name, param_value if is_real else int(param_value))
+
+
 def _autopilot_version(flight_sw_version: int) -> Sample:
     # major, minor, patch, type: one byte each, from the top
     version = flight_sw_version
@@ -276,6 +313,15 @@ GUARD_READERS = READERS | _readers(
     {
         dialect.MAVLink_position_target_local_ned_message: _position_target,
         dialect.MAVLink_manual_control_message: _sticks,
+    }
+)
+
+# Beside them, or in their place: of ArduPilot.
+ARDUPILOT_READERS = _readers(
+    {
+        dialect.MAVLink_attitude_target_message: _unbounded_target,
+        dialect.MAVLink_param_value_message: _cast_parameter,
+        EkfStatusReport: _ekf_status,
     }
 )
 

@@ -42,7 +42,7 @@ def read_telemetry(path: Path) -> Log:
         raise LogError(f"{path}: not a telemetry log: no MAVLink packet with a time stamp in it.")
     vehicle, others = _vehicle(path, packets)
     source, decoder = (vehicle.system_id, vehicle.component_id), Decoder(GUARD_READERS)
-    decoder.listen_to(*source)
+    decoder.listen_to(*source, vehicle.autopilot.wire)
     heard: list[LoggedSample] = []
     kinds: set[int] = set()
     for at_us, packet in packets:
@@ -57,13 +57,13 @@ def read_telemetry(path: Path) -> Log:
         )
     losses = [f"{wanted.name} is not in it" for wanted in WANTED if wanted not in kinds]
     if others:
-        losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
-    name = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}"
+        losses.append(f"more than one vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
+    name = f"{vehicle.autopilot.name} {vehicle.vehicle_type}, system {vehicle.system_id}"
     return Log(path, name, packets[0][0], tuple(heard), tuple(losses))
 
 
 def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
-    """The PX4 multicopter with the most IMU samples, and the other ones by number."""
+    """The multicopter with the most IMU samples, and the other ones by number."""
     decoder = Decoder()
     beats: dict[int, Heartbeat] = {}
     imu: Counter[int] = Counter()

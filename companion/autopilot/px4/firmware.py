@@ -1,7 +1,21 @@
 """PX4 behind the interface of autopilots."""
 
-from companion.autopilot.interface import Autopilot, Defaults, Remedies
+from companion.autopilot.interface import Autopilot, Defaults, Remedies, Wire
 from companion.autopilot.px4 import modes, setup
+from companion.messages import MessageId, RunChecks, VehicleCommand
+
+# ATTITUDE_TARGET_TYPEMASK: PX4's attitude loop makes the rates of roll and pitch.
+_IGNORE_ROLL_AND_PITCH_RATE = 0x03
+
+
+def _changed_law(leans: bool | None) -> tuple[VehicleCommand, ...]:
+    """Have PX4 change between its controllers of position and of attitude.
+
+    Within OFFBOARD it does so with its status, twice a second (Commander.cpp, updateControlMode): until then both
+    fly the vehicle, or neither does.
+    """
+    return () if leans is None else (RunChecks(),)
+
 
 PX4 = Autopilot(
     name="PX4",
@@ -16,9 +30,17 @@ PX4 = Autopilot(
     mode_name=modes.mode_name,
     pilot=modes.pilot,
     set_mode=modes.set_mode,
+    wire=Wire(casts_whole_numbers=False, attitude_mask=_IGNORE_ROLL_AND_PITCH_RATE),
+    least_version=(0, 0, 0),
+    streams=(),
+    estimator_message=MessageId.ESTIMATOR_STATUS,
+    is_told_to_take_off=False,
+    changed_law=_changed_law,
+    attitude_parameters=(setup.LOSS,),
+    attitude_held_s=lambda told: told[setup.LOSS],
     loss_parameter=setup.LOSS,
     rate_parameter="MAV_x_RATE",
-    integration_parameter=setup.INTEGRATION,
+    sight=setup.sight,
     asked=setup.asked,
     judge_vehicle=setup.judge_vehicle,
     judge_parameters=setup.judge_parameters,

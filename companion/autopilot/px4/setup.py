@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, Verdict, judged
+from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, Sight, Verdict, judged
 from companion.motion.config import GRAVITY_M_S2
 
 # For so long PX4 flies the last setpoint on.
@@ -17,6 +17,10 @@ FLIGHTTERM_OFF = 121212
 # COM_OBL_RC_ACT: 0 position, 1 altitude, 2 stabilised, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
 LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
 LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
+# A contact of a stiff frame (the paper's accelerometer shows 0.001 s), for the share of them that samples see.
+STIFF_CONTACT_S = 0.001
+# Eq. 2 of the paper: a foldable arm's push begins with b_s v_c, b_s = 30 /s.
+FOLDING_DAMPING_PER_S = 30.0
 # The least that PX4 documents: a lean of 11 degrees; beyond 10 a hit at 3 m/s tips a vehicle onto what it hits.
 LEAST_ACC_HOR_M_S2 = 2.0
 # Below PX4's default of 200 a sample is a mean over so long that short contacts vanish in it.
@@ -186,6 +190,16 @@ def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
         value = setup.parameters.get(name)
         unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
         yield unread if value is None else judge(name, value, setup)
+
+
+def sight(seen: Sight) -> PreflightItem:
+    """By force alone and in the quiet of standing: a flight's vibration is `rebound tune`'s to judge."""
+    integ_hz = seen.parameters.get(INTEGRATION) or 1.0 / seen.imu_averaging_interval_s
+    share = min(1.0, seen.rate_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
+    folding = f"arms that fold: from {seen.threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
+    stiff = f"stiff frames: {100 * share:.0f} % of 1 ms contacts fall into a sample"
+    remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
+    return judged("smallest hit", f"{folding}; {stiff}; {seen.false_alarms}", (share <= 0.9, DOUBTFUL, remedy))
 
 
 def loss_text(parameters: Mapping[str, int | float]) -> str:

@@ -10,7 +10,7 @@ from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 
 EPOCH_US = 1_600_000_000_000_000
-PX4, ARDUPILOT, GROUND_STATION, NO_AUTOPILOT = 12, 3, 6, 8
+PX4, GENERIC, GROUND_STATION, NO_AUTOPILOT = 12, 0, 6, 8
 
 
 class Writer:
@@ -59,12 +59,12 @@ def test_the_vehicles_samples_come_with_the_time_they_were_heard(path):
     assert "EXTENDED_SYS_STATE is not in it" not in read.losses
 
 
-def test_of_several_systems_the_px4_vehicle_with_imu_samples_is_taken(path):
-    # Given a ground station, a gimbal, an ArduPilot vehicle and two PX4 vehicles on one link
+def test_of_several_systems_the_known_vehicle_with_imu_samples_is_taken(path):
+    # Given a ground station, a gimbal, a vehicle of an unknown autopilot and two PX4 vehicles on one link
     log = Writer()
     log.heartbeat(system=255, component=190, kind=GROUND_STATION, autopilot=NO_AUTOPILOT)
     log.heartbeat(system=1, component=154, kind=26, autopilot=NO_AUTOPILOT)
-    log.heartbeat(system=3, autopilot=ARDUPILOT)
+    log.heartbeat(system=3, autopilot=GENERIC)
     log.heartbeat(system=4)
     log.heartbeat(system=5)
     for _ in range(3):
@@ -80,7 +80,7 @@ def test_of_several_systems_the_px4_vehicle_with_imu_samples_is_taken(path):
 @pytest.mark.parametrize(
     ("fill", "words"),
     [
-        (lambda log: log.heartbeat(autopilot=ARDUPILOT), "autopilot is not PX4 but ArduPilot"),
+        (lambda log: log.heartbeat(autopilot=GENERIC), "autopilot is not PX4 or ArduPilot but generic autopilot"),
         (lambda log: log.imu(), "no autopilot's heartbeat"),
         (lambda log: log.heartbeat(), "no HIGHRES_IMU from system 1"),
     ],

@@ -1,0 +1,68 @@
+"""Copter behind the interface of autopilots."""
+
+import math
+
+from companion.autopilot.ardupilot import modes, setup
+from companion.autopilot.interface import Autopilot, Defaults, Remedies, Wire
+from companion.messages import MessageId, SetAuxFunction, SetMessageInterval, VehicleCommand
+
+# RC_Channel.h: while FORCEFLYING is high, neither the crash check nor the land detector stops the motors. A recovery
+# leans further from its target, and shakes more, than they allow in the air.
+_FORCE_FLYING = 159
+_LOW, _HIGH = 0, 2
+
+
+def _changed_law(leans: bool | None) -> tuple[VehicleCommand, ...]:
+    """High while it is flown by attitude, low before and after."""
+    return (SetAuxFunction(_FORCE_FLYING, _HIGH if leans else _LOW),)
+
+
+ARDUPILOT = Autopilot(
+    name="ArduPilot",
+    mav_autopilot=3,
+    setpoints=modes.GUIDED,
+    # Not LOITER: a throttle stick that lies low, as while AUTO flies, makes it descend.
+    hold=modes.BRAKE,
+    land=modes.LAND,
+    sticks=modes.LOITER,
+    descents=frozenset({modes.LAND}),
+    mode_names=modes.MODE_NAMES,
+    guarded_modes=(),
+    mode_name=modes.mode_name,
+    pilot=modes.pilot,
+    set_mode=modes.set_mode,
+    # All three rates or none: with one that is left out alone Copter stops where it is.
+    wire=Wire(casts_whole_numbers=True, attitude_mask=0),
+    least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
+    # It has no CURRENT_MODE: how soon a pilot's mode is seen depends on this alone.
+    streams=(SetMessageInterval(MessageId.HEARTBEAT, 50_000),),
+    estimator_message=MessageId.EKF_STATUS_REPORT,
+    is_told_to_take_off=True,
+    changed_law=_changed_law,
+    attitude_parameters=(setup.LOSS, setup.OPTIONS),
+    attitude_held_s=setup.attitude_held_s,
+    loss_parameter=setup.LOSS,
+    rate_parameter="SERIALn_BAUD",
+    sight=setup.sight,
+    asked=setup.asked,
+    judge_vehicle=setup.judge_vehicle,
+    judge_parameters=setup.judge_parameters,
+    remedies=Remedies(
+        slow_streams="serial: SERIAL2_PROTOCOL 2, SERIAL2_BAUD 921; a board without HIGHRES_IMU cannot be flown",
+        full_link="the link is full: SERIAL2_BAUD 921",
+        no_time="MAVLink 2 on the link (SERIAL2_PROTOCOL 2)",
+        no_battery="set up the power module (BATT_MONITOR)",
+        no_estimator="look at EKF in Mission Planner",
+    ),
+    loss_text=setup.loss_text,
+    defaults=Defaults(
+        loss_us=3_000_000,  # GUID_TIMEOUT
+        position_gain_per_s=1.0,  # PSC_NE_POS_P
+        max_speed_m_s=10.0,  # WP_SPD
+        max_yaw_rate_deg_s=202.5,  # PILOT_Y_RATE
+        turning_deg_s=60.0,  # ATC_RATE_WPY_MAX
+        landing_m_s=0.5,  # LAND_SPD_MS
+        stick_deadzone=0.2,  # THR_DZ, of 500 from the middle
+        stick_override=math.inf,  # sticks end no mode
+    ),
+)

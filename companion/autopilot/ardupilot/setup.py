@@ -1,0 +1,135 @@
+"""How Copter's parameters have to be for collisions to be survived; each bound with its reason."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, Sight, Verdict, judged
+
+# For so long Copter flies the last attitude or velocity on.
+LOSS = "GUID_TIMEOUT"
+OPTIONS = "GUID_OPTIONS"
+FILTER = "INS_ACCEL_FILTER"
+# GUID_OPTIONS: what SET_ATTITUDE_TARGET has as thrust is thrust, and no climb rate.
+THRUST_IS_THRUST = 8
+# FRAME_CLASS, for the rotors that MAV_TYPE announces (AP_Motors_Class.h).
+CLASSES = {1: "quadrotor", 2: "hexarotor", 3: "octorotor", 4: "octorotor", 5: "hexarotor", 7: "tricopter"}
+# A low-pass of second order makes a pulse of a jump of the velocity. It is so high for each m/s and Hz: 57 m/s^2
+# for each m/s at the default, 20 Hz.
+PULSE_PER_M_S_HZ = 2.86
+DEFAULT_FILTER_HZ = 20.0
+# From this on a hit of 0.1 m/s shows with its 5.7 m/s^2.
+LEAST_FILTER_HZ = 20.0
+SERIALS, COMPANION_BAUD = range(1, 6), 921_600
+# SERIALn_PROTOCOL: MAVLink 1 and 2. SERIALn_BAUD has thousands, by ArduPilot's own rounding.
+MAVLINK_1, MAVLINK_2 = 1, 2
+BAUDS = {57_600: 57, 115_200: 115, 230_400: 230, 460_800: 460, 500_000: 500, COMPANION_BAUD: 921, 1_500_000: 1500}
+OF_A_LINE = tuple(f"SERIAL{number}_{what}" for number in SERIALS for what in ("PROTOCOL", "BAUD"))
+
+
+def _frame(setup: Setup) -> Iterator[PreflightItem]:
+    number = setup.parameters.get("FRAME_CLASS")
+    if number is not None:
+        named, kind = CLASSES.get(int(number), "another frame"), setup.vehicle_type
+        case = (
+            named != kind,
+            DOUBTFUL,
+            "FRAME_CLASS and FRAME_TYPE in Mission Planner: Setup, Frame Type; then reboot",
+        )
+        yield judged("FRAME_CLASS", f"{number:g} ({named}), MAV_TYPE says {kind}", case)
+
+
+def _port(setup: Setup) -> Iterator[PreflightItem]:
+    """The port that this line is plugged into, by its baud rate."""
+    told, line = setup.parameters, setup.line
+    if line is None or line.baud is None:
+        return
+    wanted = BAUDS.get(line.baud, line.baud // 1000)
+    fitting = [number for number in SERIALS if told.get(f"SERIAL{number}_BAUD") == wanted]
+    speaking = [n for n in fitting if told.get(f"SERIAL{n}_PROTOCOL") in (MAVLINK_1, MAVLINK_2)]
+    if not speaking:
+        remedy = f"SERIAL2_PROTOCOL = {MAVLINK_2}, SERIAL2_BAUD as in --connect (921 for {COMPANION_BAUD}); then reboot"
+        yield PreflightItem("port", DOUBTFUL, f"no port has MAVLink at {line.baud} baud", remedy)
+        return
+    name = f"SERIAL{speaking[0]}"
+    remedy = f"{name}_BAUD = 921, reboot, {COMPANION_BAUD} in --connect"
+    yield judged("port", f"{name}, {line.baud} baud", (line.baud < COMPANION_BAUD, DOUBTFUL, remedy))
+    if told[f"{name}_PROTOCOL"] == MAVLINK_1:
+        fix = (f"{name}_PROTOCOL", MAVLINK_2)
+        yield PreflightItem(fix[0], BAD, "MAVLink 1: no stream comes at its rate", f"{fix[0]} = 2, then reboot", fix)
+
+
+def _timeout(name: str, timeout_s: float, setup: Setup) -> PreflightItem:
+    found = f"{timeout_s:g} s until Copter levels out, or stops, when the companion has died"
+    held_s = setup.most_held_s
+    case = (round(timeout_s, 3) > held_s, DOUBTFUL, f"{name} = {held_s:g}, or recoveries are flown by position alone")
+    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {held_s:g} s")
+
+
+def _options(name: str, bits: float, setup: Setup) -> PreflightItem:
+    value = int(bits) | THRUST_IS_THRUST
+    if int(bits) == value:
+        return PreflightItem(name, Verdict.GOOD, f"{int(bits)}: an attitude's thrust is thrust")
+    remedy = f"{name} = {value}, or recoveries are flown by position alone"
+    return PreflightItem(name, DOUBTFUL, f"{int(bits)}: an attitude's thrust is a climb rate", remedy, (name, value))
+
+
+def _filter(name: str, edge_hz: float, setup: Setup) -> PreflightItem:
+    delay_ms = 1e3 / (math.sqrt(2.0) * math.pi * edge_hz) if edge_hz > 0.0 else 0.0
+    found = f"{edge_hz:g} Hz: a hit shows about {delay_ms:.0f} ms late" if edge_hz > 0.0 else "off"
+    remedy = f"{name} = {LEAST_FILTER_HZ:g}"
+    return judged(name, found, (0.0 < edge_hz < LEAST_FILTER_HZ, DOUBTFUL, remedy), mended=LEAST_FILTER_HZ)
+
+
+def _fence(name: str, enabled: float, setup: Setup) -> PreflightItem:
+    found = "its own fence is " + ("on" if enabled else "off")
+    remedy = f"{name} = 0, or a fence that holds all of the mission's and its margin"
+    beyond = ": a setpoint outside of it is dropped without a word"
+    return judged(name, found, (enabled != 0.0, DOUBTFUL, remedy), beyond=beyond)
+
+
+# What decides whether a collision is survived.
+_SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
+    LOSS: _timeout,
+    OPTIONS: _options,
+    FILTER: _filter,
+    "FENCE_ENABLE": _fence,
+}
+PARAMETERS = (*_SETTINGS, "FRAME_CLASS")
+
+
+def asked(line: SerialLine | None) -> tuple[str, ...]:
+    """The parameters to be read."""
+    return PARAMETERS if line is None or line.baud is None else (*PARAMETERS, *OF_A_LINE)
+
+
+def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
+    yield from _frame(setup)
+    yield from _port(setup)
+
+
+def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
+    for name, judge in _SETTINGS.items():
+        value = setup.parameters.get(name)
+        unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
+        yield unread if value is None else judge(name, value, setup)
+
+
+def sight(seen: Sight) -> PreflightItem:
+    """A filtered pulse is 18 ms wide: no hit falls between two samples."""
+    edge_hz = float(seen.parameters.get(FILTER) or DEFAULT_FILTER_HZ)
+    slowest_m_s = seen.threshold_m_s2 / (PULSE_PER_M_S_HZ * edge_hz)
+    remedy = "a faster HIGHRES_IMU (see above): a pulse is 18 ms wide, and shows in two samples from 100 Hz on"
+    found = f"from {slowest_m_s:.2f} m/s on through a filter of {edge_hz:g} Hz; {seen.false_alarms}"
+    return judged("smallest hit", found, (seen.rate_hz < 100.0, DOUBTFUL, remedy))
+
+
+def attitude_held_s(told: Mapping[str, int | float]) -> float:
+    return float(told[LOSS]) if int(told[OPTIONS]) & THRUST_IS_THRUST else math.inf
+
+
+def loss_text(parameters: Mapping[str, int | float]) -> str:
+    """What Copter does when setpoints stop, for people."""
+    loss_s = parameters.get(LOSS)
+    if loss_s is None:
+        return f"Unknown: read {LOSS} before you fly."
+    return f"A place is kept for ever; after {loss_s:g} s ({LOSS}) a velocity ends, and an attitude is levelled out."

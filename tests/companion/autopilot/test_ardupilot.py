@@ -1,0 +1,262 @@
+"""The second autopilot: what a flight says to ArduPilot's Copter, what it understands of it, and whom it refuses."""
+
+import math
+import struct
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega
+from pymavlink.dialects.v20 import development as mav
+
+from bench.fly.virtual_time import EPOCH_US
+from companion.autopilot.ardupilot import modes, setup
+from companion.autopilot.ardupilot.firmware import ARDUPILOT
+from companion.autopilot.interface import Pilot
+from companion.autopilot.known import MODE_NAMES
+from companion.autopilot.setup import SerialLine, Verdict
+from companion.autopilot.setup import Setup as VehicleSetup
+from companion.guard.config import GuardConfig
+from companion.guard.guard import Guard
+from companion.mavlink.decode import Decoder
+from companion.mavlink.encode import Encoder
+from companion.messages import (
+    AttitudeSetpoint,
+    AttitudeTarget,
+    EstimatorStatus,
+    Parameter,
+    Refused,
+    SendCommand,
+    SetAuxFunction,
+    SetParameter,
+    TakeOff,
+)
+from tests.companion.autopilot.fake_copter import (
+    AUX_FUNCTION,
+    COPTER_LAND,
+    GUIDED,
+    SET_MODE,
+    TAKE_OFF,
+    FakeCopter,
+)
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, flight
+
+POSTURES = {modes.GUIDED: Pilot.SETPOINTS, modes.LOITER: Pilot.STICKS, 0: Pilot.HAND, 3: Pilot.AUTOPILOT, 99: None}
+
+
+def commanded(f, number):
+    return [(t, message) for t, message in f.vehicle.commands if message.command == number]
+
+
+# --- a flight
+
+
+def test_a_mission_is_flown_in_guided_and_landed_in_its_land_mode():
+    f = flight(FakeCopter(), items=SQUARE_ITEMS)
+    assert f.run_to_end().outcome == "completed"
+    assert [int(message.param2) for _, message in commanded(f, SET_MODE)] == [6, 4]  # as the fake has translated them
+    modes_seen = [event.data["custom_mode"] for event in f.events if event.kind == "mode"]
+    assert modes_seen[-2:] == [GUIDED, COPTER_LAND]
+
+
+def test_it_is_told_to_take_off_and_hears_no_setpoint_until_it_is_up():
+    f = flight(FakeCopter(), items=[TAKEOFF, LANDING])
+    f.run_until(lambda: commanded(f, TAKE_OFF))
+    ((told_us, message),) = commanded(f, TAKE_OFF)
+    assert message.param7 == 1.5
+    f.run_until(lambda: f.vehicle.position[2] < -1.4)
+    assert [t for t, _ in f.vehicle.setpoints if t > told_us] == []
+    assert f.run_to_end().outcome == "completed"
+    assert f.vehicle.setpoints[-1][0] > told_us
+
+
+def test_a_take_off_that_is_refused_ends_the_flight_in_one_sentence():
+    f = flight(FakeCopter(ack=lambda command, count: [4] if command == TAKE_OFF else [0], does_take_off=False))
+    report = f.run_to_end()
+    assert (
+        report.outcome != "completed" and "no take-off: take-off to 1.5 m: the vehicle answered FAILED" in report.reason
+    )
+
+
+def test_a_hit_is_found_and_flown_away_from_and_the_crash_check_is_in_force_afterwards():
+    f = flight(FakeCopter(wall_north_m=3.0), items=[TAKEOFF, INTO_WALL, LANDING])
+    assert f.run_to_end().outcome == "completed"
+    assert len(f.report.collisions) >= 1
+    assert commanded(f, AUX_FUNCTION)[-1][1].param2 == 0.0
+
+
+# --- by attitude
+
+
+def test_force_flying_is_high_only_while_it_is_flown_by_attitude():
+    assert ARDUPILOT.changed_law(True) == (SetAuxFunction(159, 2),)
+    assert ARDUPILOT.changed_law(False) == ARDUPILOT.changed_law(None) == (SetAuxFunction(159, 0),)
+
+
+@pytest.mark.parametrize(
+    ("timeout_s", "options", "held_s"), [(0.3, 8, 0.3), (3.0, 12, 3.0), (0.3, 0, math.inf), (0.3, 4, math.inf)]
+)
+def test_an_attitude_is_asked_for_only_where_its_thrust_is_thrust(timeout_s, options, held_s):
+    assert ARDUPILOT.attitude_held_s({"GUID_TIMEOUT": timeout_s, "GUID_OPTIONS": options}) == held_s
+
+
+@pytest.mark.parametrize(("options", "loss_s"), [(8.0, 0.3), (0.0, math.inf)])
+def test_a_flight_asks_for_what_that_follows_from(options, loss_s):
+    f = flight(FakeCopter(parameters={"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": options}))
+    f.run_to("mission")
+    assert f.companion.core.flight.reflex.loss_s == loss_s
+
+
+def test_an_attitude_has_all_three_rates():
+    encoder = Encoder()
+    encoder.speak_to(1, 1, ARDUPILOT.wire)
+    (packet,) = encoder.packets(AttitudeSetpoint(0, (1.0, 0.0, 0.0, 0.0), 0.4, 0.1))
+    message = mav.MAVLink(None).decode(bytearray(packet))
+    assert message.type_mask == 0 and message.thrust == pytest.approx(0.4)
+    rates = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
+    assert rates == pytest.approx((0.0, 0.0, 0.1))
+
+
+# --- on the wire
+
+
+def sent(outgoing):
+    encoder = Encoder()
+    encoder.speak_to(1, 1, ARDUPILOT.wire)
+    (packet,) = encoder.packets(outgoing)
+    return mav.MAVLink(None).decode(bytearray(packet))
+
+
+def test_commands_of_its_own_are_made_as_mavlink_defines_them():
+    take_off, switch = sent(SendCommand(TakeOff(2.5), 0)), sent(SendCommand(SetAuxFunction(159, 2), 0))
+    assert (take_off.command, take_off.param7) == (mav.MAV_CMD_NAV_TAKEOFF, 2.5)
+    assert (switch.command, switch.param1, switch.param2) == (ardupilotmega.MAV_CMD_DO_AUX_FUNCTION, 159.0, 2.0)
+
+
+def heard(message):
+    decoder = Decoder()
+    decoder.listen_to(1, 1, ARDUPILOT.wire)
+    ((_, sample),) = decoder.feed(bytes(message.pack(ardupilotmega.MAVLink(None, 1, 1))))
+    return sample
+
+
+@pytest.mark.parametrize("kind", [mav.MAV_PARAM_TYPE_INT8, mav.MAV_PARAM_TYPE_INT16, mav.MAV_PARAM_TYPE_INT32])
+def test_a_whole_number_travels_as_a_float_both_ways(kind):
+    assert heard(mav.MAVLink_param_value_message(b"GUID_OPTIONS", 12.0, kind, 1, 0)) == Parameter("GUID_OPTIONS", 12)
+    message = sent(SetParameter("GUID_OPTIONS", 12))
+    assert (message.param_value, message.param_type) == (12.0, mav.MAV_PARAM_TYPE_REAL32)
+    assert heard(mav.MAVLink_param_value_message(b"GUID_OPTIONS", math.nan, kind, 1, 0)) is None
+
+
+def test_the_estimators_report_is_its_own_message():
+    told = ardupilotmega.MAVLink_ekf_status_report_message
+    assert heard(told(0x33F, 0.1, 0.2, 0.3, 0.4, 0.0)) == EstimatorStatus(
+        tuple(struct.unpack("<3f", struct.pack("<3f", 0.1, 0.2, 0.3))), True, False
+    )
+    assert heard(told(0, 0.1, 0.2, 0.3, 0.4, 0.0)).horizontal_velocity_is_good is False
+    assert isinstance(heard(told(0, math.nan, 0.2, 0.3, 0.4, 0.0)), Refused)
+
+
+@pytest.mark.parametrize(("thrust", "heard_as"), [(-0.05, 0.0), (0.5, 0.5)])
+def test_a_thrust_below_none_is_none(thrust, heard_as):
+    message = mav.MAVLink_attitude_target_message(1, 0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, thrust)
+    assert heard(message) == AttitudeTarget(1000, heard_as, (1.0, 0.0, 0.0, 0.0))
+    message.thrust = math.nan
+    assert isinstance(heard(message), Refused)
+
+
+def test_modes_have_copters_names_and_numbers():
+    for number, name in modes._NAMES.items():
+        assert ardupilotmega.enums["COPTER_MODE"][number].name == f"COPTER_MODE_{name}"
+    assert {number: modes.pilot(number) for number in POSTURES} == POSTURES
+    assert modes.mode_name(99) == "mode 99" and modes.set_mode(modes.GUIDED).parameters == (4, 0)
+
+
+# --- whom it refuses
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [(1, "fixed-wing aircraft"), (10, "ground rover"), (12, "submarine"), (20, "VTOL aircraft")],
+)
+def test_other_vehicles_of_ardupilots_are_refused_in_one_sentence(kind, words):
+    report = flight(FakeCopter(vehicle_type=kind)).run_to_end()
+    assert (
+        report.outcome == "failed"
+        and report.reason == f"the vehicle is not a multicopter but: {words} (MAV_TYPE {kind})"
+    )
+
+
+def test_an_old_copter_is_refused_in_one_sentence():
+    report = flight(FakeCopter(flight_version=4 << 24 | 2 << 16 | 3 << 8)).run_to_end()
+    assert report.outcome == "failed"
+    assert report.reason == "ArduPilot 4.2.3 is too old: ArduPilot 4.3 is the oldest that flies"
+
+
+def test_without_a_position_there_is_no_flight():
+    report = flight(FakeCopter(no_positions=True)).run_to_end()
+    assert report.outcome == "failed" and "LOCAL_POSITION_NED" in report.reason and "SERIALn_BAUD" in report.reason
+
+
+def test_arming_that_is_refused_ends_the_flight_in_one_sentence():
+    report = flight(
+        FakeCopter(
+            ack=lambda command, count: [4] if command == 400 else [0], obey=lambda command, count: command != 400
+        )
+    ).run_to_end()
+    assert report.outcome == "failed" and report.reason.startswith("not armed: arm: the vehicle answered FAILED")
+
+
+def test_a_guard_refuses_what_it_does_not_fly():
+    guard, vehicle, pending = Guard(GuardConfig()), FakeCopter(), b""
+    while not guard.finished:
+        result = guard.step(vehicle.step(pending), EPOCH_US + vehicle.time_us)
+        pending = b"".join(result.sent_frames)
+        assert vehicle.time_us < 30_000_000
+    assert guard.outcome == "the vehicle's autopilot is ArduPilot: a guard flies PX4 alone"
+    assert "GUIDED" not in MODE_NAMES
+
+
+# --- preflight
+
+HEALTHY = {"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": 8, "INS_ACCEL_FILTER": 20, "FENCE_ENABLE": 0, "FRAME_CLASS": 1}
+UART = SerialLine(921_600)
+ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
+
+
+def judged(parameters, line=None):
+    told = VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3)
+    return {item.item: item for item in (*setup.judge_vehicle(told), *setup.judge_parameters(told))}
+
+
+def test_a_healthy_copter_has_nothing_to_mend():
+    found = judged({**HEALTHY, **ON_SERIAL2}, UART)
+    assert {item.verdict for item in found.values()} == {Verdict.GOOD}
+    assert set(found) == {*HEALTHY, "port"}
+
+
+@pytest.mark.parametrize(
+    ("changed", "line", "item", "remedy"),
+    [
+        ({"GUID_TIMEOUT": 3.0}, None, "GUID_TIMEOUT", "GUID_TIMEOUT = 0.3"),
+        ({"GUID_OPTIONS": 4}, None, "GUID_OPTIONS", "GUID_OPTIONS = 12"),
+        ({"INS_ACCEL_FILTER": 10}, None, "INS_ACCEL_FILTER", "INS_ACCEL_FILTER = 20"),
+        ({"FENCE_ENABLE": 1}, None, "FENCE_ENABLE", "FENCE_ENABLE = 0"),
+        ({"FRAME_CLASS": 2}, None, "FRAME_CLASS", "Mission Planner"),
+        ({"SERIAL2_BAUD": 57}, UART, "port", "SERIAL2_PROTOCOL = 2"),
+        ({"SERIAL2_BAUD": 57}, SerialLine(57_600), "port", "SERIAL2_BAUD = 921"),
+        ({"SERIAL2_PROTOCOL": 1}, UART, "SERIAL2_PROTOCOL", "SERIAL2_PROTOCOL = 2, then reboot"),
+    ],
+)
+def test_what_is_not_as_it_should_be_has_its_remedy(changed, line, item, remedy):
+    found = judged({**HEALTHY, **ON_SERIAL2, **changed}, line)
+    assert found[item].verdict is not Verdict.GOOD and remedy in found[item].remedy
+
+
+def test_what_was_not_told_is_doubtful_and_what_is_asked_is_judged():
+    found = judged({})
+    assert {item.verdict for item in found.values()} == {Verdict.DOUBTFUL}
+    assert {*setup.asked(None)} == {*HEALTHY} and {*ON_SERIAL2} <= {*setup.asked(UART)}
+
+
+def test_what_happens_in_a_silence_is_told():
+    assert "after 0.3 s (GUID_TIMEOUT) a velocity ends" in setup.loss_text({"GUID_TIMEOUT": 0.3})
+    assert setup.loss_text({}).startswith("Unknown")
