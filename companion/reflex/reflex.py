@@ -58,7 +58,7 @@ class Reflex:
     monitor: CollisionMonitor
     hits: list[CollisionRecord] = field(default_factory=list)
     recovery: Recovery | None = None  # of the newest
-    loss_s: float | None = None  # for so long the vehicle flies its last setpoint on: PX4's COM_OF_LOSS_T
+    loss_s: float | None = None  # for so long the vehicle flies its last setpoint on; infinite: it takes no thrust
     thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
     thrust_boot_us: int = 0  # its newest sample
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
@@ -220,8 +220,10 @@ class Reflex:
         if not RECOVERY_LAWS[self.law_config.law].leans:
             return None
         if self.loss_s is None or self.loss_s > numbers.MOST_HELD_S:
-            told = "is not known" if self.loss_s is None else f"is {self.loss_s:g} s"
-            return f"COM_OF_LOSS_T {told}; an attitude is safe to hold for {numbers.MOST_HELD_S:g} s"
+            if self.loss_s == math.inf:
+                return "the autopilot takes no thrust with an attitude"
+            held = "for an unknown time" if self.loss_s is None else f"for {self.loss_s:g} s"
+            return f"without a companion an attitude is held {held}; {numbers.MOST_HELD_S:g} s is safe"
         if self.thrust.known_s < numbers.THRUST_LEARNT_S:
             return "the thrust is not known yet"
         return None if self._is_attitude_heard else "no attitude is heard"

@@ -93,7 +93,13 @@ def test_it_is_not_handed_over_on_the_obstacle():
 
 
 @pytest.mark.parametrize(
-    ("loss_s", "learnt_s", "word"), [(1.0, 2.0, "COM_OF_LOSS_T is 1 s"), (None, 2.0, "not known"), (0.3, 0.1, "thrust")]
+    ("loss_s", "learnt_s", "word"),
+    [
+        (1.0, 2.0, "for 1 s"),
+        (None, 2.0, "unknown time"),
+        (math.inf, 2.0, "takes no thrust"),
+        (0.3, 0.1, "not known yet"),
+    ],
 )
 def test_where_an_attitude_is_not_safe_the_plain_place_of_law_paper_is_sent(loss_s, learnt_s, word):
     flight = flight_with(loss_s, learnt_s)
