@@ -1,6 +1,6 @@
 """How an autopilot is set up, and what is said of it: an item, good, doubtful or bad, and its remedy."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -71,3 +71,13 @@ def judged(
         if holds:
             return PreflightItem(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
     return PreflightItem(item, Verdict.GOOD, found)
+
+
+def judged_settings(
+    settings: Mapping[str, Callable[[str, float, Setup], PreflightItem]], setup: Setup
+) -> Iterator[PreflightItem]:
+    """An item for each parameter, by its own judge; one that was not told is doubtful."""
+    for name, judge in settings.items():
+        value = setup.parameters.get(name)
+        unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
+        yield unread if value is None else judge(name, value, setup)

@@ -3,7 +3,17 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, Sight, Verdict, judged
+from companion.autopilot.setup import (
+    BAD,
+    DOUBTFUL,
+    PreflightItem,
+    SerialLine,
+    Setup,
+    Sight,
+    Verdict,
+    judged,
+    judged_settings,
+)
 
 # For so long Copter flies the last attitude or velocity on.
 LOSS = "GUID_TIMEOUT"
@@ -108,10 +118,7 @@ def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
-    for name, judge in _SETTINGS.items():
-        value = setup.parameters.get(name)
-        unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
-        yield unread if value is None else judge(name, value, setup)
+    return judged_settings(_SETTINGS, setup)
 
 
 def sight(seen: Sight) -> PreflightItem:
