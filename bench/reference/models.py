@@ -1,14 +1,12 @@
-"""The pages of what a person writes, from the JSON schemas of the models that read it: a row a key."""
+"""The tables of what a person writes, from the JSON schemas of the models that read it: a row a key."""
 
 import json
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-import yaml
 from pydantic import BaseModel
 
-from bench.reference.markdown import code, first_sentence, once, table
 from companion.guard.config import GuardConfig
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
@@ -16,7 +14,6 @@ from rebound_cli.check.schema import DescribedSchema
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.scene import Scene
 
-MISSIONS = Path(__file__).parents[2] / "missions"
 COMPANION = {"CompanionConfig": "[keys of their own](companion.md)"}
 OF_A_MISSION = dict.fromkeys(("Fence", "SetpointLimits", "RecoveryConfig"), "[as in a mission](mission.md)")
 Schema = Mapping[str, Any]
@@ -24,11 +21,25 @@ HEADS = ("key", "value", "default", "meaning")
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "object": "map"}
 
 
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """In Markdown, as narrow as it can be: a changed cell changes its own line alone."""
+    lines = ["| " + " | ".join(_cell(part) for part in row) + " |" for row in rows]
+    return "\n".join(["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads), *lines]) + "\n"
+
+
+def _cell(text: object) -> str:
+    """One line without a bar; what looks like a tag is none."""
+    parts = re.split(r"(`[^`]*`)", " ".join(str(text).split()))
+    plain = (part if part.startswith("`") else part.replace("<", "&lt;") for part in parts)
+    return re.sub(r"(?<!\\)\|", r"\\|", "".join(plain))
+
+
+def code(text: object) -> str:
+    return f"`{text}`" if str(text) else ""
+
+
 def mission() -> dict[str, str]:
-    """With the missions that ship."""
-    shipped = [(code(path.stem), yaml.safe_load(path.read_text("utf-8"))) for path in sorted(MISSIONS.glob("*.yaml"))]
-    missions = table(("name", "what it flies"), [(name, data["description"]) for name, data in shipped])
-    return {"keys": table(HEADS, Keys(Mission, COMPANION).rows()), "missions": missions}
+    return {"keys": table(HEADS, Keys(Mission, COMPANION).rows())}
 
 
 def companion() -> dict[str, str]:
@@ -40,7 +51,9 @@ def guard() -> dict[str, str]:
 
 
 def _short_table(keys: "Keys") -> str:
-    return table(HEADS, ((*row[:-1], first_sentence(row[-1])) for row in keys.rows()))
+    """What a key is; what follows in its docstring says why."""
+    sentence = re.compile(r"(?<=\.)\s+(?=[A-Z`0-9])")
+    return table(HEADS, ((*row[:-1], sentence.split(row[-1], maxsplit=1)[0]) for row in keys.rows()))
 
 
 def world() -> dict[str, str]:
@@ -52,14 +65,22 @@ def world() -> dict[str, str]:
 
 
 def airframe() -> dict[str, str]:
-    """With both built-in airframes' values instead of bounds."""
+    """With both built-in airframes' values instead of bounds; sensors have some keys in common."""
     first, second = (load_built_in(name).model_dump() for name in ("foldable", "rigid"))
-    rows = []
+    rows, said = [], {""}
     for key, meaning in Keys(Airframe).meanings():
         one, other = (code(json.dumps(_value(data, key))) for data in (first, second))
         if not isinstance(_value(first, key), dict):
-            rows.append((code(key), one if one == other else f"{one}, rigid {other}", meaning))
-    return {"keys": table(("key", "foldable", "meaning"), once(rows))}
+            values = one if one == other else f"{one}, rigid {other}"
+            rows.append((code(key), values, "the same" if meaning in said and meaning else meaning))
+            said.add(meaning)
+    return {"keys": table(("key", "foldable", "meaning"), rows)}
+
+
+def _value(data: Any, path: str) -> Any:
+    for part in path.split("."):
+        data = data[part] if isinstance(data, dict) and part in data else None
+    return data
 
 
 class Keys:
@@ -74,7 +95,7 @@ class Keys:
     def rows(self) -> Iterator[tuple[str, ...]]:
         shown = dict(self._elsewhere)
         for key, prop, required in self._walked(self.schema, "", shown):
-            yield code(key), self._type(prop, shown), "required" if required else _default(prop), self._meaning(prop)
+            yield self._row(key, prop, required, shown)
 
     def meanings(self) -> Iterator[tuple[str, str]]:
         return ((key, self._meaning(prop)) for key, prop, _ in self._walked(self.schema, "", {}))
@@ -86,7 +107,7 @@ class Keys:
         yield code(kind), "", "", part["description"].partition("\n")[0]
         for key, prop, required in self._walked(part, f"{kind}.", {}):
             if key.rpartition(".")[2] not in ("kind", "at_s", "between_s"):
-                yield code(key), self._type(prop, {}), "required" if required else _default(prop), self._meaning(prop)
+                yield self._row(key, prop, required, {})
 
     def choices(self, prop: Schema) -> list[str]:
         """The names of the models that a value may be, of a list its entries."""
@@ -103,6 +124,11 @@ class Keys:
                 if model not in shown:
                     shown[model] = f"as `{at}{name}`"
                     yield from self._walked(self.schema["$defs"][model], f"{at}{name}.", shown)
+
+    def _row(self, key: str, prop: Schema, required: bool, shown: Mapping[str, str]) -> tuple[str, ...]:
+        value = prop.get("default")
+        default = "" if value is None or isinstance(value, dict) or value == [] else code(json.dumps(value))
+        return code(key), self._type(prop, shown), "required" if required else default, self._meaning(prop)
 
     def _type(self, prop: Schema, shown: Mapping[str, str]) -> str:
         """In words."""
@@ -137,14 +163,3 @@ def _bounds(prop: Schema) -> str:
     if most is None:
         return f" {'≥' if 'minimum' in prop else '>'} {least:g}"
     return f" in {'[' if 'minimum' in prop else '('}{least:g}, {most:g}{']' if 'maximum' in prop else ')'}"
-
-
-def _default(prop: Schema) -> str:
-    value = prop.get("default")
-    return "" if value is None or isinstance(value, dict) or value == [] else code(json.dumps(value))
-
-
-def _value(data: Any, path: str) -> Any:
-    for part in path.split("."):
-        data = data[part] if isinstance(data, dict) and part in data else None
-    return data
