@@ -1,24 +1,16 @@
-"""What a study shows of its rows: figures out of many, bars with a verdict, tables, and a page to look at."""
+"""What a study shows of its rows: figures out of many, bars with a verdict, tables."""
 
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 from scipy.stats import beta, chi2
-
-from bench.stamps import FLOWN, stamp_text
-from rebound_cli.results.run_folder import RunFolderError
 
 MET, MISSED, REPORTED = "met", "**missed**", "reported"
 # Of bounds on a share: three hundred hits without a miss show that fewer than one in a hundred is missed.
 CONFIDENCE = 0.95
-# Nothing of a study is committed.
-BUILD = Path("build")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +25,7 @@ class Bar:
 
     @property
     def verdict(self) -> str:
-        if self.is_met is None:
-            return REPORTED
-        return MET if self.is_met else MISSED
+        return REPORTED if self.is_met is None else MET if self.is_met else MISSED
 
 
 def bars_text(bars: Sequence[Bar]) -> str:
@@ -115,39 +105,3 @@ def per_cent(value: float, digits: int = 1) -> str:
 
 def text_of(value: float, digits: int = 1) -> str:
     return "-" if math.isnan(value) else f"{value:.{digits}f}"
-
-
-class Page:
-    """A study's page, its pictures and its rows, in a folder that is made or refused before hours are flown for it."""
-
-    def __init__(self, out: Path | None, name: str) -> None:
-        """`out`: the folder, the page itself or its rows. Raises RunFolderError where it cannot be had."""
-        out = BUILD / name if out is None else out
-        self.path = out.with_suffix(".md") if out.suffix in (".md", ".jsonl") else out / f"{name}.md"
-        self.folder = self.path.parent
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise RunFolderError(f"The folder {self.folder} cannot be made: {error.strerror}.") from error
-        if not os.access(self.folder, os.W_OK) or self.path.is_dir():
-            raise RunFolderError(f"{self.path} cannot be written to.")
-
-    def write(
-        self,
-        title: str,
-        command: str,
-        parts: Mapping[str, str],
-        figures: Mapping[str, Figure] | None = None,
-        rows: pd.DataFrame | None = None,
-        code: Sequence[str] = FLOWN,
-    ) -> None:
-        """Sections by their headings, after what measured them; the rows as JSON, one a line."""
-        sections = [f"## {head}\n\n{text}" if head else text for head, text in parts.items()]
-        for name, figure in (figures or {}).items():
-            figure.savefig(self.folder / name)
-            sections.append(f"![{name.removesuffix('.png')}]({name})\n")
-        if rows is not None:
-            rows.to_json(self.path.with_suffix(".jsonl"), orient="records", lines=True)
-        text = "\n".join([f"# {title}\n", f"{stamp_text(command, code)}.\n", *sections])
-        self.path.write_text(text, encoding="utf-8")
-        print(f"Written to {self.path}.")

@@ -15,14 +15,15 @@ import pandas as pd
 import yaml
 
 from bench.fly.campaign import Json
-from bench.rows.tables import Page, at_most_an_hour, table
+from bench.rows.tables import at_most_an_hour, table
 from bench.studies.landings import CRASH_WITHIN_S
+from bench.studies.study import Shown, page_path, write_page
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import Finding
-from rebound_cli.report.page import write_page
+from rebound_cli.report import page as report_page
 from rebound_cli.report.shown_flight import replayed_flight
 
 SUFFIXES = (".ulg", ".bin", ".log", ".tlog")
@@ -124,7 +125,7 @@ def sums_text(rows: Sequence[Json]) -> str:
 
 def run_flights(options: Namespace) -> int:
     labels = yaml.safe_load((options.labels or LABELS).read_text()) or {}
-    page, rows, refused = Page(options.out, "flights"), [], []
+    page, rows, refused = page_path(options.out, "flights"), [], []
     files = (path for folder in options.folders for path in folder.rglob("*"))
     for path in sorted(path for path in files if path.suffix.lower() in SUFFIXES):
         name = f"{path.parent.name}/{path.name}"
@@ -136,14 +137,14 @@ def run_flights(options: Namespace) -> int:
             continue
         rows.append(row_of(name, replay, labels.get(name, {})))
         if replay.findings.collisions:
-            shown = page.folder / f"{path.parent.name}-{path.stem}.html"
-            write_page(replayed_flight(replay, config), shown)
+            shown = page.parent / f"{path.parent.name}-{path.stem}.html"
+            report_page.write_page(replayed_flight(replay, config), shown)
         print(f"{name}: {rows[-1]['watched_h'] * 60:.1f} min watched, {rows[-1]['collisions']} collisions")
     seen = [row for row in rows if row["watched_h"] > 0.0]
     idle = "\n".join(row["log"] for row in rows if row not in seen) or "None."
     written = [{**row, "promised": f"{row['promised']:.2g}", "wrong": "; ".join(row["wrong"])} for row in seen]
     parts = {"": f"{sums_text(seen)}\n{table(pd.DataFrame(written).round(3))}"}
     parts |= {"No evidence, because nothing of it was watched": f"{idle}\n", "Not replayed": "\n".join(refused) + "\n"}
-    page.write("Recorded flights", options.typed, parts, rows=pd.DataFrame(rows))
+    write_page(page, "Recorded flights", options.typed, Shown(parts, rows=pd.DataFrame(rows)))
     print(sums_text(seen) if rows else "no log found")
     return 0 if rows else 1

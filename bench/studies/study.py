@@ -1,15 +1,19 @@
-"""What every study does: its cases are flown, and what their rows show becomes a page."""
+"""What every study does: its cases are flown, and what their rows show becomes a page in a folder of `build/`."""
 
+import os
+import subprocess
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
 
 from bench.fly.campaign import Json, Results, run_campaign
-from bench.rows.tables import Page
+from rebound_cli import __version__
+from rebound_cli.results.run_folder import RunFolderError
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +37,10 @@ def run_study(
     show: Callable[[Results], Shown],
 ) -> int:
     """Fly the cases and write the page of that name; 1 where a case failed to be flown."""
-    page = Page(options.out, name)
+    page = page_path(options.out, name)
     results = run_campaign(name, cases, work_out, options.jobs)
     shown = show(results)
-    page.write(title, options.typed, shown.parts, shown.figures, shown.rows)
+    write_page(page, title, options.typed, shown)
     print("\n".join(filter(None, (shown.said, *results.failures))))
     return 0 if shown.is_met and not results.failures else 1
 
@@ -44,3 +48,34 @@ def run_study(
 def seeds_of(options: Namespace, count: int) -> range:
     """So many, from the first that was asked for."""
     return range(options.first_seed, options.first_seed + count)
+
+
+def page_path(out: Path | None, name: str) -> Path:
+    """The page, in a folder that is made or refused before hours are flown for it. Raises RunFolderError.
+
+    `out`: the folder, the page itself or its rows.
+    """
+    out = Path("build") / name if out is None else out
+    path = out.with_suffix(".md") if out.suffix in (".md", ".jsonl") else out / f"{name}.md"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunFolderError(f"The folder {path.parent} cannot be made: {error.strerror}.") from error
+    if not os.access(path.parent, os.W_OK) or path.is_dir():
+        raise RunFolderError(f"{path} cannot be written to.")
+    return path
+
+
+def write_page(path: Path, title: str, command: str, shown: Shown) -> None:
+    """Sections after what measured them and at which commit; pictures; the rows as JSON, one a line."""
+    sections = [f"## {head}\n\n{text}" if head else text for head, text in shown.parts.items()]
+    for name, figure in shown.figures.items():
+        figure.savefig(path.parent / name)
+        sections.append(f"![{name.removesuffix('.png')}]({name})\n")
+    if shown.rows is not None:
+        shown.rows.to_json(path.with_suffix(".jsonl"), orient="records", lines=True)
+    git = ("git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty")
+    commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip() or "no commit"
+    head = f"# {title}\n\nMeasured by `{command}` on version {__version__}, {commit}.\n"
+    path.write_text("\n".join([head, *sections]), encoding="utf-8")
+    print(f"Written to {path}.")

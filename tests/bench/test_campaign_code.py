@@ -35,4 +35,4 @@ def test_all_code_that_a_row_follows_from_is_in_its_version(work_out, imports):
     # Then each lies in a package whose code the version is made of, or only shows or names what was found
     packages = [str(importlib.import_module(room).__package__) for room in CODE]
     beside = [name for name in reached if not any(f"{name}.".startswith(f"{package}.") for package in packages)]
-    assert {*beside} <= {work_out.__module__, "bench", "bench.stamps", "bench.studies", "bench.studies.study"}
+    assert {*beside} <= {work_out.__module__, "bench", "bench.studies", "bench.studies.study"}

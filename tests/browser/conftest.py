@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import sync_playwright
 
-from bench.pictures.screens import ARGUMENTS, NoBrowserError, browser_path
+from bench.pictures import ARGUMENTS, NoBrowserError, browser_path
 from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import recorded_flight
 from tests.browser.opened_page import OpenedPage

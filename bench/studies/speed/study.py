@@ -11,14 +11,13 @@ from time import perf_counter_ns, process_time
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.lockstep import flown_in
-from bench.rows.tables import Page, table
-from bench.stamps import FLOWN, ROOT
+from bench.rows.tables import table
 from bench.studies.speed.latency import measured
 from bench.studies.speed.parts import calls_an_interval, mean_us
+from bench.studies.study import Shown, page_path, write_page
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 
-CODE = (*FLOWN, "rebound_cli")
-MISSION = ROOT / "missions" / "wall.yaml"
+MISSION = Path(__file__).parents[3] / "missions" / "wall.yaml"
 REPEATS = 2000
 
 
@@ -53,7 +52,7 @@ def parse_us() -> float:
 
 def run_speed(options: Namespace) -> int:
     """0 when it is measured, whatever it says."""
-    page = Page(options.out, "speed")
+    page = page_path(options.out, "speed")
     if options.latency:
         parts = {"From the hit to the setpoint": latency_table(options.latency)}
     else:
@@ -63,7 +62,7 @@ def run_speed(options: Namespace) -> int:
             "Times real time": flights_table(options.flights),
             "An interval of 4 ms": budget_table(options.flights),
         }
-    page.write("Speed", options.typed, parts, code=CODE)
+    write_page(page, "Speed", options.typed, Shown(parts))
     print("\n".join(parts.values()))
     return 0
 
