@@ -5,10 +5,6 @@
 """
 
 import copy
-import json
-import os
-import traceback
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -70,22 +66,3 @@ class Flight(VirtualTime):
     def setpoints_since(self, time_us: int) -> list[tuple[int, Any]]:
         """Setpoints by place."""
         return self.messages("SET_POSITION_TARGET_LOCAL_NED", time_us)
-
-
-def in_a_child(work: Callable[[], Any]) -> Any:
-    """What becomes of this instant, in a copy of the process: a simulated vehicle cannot be copied alone."""
-    reads, writes = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reads)
-        try:
-            found = work()
-        except BaseException:
-            found = {"error": traceback.format_exc()}
-        os.write(writes, json.dumps(found).encode())
-        os._exit(0)
-    os.close(writes)
-    with os.fdopen(reads) as pipe:
-        text = pipe.read()
-    os.waitpid(child, 0)
-    return json.loads(text)

@@ -2,17 +2,17 @@
 
 import json
 import os
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
-
-from bench.fly.campaign import Json
+from typing import Any
 
 
 @dataclass(slots=True)
 class Copies:
     """Each goes on by itself and ends with what it found."""
 
-    found: dict[str, Json] = field(default_factory=dict)
+    found: dict[str, Any] = field(default_factory=dict)
     """In the first process, by the copy's name."""
     me: str | None = None
     """In a copy its name."""
@@ -30,15 +30,27 @@ class Copies:
         with os.fdopen(reading) as pipe:
             text = pipe.read()
         os.waitpid(child, 0)
-        self.found[name] = json.loads(text or '{"failure": "the copy died"}')
+        self.found[name] = json.loads(text or '{"error": "the copy died"}')
         return False
 
-    def leave(self, find: Callable[[], Json]) -> None:
-        """End a copy with what it found; the first process goes on."""
+    def leave(self, find: Callable[[], Any]) -> None:
+        """End a copy with what it found, or with the error that it met; the first process goes on."""
         if self.me is None:
             return
         try:
+            found = find()
+        except BaseException:
+            found = {"error": traceback.format_exc()}
+        try:
             with os.fdopen(self._pipe, "w") as pipe:
-                pipe.write(json.dumps(find()))
+                pipe.write(json.dumps(found))
         finally:
             os._exit(0)
+
+
+def in_a_copy(work: Callable[[], Any]) -> Any:
+    """What becomes of this instant, in a copy of the process: a simulated vehicle cannot be copied alone."""
+    copies = Copies()
+    if copies.fork("copy"):
+        copies.leave(work)
+    return copies.found["copy"]

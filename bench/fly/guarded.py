@@ -18,7 +18,7 @@ from bench.cases.hits import (
 )
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.cruise import FOLLOWED_S, PATIENCE_S
-from bench.fly.stepped import Stepped
+from bench.fly.virtual_time import Stepped
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.physics.layout import HIT_ACTIVE

@@ -70,7 +70,7 @@ def work_out(case: Case) -> Json:
         try:
             flight = fly(*flyable(case.mission, drawn), Path(folder))
         finally:
-            copies.leave(lambda: {"failure": "the companion failed"} if flight is None else verdict(flight))
+            copies.leave(lambda: {"error": "the companion failed"} if flight is None else verdict(flight))
         return {"with": verdict(flight), "without": copies.found}
 
 

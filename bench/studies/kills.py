@@ -1,9 +1,9 @@
-"""`bench kills`: a companion that is killed at random instants around a hit. By the truth."""
+"""`bench kills`: a companion, or with --guard a guard that is the link, killed at random instants around a hit."""
 
 import math
 import random
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,8 +12,10 @@ import pandas as pd
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import into_a_wall
 from bench.fly.campaign import Json, Results
-from bench.fly.stepped import Stepped
-from bench.rows.killed import became, hardest, is_down, killed_copies
+from bench.fly.commanded import BetweenFlight, by_places, by_sticks, fly_a_mission
+from bench.fly.copies import in_a_copy
+from bench.fly.lockstep import STANDS_M
+from bench.fly.virtual_time import INTERVAL_US, Stepped
 from bench.rows.tables import table
 from bench.studies.study import Shown, run_study
 from companion.companion import Companion
@@ -29,62 +31,78 @@ KILLED_S = (-0.3, 1.5)
 KILLS_A_FLIGHT = 10
 # A softer touch than this is what guards are for: the goal counts harder ones alone.
 SECOND_M_S = 0.3
-
-
-def run_kills(options: Namespace) -> int:
-    """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
-    flights = cases(options.kills, options.first_seed)
-    return run_study(options, "kills", "A companion that is killed around a hit", flights, work_out, shown)
-
-
-def instants(kills: int, first_seed: int) -> Iterator[tuple[int, random.Random, int]]:
-    """Of each flight the number, what draws it from its seed, and how many kills it is for."""
-    for number in range(math.ceil(kills / KILLS_A_FLIGHT)):
-        yield number, random.Random(first_seed + number), min(KILLS_A_FLIGHT, kills - KILLS_A_FLIGHT * number)
-
-
-def drawn_instants(draw: random.Random, count: int) -> tuple[float, ...]:
-    return tuple(sorted(round(draw.uniform(*KILLED_S), 3) for _ in range(count)))
-
-
-SPEEDS_M_S = (0.7, 5.0)
+SPEEDS_M_S, MOST_SLANT_DEG, HEIGHT_M = (0.7, 5.0), 45.0, 1.5
 IMU_HZ = (250, 50)
-MOST_SLANT_DEG = 45.0
-HEIGHT_M = 1.5
 # The slowest flight takes 15 s to its wall.
 REACHED_WITHIN_S = 60.0
 # A landing from this height takes 5 s; what is not down by then has another trouble, which is told.
 LANDS_WITHIN_S = 12.0
 # How long a vehicle that keeps its companion is followed after the last instant: what follows then is the next item's.
 WITH_IT_S = 1.5
-# A tenth of a second.
+# Of the table: a tenth of a second.
 BIN_S = 0.1
+# Both airframes stand as high.
+DOWN_M = -load_built_in(AIRFRAMES[0]).geometry.foot_depth_m - STANDS_M
+# Who flies where the guard is the link; and PX4's default for its patience, and what preflight asks for.
+PROGRAMS: dict[str, Callable[[BetweenFlight], None]] = {
+    "places in OFFBOARD": by_places,
+    "AUTO mission": fly_a_mission,
+    "sticks in POSCTL": by_sticks,
+}
+LOSS_S = (1.0, 0.3)
+# The service begins another guard within this time (companion.service: RestartSec). After the next the new guard has
+# met the vehicle, and PX4's failsafe shows.
+RESTARTED_S, MET_S = 1.0, 1.0
+# PX4's failsafe without sticks comes down from a take-off's height in 4 s; one that holds is watched for twice as long.
+WATCHED_S = 8.0
+Flight = Stepped | BetweenFlight
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A flight, and when after the first touch its companion is killed."""
+    """A flight, and when after the first touch its companion is killed; with a program's name the guard between."""
 
-    airframe: str
-    imu_hz: int
-    speed_m_s: float
-    slant_deg: float
     seed: int
     kills_s: tuple[float, ...]
+    airframe: str = "foldable"
+    imu_hz: int = 250
+    speed_m_s: float = 0.0
+    slant_deg: float = 0.0
+    program: str = ""
+    loss_s: float = 0.0
 
 
-def cases(kills: int, first_seed: int) -> list[Case]:
-    """Airframes and IMU rates in turn; all else as the seed draws it."""
+def run_kills(options: Namespace) -> int:
+    """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
+    name, who = ("kills-guard", "guard in between") if options.guard else ("kills", "companion")
+    flights = cases(options.kills, options.first_seed, options.guard)
+    return run_study(options, name, f"A {who} that is killed around a hit", flights, work_out, shown)
+
+
+def cases(kills: int, first_seed: int, of_guard: bool = False) -> list[Case]:
+    """Airframes and IMU rates, or programs and time-outs, in turn; all else as the seed draws it."""
     found = []
-    for number, draw, count in instants(kills, first_seed):
-        speed_m_s, slant_deg = draw.uniform(*SPEEDS_M_S), draw.uniform(-MOST_SLANT_DEG, MOST_SLANT_DEG)
-        how = AIRFRAMES[number % 2], IMU_HZ[number // 2 % 2], round(speed_m_s, 3), round(slant_deg, 1)
-        found.append(Case(*how, first_seed + number, drawn_instants(draw, count)))
+    for number in range(math.ceil(kills / KILLS_A_FLIGHT)):
+        draw, how = random.Random(first_seed + number), dict[str, Any]()
+        if of_guard:
+            how = {"program": list(PROGRAMS)[number % 3], "loss_s": LOSS_S[number // 3 % 2]}
+        else:
+            speed_m_s, slant_deg = draw.uniform(*SPEEDS_M_S), draw.uniform(-MOST_SLANT_DEG, MOST_SLANT_DEG)
+            how = {"airframe": AIRFRAMES[number % 2], "imu_hz": IMU_HZ[number // 2 % 2]}
+            how |= {"speed_m_s": round(speed_m_s, 3), "slant_deg": round(slant_deg, 1)}
+        count = min(KILLS_A_FLIGHT, kills - KILLS_A_FLIGHT * number)
+        instants_s = sorted(round(draw.uniform(*KILLED_S), 3) for _ in range(count))
+        found.append(Case(first_seed + number, tuple(instants_s), **how))
     return found
 
 
-def begun(case: Case) -> Stepped:
-    """With the case's IMU rate; nobody knows of the wall."""
+def begun(case: Case) -> Flight:
+    """Nobody knows of the wall; where somebody else flies, on the way to it."""
+    if case.program:
+        air = BetweenFlight(None, {"COM_OF_LOSS_T": case.loss_s}, seed=case.seed)
+        air.take_off()
+        PROGRAMS[case.program](air)
+        return air
     data, airframe = into_a_wall("kills", case.speed_m_s, case.slant_deg, HEIGHT_M), load_built_in(case.airframe)
     data["companion"]["streams"] = {"highres_imu_hz": case.imu_hz}
     mission = Mission.model_validate(with_guards(data, airframe))
@@ -97,38 +115,69 @@ def begun(case: Case) -> Stepped:
 def work_out(case: Case) -> Json:
     """Every kill of a flight, and what the same flight does when nobody is killed."""
     first = begun(case)
-    while not first.vehicle.truth.hits and first.time_s < REACHED_WITHIN_S:
-        first.step()
+    first.run_until(lambda: bool(first.vehicle.truth.hits), REACHED_WITHIN_S)
     touch, flight = first.vehicle.truth.hits[0], begun(case)
-
-    def fly_until(since_s: float) -> None:
-        until_us = touch.contact_at_boot_us + 1e6 * since_s
-        while flight.vehicle.time_boot_us < until_us and not flight.programs[0].finished:
-            flight.step()
-
-    kills = killed_copies(case.kills_s, fly_until, lambda: killed(flight, touch))
-    fly_until(KILLED_S[1] + WITH_IT_S)
+    kills = []
+    for kill_s in case.kills_s:
+        fly_on(flight, touch, kill_s)
+        kills.append(in_a_copy(lambda: killed(flight, touch)))
+    fly_on(flight, touch, KILLED_S[1] + WITH_IT_S)
     again_m_s = hardest(flight.vehicle.truth.hits[1:])
     return {"touch_m_s": touch.closing_speed_m_s, "again_m_s": again_m_s, "kills": kills}
 
 
-def killed(flight: Stepped, touch: Hit) -> Json:
-    """The companion dies now, and nobody answers the vehicle any more."""
-    vehicle, killed_us = flight.vehicle, flight.vehicle.time_boot_us
-    while not is_down(vehicle) and vehicle.time_boot_us < killed_us + 1e6 * LANDS_WITHIN_S:
-        flight.step_alone()
-    return became(vehicle, 1e-6 * (killed_us - touch.contact_at_boot_us), killed_us)
+def fly_on(flight: Flight, touch: Hit, since_s: float) -> None:
+    """Until so long after the touch, by whole intervals: the next, of a guard the nearest; or until it is over."""
+    until_us = touch.contact_at_boot_us + 1e6 * since_s
+    if isinstance(flight, BetweenFlight):
+        until_us -= INTERVAL_US / 2
+    while flight.vehicle.time_boot_us < until_us and not (isinstance(flight, Stepped) and flight.programs[0].finished):
+        flight.step()
+
+
+def killed(flight: Flight, touch: Hit) -> Json:
+    """It dies now. Nobody answers the vehicle any more; the guard's link dies with it, and another one begins."""
+    vehicle, killed_us, mode = flight.vehicle, flight.vehicle.time_boot_us, ""
+    step: Callable[[], object] = flight.step
+    until_us = killed_us + 1e6 * LANDS_WITHIN_S
+    if isinstance(flight, BetweenFlight):
+        flight.be_restarted(RESTARTED_S)
+        flight.run_for(MET_S)
+        mode, until_us = flight.mode, vehicle.time_boot_us + 1e6 * WATCHED_S
+    else:
+        step = flight.step_alone
+    while not is_down(vehicle) and vehicle.time_boot_us < until_us:
+        step()
+    since_s = 1e-6 * (killed_us - touch.contact_at_boot_us)
+    later = [hit for hit in vehicle.truth.hits if hit.contact_at_boot_us >= killed_us]
+    # The touch itself is no second one, whenever it came.
+    again_m_s = hardest(later[1:] if since_s < 0.0 else later)
+    ground_m_s = math.hypot(*vehicle.truth.series()["velocity_ned_m_s"][-1]) if is_down(vehicle) else None
+    return {"kill_s": since_s, "again_m_s": again_m_s, "ground_m_s": ground_m_s, "mode": mode}
+
+
+def is_down(vehicle: SimulatedVehicle) -> bool:
+    return float(vehicle.state.body[2]) > DOWN_M
+
+
+def hardest(hits: list[Hit]) -> float:
+    """How fast the wall was met; 0 where there is none."""
+    return max((hit.closing_speed_m_s for hit in hits), default=0.0)
 
 
 def shown(results: Results) -> Shown:
-    flights = [flight for _, flight in results.found]
-    kills = pd.json_normalize(flights, "kills", ["touch_m_s"])
+    flights = results.rows()
+    kills = pd.json_normalize(flights, "kills", ["touch_m_s", "program", "loss_s"])
     again = sum(flight["again_m_s"] > SECOND_M_S for flight in flights)
-    lead = (
-        f"After the kill nothing is sent. Second contact: the centre closes with the wall at over {SECOND_M_S:g} "
-        f"m/s after the kill, the hit itself apart. With nobody killed, {again} of {len(flights)} flights do."
+    lead, shows = "After the kill nothing is sent.", kills_table
+    if flights[0]["program"]:
+        lead = f"The link dies with the guard; another one begins {RESTARTED_S:g} s later; {WATCHED_S:g} s are watched."
+        shows = guards_table
+    lead += (
+        f" Second contact: the centre closes with the wall at over {SECOND_M_S:g} m/s after the kill, the hit apart."
     )
-    return Shown({"": f"{lead}\n\n{kills_table(kills)}"}, rows=kills)
+    lead += f" With nobody killed, {again} of {len(flights)} flights do."
+    return Shown({"": f"{lead}\n\n{shows(kills)}"}, rows=kills)
 
 
 def kills_table(kills: pd.DataFrame) -> str:
@@ -140,7 +189,18 @@ def kills_table(kills: pd.DataFrame) -> str:
     return table([{"killed": name, **cells(of)} for name, of in some.items()])
 
 
-def cells(kills: pd.DataFrame) -> dict[str, Any]:
+def guards_table(kills: pd.DataFrame) -> str:
+    """By who flies, and for how long PX4 waits; before the touch, and after it."""
+    rows: list[dict[str, Any]] = []
+    for (program, loss_s), group in kills.groupby(["program", "loss_s"], sort=False):
+        for when, some in (("before", group[group["kill_s"] < 0.0]), ("after", group[group["kill_s"] >= 0.0])):
+            modes = ", ".join(f"{mode} {count}" for mode, count in some["mode"].value_counts().items()) or "–"
+            who = {"who flies": program, "COM_OF_LOSS_T [s]": f"{loss_s:g}", "killed": f"{when} the touch"}
+            rows.append({**who, **cells(some), "mode then": modes})
+    return table(rows)
+
+
+def cells(kills: pd.DataFrame) -> Mapping[str, Any]:
     again, ground = kills["again_m_s"][kills["again_m_s"] > SECOND_M_S], kills["ground_m_s"].dropna()
     return {
         "kills": len(kills),

@@ -7,8 +7,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bench.studies import kills_between
-from bench.studies.kills import KILLED_S, SPEEDS_M_S, cases, killed, kills_table, work_out
+from bench.studies.kills import KILLED_S, SPEEDS_M_S, cases, guards_table, killed, kills_table, work_out
 from tests.bench.random_missions.made_up import hit
 
 
@@ -52,7 +51,7 @@ def test_a_second_contact_is_the_hardest_after_the_kill_the_touch_itself_apart(k
     )
     on_the_ground = SimpleNamespace(body=[0.0, 0.0, -0.08])
     vehicle = SimpleNamespace(time_boot_us=killed_at_s * 1e6, truth=truth, state=on_the_ground)
-    flight: Any = SimpleNamespace(vehicle=vehicle, step_alone=lambda: b"")
+    flight: Any = SimpleNamespace(vehicle=vehicle, step=list, step_alone=lambda: b"")
     kill = killed(flight, touch)
     assert kill["again_m_s"] == pytest.approx(again_m_s) and kill["ground_m_s"] == pytest.approx(0.5)
 
@@ -67,8 +66,8 @@ def test_the_table_counts_the_hard_contacts_by_the_instant_of_the_kill():
 
 @pytest.mark.slow
 def test_a_guard_in_between_that_dies_in_a_recovery_leaves_the_vehicle_to_px4s_failsafe_which_lands():
-    case = replace(kills_between.cases(10, first_seed=1)[0], kills_s=(0.5,))
-    flight = kills_between.work_out(case)
+    case = replace(cases(10, first_seed=1, of_guard=True)[0], kills_s=(0.5,))
+    flight = work_out(case)
     (kill,) = flight["kills"]
     assert kill["again_m_s"] == 0.0 and kill["mode"] == "POSCTL"
     assert kill["ground_m_s"] == pytest.approx(0.7, abs=0.2), "MPC_LAND_SPEED"
@@ -85,7 +84,7 @@ def test_the_table_of_the_guard_has_a_row_for_each_program_before_and_after_the_
             "loss_s": [0.3] * 3,
         }
     )
-    lines = kills_between.kills_table(kills).splitlines()[2:]
+    lines = guards_table(kills).splitlines()[2:]
     before, after = ([cell.strip() for cell in line.split("|")[1:-1]] for line in lines)
     assert before[3:] == ["1", "1 (100.0 %)", "0.90", "1", "0.70", "0.70", "POSCTL 1"]
     assert after[3:] == ["2", "0 (0.0 %)", "–", "1", "1.10", "1.10", "POSCTL 1, AUTO.LOITER 1"]

@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
+from bench.fly.copies import in_a_copy
 from bench.fly.packets import changed, made, number_of
 from companion.mavlink.packet import message_id_of
-from tests.flying import Flight, in_a_child
+from tests.flying import Flight
 from tests.simulated import simulated, wall
 
 pytestmark = pytest.mark.flight
@@ -77,7 +78,7 @@ def cruising(*sets: str) -> Flight:
 def fly_on(work: Callable[[Flight], None], *sets: str) -> None:
     """What the test does with a vehicle in the middle of its cruise."""
     air = cruising(*sets)
-    found = in_a_child(lambda: work(air))
+    found = in_a_copy(lambda: work(air))
     assert found is None, found["error"]
 
 

@@ -4,9 +4,10 @@ from typing import Any
 
 import pytest
 
+from bench.fly.copies import in_a_copy
 from bench.fly.packets import ARM, GROUND_STATION, SET_MODE, custom_mode, decoded, made
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, POSCTL
-from tests.flying import Flight, in_a_child
+from tests.flying import Flight
 from tests.missions.test_confirming import ITEMS
 from tests.simulated import simulated, wall
 
@@ -71,9 +72,9 @@ def test_a_pilots_mode_at_any_instant_of_a_recovery_is_followed_by_no_setpoint(m
     air = simulated(ITEMS, on_collision={"then": "continue", "max_hits": 2}, sim={"walls": [wall(3.0)]})
     air.run_to("recovering")
     tried = 0
-    while in_a_child(lambda: recovers_on(air)):
+    while in_a_copy(lambda: recovers_on(air)):
         # When the pilot chooses a mode at this instant
-        found = in_a_child(lambda: taken_over(air, mode))
+        found = in_a_copy(lambda: taken_over(air, mode))
         # Then from the step on that hears of it nothing is sent that flies, and the mode is his
         assert found["reported"] is not None and found["reported"] <= REPORTED_WITHIN, (tried, found)
         assert (found["sent"], found["mode"]) == ([], name), (tried, found)

@@ -16,7 +16,7 @@ import numpy as np
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
-from bench.fly.stepped import Stepped
+from bench.fly.virtual_time import Stepped
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
