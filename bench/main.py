@@ -1,6 +1,5 @@
 """The command `python -m bench`: its studies and their options are in `studies.yaml`."""
 
-import math
 import os
 import shlex
 import sys
@@ -12,13 +11,12 @@ from typing import Any
 import yaml
 
 from bench.studies.rules import RULES
-from rebound_cli.arguments import count, number, runs
+from rebound_cli.arguments import count, runs
 from rebound_cli.main import run
 
 # What the file names, and what it cannot know.
 TYPES = {
     "count": count,
-    "hours": number(float, math.ulp(0.0), 10_000, "a time: give hours, such as 0.5"),
     "path": Path,
 }
 KNOWN_HERE = {"cores": os.cpu_count() or 1, "rules": tuple(rule.name for rule in RULES)}

@@ -1,4 +1,4 @@
-"""Flights of the plant alone, each heard by every detector: a hit in cruise, a hand in hover, a healthy flight."""
+"""Flights of the plant alone, each heard by every detector: a hit in cruise, a hand in hover."""
 
 import math
 from contextlib import suppress
@@ -22,8 +22,6 @@ from bench.cases.hits import (
     pushed_by,
     velocity_towards,
 )
-from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
-from bench.cases.pilot import Pilot
 from bench.fly.wire import VehicleRecording
 from companion.messages import LandedState, Vector3
 from companion.reflex.detector import Situation
@@ -43,9 +41,6 @@ SWITCHED_ON_AFTER_S = 0.5
 PATIENCE_S = 3.0
 # From the first touch on: the longest contact is 0.12 s, its aftermath is in the velocity after 0.1 s more.
 FOLLOWED_S = 0.45
-# A vehicle this low that was not asked to be is about to hit the ground, which would be a collision.
-LOST_BELOW_M = 1.0
-NEAR_GROUND = frozenset({"ground", "takeoff", "climb", "descend", "landing", "landed"})
 # The wall is far above the ground and met at once, so that the fall counts for nothing.
 THROWN_M, GAP_M, AFTER_S = 5.0, 0.02, 0.35
 
@@ -124,33 +119,6 @@ def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[VehicleRecording,
         situation = _in_air(output, 1e-6 * output.time_boot_us, None)
         recording.add(cruise.plant, output, situation, airframe.mass_kg)
     return recording, 1e6 * from_s
-
-
-def fly_healthy(case: FlightCase, airframe: Airframe) -> tuple[VehicleRecording, list[str]]:
-    """From the ground to the ground, or up to where its fault ends it; and the phase of each interval."""
-    rng = np.random.default_rng([case.seed, 2])
-    mishaps = FAMILIES[case.family](np.random.default_rng([case.seed, 4]))
-    scene = Scene.model_validate({"faults": mishaps.faults})
-    plant = Plant(airframe, scene, case.seed, keeps_path=False)
-    pilot = Pilot(plant, airframe, rng, AIRBORNE_S)
-    recording, phases = VehicleRecording(), list[str]()
-    ground_m = plant.state.body[2]
-    for asked in pilot.fly():
-        output = plant.step(asked.setpoint, asked.armed)
-        situation = Situation(
-            off_reason=asked.off_reason,
-            armed=asked.armed,
-            landed_state=asked.landed_state,
-            height_m=ground_m - output.position_ned_m[2],
-            descent_commanded=asked.phase in ("landing", "landed"),
-            setpoint_position_ned_m=asked.position_ned_m,
-        )
-        recording.add(plant, output, situation, airframe.mass_kg)
-        phases.append(asked.phase)
-        is_lost = asked.phase not in NEAR_GROUND and ground_m - plant.state.body[2] < LOST_BELOW_M
-        if is_lost or (mishaps.ends_s is not None and output.time_boot_us > 1e6 * mishaps.ends_s):
-            break
-    return recording, phases
 
 
 @dataclass(frozen=True, slots=True)

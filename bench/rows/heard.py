@@ -1,14 +1,13 @@
-"""What each detector reported of a hit, a hand or a healthy flight, beside the truth."""
+"""What each detector reported of a hit or a hand, beside the truth."""
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bench.cases.hits import HandCase, HitCase, vehicle_of_hit
-from bench.cases.mishaps import FlightCase
 from bench.cases.vehicles import BenchVehicle, vehicle_of
 from bench.fly.campaign import Json
-from bench.fly.cruise import fly_healthy, hit_of, hover_in_hand
+from bench.fly.cruise import hit_of, hover_in_hand
 from bench.fly.wire import (
     ASKED_HZ,
     FOUND_WITHIN_US,
@@ -67,11 +66,9 @@ def first_possible(
     return Possible(first, times)
 
 
-def work_out_heard(case: HitCase | HandCase | FlightCase) -> Json:
+def work_out_heard(case: HitCase | HandCase) -> Json:
     """Fly it once, then let every detector hear it at every rate: a row for each."""
-    if isinstance(case, HitCase):
-        return work_out_hit(case)
-    return work_out_hand(case) if isinstance(case, HandCase) else work_out_flight(case)
+    return work_out_hit(case) if isinstance(case, HitCase) else work_out_hand(case)
 
 
 def work_out_hit(case: HitCase) -> Json:
@@ -80,9 +77,7 @@ def work_out_hit(case: HitCase) -> Json:
     recording, hit = hit_of(case, vehicle.airframe)
     touch_us = hit.contact_at_boot_us
     floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
-    truth = {
-        "true_speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
-    }
+    truth = {"true_speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s)}
     rows = []
     for rate, arrived in _heard(recording, case.seed):
         possible = first_possible(recording, arrived, touch_us, floor_m_s2)
@@ -105,23 +100,6 @@ def work_out_hand(case: HandCase) -> Json:
             kinds, late_ms = [f.final.impact.kind.value for f in found], [1e-3 * (t - began_us) for t in told_us]
             entry = {"collisions": kinds, "told_after_ms": late_ms[0] if late_ms else None}
             rows.append({"rate": rate, "detector": name, **entry})
-    return {"rows": rows}
-
-
-def work_out_flight(case: FlightCase) -> Json:
-    """Fly it, let every detector hear it at every rate, list what they report: a row for each."""
-    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
-    recording, phases = fly_healthy(case, vehicle.airframe)
-    samples, rows = recording.samples, []
-    seconds = 1e-6 * (samples[-1].time_boot_us - samples[0].time_boot_us)
-    for rate, arrived in _heard(recording, case.seed):
-        phase_at = {step.time_boot_us: phases[step.index] for step in arrived}
-        for name, (found, touches) in _watched(case.detectors, vehicle, recording, arrived):
-            alarms = [
-                [round(1e-6 * f.time_boot_us, 3), phase_at[f.time_boot_us], f.first.impact.kind.value] for f in found
-            ]
-            entry = {"alarms": alarms, "touches": len(touches)}
-            rows.append({"true_seconds": seconds, "rate": rate, "detector": name, **entry})
     return {"rows": rows}
 
 

@@ -10,7 +10,6 @@ from bench.cases.missions import MissionCase, flyable, random_mission
 from bench.fly.campaign import Json
 from bench.fly.lockstep import NOTICED_M_S, JudgedFlight, fly
 from bench.rows.contacts import JudgedContact, MissionPhase, Role, contacts_of, crashes, same_surface, without_contact
-from bench.rows.obedience import disobediences
 from bench.rows.recovered import recoveries
 from companion.mission.items import GoToItem, PathItem, TakeoffItem, program
 from companion.report import Event
@@ -32,13 +31,23 @@ def failures(flight: JudgedFlight) -> list[tuple[str, str]]:
     """The cause that it is counted by, and details, the gravest first; empty where it ended as the mission says."""
     contacts = contacts_of(flight)
     others = {
-        "not as the mission says": disobediences(flight),
+        "not as the mission says": _ending(flight),
         "not where the mission says": _places(flight, contacts),
         "flew into a known surface": repeated(flight, contacts),
         "gave up a goal in the open": given_up(flight),
     }
     found = [*crashes(flight), *_noticing(flight, contacts)]
     return found + [(cause, text) for cause, texts in others.items() for text in texts]
+
+
+def _ending(flight: JudgedFlight) -> Iterator[str]:
+    """An end that no policy of the mission asks for."""
+    mission, report = flight.mission, flight.report
+    policies = [mission.on_collision, *(step.item.on_collision for step in program(mission.items))]
+    asked: set[str] = {policy.after_max_hits for policy in policies if policy is not None}
+    asked.add(mission.obstacles.on_unreachable)
+    if report.outcome != "completed" and not (report.outcome == "aborted" and "abort" in asked):
+        yield f"{report.outcome}: {report.reason}"
 
 
 def _noticing(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[tuple[str, str]]:

@@ -1,6 +1,5 @@
-"""`bench detectors`: every collision detector on simulated hits and on hard healthy flights."""
+"""`bench detectors`: every collision detector on simulated hits, and in a hand."""
 
-import math
 from argparse import Namespace
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
@@ -9,8 +8,6 @@ from typing import Any
 import pandas as pd
 
 from bench.cases.hits import SPEEDS_M_S, HandCase, HitCase, draw_case, draw_hand
-from bench.cases.mishaps import AIRBORNE_S, FAMILIES, FlightCase
-from bench.cases.vehicles import AIRFRAMES
 from bench.detectors.config import BaselineConfig
 from bench.fly.campaign import Results
 from bench.fly.wire import ASKED_HZ, FLOWN_WITH
@@ -18,10 +15,10 @@ from bench.rows.heard import OF_FOUND, work_out_heard
 from bench.rows.tables import Bar, bars_text, per_cent, rms, share_bar, summary_text, table, text_of
 from bench.studies.study import Shown, run_study
 
-# Tried on everything. The others are compared on at least so many hits and flights, and on one in eight at most sizes:
+# Tried on everything. The others are compared on at least so many hits, and on one in eight at most sizes:
 # all seven take three times as long as these two.
 THOROUGH = ("fused", "threshold")
-COMPARED_HITS, COMPARED_FLIGHTS, COMPARED_EVERY_AT_MOST = 400, 16, 8
+COMPARED_HITS, COMPARED_EVERY_AT_MOST = 400, 8
 # Beside the hits of the airframes as they are, one in so many again with more vibration.
 VARIED_SHARE = 16
 # An IMU sample's spread on each axis; four public PX4 logs of healthy flights lie between 1.2 and 4 m/s^2.
@@ -29,13 +26,11 @@ VIBRATIONS_M_S2 = (0.05, 1.0, 2.0, 4.0)
 # Of a hovering vehicle, by hand: one in so many each, by the default detector and the baseline alone.
 # No more than these, which take two minutes of one core together; a missed one in a hundred shows.
 SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
-# Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
-FLIGHT_S = AIRBORNE_S + 40.0
 # What the drone's own detector must show, by airframe and rate received.
 DEFAULT, SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
 FOUND_BARS = {("foldable", rate): 1.0 for rate in ASKED_HZ}
 FOUND_BARS |= {("rigid", 246): 1.0, ("rigid", 100): 0.995, ("rigid", 50): 0.97}
-LATE_BAR, HOURS_BAR = 0.01, 10.0
+LATE_BAR = 0.01
 # v_c is judged as a share of the speed from here on.
 FAST_M_S, SPEED_ERROR_BAR_M_S, SPEED_ERROR_BAR = 2.0, 0.05, 0.03
 SPEED_BINS_M_S = [0.3, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0]
@@ -46,13 +41,13 @@ Frames = Mapping[type[object], pd.DataFrame]
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
     hits, first = options.hits, options.first_seed
-    cases: list[Any] = [*hit_cases(hits, first), *hand_cases(hits, first), *flight_cases(options.hours, first)]
+    cases: list[Any] = [*hit_cases(hits, first), *hand_cases(hits, first)]
     cases = [replace(case, is_drawn=options.vehicles == "drawn") for case in cases]
     return run_study(options, "detectors", "Detection", cases, work_out_heard, shown)
 
 
 def shown(results: Results) -> Shown:
-    frames: Frames = {kind: rows(results, kind) for kind in (HitCase, HandCase, FlightCase)}
+    frames: Frames = {kind: rows(results, kind) for kind in (HitCase, HandCase)}
     bars = all_bars(frames)
     parts = {"What must be shown": bars_text(bars), **all_tables(frames)}
     return Shown(parts, summary_text(bars), frames[HitCase])
@@ -88,16 +83,6 @@ def hand_cases(hits: int, first: int) -> list[HandCase]:
     return [draw_hand(seed, THOROUGH) for seed in range(first, first + 2 * _side(hits, HANDS_AT_MOST // 2))]
 
 
-def flight_cases(hours: float, first: int) -> list[FlightCase]:
-    """At least so many hours of flight, airframes in turn."""
-    count = max(2, math.ceil(3600.0 * hours / FLIGHT_S))
-    families, every = list(FAMILIES), _every(count, COMPARED_FLIGHTS)
-    return [
-        FlightCase(families[seed // 2 % len(families)], seed, AIRFRAMES[seed % 2], _compared(seed, every))
-        for seed in range(first, first + count)
-    ]
-
-
 def _side(hits: int, at_most: int) -> int:
     """In pairs, one for each airframe, and never none."""
     return 2 * max(1, min(at_most, hits // SIDE_SHARE) // 2)
@@ -119,7 +104,7 @@ def _compared(seed: int, every: int) -> tuple[str, ...]:
 def all_tables(frames: Frames) -> dict[str, str]:
     """By their headings; of every detector, and more of the drone's own."""
     hits = frames[HitCase].assign(band=pd.cut(frames[HitCase]["speed_m_s"], SPEED_BINS_M_S, right=False))
-    ours, flights = hits[hits["detector"] == DEFAULT], frames[FlightCase]
+    ours = hits[hits["detector"] == DEFAULT]
     return {
         "Every detector on simulated hits": by(usual(hits), "detector", *USUAL),
         "By obstacle": by(usual(ours), "approach", *USUAL),
@@ -127,8 +112,6 @@ def all_tables(frames: Frames) -> dict[str, str]:
         "By vibration": by(ours[ours["family"] == "vibration"], "vibration_m_s2", *USUAL),
         "Struck in hover": by(hits[hits["family"] == "struck"], "detector", *USUAL),
         "In a person's hand": hands_table(frames[HandCase]),
-        "Healthy flights, simulated": alarms_table(flights, "detector", "rate"),
-        "By kind of flight": alarms_table(flights[flights["detector"] == DEFAULT], "family", "rate"),
     }
 
 
@@ -164,21 +147,11 @@ def hands_table(hands: pd.DataFrame) -> str:
     return table(figures.assign(after_ms=groups["told_after_ms"].median().round(1)).reset_index())
 
 
-def alarms_table(flights: pd.DataFrame, *keys: str) -> str:
-    """False alarms of healthy flights, in all, in the air, and an hour."""
-    told = flights["alarms"]
-    in_air = told.map(lambda found: sum(phase not in ("landing", "landed") for _, phase, _ in found))
-    counted = flights.assign(hours=flights["true_seconds"] / 3600.0, alarms=told.map(len), in_air=in_air)
-    figures = counted.groupby(list(keys), sort=False)[["hours", "alarms", "in_air", "touches"]].sum()
-    per_hour = figures[["alarms", "in_air"]].div(figures["hours"], axis=0).round(2).add_suffix("_per_hour")
-    return table(figures.round(2).join(per_hour).reset_index())
-
-
 # --- what must be shown of the drone's own detector
 
 
 def all_bars(frames: Frames) -> list[Bar]:
-    ours, hands, flights = (frames[kind].query("detector == @DEFAULT") for kind in (HitCase, HandCase, FlightCase))
+    ours, hands = (frames[kind].query("detector == @DEFAULT") for kind in (HitCase, HandCase))
     bars: list[Bar] = []
     for (airframe, rate), hits in ours.groupby(list(USUAL)):
         where, least = f"{airframe}, {rate} Hz", FOUND_BARS[airframe, rate]
@@ -188,7 +161,7 @@ def all_bars(frames: Frames) -> list[Bar]:
     for (rate, grip), held in hands.groupby(["rate", "grip"]):
         what = f"{rate} Hz, {grip} by a hand in hover: no collision"
         bars.append(share_bar(what, ~held["collisions"].map(bool), 1.0))
-    return bars + [_alarm_bar(rate, flown) for rate, flown in flights.groupby("rate")]
+    return bars
 
 
 def usual(hits: pd.DataFrame) -> pd.DataFrame:
@@ -213,11 +186,3 @@ def _rms_bar(what: str, errors: "pd.Series[float]", most: float) -> Bar:
     error = rms(errors)
     is_met = error <= most if len(errors) else None
     return Bar(what, f"≤ {most:g} RMS", text_of(error, 3), is_met, f"{len(errors)} hits")
-
-
-def _alarm_bar(rate: int, flights: pd.DataFrame) -> Bar:
-    alarms, hours = int(flights["alarms"].map(len).sum()), flights["true_seconds"].sum() / 3600.0
-    what = f"{rate} Hz: false alarms in simulated flights, landings included"
-    # Fewer hours without an alarm prove nothing yet; an alarm does.
-    is_met = False if alarms else True if hours >= HOURS_BAR else None
-    return Bar(what, f"none in {HOURS_BAR:g} h", f"{alarms} in {hours:.1f} h", is_met, f"{len(flights)} flights")

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bench.cases.mishaps import FAMILIES
 from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
+from bench.cases.weather import AIR
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
 from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row
 from bench.fly.campaign import Results
@@ -24,7 +24,6 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 
 HAND_MODES = ("POSCTL", "ALTCTL", "STABILIZED")
-AIR = ("calm", "gusts", "turbulence", "vibration")
 # Limits as a pilot of a racer sets them. PX4's own: 35 deg, 3 m/s^2, 8 m/s^3, 100 deg/s.
 TILT_DEG, JERK_M_S3, ACCELERATION_M_S2 = (30.0, 45.0), (30.0, 200.0), (6.0, 12.0)
 SPEED_M_S, CLIMB_M_S, SINK_M_S, YAW_DEG_S = (5.0, 12.0), (2.0, 5.0), (1.5, 4.0), (90.0, 200.0)
@@ -63,8 +62,8 @@ def fly_by_hand(case: HandCase) -> Row:
     rng = np.random.default_rng([case.seed, 11])
     built = vehicle_of(AIRFRAMES[case.seed // 4 % 2], case.seed)
     airframe, parameters = agile(built.airframe, rng)
-    air = str(rng.choice(AIR))
-    scene = Scene.model_validate({"faults": FAMILIES[air](rng).faults})
+    air = str(rng.choice(list(AIR)))
+    scene = Scene.model_validate({"faults": AIR[air](rng)})
     vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
     guards = [Guard(_config(built, imu_hz)) for imu_hz in IMU_HZ]
     flight = GuardedFlight(vehicle, *guards)

@@ -2,19 +2,15 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from bench.cases.hits import draw_case, draw_hand, vehicle_of_hit
-from bench.cases.mishaps import FlightCase
-from bench.fly import cruise
-from bench.fly.cruise import fly_healthy, fly_hit
+from bench.fly.cruise import fly_hit
 from bench.fly.wire import ASKED_HZ, VehicleRecording, heard, streams_asked_hz
 from bench.rows.heard import first_possible, work_out_hand, work_out_hit
 from companion.mavlink.decode import Decoder
-from companion.messages import ExtendedState, LandedState
+from companion.messages import ExtendedState
 from companion.reflex.detector import Situation
-from sim_vehicle.airframe import load_built_in
 from sim_vehicle.plant.plant import Plant
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 
@@ -128,25 +124,3 @@ def test_the_default_detector_finds_them_and_lets_hands_be():
             assert row["latency_ms"] is not None and row["false"] == 0
     for row in work_out_hand(draw_hand(6, ("fused",)))["rows"]:
         assert row["collisions"] == [] and row["told_after_ms"] is not None
-
-
-# --- healthy flights
-
-
-def test_a_healthy_flight_goes_from_the_ground_to_the_ground_and_is_hard(monkeypatch):
-    # Given a pilot with half a minute in the air
-    monkeypatch.setattr(cruise, "AIRBORNE_S", 30.0)
-    recording, flown_phases = fly_healthy(FlightCase("calm", 0, "foldable", ()), load_built_in("foldable"))
-    samples, situations = recording.samples, recording.situations
-    phases = np.array(flown_phases)
-    # Then it begins and ends on the ground, motors off at the end, after a landing that was felt
-    assert (phases[0], phases[-1]) == ("ground", "landed")
-    assert situations[-1].landed_state is LandedState.ON_GROUND and situations[-1].armed is False
-    assert abs(samples[-1].position_ned_m[2] - samples[0].position_ned_m[2]) < 0.1
-    felt = [math.hypot(*s.specific_force_frd_m_s2) for s, p in zip(samples, phases, strict=True) if p == "landing"]
-    assert max(felt) > 18.0
-    # And only in take-off and on the ground nothing is to be reported
-    off = {phase for phase, now in zip(phases, situations, strict=True) if now.off_reason is not None}
-    assert off == {"ground", "takeoff"}
-    # And no obstacle was ever touched
-    assert not any(recording.contact_m_s2)

@@ -6,8 +6,6 @@ import pandas as pd
 import pytest
 
 from bench.cases.hits import HandCase, HitCase, draw_case, draw_hand
-from bench.cases.mishaps import FlightCase
-from bench.fly import cruise
 from bench.fly.campaign import Results
 from bench.fly.wire import ASKED_HZ
 from bench.main import main
@@ -26,8 +24,8 @@ def frame(cases, results):
     return rows(Results([*zip(cases, results, strict=True)]), type(cases[0]))
 
 
-def bars(count=200, hours=10.0, alarms=0, collisions=(), **changes):
-    """Perfect hits, hands and flights of either airframe; the first two hits of each kind are changed."""
+def bars(count=200, collisions=(), **changes):
+    """Perfect hits and hands of either airframe; the first two hits of each kind are changed."""
     plain = [draw_case("plain", seed, BY) for seed in range(count)]
     struck = [draw_case("struck", seed, BY) for seed in range(4)]
     cases = [dataclasses.replace(case, speed_m_s=2.5) for case in (*plain, *struck)]
@@ -39,18 +37,7 @@ def bars(count=200, hours=10.0, alarms=0, collisions=(), **changes):
         hits.append(at_each_rate({**truth, "detector": "fused", **ours}, {**truth, "detector": "threshold", **theirs}))
     hands = [draw_hand(seed, ("fused",)) for seed in range(4)]
     held = at_each_rate({"detector": "fused", "collisions": list(collisions), "told_after_ms": 40.0})
-    flown = {"true_seconds": 3600.0 * hours, "touches": 0}
-    flight = at_each_rate(
-        {**flown, "detector": "fused", "alarms": [[1.0, "flip", "wall"]] * alarms},
-        {**flown, "detector": "threshold", "alarms": [[1.0, "flip", "wall"]] * 9},
-    )
-    return all_bars(
-        {
-            HitCase: frame(cases, hits),
-            HandCase: frame(hands, [held] * 4),
-            FlightCase: frame([FlightCase("calm", 0, "foldable", BY)], [flight]),
-        }
-    )
+    return all_bars({HitCase: frame(cases, hits), HandCase: frame(hands, [held] * 4)})
 
 
 def at_each_rate(*rows):
@@ -61,7 +48,7 @@ def verdicts(found, word):
     return {bar.verdict for bar in found if word in bar.what} - {REPORTED}
 
 
-def test_perfect_hits_hands_and_flights_meet_every_bar():
+def test_perfect_hits_and_hands_meet_every_bar():
     assert {bar.verdict for bar in bars()} == {MET}
 
 
@@ -73,24 +60,18 @@ def test_perfect_hits_hands_and_flights_meet_every_bar():
         ({"samples_late": 2}, "at the first sample that shows it"),
         ({"speed_error_m_s": 2.0}, ": v_c"),
         ({"collisions": ["wall"]}, "by a hand"),
-        ({"alarms": 1}, "false alarms in simulated flights"),
     ],
 )
 def test_each_figure_has_its_bar(changes, word):
     assert MISSED in verdicts(bars(**changes), word)
 
 
-def test_one_quiet_hour_proves_nothing():
-    assert {bar.verdict for bar in bars(hours=1.0) if "in simulated flights" in bar.what} == {REPORTED}
-
-
 def test_the_command_writes_tables_and_rows(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cruise, "AIRBORNE_S", 2.0)
     monkeypatch.setattr(detectors, "THOROUGH", ("fused", "threshold"))
-    assert main(["detectors", "--hits", "4", "--hours", "0.01", "--jobs", "1", "--out", "page"]) == 0
+    assert main(["detectors", "--hits", "4", "--jobs", "1", "--out", "page"]) == 0
     text = (tmp_path / "page" / "detectors.md").read_text()
-    assert "`python -m bench detectors --hits 4 --hours 0.01 --jobs 1 --out page`" in text
+    assert "`python -m bench detectors --hits 4 --jobs 1 --out page`" in text
     assert "## Every detector on simulated hits" in text and "bars are met" in capsys.readouterr().out
     table = pd.read_json(tmp_path / "page" / "detectors.jsonl", lines=True)
     assert {*table["detector"]} >= {*BY} and {*table["rate"]} == {*ASKED_HZ}

@@ -8,7 +8,6 @@ import pytest
 
 from bench.rows.contacts import Role, contacts_of
 from bench.rows.judge import failures
-from bench.rows.obedience import disobediences
 from bench.rows.recovered import recoveries
 from sim_vehicle.world import plate
 from tests.bench.random_missions.made_up import (
@@ -116,70 +115,9 @@ def test_a_contact_that_fell_between_the_samples_explains_a_detection_shortly_af
     assert causes(bounced(collisions=[collision(at_s=10.3)])) == ["hit not noticed", "answered a hit that was none"]
 
 
-@pytest.mark.parametrize(
-    ("policy", "after"),
-    [
-        ({"then": "land"}, LANDS_THERE),
-        ({"then": "hold", "hold_s": 1}, [event(12, "hold"), event(13, "item", step=2), event(13, "landing")]),
-        ({"then": "continue"}, [event(12, "item", step=2), event(12, "landing")]),
-        ({"then": "land", "max_hits": 1, "after_max_hits": "land"}, LANDS_THERE),
-    ],
-)
-def test_what_the_policy_says_is_no_failure(policy, after):
-    assert causes(bounced(*after, event(DONE_S, "done"), policy=policy)) == []
-
-
-@pytest.mark.parametrize(
-    ("policy", "after"),
-    [
-        ({"then": "land"}, [event(12, "item", step=2), event(12, "landing")]),
-        ({"then": "hold", "hold_s": 1}, [event(12, "item", step=2), event(12, "landing")]),
-        ({"then": "continue"}, LANDS_THERE),
-        ({"then": "retry"}, [event(12, "item", step=2), event(12, "landing")]),
-        ({"then": "return"}, LANDS_THERE),
-        ({"then": "land", "max_hits": 1, "after_max_hits": "return"}, LANDS_THERE),
-    ],
-)
-def test_anything_else_after_the_recovery_is_a_failure(policy, after):
-    assert "not as the mission says" in causes(bounced(*after, event(DONE_S, "done"), policy=policy))
-
-
-@pytest.mark.parametrize("policy", [DETOUR, {"then": "land", "max_hits": 1, "after_max_hits": "return"}])
-def test_after_a_hit_on_the_way_down_there_is_nothing_but_the_landing(policy):
-    begun = [event(5, "armed"), event(8, "item", step=1), event(8.5, "item", step=2), event(9, "landing")]
-    hit_there = [event(10.004, "detection"), event(12, "recovered")]
-    settings = {"on_collision": policy, "hits": [hit()], "collisions": [collision()], "series": BOUNCED}
-    done = event(DONE_S, "done")
-    assert disobediences(flight([*begun, *hit_there, event(12, "landing"), done], **settings)) == []
-    assert disobediences(flight([*begun, *hit_there, event(12, "return"), event(13, "landing"), done], **settings))
-
-
-@pytest.mark.parametrize("policy", [{"then": "land", "max_hits": 1, "after_max_hits": "return"}, DETOUR])
-def test_after_a_detection_that_nothing_confirms_the_flight_goes_on_where_it_was(policy):
-    up, there = [event(5, "armed"), event(8, "item", step=1)], [event(12, "item", step=2), event(12.1, "landing")]
-    taken_back, done = [event(10.004, "detection"), event(10.15, "unconfirmed")], event(DONE_S, "done")
-    on_way_down = [event(12.5, "detection"), event(12.65, "unconfirmed"), event(12.65, "landing")]
-    again = event(10.15, "item", step=1)
-    assert disobediences(flight([*up, *taken_back, again, *there, *on_way_down, done], on_collision=policy)) == []
-    assert disobediences(flight([*up, *taken_back, event(10.15, "item", step=2), *there, done], on_collision=policy))
-    # What was taken back does not count among the hits
-    hit_then = [event(11.0, "detection"), event(11.9, "recovered"), event(11.9, "landing"), done]
-    two = {"on_collision": {"then": "land", "max_hits": 2, "after_max_hits": "return"}}
-    assert disobediences(flight([*up, *taken_back, again, *hit_then], **two)) == []
-    # The take-off is over with it
-    early = [event(5, "armed"), event(6, "detection"), event(6.15, "unconfirmed"), event(6.15, "item", step=1)]
-    assert disobediences(flight([*early, *there, done], on_collision=policy)) == []
-    # A hold goes on, and so does what follows it
-    held = [event(9, "detection"), event(9.5, "recovered"), event(9.5, "hold")]
-    on = [event(10.15, "hold"), *there, done]
-    holds = {"on_collision": {"then": "hold", "hold_s": 3, "max_hits": 2, "after_max_hits": "land"}}
-    assert disobediences(flight([*up, *held, *taken_back, *on], **holds)) == []
-    assert disobediences(flight([*up, *held, *taken_back, *there, done], **holds))
-    # Home goes on home
-    home = [event(9, "detection"), event(9.9, "recovered"), event(9.9, "return")]
-    away = [event(10.15, "return"), event(12.1, "landing"), done]
-    returns = {"on_collision": {"then": "return", "max_hits": 9}}
-    assert disobediences(flight([*up, *home, *taken_back, *away], **returns)) == []
+def test_what_the_policy_says_is_no_failure():
+    held = [event(12, "hold"), event(13, "item", step=2), event(13, "landing"), event(DONE_S, "done")]
+    assert causes(bounced(*held, policy={"then": "hold", "hold_s": 1})) == []
 
 
 def test_an_abort_is_a_failure_unless_the_policy_asked_for_it():
@@ -187,6 +125,7 @@ def test_an_abort_is_a_failure_unless_the_policy_asked_for_it():
     asked = {"then": "hold", "max_hits": 1, "after_max_hits": "abort"}
     assert causes(bounced(*aborts, policy=asked, outcome="aborted")) == []
     assert causes(bounced(*aborts, outcome="aborted", reason="not arrived")) == ["not as the mission says"]
+    assert causes(bounced(*aborts, policy=asked, outcome="failed")) == ["not as the mission says"]
 
 
 def test_a_vehicle_that_drifts_while_it_holds_is_a_failure():
