@@ -9,12 +9,11 @@ from typing import Any
 
 import yaml
 
-from bench.faults import injectors, people
-from bench.faults.injectors import CHANGES, Change, Once, adding, rewritten, setting, simulated
-from bench.faults.people import forged
+from bench.faults import injectors
+from bench.faults.injectors import CHANGES, Change, adding, forged, rewritten, setting, simulated
 from bench.fly.air import Air, Expected, Fault, Injector, When
 from bench.fly.packets import number_of
-from sim_vehicle.bench.faults import FaultRequest, ekf_reset, other
+from sim_vehicle.bench.faults import FaultRequest, clock_jump, ekf_reset, other
 
 Row = Mapping[str, Any]
 _ARMED = 0x80
@@ -28,31 +27,31 @@ def _change(row: Row) -> Change:
     return setting(**row["set"]) if "set" in row else adding(**row["add"])
 
 
-def _moment(chance: random.Random, name: str = "flying") -> When:
-    return When.recovering(chance) if name == "recovering" else When.flying(chance)
-
-
 def _once(do: Callable[[Air], None], chance: random.Random, moment: str = "flying") -> Injector:
-    return Once(_moment(chance, moment), do)
+    return Injector(When.recovering(chance) if moment == "recovering" else When.flying(chance), do)
+
+
+def _from_any_side(chance: random.Random) -> tuple[float, float]:
+    """North and east."""
+    side = chance.uniform(-math.pi, math.pi)
+    return math.cos(side), math.sin(side)
 
 
 def _reset(chance: random.Random, position_m: float, velocity_m_s: float) -> Injector:
-    """Sideways from any side."""
-    north, east = (f(chance.uniform(-math.pi, math.pi)) for f in (math.cos, math.sin))
-    jump, hop = (position_m * north, position_m * east, 0.0), (velocity_m_s * north, velocity_m_s * east, 0.0)
+    north, east = math.cos(chance.uniform(-math.pi, math.pi)), math.sin(chance.uniform(-math.pi, math.pi))
+    jump, hop = ((size * north, size * east, 0.0) for size in (position_m, velocity_m_s))
     return simulated(ekf_reset(jump, hop), When.flying(chance))
 
 
 def _gust(chance: random.Random) -> Injector:
-    side, speed = chance.uniform(-math.pi, math.pi), chance.uniform(4.0, 8.0)
-    wind = (speed * math.cos(side), speed * math.sin(side), 0.0)
+    (north, east), speed = _from_any_side(chance), chance.uniform(4.0, 8.0)
+    wind = (speed * north, speed * east, 0.0)
     return simulated(other("gust", velocity_ned_m_s=wind, rise_s=0.3), When.flying(chance, 2.0))
 
 
 def _push(chance: random.Random) -> Injector:
-    side = chance.uniform(-math.pi, math.pi)
-    force = (2.0 * math.cos(side), 2.0 * math.sin(side), 0.0)
-    return simulated(other("push", force_ned_n=force), When.flying(chance, 0.5))
+    north, east = _from_any_side(chance)
+    return simulated(other("push", force_ned_n=(2.0 * north, 2.0 * east, 0.0)), When.flying(chance, 0.5))
 
 
 def _disarm(message: Any, air: Air) -> None:
@@ -74,8 +73,8 @@ def _forged_imu(names: Sequence[str], chance: random.Random, size: float, times:
 DOES: dict[str, Callable[..., Injector]] = {
     "stuck": lambda c, names, for_s=math.inf: injectors.stuck(When.flying(c, for_s), _numbers(names)),
     "thinned": lambda c, names, every: injectors.thinned(When.flying(c), _numbers(names), every),
-    "jumped": lambda c, jump_s: injectors.Jumped(When.flying(c), jump_s),
-    "anew": lambda c: injectors.anew(When.flying(c)),
+    "jumped": lambda c, jump_s: Injector(When.flying(c), ahead_s=jump_s),
+    "anew": lambda c: _once(lambda air: air.inject(clock_jump(-air.now_s)), c),
     "stalled": lambda c, seconds, moment="flying": _once(injectors.stall(seconds), c, moment),
     "signalled": lambda c, reason, moment="flying": _once(injectors.signal(reason), c, moment),
     "killed": partial(_once, Air.kill),
@@ -90,13 +89,13 @@ DOES: dict[str, Callable[..., Injector]] = {
     "forged_velocity": _forged_velocity,
     "forged_rate": partial(_forged_imu, ("xgyro", "ygyro")),
     "forged_force": partial(_forged_imu, ("xacc", "yacc")),
-    "denied": lambda c: people.denied(When.flying(c)),
-    "strangers": lambda c: people.strangers(When("connect", 2.0)),
-    "flood": lambda c: people.strangers(When.flying(c, 3.0), 10),
-    "foreign_byte": lambda c: people.noise(When("connect", 2.0), 1),
-    "foreign_bytes": lambda c: people.noise(When.flying(c), 300),
-    "hostile": lambda c, spared=(): people.hostile(When.flying(c), _numbers(spared)),
-    "taken": lambda c, state, from_s, within_s, stall_s=0.0, cut_s=0.0: people.Taken(
+    "denied": lambda c: injectors.denied(When.flying(c)),
+    "strangers": lambda c: injectors.strangers(When("connect", 2.0)),
+    "flood": lambda c: injectors.strangers(When.flying(c, 3.0), 10),
+    "foreign_byte": lambda c: injectors.noise(When("connect", 2.0), 1),
+    "foreign_bytes": lambda c: injectors.noise(When.flying(c), 300),
+    "hostile": lambda c, spared=(): injectors.hostile(When.flying(c), _numbers(spared)),
+    "taken": lambda c, state, from_s, within_s, stall_s=0.0, cut_s=0.0: injectors.taken(
         When(state, c.uniform(from_s, from_s + within_s)), stall_s, cut_s
     ),
 }

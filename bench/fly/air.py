@@ -37,26 +37,6 @@ ENDS = {
 }
 
 
-class Injector:
-    """Does nothing; each fault overrides where it acts."""
-
-    def begin(self, air: Air) -> None:
-        """Before the first interval."""
-
-    def each(self, air: Air) -> None:
-        """Before every interval of the vehicle."""
-
-    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        return frames
-
-    def to_vehicle(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        return frames
-
-    def clock_us(self, air: Air, now_us: int) -> int:
-        """What the companion's clock shows."""
-        return now_us
-
-
 @dataclass(frozen=True, slots=True)
 class When:
     """From some time after the companion was first in a state, and for how long."""
@@ -65,13 +45,12 @@ class When:
     after_s: float = 0.0
     for_s: float = math.inf
 
-    def is_on(self, air: Air) -> bool:
-        return self.is_on_at(air, air.now_s)
-
-    def is_on_at(self, air: Air, at_s: float) -> bool:
-        """Whether it was on then, by the vehicle's clock."""
+    def is_on(self, air: Air, at_s: float | None = None) -> bool:
+        """Now, or whether it was on then, by the vehicle's clock."""
         since_s = air.since.get(self.state)
-        return since_s is not None and 0.0 <= at_s - since_s - self.after_s < self.for_s
+        return (
+            since_s is not None and 0.0 <= (air.now_s if at_s is None else at_s) - since_s - self.after_s < self.for_s
+        )
 
     def ended_s(self, air: Air) -> float:
         """When it ends; of what has not begun never."""
@@ -86,6 +65,26 @@ class When:
     def recovering(cls, chance: random.Random) -> When:
         """At a random instant of the first 0.6 s after the hit."""
         return cls("recovering", chance.uniform(0.0, 0.6))
+
+
+Act = Callable[["Air", list[bytes]], Sequence[bytes]]
+"""What somebody makes of the packets on their way."""
+
+
+@dataclass
+class Injector:
+    """What a fault does while it is time; what is not given it leaves alone."""
+
+    when: When = When("never")
+    once: Callable[[Air], None] | None = None
+    """When it begins."""
+    to_companion: Act = lambda air, frames: frames
+    to_vehicle: Act = lambda air, frames: frames
+    note: Callable[[list[bytes]], None] = lambda frames: None
+    """Sees all that the vehicle says from the beginning on."""
+    ahead_s: float = 0.0
+    """Of the clock that the companion reads."""
+    has_pilot: bool = False
 
 
 class Killed(BaseException):
@@ -119,9 +118,8 @@ class Air:
     """How long the process gets no time, from now on."""
     outside: list[str] = field(default_factory=list)
     """Setpoints outside the envelope."""
-    pilot_mode: int | None = None
-    """What a pilot has taken."""
     pilot_at_s: float | None = None
+    """When a pilot has taken position mode."""
     is_told: bool = False
     """Whether the companion has been handed a packet that says so."""
     after_told: int = 0
@@ -152,7 +150,8 @@ class Air:
 
     def now_us(self) -> int:
         self._readings += 1
-        return self.injector.clock_us(self, EPOCH_US + self.vehicle.time_boot_us + _READING_US * self._readings)
+        now_us = EPOCH_US + self.vehicle.time_boot_us + _READING_US * self._readings
+        return now_us + round(self.injector.ahead_s * 1e6) if self.injector.when.is_on(self) else now_us
 
     def sleep(self, duration_s: float) -> None:
         until_s = self.now_s + duration_s
@@ -196,8 +195,8 @@ class Air:
         self._to_vehicle.append(frame)
 
     def _hand_over(self, frames: Sequence[bytes]) -> bytes:
-        if self.pilot_mode is not None and not self.is_told:
-            self.is_told = any(custom_mode(frame) == self.pilot_mode for frame in frames if len(frame) > 12)
+        if self.pilot_at_s is not None and not self.is_told:
+            self.is_told = any(custom_mode(frame) == POSCTL for frame in frames if len(frame) > 12)
         return b"".join(frames)
 
     # --- the vehicle's side
@@ -214,16 +213,20 @@ class Air:
         began_s = self.since.setdefault(state, self.now_s)
         if state == "landing" and not self.to_the_ground and self.now_s - began_s > 1.0 and self.vehicle.mode == "Land":
             raise Landing
-        self.injector.each(self)
+        injector = self.injector
+        if injector.once is not None and injector.when.is_on(self):
+            do, injector.once = injector.once, None
+            do(self)
         self._fly_sticks()
         frames, self._to_vehicle = self._to_vehicle, []
-        said = self.vehicle.step(b"".join(self.injector.to_vehicle(self, frames)))
+        said = self.vehicle.step(b"".join(injector.to_vehicle(self, frames) if injector.when.is_on(self) else frames))
         if self._station is not None:
             self._station.hear()
         if self.pilot_at_s is not None:
             self.is_overruled |= self.has_pilot and self.vehicle.mode != "Position"
             self.has_pilot |= self.vehicle.mode == "Position"
-        return list(self.injector.to_companion(self, list(said)))
+        injector.note(list(said))
+        return list(injector.to_companion(self, list(said)) if injector.when.is_on(self) else said)
 
     def alone(self, seconds: float) -> None:
         """The vehicle goes on until it is disarmed, or for this long; nobody reads what it says."""
@@ -251,7 +254,7 @@ class Air:
         """The pilot takes position mode."""
         assert self._station is not None, "there is a pilot from the beginning"
         self._station.set_mode("POSCTL")
-        self.pilot_mode, self.pilot_at_s = POSCTL, self.now_s
+        self.pilot_at_s = self.now_s
 
     def _fly_sticks(self) -> None:
         self._intervals += 1
@@ -265,10 +268,8 @@ class Air:
 
 def _takes_control(frame: bytes) -> bool:
     number = message_id_of(frame)
-    if number == SETPOINT:
-        return True
     message = decoded(frame) if number == COMMAND else None
-    return message is not None and message.command in (SET_MODE, ARM)
+    return number == SETPOINT or (message is not None and message.command in (SET_MODE, ARM))
 
 
 @dataclass(frozen=True, slots=True)

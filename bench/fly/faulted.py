@@ -94,7 +94,8 @@ class FaultedFlight:
     def fly(self) -> None:
         air, console = self.air, Console(io.StringIO())
         try:
-            loop = Loop(self.companion, air, _clock(air), self.recorder, console, self.interrupts)
+            clock: Any = air
+            loop = Loop(self.companion, air, clock, self.recorder, console, self.interrupts)
             fly_realtime(self.companion, loop, ConfirmAtOnce())
         except FlightFaultError as error:
             self.fault_text = str(error)
@@ -115,9 +116,5 @@ class FaultedFlight:
         if not self.fault.expected.has_wall:
             self.air.vehicle.remove(self.air.vehicle.obstacles)
         self.air.injector = self.injector
-        self.injector.begin(self.air)
-
-
-def _clock(air: Air) -> Any:
-    """The air is the clock, too."""
-    return air
+        if self.injector.has_pilot:
+            self.air.add_pilot()

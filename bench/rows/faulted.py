@@ -1,5 +1,6 @@
 """What became of a flight with a fault, by the simulator's truth."""
 
+import math
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -7,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from bench.faults.catalogue import FLOWN
-from bench.faults.injectors import OnTheWay
 from bench.fly.air import FAILED, HANDED_OVER, KILLED, Fault
 from bench.fly.campaign import Json
 from bench.fly.faulted import FaultedFlight
@@ -58,13 +58,20 @@ def judged(flight: FaultedFlight) -> Json:
     if first is not None and blind_until_us is not None:
         touches.append(replace(first, ended_at_boot_us=max(first.ended_at_boot_us, blind_until_us)))
     is_found = first is not None and any(_is_of(first, at_s) for at_s in told_s)
-    beside = [at_s for at_s in told_s if not any(_is_of(hit, at_s) for hit in touches) and _is_up(flown, at_s)]
+    is_up = heights_m(flown) > STANDS_M
+    beside = [at for at in told_s if not any(_is_of(hit, at) for hit in touches) and is_up[flown.row_at(at * 1e6)]]
     counted_false = max(0, len(beside) - flown.report.unconfirmed)
     outcome = flight.ended or flown.report.outcome
-    again = [hit.closing_speed_m_s for hit in touches if first is not None and _is_later(hit, first)]
-    complaints = [f"{cause}: {details}" for cause, details in crashes(flown) if _counts(flight, cause) and not unseen]
-    complaints += [f"setpoint outside: {flight.air.outside[0]}"] if flight.air.outside else []
-    complaints += _authority(flight) + _log(flight)
+    after_us = math.inf if first is None else first.ended_at_boot_us + SAME_TOUCH_S * 1e6
+    again = [hit.closing_speed_m_s for hit in touches if hit.contact_at_boot_us > after_us]
+    air = flight.air
+    # A landing that PX4 or a pilot flies may come at any time.
+    excused = ("touched the ground",) if air.has_left_offboard else ()
+    complaints = [f"{cause}: {details}" for cause, details in crashes(flown) if cause not in excused and not unseen]
+    complaints += [f"setpoint outside: {air.outside[0]}"] if air.outside else []
+    complaints += [f"{air.after_told} setpoints or commands after the pilot was heard"] if air.after_told else []
+    complaints += ["the pilot was overruled"] if air.is_overruled else []
+    complaints += _log(flight)
     outcomes = (*expected.outcomes, HANDED_OVER) if unseen else expected.outcomes
     complaints += [f"{outcome}: {flown.report.reason}"] if outcome not in outcomes else []
     complaints += ["hit not found"] if expected.finds and first is not None and not is_found else []
@@ -90,14 +97,8 @@ def _blind_until_us(flight: FaultedFlight, hit: Hit | None) -> float | None:
     """When the fault's end lets a hit be seen that it hid; None for one that it did not hide."""
     if hit is None or not flight.fault.expected.blinds:
         return None
-    assert isinstance(flight.injector, OnTheWay), "what hides a hit rewrites the sensor's messages"
     when = flight.injector.when
-    return 1e6 * when.ended_s(flight.air) if when.is_on_at(flight.air, 1e-6 * hit.contact_at_boot_us) else None
-
-
-def _counts(flight: FaultedFlight, cause: str) -> bool:
-    """A landing that PX4 or a pilot flies may come at any time."""
-    return cause != "touched the ground" or not flight.air.has_left_offboard
+    return 1e6 * when.ended_s(flight.air) if when.is_on(flight.air, 1e-6 * hit.contact_at_boot_us) else None
 
 
 def _flown(flight: FaultedFlight) -> JudgedFlight:
@@ -109,12 +110,6 @@ def _flown(flight: FaultedFlight) -> JudgedFlight:
     ]
     known = FlightTruth(truth.hits, truth.series(), EPOCH_US, truth.faults)
     return judged_flight(flight.mission, flight.companion.report(), events, known, flight.scene, flight.airframe)
-
-
-def _authority(flight: FaultedFlight) -> list[str]:
-    air = flight.air
-    found = [f"{air.after_told} setpoints or commands after the pilot was heard"] if air.after_told else []
-    return found + (["the pilot was overruled"] if air.is_overruled else [])
 
 
 def _log(flight: FaultedFlight) -> list[str]:
@@ -130,20 +125,12 @@ def _log(flight: FaultedFlight) -> list[str]:
     # Noise that looks like a header may hide the packet after it from who reads the file.
     if abs(len(stamps) - flight.recorder.counted) > flight.recorder.counted * CLIPPED_PART:
         return [f"log lost: {flight.recorder.counted - len(stamps)} of {flight.recorder.counted} packets"]
-    if flight.number < DECIDED_AGAIN and not flight.fault_text and _is_reproducible(flight):
+    # A fault inside the program is in no log.
+    is_reproducible = not flight.fault_text and not any(event.kind == "fault" for event in flight.recorder.events)
+    if flight.number < DECIDED_AGAIN and is_reproducible:
         difference = reproduce(read_recording(flight.recorder.folder)).first_difference
         return [] if difference is None else [f"decided otherwise from the log: {difference}"]
     return []
-
-
-def _is_reproducible(flight: FaultedFlight) -> bool:
-    """A fault inside the program is in no log."""
-    return not any(event.kind == "fault" for event in flight.recorder.events)
-
-
-def _is_up(flown: JudgedFlight, at_s: float) -> bool:
-    """Whether the vehicle is off the ground then."""
-    return bool(heights_m(flown)[flown.row_at(at_s * 1e6)] > STANDS_M)
 
 
 def _ground_m_s(flown: JudgedFlight) -> float | None:
@@ -160,7 +147,3 @@ def _ground_m_s(flown: JudgedFlight) -> float | None:
 
 def _is_of(hit: Hit, at_s: float) -> bool:
     return at_s - 1e-6 * hit.contact_at_boot_us >= 0.0 and at_s - 1e-6 * hit.ended_at_boot_us <= FOUND_WITHIN_S
-
-
-def _is_later(hit: Hit, first: Hit) -> bool:
-    return hit.contact_at_boot_us - first.ended_at_boot_us > SAME_TOUCH_S * 1e6

@@ -8,8 +8,7 @@ from dataclasses import replace
 import pytest
 
 from bench.faults.catalogue import FLOWN, GROUPS
-from bench.faults.injectors import rewritten, setting, simulated
-from bench.faults.people import Taken
+from bench.faults.injectors import rewritten, setting, simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.packets import ARM, SET_MODE, made, number_of, outside
 from bench.rows.faulted import FaultCase, flown_with, work_out_fault
@@ -90,21 +89,16 @@ def test_what_the_companion_sends_once_it_has_heard_of_the_pilot_counts(air: Air
     assert air.after_told == 3
 
 
-class Sending(Injector):
+def sending() -> Injector:
     """One setpoint far outside, as if the companion had sent it."""
-
-    is_sent = False
-
-    def each(self, air: Air) -> None:
-        if not self.is_sent:
-            self.is_sent = True
-            air.send(made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0}))
+    frame = made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0})
+    return Injector(When("mission"), lambda air: air.send(frame))
 
 
-class Overruling(Taken):
+def overruling() -> Injector:
     """Soon after the pilot has taken over, somebody asks for OFFBOARD in the companion's name."""
 
-    def to_vehicle(self, air: Air, frames: list[bytes]) -> list[bytes]:
+    def to_vehicle(air: Air, frames: list[bytes]) -> list[bytes]:
         if not air.has_pilot:
             return frames
         fields = {"command": SET_MODE, "param1": 1.0, "param2": 6.0, "target_system": 1, "target_component": 1}
@@ -112,13 +106,15 @@ class Overruling(Taken):
         ours = (1, COMPONENT_ID)
         return [made("SET_POSITION_TARGET_LOCAL_NED", setpoint, ours), made("COMMAND_LONG", fields, ours)]
 
+    return replace(taken(When("mission", 0.3)), to_vehicle=to_vehicle)
+
 
 @pytest.mark.slow
 def test_a_judge_names_each_kind_of_loss() -> None:
     no_wall = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
     bad = {
-        "setpoint outside: outside the fence": lambda _: Sending(),
-        "the pilot was overruled": lambda _: Overruling(When("mission", 0.3)),
+        "setpoint outside: outside the fence": lambda _: sending(),
+        "the pilot was overruled": lambda _: overruling(),
         "tumbled: ": lambda _: simulated(motor_failure(0), When("mission", 0.3)),
         "1 false hits counted": lambda _: simulated(
             other("push", force_ned_n=(0.0, 12.0, 0.0), rise_s=0.01), When("mission", 0.3, 0.1)

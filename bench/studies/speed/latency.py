@@ -39,7 +39,6 @@ LEAD = 30
 # Intervals after the hit in which a setpoint is waited for: half a second.
 AFTER = 125
 _FLIGHTS = 5
-SHARES = (0.5, 0.99, 0.999)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,20 +158,21 @@ def reckon() -> None:
 def spread(taken: Sequence[float | None]) -> Json:
     """Milliseconds; one that did not come in time is without bound, and counts. One before the hit is below none."""
     sizes = [math.inf if seconds is None else 1e3 * seconds for seconds in taken]
-    early, (p50, p99, p999) = sum(size < 0.0 for size in sizes), np.quantile(sizes, SHARES, method="inverted_cdf")
-    found = sum(map(math.isfinite, sizes)) - early
-    return {"found": found, "early": early, "p50": p50, "p99": p99, "p999": p999, "most": max(sizes)}
+    found = sum(0.0 <= size < math.inf for size in sizes)
+    p50, p99, p999 = np.quantile(sizes, (0.5, 0.99, 0.999), method="inverted_cdf")
+    shares = {"p50": p50, "p99": p99, "p99.9": p999, "most": max(sizes)}
+    return {"setpoints": found, **{name: f"{size:.2f}" for name, size in shares.items()}}
 
 
-def measured(hits: int) -> dict[str, Json]:
+def measured(hits: int) -> list[Json]:
     """Quiet and busy: how the milliseconds of so many hits are spread."""
     flights, times = [recorded(number) for number in range(_FLIGHTS)], -(-hits // _FLIGHTS)
 
-    def spread_of_all() -> Json:
-        return spread([taken for flight in flights for taken in timed(flight, times)])
+    def spread_of_all(state: str) -> Json:
+        return {"beside it": state, **spread([taken for flight in flights for taken in timed(flight, times)])}
 
-    quiet = spread_of_all()
+    quiet = spread_of_all("quiet")
     with contextlib.ExitStack() as loops:
         for _ in range(BUSY_LOOPS):
             loops.enter_context(beside(reckon))
-        return {"quiet": quiet, "busy": spread_of_all()}
+        return [quiet, spread_of_all("busy")]

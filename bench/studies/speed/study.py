@@ -1,24 +1,50 @@
 """`bench speed`: how many times real time, and the budget of an interval; or the latency alone."""
 
 import gc
+import importlib
 import os
 import statistics
 import tempfile
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter_ns, process_time
+from typing import Any, NamedTuple
+from unittest.mock import patch
 
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.lockstep import flown_in
 from bench.rows.tables import table
 from bench.studies.speed.latency import measured
-from bench.studies.speed.parts import calls_an_interval, mean_us
 from bench.studies.study import Shown, page_path, write_page
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 
 MISSION = Path(__file__).parents[3] / "missions" / "wall.yaml"
 REPEATS = 2000
+
+
+class Part(NamedTuple):
+    """A function ("module:name" or "module:Class.name"), and the part that calls it, whose time is without it."""
+
+    name: str
+    place: str
+    caller: str = ""
+
+
+KERNEL, PLANT, VEHICLE, COMPANION, LOG = "plant: kernel", "plant: the rest", "vehicle: autopilot", "companion", "log"
+PARTS = (
+    Part(KERNEL, "sim_vehicle.plant.plant:advance_interval", PLANT),
+    Part(PLANT, "sim_vehicle.plant.plant:Plant._advance", VEHICLE),
+    Part(VEHICLE, "sim_vehicle.vehicle:SimulatedVehicle.advance"),
+    Part("vehicle: MAVLink in", "sim_vehicle.mavlink.link:Link.receive", VEHICLE),
+    Part("vehicle: MAVLink out", "sim_vehicle.mavlink.link:Link.update", VEHICLE),
+    Part("companion: MAVLink in", "companion.mavlink.decode:Decoder.feed", COMPANION),
+    Part(COMPANION, "companion.companion:Stepped.step"),
+    Part("companion: MAVLink out", "companion.mavlink.encode:Encoder.all_packets", COMPANION),
+    # The last of an interval of a flight that is logged.
+    Part(LOG, "rebound_cli.results.run_folder:FlightRecorder.record"),
+)
 
 
 def fly() -> tuple[float, float]:
@@ -54,7 +80,8 @@ def run_speed(options: Namespace) -> int:
     """0 when it is measured, whatever it says."""
     page = page_path(options.out, "speed")
     if options.latency:
-        parts = {"From the hit to the setpoint": latency_table(options.latency)}
+        # Milliseconds.
+        parts = {"From the hit to the setpoint": table(measured(options.latency))}
     else:
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
         fly()
@@ -86,21 +113,42 @@ def flights_table(flights: int) -> str:
 
 
 def budget_table(flights: int) -> str:
-    spent_us, calls = mean_us(fly, flights), calls_an_interval(fly)
-    spent_us["together"], calls["together"] = total_us, _ = sum(spent_us.values()), sum(calls.values())
-    return table(
-        [
-            {"part": name, "µs": f"{us:.1f}", "share": f"{us / total_us:.0%}", "calls": f"{calls[name]:.0f}"}
-            for name, us in spent_us.items()
-        ]
-    )
+    """Each part's time without the parts that it calls: the least of so many flights, which are the same to the bit."""
+    flown = [spent_us() for _ in range(flights)]
+    least = {part.name: min(spent[part.name] for spent in flown) for part in PARTS}
+    own = {name: us - sum(least[part.name] for part in PARTS if part.caller == name) for name, us in least.items()}
+    own["together"] = total_us = sum(own.values())
+    return table([{"part": name, "µs": f"{us:.1f}", "share": f"{us / total_us:.0%}"} for name, us in own.items()])
 
 
-def latency_table(hits: int) -> str:
-    """Milliseconds."""
-    columns = {"p50": "p50", "p99": "p99", "p999": "p99.9", "most": "most"}
-    rows = [
-        {"beside it": state, "setpoints": row["found"]} | {label: f"{row[key]:.2f}" for key, label in columns.items()}
-        for state, row in measured(hits).items()
-    ]
-    return table(rows)
+def spent_us() -> dict[str, float]:
+    """Of an interval, by part, with the parts that it calls; a timer costs 0.1 us, which its caller has."""
+    spent_ns, intervals = dict.fromkeys((part.name for part in PARTS), 0), 0
+
+    def timed(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        def run(*arguments: Any, **named: Any) -> Any:
+            nonlocal intervals
+            begun = perf_counter_ns()
+            try:
+                return function(*arguments, **named)
+            finally:
+                spent_ns[name] += perf_counter_ns() - begun
+                intervals += name == LOG
+
+        return run
+
+    timers = []
+    for part in PARTS:
+        module, _, names = part.place.partition(":")
+        owner: Any = importlib.import_module(module)
+        *classes, name = names.split(".")
+        for class_name in classes:
+            owner = getattr(owner, class_name)
+        timers.append(patch.object(owner, name, timed(part.name, getattr(owner, name))))
+        timers[-1].start()
+    try:
+        fly()
+    finally:
+        for timer in timers:
+            timer.stop()
+    return {name: 1e-3 * ns / intervals for name, ns in spent_ns.items()}
