@@ -7,108 +7,46 @@ flight alone, and up to that moment both flights are the same to the bit.
 import functools
 import importlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from bench.fly.copies import Copies
-from companion.motion.vector import ZERO
+import yaml
 
-Arguments = tuple[Any, ...]
+from bench.fly.copies import Copies
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A function of the companion, and what it would answer if the rule did not exist.
-
-    `place` is "module:function" or "module:Class.method"; a property is a method, too. `without` gets the arguments and
-    the true answer. `forget` takes back what the true call has remembered.
-    """
+    """A function of the companion, and what it would answer if the rule did not exist (see `rules.yaml`)."""
 
     name: str
     does: str
     place: str
-    without: Callable[[Arguments, Any], Any]
-    forget: Callable[[Arguments], None] = lambda arguments: None
+    says: Any = None
+    argument: int | None = None
+    attribute: str = ""
+    forget: Mapping[str, float] = field(default_factory=dict)
+
+    def without(self, arguments: tuple[Any, ...]) -> Any:
+        """What is answered without it."""
+        if self.argument is not None:
+            return arguments[self.argument]
+        if self.attribute:
+            return getattr(arguments[0], self.attribute)
+        # A vector is a tuple.
+        return tuple(self.says) or [] if isinstance(self.says, list) else self.says
+
+    def take_back(self, arguments: tuple[Any, ...]) -> None:
+        """What the true call has remembered."""
+        for name, value in self.forget.items():
+            getattr(arguments[0], name).fill(value)
 
 
-def _says(answer: Any) -> Callable[[Arguments, Any], Any]:
-    return lambda arguments, found: answer
-
-
-def _argument(number: int) -> Callable[[Arguments, Any], Any]:
-    return lambda arguments, found: arguments[number]
-
-
-_REFLEX, _FLIGHT = "companion.reflex.", "companion.flight."
-
-RULES = (
-    Rule(
-        "velocity jump",
-        "a velocity that the accelerometer does not explain is a hit",
-        _REFLEX + "velocity_jump:VelocityJump.step_m_s",
-        _says(None),
-    ),
-    Rule(
-        "hand",
-        "a soft force on a hovering vehicle waits",
-        _REFLEX + "fused:FusedState.may_be_hand",
-        _says(False),
-    ),
-    Rule(
-        "turning drag",
-        "a turning vehicle needs more force for a hit",
-        _REFLEX + "fused:FusedState.side_threshold_m_s2",
-        lambda arguments, found: arguments[0].threshold_m_s2,
-    ),
-    Rule(
-        "second sample",
-        "a weak force shows in two samples together",
-        _REFLEX + "fused:FusedState._together_m_s2",
-        _says(0.0),
-    ),
-    Rule(
-        "leaning",
-        "thrust that moves nothing is a hit",
-        _REFLEX + "sustained_force:SustainedForceMonitor.step",
-        _says(None),
-    ),
-    Rule(
-        "attitude by rates",
-        "no clipped attitude",
-        _REFLEX + "correction:VelocityValidity.tilt_error_rad",
-        _says(0.0),
-    ),
-    Rule(
-        "trust",
-        "a larger velocity jump while a hit is corrected",
-        _REFLEX + "correction:VelocityValidity.correction_m_s",
-        _says(0.0),
-    ),
-    Rule("change", "the normal by the change of velocity", _REFLEX + "collision:with_change", _argument(0)),
-    Rule("held off", "no attitude that leads into what is near", _REFLEX + "attitude_law:held_off", _argument(0)),
-    Rule(
-        "leaves",
-        "no vehicle goes on into what it has hit",
-        _REFLEX + "motion_estimator:FilterBank.leave",
-        _says(None),
-        lambda arguments: arguments[0].leaves.fill(1.0),
-    ),
-    Rule(
-        "known rest",
-        "what is missing still is known and asked for",
-        _REFLEX + "motion_estimator:FilterBank.mean_error",
-        _says(ZERO),
-    ),
-    Rule(
-        "velocity by places",
-        "no velocity that the places deny",
-        _REFLEX + "motion_estimator:_rate_error",
-        _says(ZERO),
-    ),
-    Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "obstacle_map:remembered_surfaces", _says([])),
-)
+_FILE = Path(__file__).with_name("rules.yaml")
+RULES = tuple(Rule(name, **rule) for name, rule in yaml.safe_load(_FILE.read_text("utf-8")).items())
 
 
 @contextmanager
@@ -129,7 +67,7 @@ def switched(rules: Sequence[Rule]) -> Iterator[Copies]:
 def _places(rule: Rule) -> list[tuple[Any, str]]:
     """The class of a method; of a function every module of the companion that calls it."""
     module_name, _, path = rule.place.partition(":")
-    module = importlib.import_module(module_name)
+    module = importlib.import_module(f"companion.{module_name}")
     owner_name, _, name = path.rpartition(".")
     if owner_name:
         return [(getattr(module, owner_name), name)]
@@ -147,16 +85,14 @@ def _watched(rule: Rule, copies: Copies, original: Any) -> Any:
     def watched(*arguments: Any) -> Any:
         found = original(*arguments)
         if copies.me == rule.name:
-            rule.forget(arguments)
-            return rule.without(arguments, found)
+            rule.take_back(arguments)
+            return rule.without(arguments)
         if copies.me is not None or rule.name in copies.found:
             return found
-        other = rule.without(arguments, found)
-        if other == found:
+        other = rule.without(arguments)
+        if other == found or not copies.fork(rule.name):
             return found
-        if not copies.fork(rule.name):
-            return found
-        rule.forget(arguments)
+        rule.take_back(arguments)
         return other
 
     return watched

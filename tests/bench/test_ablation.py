@@ -8,7 +8,7 @@ from bench.studies.ablation import flights_table
 from bench.studies.rules import RULES, Rule, switched
 from companion.reflex import attitude_law, surface
 
-RULE = Rule("away", "away from what was hit", "companion.reflex.surface:plus", lambda arguments, found: (9, 9, 9))
+RULE = Rule("away", "away from what was hit", "reflex.surface:plus", says=[9, 9, 9])
 NOT_RECOVERED = {"recovered": False}
 RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "rest_s": 1.2, "normal_deg": 5.0, "recovered": True}
 
@@ -29,9 +29,9 @@ def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
 
 
 def test_where_a_rule_changes_nothing_there_is_no_copy():
-    same = Rule("same", "", "companion.reflex.surface:plus", lambda arguments, found: found)
+    same = Rule("same", "", "reflex.surface:plus", says=[1.0, 0.0, 0.0])
     with switched([same]) as copies:
-        flown(copies)
+        assert surface.plus((0, 0, 0), 1.0, (1, 0, 0)) == (1.0, 0.0, 0.0)
     assert copies.found == {}
 
 
@@ -48,7 +48,7 @@ def test_a_copy_that_fails_is_told():
 @pytest.mark.parametrize("rule", RULES, ids=[rule.name for rule in RULES])
 def test_every_rule_is_a_function_of_the_companion(rule):
     module, _, path = rule.place.partition(":")
-    found = importlib.import_module(module)
+    found = importlib.import_module(f"companion.{module}")
     for name in path.split("."):
         found = getattr(found, name)
     assert callable(found) or isinstance(found, property)

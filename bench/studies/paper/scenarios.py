@@ -11,10 +11,12 @@ from bench.fly.campaign import Json
 from bench.rows.paper import StudyFlight
 from bench.rows.tables import rms
 from bench.studies.paper.figures import (
+    CENTRE,
+    INTO_WALL,
+    WALL,
     add_legend,
+    draw_flight,
     draw_fold,
-    draw_position,
-    draw_velocity,
     finish,
     mark_moments,
     mark_paper,
@@ -64,22 +66,21 @@ def _of_scenario(flights: pd.DataFrame) -> Findings:
 
 def _scenario_figure(track: Json) -> Figure:
     figure, axes = new_figure(2, 2, "The paper's sample scenario: wall 0.3 m ahead, target 2 m ahead")
-    draw_position(axes[0, 0], track, "b: position", -0.5, 3.0)
-    draw_velocity(axes[0, 1], track, "c: velocity", -0.5, 3.0)
+    draw_flight(axes[0], track, ("b: position", "c: velocity"), -0.5, 3.0)
     mark_paper(axes[0, 1], IMPACT_M_S, f"paper: hits at {IMPACT_M_S:g} m/s")
     mark_paper(axes[0, 1], -REBOUND_M_S, f"paper: rebounds at {REBOUND_M_S:g} m/s")
     zoom, time_s, place_m = axes[1, 0], np.array(track["time_s"]), np.array(track["place_m"])
     near = (time_s >= -0.05) & (time_s <= 0.3)
-    zoom.plot(time_s[near], place_m[near], color="tab:blue", linewidth=1.8, label="vehicle's centre")
+    zoom.plot(time_s[near], place_m[near], label="vehicle's centre", **CENTRE)
     touching = near & (np.max(track["fold_m"], axis=1) > 0.002) & (time_s >= 0.0)
     zoom.plot(time_s[touching], place_m[touching], color="red", linewidth=3.5, label="arms folded (red)")
-    zoom.axhline(track["touch_m"], color="tab:brown", linewidth=1.0, linestyle=":")
+    zoom.axhline(track["touch_m"], color=WALL, linewidth=1.0, linestyle=":")
+    finish(zoom, "d: the centre while the arms fold and unfold", INTO_WALL, (-0.06, 0.31))
     mark_moments(zoom, track)
-    finish(zoom, "d: the centre while the arms fold and unfold", "distance from take-off point\ninto the wall [m]")
     draw_fold(axes[1, 1], track, "fold of each arm")
     mark_paper(axes[1, 1], 1e3 * FOLD_MAX_M, f"paper: folds by {1e3 * FOLD_MAX_M:g} mm")
     axes[1, 1].set_ylim(top=1e3 * FOLD_MAX_M + 4.0)
-    add_legend(figure, axes)
+    add_legend(figure)
     return figure
 
 
@@ -105,13 +106,12 @@ def _of_experiment(flights: pd.DataFrame) -> Findings:
 
 def _experiment_figure(track: Json) -> Figure:
     figure, axes = new_figure(1, 2, "A hit at 2.1 m/s with γ = 0.5: the setpoint lies 1.05 m back")
-    draw_position(axes[0, 0], track, "position")
-    draw_velocity(axes[0, 1], track, "velocity")
+    draw_flight(axes[0], track, ("position", "velocity"))
     flown_m = BACK_M - SETPOINT_ERROR_M
     mark_paper(axes[0, 0], track["touch_m"] - BACK_M, f"paper: {BACK_M:g} m back")
     mark_paper(axes[0, 0], track["touch_m"] - flown_m, f"its experiment: {flown_m:.2f} m", above=True)
     mark_paper(axes[0, 1], SPEED_M_S, f"paper: v_c = {SPEED_M_S:g} m/s")
-    add_legend(figure, axes)
+    add_legend(figure)
     return figure
 
 

@@ -15,8 +15,7 @@ from bench.rows.tables import table
 from bench.studies.paper.figures import (
     CONTACT,
     add_legend,
-    draw_position,
-    draw_velocity,
+    draw_flight,
     finish,
     mark_paper,
     new_figure,
@@ -102,9 +101,8 @@ def _arm_figure(single: HeadOnHit, rests_mm: float) -> Figure:
     axis.axhline(rests_mm, color="tab:green", linestyle=":", label=f"δl = {rests_mm:g} mm")
     axis.axvline(0.0, color=CONTACT, linewidth=1.1, label="first contact")
     axis.axvline(single.hit.contact_duration_s, color=CONTACT, linewidth=1.1, linestyle="--", label="wall lets go")
-    axis.set_xlim(-0.02, AFTER_S)
     axis.set_ylim(0.0, 34.0)
-    finish(axis, "", "fold of the arm l [mm]")
+    finish(axis, "", "fold of the arm l [mm]", (-0.02, AFTER_S))
     axis.legend(fontsize=8)
     return figure
 
@@ -194,9 +192,8 @@ def _conclude(flights: pd.DataFrame) -> Findings:
 def _figure(flights: pd.DataFrame) -> Figure:
     figure, axes = new_figure(2, 2, "The same wall at 1 m/s without and with recovery (foldable)")
     for column, (track, title) in enumerate(zip(flights["track"], ("recovery off", "recovery on"), strict=True)):
-        draw_position(axes[0, column], track, title)
-        draw_velocity(axes[1, column], track, "")
-    add_legend(figure, axes)
+        draw_flight(axes[:, column], track, (title, ""))
+    add_legend(figure)
     return figure
 
 

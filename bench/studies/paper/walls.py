@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import GAMMA_S, approach
 from bench.rows.paper import StudyFlight
-from bench.studies.paper.figures import add_legend, draw_position, draw_velocity, mark_paper, new_figure
+from bench.studies.paper.figures import add_legend, draw_flight, mark_paper, new_figure
 from bench.studies.paper.study import Findings, Study, claim, flown_table, number
 
 # --- the paper's flight tests, head-on at 1 to 2.5 m/s, and on to the 5 m/s of its design
@@ -49,11 +49,10 @@ def _figure(airframe: str, flights: pd.DataFrame) -> Figure:
     for flight in flights[flights["track"].notna()].itertuples():
         column, speed_m_s = PAPER_SPEEDS_M_S.index(flight.speed_m_s), flight.speed_m_s
         seen, back_m = "" if flight.seen else ", not seen: its sample was lost", GAMMA_S * speed_m_s
-        draw_position(axes[0, column], flight.track, f"v_c = {speed_m_s:g} m/s{seen}")
-        draw_velocity(axes[1, column], flight.track, "")
+        draw_flight(axes[:, column], flight.track, (f"v_c = {speed_m_s:g} m/s{seen}", ""))
         mark_paper(axes[0, column], flight.track["touch_m"] - back_m, f"paper: {back_m:g} m back")
         mark_paper(axes[1, column], speed_m_s, f"paper: v_c ≈ {speed_m_s:g} m/s")
-    add_legend(figure, axes)
+    add_legend(figure)
     return figure
 
 
