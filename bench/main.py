@@ -10,19 +10,18 @@ from typing import Any
 
 import yaml
 
-from bench.studies.rules import RULES
 from rebound_cli.arguments import count, runs
 from rebound_cli.main import run
 
+STUDIES, RULES = (
+    yaml.safe_load((Path(__file__).parent / name).read_text("utf-8")) for name in ("studies.yaml", "studies/rules.yaml")
+)
 # What the file names, and what it cannot know.
 TYPES = {
     "count": count,
     "path": Path,
 }
-KNOWN_HERE = {"cores": os.cpu_count() or 1, "rules": tuple(rule.name for rule in RULES)}
-
-
-STUDIES = yaml.safe_load(Path(__file__).with_name("studies.yaml").read_text("utf-8"))
+KNOWN_HERE = {"cores": os.cpu_count() or 1, "rules": tuple(RULES)}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -94,7 +94,6 @@ DOES: dict[str, Callable[..., Injector]] = {
     "flood": lambda c: injectors.strangers(When.flying(c, 3.0), 10),
     "foreign_byte": lambda c: injectors.noise(When("connect", 2.0), 1),
     "foreign_bytes": lambda c: injectors.noise(When.flying(c), 300),
-    "hostile": lambda c, spared=(): injectors.hostile(When.flying(c), _numbers(spared)),
     "taken": lambda c, state, from_s, within_s, stall_s=0.0, cut_s=0.0: injectors.taken(
         When(state, c.uniform(from_s, from_s + within_s)), stall_s, cut_s
     ),

@@ -2,12 +2,11 @@
 
 import itertools
 import math
-import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from bench.fly.air import Air, Injector, When
-from bench.fly.packets import SET_MODE, changed, decoded, made, packed_by
+from bench.fly.packets import SET_MODE, changed, made
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import message_id_of
 from sim_vehicle.bench.faults import FaultRequest
@@ -17,10 +16,6 @@ Change = Callable[[Any, Air], None]
 _MANUAL, _STRANGER = 1 << 16, (7, 1)
 # Ten a second.
 _DENIED_EVERY = 25
-# Among them NaN, infinities, what no float holds twice, and what a vehicle could say.
-_FLOATS: tuple[float, ...] = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, 1e-45, 0.0)
-_FLOATS += (-1e6, -100.0, -10.0, -1.0, 1.0, 10.0, 100.0)
-_BITS = {"uint8_t": 8, "uint16_t": 16, "uint32_t": 32, "uint64_t": 64, "int8_t": 7, "int16_t": 15, "int32_t": 31}
 
 
 def simulated(request: FaultRequest, when: When) -> Injector:
@@ -110,55 +105,20 @@ CHANGES: dict[str, Change] = {"near_zero": near_zero, "repeating": repeating, "b
 
 def forged(when: When, number: int, change: Change, times: int = 1, every_s: float = 0.0) -> Injector:
     """Packets in the vehicle's name beside its own: the newest true one of its kind with some fields changed."""
-    left, due_s = times, 0.0
-
-    def beside(air: Air, latest: dict[int, bytes]) -> list[bytes]:
-        nonlocal left, due_s
-        if number not in latest or left == 0 or air.now_s < due_s:
-            return []
-        left, due_s = left - 1, air.now_s + every_s
-        return [changed(latest[number], lambda message: change(message, air))]
-
-    return _knowing(when, lambda air, frames, latest: [*frames, *beside(air, latest)])
-
-
-def hostile(when: When, spared: Sequence[int] = ()) -> Injector:
-    """True packets of every kind that comes, with one to three fields spoiled, beside the vehicle's own."""
-
-    def act(air: Air, frames: list[bytes], latest: dict[int, bytes]) -> list[bytes]:
-        chance, kinds = air.chance, [number for number in latest if number not in spared]
-        count = chance.choice((0, 0, 1, 1, 2))
-        return [*(_spoiled(chance, latest[chance.choice(kinds)]) for _ in range(count)), *frames]
-
-    return _knowing(when, act)
-
-
-def _knowing(when: When, act: Callable[[Air, list[bytes], dict[int, bytes]], list[bytes]]) -> Injector:
-    """With the newest packet of every kind."""
     latest: dict[int, bytes] = {}
+    left, due_s = times, 0.0
 
     def note(frames: list[bytes]) -> None:
         latest.update((message_id_of(frame), frame) for frame in frames)
 
-    return Injector(when, to_companion=lambda air, frames: act(air, frames, latest), note=note)
+    def act(air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        nonlocal left, due_s
+        if number not in latest or left == 0 or air.now_s < due_s:
+            return frames
+        left, due_s = left - 1, air.now_s + every_s
+        return [*frames, changed(latest[number], lambda message: change(message, air))]
 
-
-def _spoiled(chance: random.Random, frame: bytes) -> bytes:
-    message = decoded(frame)
-    assert message is not None, "it was the vehicle's own"
-    names = [name for name, kind in zip(message.fieldnames, message.fieldtypes, strict=True) if kind != "char"]
-    for name in chance.sample(names, min(len(names), chance.randint(1, 3))):
-        kind, now = message.fieldtypes[message.fieldnames.index(name)], getattr(message, name)
-        value = _value(chance, kind)
-        setattr(message, name, [*now[:-1], value] if isinstance(now, list) else value)
-    return packed_by(message)
-
-
-def _value(chance: random.Random, kind: str) -> float:
-    if kind in ("float", "double"):
-        return chance.choice((chance.choice(_FLOATS), chance.uniform(-20.0, 20.0)))
-    bits = _BITS.get(kind, 31)
-    return chance.choice((0, 1, (1 << bits) - 1, chance.randint(0, (1 << bits) - 1)))
+    return Injector(when, to_companion=act, note=note)
 
 
 def noise(when: When, most: int) -> Injector:

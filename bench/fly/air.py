@@ -95,10 +95,6 @@ class Hung(BaseException):
     """The flight has taken longer than any should."""
 
 
-class Landing(BaseException):
-    """The vehicle has been landing by itself for a second; the rest is its own affair."""
-
-
 @dataclass
 class Air:
     """One flight's wire, clock and vehicle."""
@@ -109,8 +105,6 @@ class Air:
     injector: Injector
     chance: random.Random
     limit_s: float
-    to_the_ground: bool = True
-    """Whether the vehicle's own landing is waited for."""
     at_first_item: Callable[[], None] | None = None
     since: dict[str, float] = field(default_factory=dict)
     """When the companion was first in a state; seconds of the vehicle's clock."""
@@ -210,9 +204,7 @@ class Air:
             begin, self.at_first_item = self.at_first_item, None
             begin()
         self.has_left_offboard |= "mission" in self.since and self.vehicle.mode != "Offboard"
-        began_s = self.since.setdefault(state, self.now_s)
-        if state == "landing" and not self.to_the_ground and self.now_s - began_s > 1.0 and self.vehicle.mode == "Land":
-            raise Landing
+        self.since.setdefault(state, self.now_s)
         injector = self.injector
         if injector.once is not None and injector.when.is_on(self):
             do, injector.once = injector.once, None

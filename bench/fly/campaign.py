@@ -66,11 +66,10 @@ def run_campaign(
         print(f"{name}: going on after {len(cases) - len(missing)} of {len(cases)} cases", file=sys.stderr)
     console = Console(stderr=True)
     outcomes = worked_out(work_out, missing, jobs)
-    shown = track(outcomes, name, len(missing), console=console, disable=not console.is_terminal or not missing)
     folder.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as file:
         try:
-            for outcome in shown:
+            for outcome in track(outcomes, name, len(missing), console=console, disable=not console.is_terminal):
                 line = json.dumps(outcome, separators=(",", ":"))
                 file.write(line + "\n")
                 file.flush()

@@ -10,7 +10,7 @@ from typing import Any
 
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import across, there
-from bench.fly.air import COMPLETED, KILLED, Air, Fault, Hung, Injector, Killed, Landing
+from bench.fly.air import KILLED, Air, Fault, Hung, Injector, Killed
 from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.shell.tlog import may_be_logged
@@ -30,8 +30,6 @@ HEIGHT_M, WALL_M = 1.0, 2.0
 LIMIT_S = 60.0
 # What an aborted flight leaves hovers, or comes down by itself from this height within 12 s.
 LEFT_ALONE_S, KILLED_FOR_S = 1.5, 12.0
-# So many flights of each row end on the ground; of the others the vehicle's own landing is not waited for.
-TO_THE_GROUND = 1
 
 
 class Noting(FlightRecorder):
@@ -78,7 +76,6 @@ class FaultedFlight:
         vehicle = SimulatedVehicle(self.airframe, self.scene, self.scene.seed, links_may_fail=True)
         self.interrupts, self.companion = Interrupts(), Companion(self.mission)
         self.air = Air(vehicle, self.companion, self.interrupts, Injector(), self._chance(), LIMIT_S)
-        self.air.to_the_ground = number < TO_THE_GROUND
         if fault.from_the_start:
             self._begin()
         else:
@@ -99,10 +96,10 @@ class FaultedFlight:
             fly_realtime(self.companion, loop, ConfirmAtOnce())
         except FlightFaultError as error:
             self.fault_text = str(error)
-        except (Killed, Hung, Landing) as end:
-            self.ended = {Killed: KILLED, Hung: "hung", Landing: COMPLETED}[type(end)]
+        except (Killed, Hung) as end:
+            self.ended = {Killed: KILLED, Hung: "hung"}[type(end)]
         self.killed_at_s = air.now_s
-        air.alone({KILLED: KILLED_FOR_S, COMPLETED: 0.0}.get(self.ended, LEFT_ALONE_S))
+        air.alone(KILLED_FOR_S if self.ended == KILLED else LEFT_ALONE_S)
         if self.ended == KILLED:
             # What a killed process had in memory is gone; what it had given to the system is not.
             self.recorder._tlog._pending.clear()

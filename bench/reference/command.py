@@ -18,8 +18,6 @@ from companion.flight.states import TABLE as FLIGHT
 from companion.guard.states import TABLE as GUARD
 from companion.mavlink import encode, readers
 from companion.state_table import StateTable
-from sim_vehicle.autopilot.commander.failsafe_table import OFFBOARD_LOSS, ROWS, Action
-from sim_vehicle.autopilot.modes import NEEDS, TRANSITIONS, ModeCondition, Transition
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "reference"
@@ -66,8 +64,6 @@ def states() -> dict[str, str]:
         "flight": transitions(FLIGHT),
         "guard_diagram": mermaid_diagram(GUARD),
         "guard": transitions(GUARD),
-        "modes": table(("event", "in", "leads to", "if"), map(_mode_row, TRANSITIONS)),
-        "failsafes": table(("trigger", "parameter", "does", "ends"), _failsafes()),
     }
 
 
@@ -89,32 +85,6 @@ def transitions(states: StateTable[Any, Any]) -> str:
             sources.setdefault((trigger.value, target.value), []).append(state.value)
     rows = [(trigger, ", ".join(inside), target) for (trigger, target), inside in sources.items()]
     return table(("trigger", "in", "leads to"), rows)
-
-
-def _mode_row(row: Transition) -> tuple[str, str, str, str]:
-    """Of the simulated vehicle's modes."""
-    where = ", ".join(mode.name for mode in row.sources) if row.sources else "any mode"
-    condition = row.guard.value
-    if row.guard is ModeCondition.CAN_RUN and row.target is not None:
-        condition = f"disarmed, or there is: {', '.join(sorted(NEEDS[row.target]))}"
-    return row.event.value, where, row.target.name if row.target is not None else "the mode before", condition
-
-
-def _failsafes() -> Iterator[tuple[str, str, str, str]]:
-    """The simulated vehicle's, what is no row of its table at the end."""
-    for row in ROWS:
-        actions = {str(value): response.action for value, response in row.responses.items()}
-        if row.otherwise.action is not Action.NONE:
-            actions["else"] = row.otherwise.action
-        ends = {response.clears.value for response in row.responses.values() if response.action > Action.WARN}
-        yield row.trigger.value, code(row.parameter), _done(actions), ", or ".join(sorted(ends))
-    losses = {str(value): action for value, (action, _) in OFFBOARD_LOSS.items()}
-    yield "setpoints stopped in OFFBOARD", code("COM_OBL_RC_ACT"), _done(losses), "with the trigger"
-    yield "mode cannot run", "", "a mode of sticks: the next that needs less; else return", "with the trigger"
-
-
-def _done(actions: dict[str, Action]) -> str:
-    return ", ".join(f"{value}: {action.name.lower().replace('_', ' ')}" for value, action in actions.items())
 
 
 # Of each page, whose text stands in `pages/`, the function that makes what is put in.

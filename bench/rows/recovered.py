@@ -16,11 +16,8 @@ from rebound_cli.results.truth_match import Vector3
 from sim_vehicle.truth import Hit
 from sim_vehicle.world import Obstacle
 
-Rows = npt.NDArray[np.intp]
 Floats = npt.NDArray[np.float64]
 
-# The vehicle is watched at rest for this long, unless it flies on earlier.
-RESTING_S = 0.5
 # A vehicle that leaves a surface does not come nearer again by this; else a touch is another guard swinging in.
 CAME_BACK_M = 0.02
 # Nor does one that is still on its way in, from one guard to the next, before anything sent can have turned it.
@@ -30,7 +27,7 @@ MOVED_M = 1e-3
 _LOOK_EVERY = 10
 _DIGITS = 4
 # Of a hit that nobody answered.
-UNANSWERED: Json = dict.fromkeys(("settled_s", "past_m", "lost_m", "risen_m", "clear_m"))
+UNANSWERED: Json = dict.fromkeys(("settled_s", "past_m", "lost_m"))
 
 
 def recoveries(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> list[Json]:
@@ -61,10 +58,10 @@ def _figures(flight: JudgedFlight, episode: Sequence[JudgedContact]) -> Json:
         "returned": sum(_returned(flight, first, before, touch) for before, touch in pairwise(episode)),
     }
     seen = [contact for contact in episode if contact.collision is not None]
-    return found | (_recovery(flight, seen[-1], episode) if seen else UNANSWERED)
+    return found | (_recovery(flight, seen[-1]) if seen else UNANSWERED)
 
 
-def _recovery(flight: JudgedFlight, contact: JudgedContact, episode: Sequence[JudgedContact]) -> Json:
+def _recovery(flight: JudgedFlight, contact: JudgedContact) -> Json:
     """After the last hit of an episode that was seen, to the setpoint that is flown to in the end."""
     hit, series = contact.hit, flight.truth.series
     collision, ended_us = _last_of_recovery(flight, contact)
@@ -78,22 +75,15 @@ def _recovery(flight: JudgedFlight, contact: JudgedContact, episode: Sequence[Ju
         until_s = min(until_s, 1e-6 * (ended_us - hit.contact_at_boot_us))
     during = (since_s >= 0.0) & (since_s <= until_s)
     past_m = _past_m(hit, collision, series["position_ned_m"][during])
-    resting = (since_s >= until_s - RESTING_S) & (since_s <= until_s)
-    clear_m = None if settled_s is None else _clear_m(flight, episode, np.flatnonzero(resting))
     down_m = series["position_ned_m"][during, 2]
     # From the contact to the setpoint, which lies below a ceiling and above a floor, height is wanted.
-    top_m, bottom_m = sorted(
-        (hit.contact_position_ned_m[2], collision.recovery_setpoint_ned_m[2] - hit.frame_offset_ned_m[2])
-    )
-    if away_from(hit.normal_ned)[2] == 0.0:
-        top_m = bottom_m = hit.contact_position_ned_m[2]
-    risen_m, lost_m = (top_m - float(down_m.min()), float(down_m.max()) - bottom_m) if during.any() else (0.0, 0.0)
+    bottom_m = hit.contact_position_ned_m[2]
+    if away_from(hit.normal_ned)[2] != 0.0:
+        bottom_m = max(bottom_m, collision.recovery_setpoint_ned_m[2] - hit.frame_offset_ned_m[2])
     return {
         "settled_s": None if settled_s is None else round(settled_s, _DIGITS),
         "past_m": round(past_m, _DIGITS),
-        "lost_m": round(max(0.0, lost_m), _DIGITS),
-        "risen_m": round(max(0.0, risen_m), _DIGITS),
-        "clear_m": None if clear_m is None else round(clear_m, _DIGITS),
+        "lost_m": round(max(0.0, float(down_m.max(initial=bottom_m)) - bottom_m), _DIGITS),
     }
 
 
@@ -137,20 +127,6 @@ def _returned(flight: JudgedFlight, first: JudgedContact, before: JudgedContact,
     has_left = max(off_m) - off_m[0] > MOVED_M
     is_answered = touch.hit.contact_at_boot_us - first.hit.contact_at_boot_us > UNANSWERED_US
     return (has_left or is_answered) and max(off_m) - off_m[-1] > CAME_BACK_M
-
-
-def _clear_m(flight: JudgedFlight, episode: Sequence[JudgedContact], resting: Rows) -> float | None:
-    """How much further from everything touched than when it was touched; the nearest while the vehicle rests."""
-    series = flight.truth.series
-    nearest = []
-    for hit in (contact.hit for contact in episode if contact.hit.obstacle in flight.obstacles):
-        obstacle = flight.obstacles[hit.obstacle]
-        touching_m = _distance_m(obstacle, hit.contact_position_ned_m, hit.contact_at_boot_us)
-        nearest += [
-            _distance_m(obstacle, series["position_ned_m"][index], series["time_boot_us"][index]) - touching_m
-            for index in resting[::_LOOK_EVERY]
-        ]
-    return min(nearest, default=None)
 
 
 def _distance_m(obstacle: Obstacle, place_ned_m: Vector3, boot_us: float) -> float:

@@ -27,7 +27,6 @@ DRAWN_WANTED = {"foldable": 0.995, "rigid": 0.99}
 CLEAN_WANTED = 0.99
 OVERSHOOT_MOST_M = 0.05
 LOST_MOST_M, LOST_UP_TO_M_S = 0.10, 2.5
-CLEAR_LEAST_M = 0.3
 # The hits that the bars are about: 1 to 5 m/s; heights of vehicles that fly level past something upright.
 HIT_SPEEDS_M_S = (1.0, 5.0)
 LEVEL_M_S = 0.3
@@ -165,8 +164,6 @@ def _hits(airframe: str, hits: pd.DataFrame) -> Iterator[Bar]:
     yield share_bar(what, is_near & (answered["again"] == 0), CLEAN_WANTED if is_judged else None)
     what = f"{where}: the same, but for other guards that swing in while the vehicle leaves"
     yield share_bar(what, is_near & (answered["returned"] == 0))
-    what = f"{where}: guards at rest {CLEAR_LEAST_M} m clear of what was hit"
-    yield share_bar(what, fast["clear_m"].dropna() >= CLEAR_LEAST_M)
     yield _lost_bar(airframe, level(hits[hits["speed_m_s"] < LOST_UP_TO_M_S])["lost_m"])
     into = hits[noticeable(hits)]
     yield share_bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", into["seen"])

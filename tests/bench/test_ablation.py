@@ -4,8 +4,7 @@ import importlib
 
 import pytest
 
-from bench.studies.ablation import flights_table
-from bench.studies.rules import RULES, Rule, switched
+from bench.studies.ablation import RULES, Rule, flights_table, switched
 from companion.reflex import attitude_law, surface
 
 RULE = Rule("away", "away from what was hit", "reflex.surface:plus", says=[9, 9, 9])

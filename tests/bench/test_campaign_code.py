@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from bench.fly.campaign import CODE
-from bench.rows.faulted import work_out_fault
 from bench.rows.heard import work_out_hit
-from bench.rows.hits import work_out_flown
 from bench.rows.judge import work_out_mission
 from bench.studies import kills
+from bench.studies.faults import work_out_fault
+from bench.studies.hits import work_out_flown
 from tests.import_graph import module_imports
 
 ROOT = Path(__file__).parents[2]

@@ -11,7 +11,7 @@ from bench.faults.catalogue import FLOWN, GROUPS
 from bench.faults.injectors import rewritten, setting, simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.packets import ARM, SET_MODE, made, number_of, outside
-from bench.rows.faulted import FaultCase, flown_with, work_out_fault
+from bench.studies.faults import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
 from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in

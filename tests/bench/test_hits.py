@@ -6,9 +6,8 @@ import pytest
 from bench.cases.hits import HitCase
 from bench.fly.campaign import Results
 from bench.fly.guarded import draw_flown
-from bench.rows.hits import work_out_flown
 from bench.rows.tables import at_most, at_most_of_groups
-from bench.studies.hits import hit_rows, lead, parts
+from bench.studies.hits import hit_rows, lead, parts, work_out_flown
 from tests.bench.test_recoveries import flown as flown_whole
 
 pytestmark = pytest.mark.slow

@@ -24,13 +24,12 @@ def flown(airframe, speed_m_s, slant_deg=0, law="adaptive"):
     return flight.report.outcome, recoveries(flight, contacts_of(flight))[0]
 
 
-def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_wall():
+def test_adaptive_settles_a_fifth_sooner_without_running_past():
     paper, adaptive = (flown("foldable", 2.0, law=law) for law in ("paper", "adaptive"))
     assert (paper[0], adaptive[0]) == ("completed", "completed")
     paper, adaptive = paper[1], adaptive[1]
     assert adaptive["settled_s"] < 0.8 * paper["settled_s"]
     assert adaptive["past_m"] < 0.05 and adaptive["again"] == 0
-    assert adaptive["clear_m"] > 0.3
 
 
 def test_a_vehicle_that_the_hit_spins_comes_to_rest_though_lower_and_further_on():
@@ -51,6 +50,4 @@ def test_a_clipped_hit_that_the_vehicle_has_not_seen_whole_leads_neither_into_th
     outcome, flight = flown(airframe, speed_m_s)
     assert (outcome, flight["again"], flight["returned"]) == ("completed", 0, 0)
     assert flight["past_m"] < 0.05
-    assert flight["clear_m"] > 0.3
-    # At 4 m/s it is thrown up by 0.6 m/s, which shows when the estimate begins to be put right, after 0.16 s
-    assert flight["risen_m"] < 0.25 and flight["lost_m"] < 0.1
+    assert flight["lost_m"] < 0.1

@@ -19,6 +19,8 @@ from companion.reflex.classify import TABLE as IMPACTS
 from rebound_cli import exit_codes
 from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth
+from sim_vehicle.autopilot.commander.failsafe_table import ROWS
+from sim_vehicle.autopilot.modes import TRANSITIONS
 from tests.rebound_cli.results.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
 
 # What is told under a kind that stands in no call.
@@ -92,6 +94,18 @@ def test_diagram_and_table_show_every_transition(states):
             assert state is target or arrow in diagram
             (inside,) = [where for what, where, to in rows if (what, to) == (trigger.value, target.value)]
             assert state.value in inside.split(", ")
+
+
+def test_the_simulated_vehicles_modes_and_failsafes_are_all_named():
+    modes = [(event, target) for event, _, target, _ in rows_below("states.md", "The simulated vehicle's modes")]
+    targets = {row: row.target.name if row.target is not None else "the mode before" for row in TRANSITIONS}
+    assert modes == [(row.event.value, targets[row]) for row in TRANSITIONS]
+    failsafes = rows_below("states.md", "The simulated vehicle's failsafes")
+    named = [(row.trigger.value, f"`{row.parameter}`" if row.parameter else "") for row in ROWS]
+    assert [(trigger, parameter) for trigger, parameter, _, _ in failsafes][: len(named)] == named
+    for row, (_, _, does, _) in zip(ROWS, failsafes, strict=False):
+        actions = {value: answer.action.name.lower().replace("_", " ") for value, answer in row.responses.items()}
+        assert all(f"{value}: {action}" in does for value, action in actions.items())
 
 
 def test_every_key_of_the_summary_has_its_meaning():

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
+from bench.cases.vehicles import BenchVehicle
 from bench.fly.by_hand.watched import GuardedFlight, Sticks
 from companion.autopilot.known import GUARDED_MODES
 from companion.companion import Companion
@@ -54,30 +54,6 @@ class GroundCase:
     @property
     def is_fall(self) -> bool:
         return self.way in FALLS
-
-
-@dataclass(frozen=True, slots=True)
-class GroundFlight:
-    """What became of a case: the flight at its end, the speed that was asked for, and the height's error."""
-
-    flight: GuardedFlight
-    airframe: str
-    sink_m_s: float
-    height_error_m: float
-
-
-def flown_to_the_ground(case: GroundCase) -> GroundFlight:
-    """To the ground and a while on."""
-    rng = np.random.default_rng([case.seed, 12 + case.is_fall])
-    built = vehicle_of(AIRFRAMES[case.seed // 2 % 2], case.seed)
-    sink_m_s = float(rng.uniform(*(STICKS_M_S if case.way in BY_STICKS else LAND_M_S)))
-    airframe = on_ground(case.ground, built.airframe, rng)
-    flight, height_error_m = begun(case, built, airframe, sink_m_s, rng)
-    if case.way == "mission" or case.is_fall:
-        to_the_end(flight)
-    else:
-        land(flight, case.way, airframe, sink_m_s, rng)
-    return GroundFlight(flight, airframe.name, sink_m_s, height_error_m)
 
 
 def on_ground(ground: str, airframe: Airframe, rng: np.random.Generator) -> Airframe:

@@ -1,9 +1,9 @@
 """What the paper says of rigid vehicles: why ours does not do what its did, and hits against the sensor's rate."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from pathlib import Path
 
 import pandas as pd
+import yaml
 
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import CRUISE_S, approach
@@ -11,55 +11,28 @@ from bench.rows.paper import StudyFlight
 from bench.rows.tables import table
 from bench.studies.paper.study import Findings, Study, claim, flown_table
 
-# --- why our rigid vehicle does not do what the paper's did: one cause at a time. None is a setting anybody else uses.
-
+CAUSES = yaml.safe_load(Path(__file__).with_name("causes.yaml").read_text("utf-8"))
+_, LOST, _, _, LEANING, _, CLIPPED = CAUSES
 CAUSE_M_S, CAUSE_SEEDS = 2.0, 6
-
-
-class Cause(NamedTuple):
-    """What is changed, and for which airframes."""
-
-    name: str
-    airframes: tuple[str, ...] = AIRFRAMES
-    heading_deg: float = 0.0
-    cruise_s: float = CRUISE_S
-    changes: Mapping[str, Any] = {}
-    companion: Mapping[str, Any] = {}
-
-
-# Damping sqrt(k_v / k_p) / 2 = 0.43 instead of 1.03.
-SOFT_GAINS = {"control": {"position_p_per_s": 2.0, "velocity_p_per_s": 1.5, "velocity_i_per_s2": 0.3}}
-# Gains so soft lift off two seconds late.
-PATIENT = {"flight": {"arrival_timeout_s": 10.0}}
-# PX4's BADACC_BIAS_PNOISE, made for vibration: 0.5 g is all that a clipped sample may have lost.
-PX4_FILTER = {"estimator": {"clipped_excess_m_s2": 4.9}}
-# PX4's default rate of HIGHRES_IMU: four samples of 4 ms in five are never sent.
-FEW_SAMPLES = {"streams": {"highres_imu_hz": 50.0}}
-LOST, CLIPPED = "lost samples: `HIGHRES_IMU` at 50 Hz", "estimate: clipping allowed for as PX4's filter does"
-LEANING = "moments: hit while it accelerates at 2 m/s², leaning 12°"
-CAUSES = (
-    Cause("as it is"),
-    Cause(LOST, companion=FEW_SAMPLES),
-    Cause("moments: met by one guard, nose turned by 45°", ("rigid",), heading_deg=45.0),
-    Cause("moments: one guard before the other, nose turned by 10°", ("rigid",), heading_deg=10.0),
-    Cause(LEANING, cruise_s=0.0),
-    Cause("gains: damping 0.43", changes=SOFT_GAINS, companion=PATIENT),
-    Cause(CLIPPED, changes=PX4_FILTER),
-)
 
 
 def _caused(seeds: int) -> list[StudyFlight]:
     return [
         StudyFlight(
-            {"cause": cause.name},
-            approach(CAUSE_M_S, cause.heading_deg, cruise_s=cause.cruise_s, companion=cause.companion),
+            {"cause": name},
+            approach(
+                CAUSE_M_S,
+                cause.get("heading_deg", 0.0),
+                cruise_s=cause.get("cruise_s", CRUISE_S),
+                companion=cause.get("companion", {}),
+            ),
             airframe,
             seed,
-            cause.changes,
+            cause.get("changes", {}),
         )
         for airframe in reversed(AIRFRAMES)
-        for cause in CAUSES
-        if airframe in cause.airframes
+        for name, cause in CAUSES.items()
+        if airframe in cause.get("airframes", AIRFRAMES)
         for seed in range(1, CAUSE_SEEDS + 1)
     ]
 

@@ -31,8 +31,6 @@ HIT = {
     "settled_s": 1.4,
     "past_m": 0.01,
     "lost_m": 0.02,
-    "risen_m": 0.0,
-    "clear_m": 0.5,
 }
 
 
