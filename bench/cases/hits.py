@@ -1,4 +1,4 @@
-"""Hits and hands of vehicles in free air: what is met, how, by whom, drawn from a seed."""
+"""Hits of vehicles in free air: what is met, how, by whom, drawn from a seed."""
 
 import math
 from collections.abc import Mapping
@@ -31,14 +31,6 @@ POLE_RADIUS_M = (0.02, 0.30)
 # Beside the middle, as a share of what still touches if a guard points there; where the vehicle slips by between two of
 # them, the same pole again, nearer to the middle.
 POLE_OFFSET_SHARES = (0.8, 0.4, 0.0)
-GRIPS = ("held", "pushed")
-# A vehicle that holds its position wanders: half of what still counts as a hover, or its noise alone would end it.
-DRIFT_MAX_M_S = 0.1
-FROM_S, LASTS_S, LOOKED_AFTER_S = (1.5, 1.9), (0.4, 1.5), 0.5
-# Of an arm that holds still (Mussa-Ivaldi, Hogan and Bizzi, 1985), about critically damped for half a kilogram.
-STIFFNESS_N_M, DAMPING_N_S_M = (100.0, 400.0), (10.0, 30.0)
-# Per unit mass: a push that a vehicle's position control still holds against, risen as fast as an arm moves.
-PUSH_M_S2, RISE_S = (2.0, 6.0), (0.08, 0.2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,38 +136,4 @@ def coming(scene: Mapping[str, Any], velocity: Floats, after_s: float) -> dict[s
             for one in obstacles
         ]
         for kind, obstacles in scene.items()
-    }
-
-
-@dataclass(frozen=True, slots=True)
-class HandCase:
-    """One grip; everything that is not here is drawn from the seed."""
-
-    grip: str
-    seed: int
-    airframe: str
-    detectors: tuple[str, ...]
-    is_drawn: bool = False
-
-
-def draw_hand(seed: int, detectors: tuple[str, ...]) -> HandCase:
-    """Airframes and grips in turn."""
-    return HandCase(GRIPS[seed // 2 % len(GRIPS)], seed, AIRFRAMES[seed % 2], detectors)
-
-
-def held_by(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "kind": "hand_catch",
-        "stiffness_n_m": float(rng.uniform(*STIFFNESS_N_M)),
-        "damping_n_s_m": float(rng.uniform(*DAMPING_N_S_M)),
-    }
-
-
-def pushed_by(rng: np.random.Generator, airframe: Airframe) -> dict[str, Any]:
-    """Level, from any side, at the middle."""
-    side, force_n = rng.uniform(-math.pi, math.pi), airframe.mass_kg * rng.uniform(*PUSH_M_S2)
-    return {
-        "kind": "push",
-        "force_ned_n": [force_n * math.cos(side), force_n * math.sin(side), 0.0],
-        "rise_s": float(rng.uniform(*RISE_S)),
     }

@@ -24,7 +24,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 SET_MODE, ARM, TAKEOFF = 176, 400, 22
 # From the wall's face to the centre of a vehicle that touches it with guards unfolded: 0.24 m.
 FACE_NORTH_M = 4.0
-VELOCITY_ONLY, PLACE_ONLY = 0xDC7, 0xDF8
+PLACE_ONLY = 0xDF8
 MANUAL_POSITION, OFFBOARD, HOLD, MISSION, LAND = (3, 0), (6, 0), (4, 3), (4, 4), (4, 6)
 # MAVSDK's Offboard repeats its last setpoint every 50 ms, for ever; in whole intervals of 4 ms.
 REPEATED_EVERY_S = 0.052
@@ -33,7 +33,7 @@ SOCKET_HOLDS = 277
 
 
 class Commanded(VirtualTime):
-    """A vehicle that somebody commands before a wall, and a guard; `on_wire` has all that reaches the vehicle."""
+    """A vehicle that somebody commands before a wall, and a guard."""
 
     guard: Any
     vehicle: SimulatedVehicle
@@ -43,8 +43,6 @@ class Commanded(VirtualTime):
         built = Scene.model_validate({"walls": [wall], **scene})
         self.vehicle = SimulatedVehicle(load_built_in(airframe), built, built.seed, parameters=parameters)
         self.events: list[Event] = []
-        self.on_wire: list[tuple[float, str, Any]] = []
-        self.does_beat = True
         self.is_late = False  # the guard: what comes waits in its socket
         self._unread: list[bytes] = []
         self._repeated: list[Callable[[], None]] = []
@@ -71,8 +69,7 @@ class Commanded(VirtualTime):
         """The other's message goes with the next step."""
 
     def _beat(self) -> None:
-        if self.does_beat:
-            self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
 
     def command(self, number: int, *params: float) -> None:
         unset = math.nan if number == TAKEOFF else 0.0
@@ -80,11 +77,6 @@ class Commanded(VirtualTime):
 
     def set_mode(self, main_and_sub: tuple[int, int]) -> None:
         self.command(SET_MODE, 1, *main_and_sub)
-
-    def velocity(self, north: float, east: float = 0.0, down: float = 0.0) -> None:
-        values = (0.0, 0.0, 0.0, north, east, down, *[0.0] * 5)
-        boot_ms = round(1e3 * self.time_s)
-        self.send(dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, VELOCITY_ONLY, *values))
 
     def place(self, north_m: float, east_m: float = 0.0) -> None:
         """At PX4's take-off height, and nothing else."""
@@ -105,10 +97,6 @@ class Commanded(VirtualTime):
 
         self._repeated.append(act)
         return lambda: self._repeated.remove(act)
-
-    def stop_all(self) -> None:
-        """Whatever is repeated."""
-        self._repeated.clear()
 
     def step(self) -> None:
         for action in tuple(self._repeated):
@@ -134,20 +122,6 @@ class Commanded(VirtualTime):
         self.run_to(State.WATCHING, 20.0)
         self.run_for(3.0)
 
-    def sent_by(self, sender: str, name: str = "", since_s: float = 0.0, until_s: float = math.inf) -> list[Any]:
-        """Messages on the wire whose name contains that, in that time."""
-        return [
-            message
-            for at_s, who, message in self.on_wire
-            if who == sender and name in message.get_type() and since_s <= at_s < until_s
-        ]
-
-    def setpoints(self, sender: str, since_s: float = 0.0, until_s: float = math.inf) -> list[Any]:
-        return self.sent_by(sender, "SET_POSITION_TARGET", since_s, until_s)
-
-    def event_s(self, kind: str) -> float:
-        return 1e-6 * (self.event(kind).time_us - EPOCH_US)
-
 
 class BetweenFlight(Commanded):
     """The guard is the link; whoever commands comes as clients of it, each by a name."""
@@ -161,11 +135,9 @@ class BetweenFlight(Commanded):
         self._begin()
         self.link = self.vehicle.add_link(LinkKind.ONBOARD)
         self._mavlinks: dict[str, dialect.MAVLink] = {}
-        self._parser, self._reader = dialect.MAVLink(None), dialect.MAVLink(None)
+        self._reader = dialect.MAVLink(None)
         self.others_last: dict[str, Any] = {}
-        self.texts_heard: list[tuple[float, str]] = []
         self.told_by_clients: list[Any] = []
-        self.on_heard: Callable[[Any], None] = lambda message: None
 
     def _begin(self) -> None:
         self.guard, self.between = Guard(self._config), Between(2_000_000, signs=False)
@@ -198,8 +170,11 @@ class BetweenFlight(Commanded):
         self._clients = []
         for sender, packets in (("guard", self._guards), ("program", self.between.to_vehicle(self.now_us))):
             for packet in packets:
-                self.on_wire.append((self.time_s, sender, self._parser.decode(bytearray(packet))))
+                self.passes(sender, packet)
                 self.link.push(packet)
+
+    def passes(self, sender: str, packet: bytes) -> None:
+        """A packet on its way to the vehicle."""
 
     def _hear(self, received: bytes) -> None:
         heard = self.between.to_clients(received)
@@ -209,11 +184,11 @@ class BetweenFlight(Commanded):
         self.events += result.events
         self.told_by_clients += self.guard.look_at(self.between, self.now_us)
         for packet in heard:
-            message = self._reader.decode(bytearray(packet))
-            self.others_last[message.get_type()] = message
-            self.on_heard(message)
-            if message.get_type() == "STATUSTEXT":
-                self.texts_heard.append((self.time_s, message.text))
+            self.others_heard(self._reader.decode(bytearray(packet)))
+
+    def others_heard(self, message: Any) -> None:
+        """The clients."""
+        self.others_last[message.get_type()] = message
 
 
 def by_places(air: BetweenFlight) -> None:

@@ -1,4 +1,4 @@
-"""Flights of the plant alone, each heard by every detector: a hit in cruise, a hand in hover."""
+"""Flights of the plant alone: a hit in cruise, for every detector; a hit with motors off."""
 
 import math
 from contextlib import suppress
@@ -7,19 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.cases.hits import (
-    DRIFT_MAX_M_S,
-    FROM_S,
     HEIGHT_M,
-    LASTS_S,
-    LOOKED_AFTER_S,
     POLE_OFFSET_SHARES,
     Floats,
-    HandCase,
     HitCase,
     coming,
-    held_by,
     obstacle_before,
-    pushed_by,
     velocity_towards,
 )
 from bench.fly.wire import VehicleRecording
@@ -99,26 +92,6 @@ def _in_air(output: Estimate, flown_s: float, asked_ned_m: Vector3 | None) -> Si
 
 def _triple(vector: Floats) -> Vector3:
     return float(vector[0]), float(vector[1]), float(vector[2])
-
-
-def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[VehicleRecording, float]:
-    """Until some time after the hand has let go; and when it came, by the vehicle's clock in microseconds."""
-    rng = np.random.default_rng([case.seed, 5])
-    heading, drift_m_s = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, DRIFT_MAX_M_S)
-    velocity = (drift_m_s * math.cos(heading), drift_m_s * math.sin(heading), 0.0)
-    from_s = float(rng.uniform(*FROM_S))
-    until_s = from_s + float(rng.uniform(*LASTS_S))
-    grip = held_by(rng) if case.grip == "held" else pushed_by(rng, airframe)
-    scene = Scene.model_validate({"faults": [{**grip, "between_s": [from_s, until_s]}]})
-    yaw_rad = float(rng.uniform(-math.pi, math.pi))
-    cruise = Cruise(airframe, scene, (0.0, 0.0, -HEIGHT_M), velocity, yaw_rad, case.seed)
-    recording = VehicleRecording()
-    while cruise.time_boot_us < 1e6 * (until_s + LOOKED_AFTER_S):
-        setpoint = cruise.setpoint()
-        output = cruise.step(setpoint)
-        situation = _in_air(output, 1e-6 * output.time_boot_us, None)
-        recording.add(cruise.plant, output, situation, airframe.mass_kg)
-    return recording, 1e6 * from_s
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,12 @@
 """A mission flown in lockstep through the whole wire, and what is known of the flight afterwards."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
@@ -13,12 +14,13 @@ from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
-from rebound_cli.results.truth_match import FlightTruth, Vector3
+from rebound_cli.results.truth_match import FlightTruth
 from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
 from sim_vehicle.world import Obstacle
 
+Floats = npt.NDArray[np.float64]
 # The slowest hit into a surface that a detector's bars promise to find.
 NOTICED_M_S = 0.5
 # Closer than this to how it stands, a vehicle is on the ground.
@@ -27,20 +29,29 @@ STANDS_M = 0.03
 
 @dataclass(frozen=True, slots=True)
 class JudgedFlight:
-    """What a judge may look at: the mission, what the companion told, what really happened."""
+    """What a judge may look at: the mission, what the companion told, what really happened, in which world, to whom."""
 
     mission: Mission
     report: FlightReport
     events: Sequence[Event]
     truth: FlightTruth
-    start_ned_m: Vector3 = (0.0, 0.0, 0.0)
-    standing_m: float = 0.08
-    """Height of the centre when the vehicle stands on the ground."""
-    arm_m: float = 0.0
-    """From the centre to a motor's axis, about which a guard goes round with `guard_m`."""
-    guard_m: float = 0.0
-    obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
-    """By name."""
+    scene: Scene
+    airframe: Airframe
+
+    @property
+    def obstacles(self) -> dict[str, Obstacle]:
+        """By name."""
+        return {obstacle.name: obstacle for _, obstacle in self.scene.obstacles()}
+
+    @property
+    def start_ned_m(self) -> Floats:
+        """In the world, on the ground."""
+        return np.array(self.scene.start.position_ned_m)
+
+    @property
+    def standing_m(self) -> float:
+        """Height of the centre when the vehicle stands on the ground."""
+        return self.airframe.geometry.foot_depth_m
 
     def boot_us(self, event: Event) -> float:
         return event.time_us - self.truth.epoch_at_boot_us
@@ -72,18 +83,4 @@ def fly(mission: Mission, scene: Scene, airframe: Airframe, folder: Path | None 
             return fly(mission, scene, airframe, Path(name))
     flown, events = flown_in(folder, mission, scene, airframe)
     assert flown.truth is not None, "a lockstep flight has its truth"
-    return judged_flight(mission, flown.report, events, flown.truth, scene, airframe)
-
-
-def judged_flight(
-    mission: Mission,
-    report: FlightReport,
-    events: Sequence[Event],
-    truth: FlightTruth,
-    scene: Scene,
-    airframe: Airframe,
-) -> JudgedFlight:
-    frame = airframe.geometry
-    parts = frame.foot_depth_m, frame.motor_radius_m, frame.guard_radius_m
-    obstacles = {obstacle.name: obstacle for _, obstacle in scene.obstacles()}
-    return JudgedFlight(mission, report, events, truth, scene.start.position_ned_m, *parts, obstacles)
+    return JudgedFlight(mission, flown.report, events, flown.truth, scene, airframe)

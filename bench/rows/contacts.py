@@ -1,5 +1,6 @@
 """What happened in a flight: its phases by what was reported, its crashes and contacts by the simulator's truth."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from bench.fly.lockstep import JudgedFlight
 from companion.reflex.collision import CollisionReport
 from companion.report import Event
-from rebound_cli.results.truth_match import LATE_SAMPLE_US
+from rebound_cli.results.truth_match import LATE_SAMPLE_US, Vector3
 from sim_vehicle.truth import Hit
 
 
@@ -90,7 +91,7 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
         phase = phases_of(flight.events, flight.truth.epoch_at_boot_us).at(float(time_us[index]))
         if phase not in (MissionPhase.LANDING, MissionPhase.OVER):
             yield "touched the ground", f"while {phase.value} {flight.at(time_us[index])}"
-    fence, start = flight.mission.fence, np.array(flight.start_ned_m)
+    fence, start = flight.mission.fence, flight.start_ned_m
     places = series["position_ned_m"][:: max(1, len(time_us) // 2000)] - start
     outside_m = max(fence.outside_by_m((float(n), float(e), float(d))) for n, e, d in places)
     if outside_m > OUTSIDE_MOST_M:
@@ -99,11 +100,12 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
 
 def heights_m(flight: JudgedFlight) -> Floats:
     """Of the lowest part above the ground, (n,): the feet, or where the vehicle leans by more the rim of a guard."""
-    series = flight.truth.series
+    series, frame = flight.truth.series, flight.airframe.geometry
     w, x, y, z = series["attitude_wxyz"].T
     # By how much a metre along body x and y is lower.
     along_x, along_y = np.abs(2.0 * (x * z - w * y)), np.abs(2.0 * (y * z + w * x))
-    depth_m = flight.arm_m * np.sqrt(0.5) * (along_x + along_y) + flight.guard_m * np.hypot(along_x, along_y)
+    reach_m, guard_m = frame.motor_radius_m * np.sqrt(0.5), frame.guard_radius_m
+    depth_m = reach_m * (along_x + along_y) + guard_m * np.hypot(along_x, along_y)
     heights: Floats = -series["position_ned_m"][:, 2] - np.maximum(flight.standing_m, depth_m)
     return heights
 
@@ -113,6 +115,14 @@ def tilts_deg(attitude_wxyz: Floats) -> Floats:
     cosine = 1.0 - 2.0 * (attitude_wxyz[:, 1] ** 2 + attitude_wxyz[:, 2] ** 2)
     tilts: Floats = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     return tilts
+
+
+def angle_deg(one: Vector3, other: Vector3) -> float:
+    lengths = math.hypot(*one) * math.hypot(*other)
+    if lengths == 0.0:
+        return 180.0
+    cosine = sum(a * b for a, b in zip(one, other, strict=True)) / lengths
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
 
 
 # --- contacts

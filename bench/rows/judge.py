@@ -107,7 +107,7 @@ def _goal(action: object) -> Floats | None:
 def _place(flight: JudgedFlight, event: Event) -> Floats:
     """Where the vehicle truly was, mission coordinates."""
     world_ned_m = flight.truth.series["position_ned_m"][flight.row_at(flight.boot_us(event))]
-    place: Floats = world_ned_m - np.array(flight.start_ned_m) + [0.0, 0.0, flight.standing_m]
+    place: Floats = world_ned_m - flight.start_ned_m + [0.0, 0.0, flight.standing_m]
     return place
 
 
@@ -208,7 +208,7 @@ def given_up(flight: JudgedFlight) -> Iterator[str]:
 
 def _is_open(flight: JudgedFlight, event: Event, goal_ned_m: Sequence[float]) -> bool:
     start = flight.truth.series["position_ned_m"][flight.row_at(flight.boot_us(event))]
-    goal = np.array(goal_ned_m) + np.array(flight.start_ned_m) - [0.0, 0.0, flight.standing_m]
+    goal = np.array(goal_ned_m) + flight.start_ned_m - [0.0, 0.0, flight.standing_m]
     places = [start + share * (goal - start) for share in np.linspace(0.0, 1.0, _LOOKS)]
     still = [obstacle for obstacle in flight.obstacles.values() if obstacle.motion is None]
     return all(obstacle.distance_m((float(n), float(e), float(d))) > OPEN_M for obstacle in still for n, e, d in places)

@@ -3,7 +3,6 @@
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +31,6 @@ ESTIMATE = {"kind": "ekf"}
 LOST_SHARE = 0.1
 # Of an arm that is on its way: an arm that rests on its hysteresis is there to the last bit.
 LEAST_FOLD_M = 1e-6
-# The hit turns the vehicle, the attitude loop turns it back: all of that is over within a second.
-LEAN_LOOKED_AT_S = 1.0
 # What is kept of a flight that is to be drawn, around its first contact.
 TRACK_BEFORE_S, TRACK_AFTER_S = 2.0, 8.0
 
@@ -118,11 +115,7 @@ def _of_hits(truth: FlightTruth, hysteresis_m: float, again: int) -> Json:
         "impact_m_s": impact_m_s,
         "rebound_m_s": first.rebound_speed_m_s,
         "peak_n": max(hit.peak_force_n for hit in truth.hits),
-        "lean_rad": _greatest_lean_rad(truth),
         "second_hits": again - sum(ends),
-        "gaps_s": [1e-6 * (b.contact_at_boot_us - a.ended_at_boot_us) for a, b in pairwise(truth.hits)],
-        "later_peaks_n": [hit.peak_force_n for hit in later],
-        "later_folds_m": folds_m,
     }
 
 
@@ -147,15 +140,6 @@ def share_received(sample_times_boot_us: Floats, interval_us: int, hit: Hit) -> 
     start, end = hit.contact_at_boot_us, hit.ended_at_boot_us
     covered = np.minimum(sample_times_boot_us, end) - np.maximum(sample_times_boot_us - interval_us, start)
     return float(np.clip(covered, 0.0, None).sum() / max(end - start, 1.0))
-
-
-def _greatest_lean_rad(truth: FlightTruth) -> float:
-    """Of the thrust towards the wall in the second after the first touch: what presses the vehicle back on."""
-    hit = truth.hits[0]
-    since_s = 1e-6 * (truth.series["time_boot_us"] - hit.contact_at_boot_us)
-    w, x, y, z = truth.series["attitude_wxyz"][(since_s >= 0.0) & (since_s <= LEAN_LOOKED_AT_S)].T
-    thrust_ned = -np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-    return float(np.arcsin(np.clip(-np.array(hit.normal_ned) @ thrust_ned, -1.0, 1.0)).max())
 
 
 def _track(report: FlightReport, truth: FlightTruth, log: FlightLog, scene: Scene) -> Json:

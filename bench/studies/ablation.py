@@ -25,8 +25,7 @@ from bench.cases.vehicles import AIRFRAMES
 from bench.fly.campaign import Json, Results
 from bench.fly.copies import Copies
 from bench.fly.lockstep import JudgedFlight, fly
-from bench.rows.contacts import JudgedContact, Role, contacts_of
-from bench.rows.heard import angle_deg
+from bench.rows.contacts import JudgedContact, Role, angle_deg, contacts_of
 from bench.rows.judge import failures
 from bench.rows.recovered import recoveries
 from bench.rows.tables import table

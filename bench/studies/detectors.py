@@ -1,31 +1,41 @@
-"""`bench detectors`: every collision detector on simulated hits, and in a hand."""
+"""`bench detectors`: every collision detector on simulated hits, by what each reported, beside the truth."""
 
+import math
 from argparse import Namespace
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import pandas as pd
 
-from bench.cases.hits import SPEEDS_M_S, HandCase, HitCase, draw_case, draw_hand
+from bench.cases.hits import SPEEDS_M_S, HitCase, draw_case, vehicle_of_hit
 from bench.detectors.config import BaselineConfig
-from bench.fly.campaign import Results
-from bench.fly.wire import ASKED_HZ, FLOWN_WITH
-from bench.rows.heard import OF_FOUND, work_out_heard
+from bench.fly.campaign import Json, Results
+from bench.fly.cruise import hit_of
+from bench.fly.wire import (
+    ASKED_HZ,
+    FLOWN_WITH,
+    FOUND_WITHIN_US,
+    Found,
+    HeardStep,
+    VehicleRecording,
+    configuration,
+    heard,
+    streams_asked_hz,
+    watch_all,
+)
+from bench.rows.contacts import angle_deg
 from bench.rows.tables import Bar, bars_text, per_cent, rms, share_bar, summary_text, table, text_of
 from bench.studies.study import Shown, run_study
+from companion.messages import ImuSample
+from sim_vehicle.truth import Hit
 
 # Tried on everything. The others are compared on at least so many hits, and on one in eight at most sizes:
 # all seven take three times as long as these two.
 THOROUGH = ("fused", "threshold")
 COMPARED_HITS, COMPARED_EVERY_AT_MOST = 400, 8
-# Beside the hits of the airframes as they are, one in so many again with more vibration.
-VARIED_SHARE = 16
-# An IMU sample's spread on each axis; four public PX4 logs of healthy flights lie between 1.2 and 4 m/s^2.
-VIBRATIONS_M_S2 = (0.05, 1.0, 2.0, 4.0)
-# Of a hovering vehicle, by hand: one in so many each, by the default detector and the baseline alone.
-# No more than these, which take two minutes of one core together; a missed one in a hundred shows.
-SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
+# Of a hovering vehicle: one in so many, by the default detector and the baseline alone. No more than these, which take
+# a minute of one core; a missed one in a hundred shows.
+SIDE_SHARE, SIDE_AT_MOST = 16, 240
 # What the drone's own detector must show, by airframe and rate received.
 DEFAULT, SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
 FOUND_BARS = {("foldable", rate): 1.0 for rate in ASKED_HZ}
@@ -35,83 +45,134 @@ LATE_BAR = 0.01
 FAST_M_S, SPEED_ERROR_BAR_M_S, SPEED_ERROR_BAR = 2.0, 0.05, 0.03
 SPEED_BINS_M_S = [0.3, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0]
 USUAL = ("airframe", "rate")
-Frames = Mapping[type[object], pd.DataFrame]
+# A force counts as above the noise floor from this many standard deviations of an IMU sample on: of ten hours at
+# 250 Hz on three axes, 2.7e7 numbers, noise alone takes one above six with a probability of 0.05.
+NOISE_FLOOR_SIGMAS = 6.0
+# None of a hit that was not found.
+OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "normal_error_deg")
 
 
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
-    hits, first = options.hits, options.first_seed
-    cases: list[Any] = [*hit_cases(hits, first), *hand_cases(hits, first)]
-    cases = [replace(case, is_drawn=options.vehicles == "drawn") for case in cases]
-    return run_study(options, "detectors", "Detection", cases, work_out_heard, shown)
+    cases = [
+        replace(case, is_drawn=options.vehicles == "drawn") for case in hit_cases(options.hits, options.first_seed)
+    ]
+    return run_study(options, "detectors", "Detection", cases, work_out_hit, shown)
 
 
 def shown(results: Results) -> Shown:
-    frames: Frames = {kind: rows(results, kind) for kind in (HitCase, HandCase)}
-    bars = all_bars(frames)
-    parts = {"What must be shown": bars_text(bars), **all_tables(frames)}
-    return Shown(parts, summary_text(bars), frames[HitCase])
+    hits = rows(results)
+    bars = all_bars(hits)
+    return Shown({"What must be shown": bars_text(bars), **all_tables(hits)}, summary_text(bars), hits)
 
 
-def rows(results: Results, kind: type) -> pd.DataFrame:
-    """One for each case of a kind, rate and detector: the case's own numbers, the truth's, and what was reported."""
-    found = [
-        {"case": at, **asdict(case), **row}
-        for at, (case, heard) in enumerate(each for each in results.found if isinstance(each[0], kind))
-        for row in heard["rows"]
-    ]
-    frame = pd.DataFrame(found).drop(columns="detectors")
-    return frame.astype(dict.fromkeys(OF_FOUND, float)) if kind is HitCase else frame
+def rows(results: Results) -> pd.DataFrame:
+    """One for each case, rate and detector: the case's own numbers, the truth's, and what was reported."""
+    found = [{"case": at, **asdict(case), **row} for at, (case, hit) in enumerate(results.found) for row in hit["rows"]]
+    return pd.DataFrame(found).drop(columns="detectors").astype(dict.fromkeys(OF_FOUND, float))
 
 
 def hit_cases(hits: int, first: int) -> list[HitCase]:
-    """So many hits as the vehicles are, a sixteenth more that vibrate, and some in hover."""
-    every = _every(hits, COMPARED_HITS)
-    cases = [draw_case("plain", seed, _compared(seed, every)) for seed in range(first, first + hits)]
-    first += hits
-    for seed in range(first, first + hits // VARIED_SHARE):
-        vibration = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
-        cases.append(draw_case("vibration", seed, _compared(seed, every), vibration_m_s2=vibration))
+    """So many hits in cruise, and some in hover. In pairs, so that both airframes have their turns at all detectors."""
+    every = max(1, min(COMPARED_EVERY_AT_MOST, hits // COMPARED_HITS))
+    compared = {seed: seed // 2 % every == 0 for seed in range(first, first + hits)}
+    everyone = tuple(BaselineConfig.detectors)
+    cases = [draw_case("plain", seed, everyone if is_for_all else THOROUGH) for seed, is_for_all in compared.items()]
     # Where these seeds have always been.
-    first += 3 * hits
-    side = range(first, first + _side(hits, SIDE_HITS_AT_MOST))
+    first += 4 * hits
+    side = range(first, first + 2 * max(1, min(SIDE_AT_MOST, hits // SIDE_SHARE) // 2))
     return cases + [draw_case("struck", seed, THOROUGH, is_struck=True) for seed in side]
 
 
-def hand_cases(hits: int, first: int) -> list[HandCase]:
-    """A hand's grips on a hovering vehicle, as many as belong to so many hits."""
-    return [draw_hand(seed, THOROUGH) for seed in range(first, first + 2 * _side(hits, HANDS_AT_MOST // 2))]
+# --- one hit
 
 
-def _side(hits: int, at_most: int) -> int:
-    """In pairs, one for each airframe, and never none."""
-    return 2 * max(1, min(at_most, hits // SIDE_SHARE) // 2)
+@dataclass(frozen=True, slots=True)
+class Possible:
+    """The first sample that shows the contact, or None where the contact fell between the samples."""
+
+    time_boot_us: int | None
+    imu_times_boot_us: Sequence[int]
+
+    def samples_late(self, found_boot_us: int) -> int | None:
+        """How many IMU samples the report came after the first possible one; 0: with it."""
+        first = self.time_boot_us
+        if first is None:
+            return None
+        if found_boot_us <= first:
+            return 0
+        return sum(first < time_us <= found_boot_us for time_us in self.imu_times_boot_us)
 
 
-def _every(cases: int, compared: int) -> int:
-    """One in how many cases is for all detectors."""
-    return max(1, min(COMPARED_EVERY_AT_MOST, cases // compared))
+def first_possible(
+    recording: VehicleRecording, arrived: Sequence[HeardStep], touch_boot_us: float, floor_m_s2: float
+) -> Possible:
+    """By the truth: the first received sample whose averaging window holds the contact's force above the floor."""
+    contact_m_s2 = {
+        sample.time_boot_us: force for sample, force in zip(recording.samples, recording.contact_m_s2, strict=True)
+    }
+    times, first = [], None
+    for step in arrived:
+        stamps_heard = [sample.time_boot_us for sample in step.samples if isinstance(sample, ImuSample)]
+        if not stamps_heard:
+            continue
+        times.append(step.time_boot_us)
+        shows = any(stamp >= touch_boot_us and contact_m_s2[stamp] > floor_m_s2 for stamp in stamps_heard)
+        if shows and first is None:
+            first = step.time_boot_us
+    return Possible(first, times)
 
 
-def _compared(seed: int, every: int) -> tuple[str, ...]:
-    """In pairs, so that both airframes have their turns."""
-    return tuple(BaselineConfig.detectors) if seed // 2 % every == 0 else THOROUGH
+def work_out_hit(case: HitCase) -> Json:
+    """Fly it once, then let every detector hear it at every rate: a row for each."""
+    vehicle = vehicle_of_hit(case)
+    recording, hit = hit_of(case, vehicle.airframe)
+    touch_us = hit.contact_at_boot_us
+    floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
+    truth = {"true_speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s)}
+    rows = []
+    for rate in ASKED_HZ:
+        arrived = heard(recording, streams_asked_hz(rate), case.seed + rate)
+        possible = first_possible(recording, arrived, touch_us, floor_m_s2)
+        possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
+        for name in case.detectors:
+            found, touches = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
+            told = sum(touch.impact.sample_time_boot_us >= touch_us for touch in touches)
+            entry = _entry(found, hit, possible) | {"touches": told}
+            rows.append({**truth, "rate": rate, "possible_ms": possible_ms, "detector": name, **entry})
+    return {"rows": rows}
 
 
-# --- tables: a frame a kind of case, a row a case, rate and detector
+def _entry(found: Sequence[Found], hit: Hit, possible: Possible) -> Json:
+    """One detector's report on one hit."""
+    touch_us = hit.contact_at_boot_us
+    false = sum(f.time_boot_us < touch_us for f in found)
+    first = next((f for f in found if touch_us <= f.time_boot_us <= touch_us + FOUND_WITHIN_US), None)
+    if first is None:
+        return {"false": false, "evidence": None, **dict.fromkeys(OF_FOUND)}
+    velocity, true_velocity = first.final.velocity_ned_m_s, hit.impact_velocity_ned_m_s
+    return {
+        "false": false,
+        "latency_ms": 1e-3 * (first.time_boot_us - touch_us),
+        "samples_late": possible.samples_late(first.time_boot_us),
+        "evidence": first.first.impact.evidence.value,
+        "speed_error_m_s": math.hypot(*velocity) - math.hypot(*true_velocity),
+        "normal_error_deg": angle_deg(first.final.normal.direction_ned, hit.normal_ned),
+    }
 
 
-def all_tables(frames: Frames) -> dict[str, str]:
+# --- all of them: a row a case, rate and detector
+
+
+def all_tables(hits: pd.DataFrame) -> dict[str, str]:
     """By their headings; of every detector, and more of the drone's own."""
-    hits = frames[HitCase].assign(band=pd.cut(frames[HitCase]["speed_m_s"], SPEED_BINS_M_S, right=False))
+    hits = hits.assign(band=pd.cut(hits["speed_m_s"], SPEED_BINS_M_S, right=False))
     ours = hits[hits["detector"] == DEFAULT]
     return {
         "Every detector on simulated hits": by(usual(hits), "detector", *USUAL),
         "By obstacle": by(usual(ours), "approach", *USUAL),
         "By speed": by(ours[ours["family"] == "plain"], "band", *USUAL),
-        "By vibration": by(ours[ours["family"] == "vibration"], "vibration_m_s2", *USUAL),
         "Struck in hover": by(hits[hits["family"] == "struck"], "detector", *USUAL),
-        "In a person's hand": hands_table(frames[HandCase]),
     }
 
 
@@ -136,31 +197,16 @@ def _figures(hits: pd.DataFrame) -> dict[str, object]:
     }
 
 
-def hands_table(hands: pd.DataFrame) -> str:
-    groups = hands.assign(wrong=hands["collisions"].map(bool)).groupby(["grip", "detector", "rate"])
-    counted = {
-        "hands": ("wrong", "size"),
-        "taken_for_a_collision": ("wrong", "sum"),
-        "told": ("told_after_ms", "count"),
-    }
-    figures = groups.agg(**counted)
-    return table(figures.assign(after_ms=groups["told_after_ms"].median().round(1)).reset_index())
-
-
 # --- what must be shown of the drone's own detector
 
 
-def all_bars(frames: Frames) -> list[Bar]:
-    ours, hands = (frames[kind].query("detector == @DEFAULT") for kind in (HitCase, HandCase))
+def all_bars(hits: pd.DataFrame) -> list[Bar]:
     bars: list[Bar] = []
-    for (airframe, rate), hits in ours.groupby(list(USUAL)):
+    for (airframe, rate), ours in hits[hits["detector"] == DEFAULT].groupby(list(USUAL)):
         where, least = f"{airframe}, {rate} Hz", FOUND_BARS[airframe, rate]
-        bars += _hit_bars(where, least, usual(hits))
-        struck = hits[hits["family"] == "struck"]["latency_ms"].notna()
+        bars += _hit_bars(where, least, usual(ours))
+        struck = ours[ours["family"] == "struck"]["latency_ms"].notna()
         bars.append(share_bar(f"{where}, struck in hover at 0.5 to 3 m/s: detected", struck, least))
-    for (rate, grip), held in hands.groupby(["rate", "grip"]):
-        what = f"{rate} Hz, {grip} by a hand in hover: no collision"
-        bars.append(share_bar(what, ~held["collisions"].map(bool), 1.0))
     return bars
 
 

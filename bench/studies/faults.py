@@ -14,7 +14,7 @@ from bench.faults.catalogue import FLOWN, GROUPS
 from bench.fly.air import ENDS, FAILED, HANDED_OVER, KILLED, Fault
 from bench.fly.campaign import Json, Results
 from bench.fly.faulted import FaultedFlight
-from bench.fly.lockstep import NOTICED_M_S, STANDS_M, JudgedFlight, judged_flight
+from bench.fly.lockstep import NOTICED_M_S, STANDS_M, JudgedFlight
 from bench.rows.contacts import AIRBORNE_M, crashes, heights_m, tilts_deg
 from bench.rows.tables import table
 from bench.studies.study import Shown, run_study
@@ -129,7 +129,7 @@ def _flown(flight: FaultedFlight) -> JudgedFlight:
         for event, at_s in zip(flight.recorder.events, flight.recorder.told_s, strict=True)
     ]
     known = FlightTruth(truth.hits, truth.series(), EPOCH_US, truth.faults)
-    return judged_flight(flight.mission, flight.companion.report(), events, known, flight.scene, flight.airframe)
+    return JudgedFlight(flight.mission, flight.companion.report(), events, known, flight.scene, flight.airframe)
 
 
 def _log(flight: FaultedFlight) -> list[str]:

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from bench.fly.campaign import CODE
-from bench.rows.heard import work_out_hit
 from bench.rows.judge import work_out_mission
 from bench.studies import kills
+from bench.studies.detectors import work_out_hit
 from bench.studies.faults import work_out_fault
 from bench.studies.hits import work_out_flown
 from tests.import_graph import module_imports

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from bench.cases.hits import draw_case, draw_hand, vehicle_of_hit
+from bench.cases.hits import draw_case, vehicle_of_hit
 from bench.fly.cruise import fly_hit
 from bench.fly.wire import ASKED_HZ, VehicleRecording, heard, streams_asked_hz
-from bench.rows.heard import first_possible, work_out_hand, work_out_hit
+from bench.studies.detectors import first_possible, work_out_hit
 from companion.mavlink.decode import Decoder
 from companion.messages import ExtendedState
 from companion.reflex.detector import Situation
@@ -116,11 +116,9 @@ def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
 # --- verdicts ---------------------------------------------------------------------------------------------------------
 
 
-def test_the_default_detector_finds_them_and_lets_hands_be():
-    # Given a hit, an obstacle that comes, and a hand
+def test_the_default_detector_finds_them():
+    # Given a hit, and an obstacle that comes
     for is_struck in (False, True):
-        # Then the hits are found at every rate, with no alarm before, and the hand is no collision
+        # Then the hits are found at every rate, with no alarm before
         for row in work_out_hit(draw_case("any", 1, ("fused",), is_struck=is_struck))["rows"]:
             assert row["latency_ms"] is not None and row["false"] == 0
-    for row in work_out_hand(draw_hand(6, ("fused",)))["rows"]:
-        assert row["collisions"] == [] and row["told_after_ms"] is not None

@@ -5,7 +5,7 @@ import dataclasses
 import pandas as pd
 import pytest
 
-from bench.cases.hits import HandCase, HitCase, draw_case, draw_hand
+from bench.cases.hits import draw_case
 from bench.fly.campaign import Results
 from bench.fly.wire import ASKED_HZ
 from bench.main import main
@@ -21,11 +21,11 @@ BY = ("fused", "threshold")
 
 
 def frame(cases, results):
-    return rows(Results([*zip(cases, results, strict=True)]), type(cases[0]))
+    return rows(Results([*zip(cases, results, strict=True)]))
 
 
-def bars(count=200, collisions=(), **changes):
-    """Perfect hits and hands of either airframe; the first two hits of each kind are changed."""
+def bars(count=200, **changes):
+    """Perfect hits of either airframe; the first two hits of each kind are changed."""
     plain = [draw_case("plain", seed, BY) for seed in range(count)]
     struck = [draw_case("struck", seed, BY) for seed in range(4)]
     cases = [dataclasses.replace(case, speed_m_s=2.5) for case in (*plain, *struck)]
@@ -35,9 +35,7 @@ def bars(count=200, collisions=(), **changes):
         ours = {**FOUND, **(changes if case.seed < 2 else {})}
         theirs = FOUND | {"latency_ms": None if case.seed < 4 else 40.0}
         hits.append(at_each_rate({**truth, "detector": "fused", **ours}, {**truth, "detector": "threshold", **theirs}))
-    hands = [draw_hand(seed, ("fused",)) for seed in range(4)]
-    held = at_each_rate({"detector": "fused", "collisions": list(collisions), "told_after_ms": 40.0})
-    return all_bars({HitCase: frame(cases, hits), HandCase: frame(hands, [held] * 4)})
+    return all_bars(frame(cases, hits))
 
 
 def at_each_rate(*rows):
@@ -48,7 +46,7 @@ def verdicts(found, word):
     return {bar.verdict for bar in found if word in bar.what} - {REPORTED}
 
 
-def test_perfect_hits_and_hands_meet_every_bar():
+def test_perfect_hits_meet_every_bar():
     assert {bar.verdict for bar in bars()} == {MET}
 
 
@@ -59,7 +57,6 @@ def test_perfect_hits_and_hands_meet_every_bar():
         ({"latency_ms": None}, "struck in hover"),
         ({"samples_late": 2}, "at the first sample that shows it"),
         ({"speed_error_m_s": 2.0}, ": v_c"),
-        ({"collisions": ["wall"]}, "by a hand"),
     ],
 )
 def test_each_figure_has_its_bar(changes, word):

@@ -11,7 +11,7 @@ from bench.cases.walls import approach
 from bench.detectors.config import BaselineMission
 from bench.fly.cruise import head_on
 from bench.rows.paper import StudyFlight, ends_the_one_before, fly, share_received
-from bench.studies.paper import command, scenarios, single
+from bench.studies.paper import command, flights, single
 from bench.studies.paper.study import CLAIMS, FAILED, PASSED, claim
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
@@ -25,7 +25,7 @@ DOCUMENT = (ROOT / "bench" / "notes" / "paper.md").read_text()
 
 
 # What the claims' texts are told.
-NUMBERS = ("flown", "from_m", "to_m", "rms", "lost", "own", "past", "speed", "said", "contact", "contact_ms", "least")
+NUMBERS = ("flown", "from_m", "to_m", "rms", "lost", "own", "past", "speed", "sides", "contact", "contact_ms", "least")
 NUMBERS += ("mass", "scaled", "on")
 AROUND = [name for name, stated in CLAIMS.items() if {"within", "factor"} & {*stated}]
 
@@ -114,11 +114,11 @@ def test_every_study_states_the_papers_detector_law_and_gain(study):
 @pytest.fixture(scope="module")
 def sample():
     """The row of the sample scenario."""
-    return fly(scenarios.SAMPLE.flights(1)[0])
+    return fly(flights.SAMPLE.flights(1)[0])
 
 
 def test_the_sample_scenario_agrees_and_its_picture_marks_everything(sample):
-    findings = scenarios.SAMPLE.conclude(pd.DataFrame([sample]))
+    findings = flights.SAMPLE.conclude(pd.DataFrame([sample]))
     assert {row["verdict"] for row in findings.rows} == {PASSED}
     figure = findings.pictures["sample_scenario.png"]
     names = {text.get_text() for text in figure.legends[0].get_texts()}
@@ -132,7 +132,7 @@ def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
     x, (north_m, *beside) = sample["contact_m"][0], sample["setpoint_m"]
     for wrong_m in (north_m - x, 2 * (x - north_m), (x - north_m) / 2):
         moved = sample | {"setpoint_m": [x - wrong_m, *beside]}
-        rows = scenarios.SAMPLE.conclude(pd.DataFrame([moved])).rows
+        rows = flights.SAMPLE.conclude(pd.DataFrame([moved])).rows
         assert [row["claim"] for row in rows if row["verdict"] == FAILED] == ["setpoint by eq. 3, back from x(t_c)"]
 
 

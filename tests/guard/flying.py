@@ -11,6 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from bench.fly import commanded
 from bench.fly.commanded import MANUAL_POSITION, OFFBOARD, REPEATED_EVERY_S, Commanded
 from bench.fly.packets import GROUND_STATION, decoded
 from bench.fly.virtual_time import EPOCH_US
@@ -21,8 +22,61 @@ from companion.guard.states import State
 from companion.report import Event
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
+VELOCITY_ONLY = 0xDC7
 
-class GuardedFlight(Commanded):
+
+class Watched(Commanded):
+    """`on_wire` has all that reaches the vehicle: when, from whom and what."""
+
+    def __init__(self, *arguments: Any, **scene: Any) -> None:
+        self.on_wire: list[tuple[float, str, Any]] = []
+        super().__init__(*arguments, **scene)
+
+    def passes(self, sender: str, packet: bytes) -> None:
+        self.on_wire.append((self.time_s, sender, decoded(packet)))
+
+    def velocity(self, north: float, east: float = 0.0, down: float = 0.0) -> None:
+        values = (0.0, 0.0, 0.0, north, east, down, *[0.0] * 5)
+        boot_ms = round(1e3 * self.time_s)
+        self.send(dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, VELOCITY_ONLY, *values))
+
+    def stop_all(self) -> None:
+        """Whatever is repeated."""
+        self._repeated.clear()
+
+    def sent_by(self, sender: str, name: str = "", since_s: float = 0.0, until_s: float = math.inf) -> list[Any]:
+        """Messages on the wire whose name contains that, in that time."""
+        return [
+            message
+            for at_s, who, message in self.on_wire
+            if who == sender and name in message.get_type() and since_s <= at_s < until_s
+        ]
+
+    def setpoints(self, sender: str, since_s: float = 0.0, until_s: float = math.inf) -> list[Any]:
+        return self.sent_by(sender, "SET_POSITION_TARGET", since_s, until_s)
+
+    def event_s(self, kind: str) -> float:
+        return 1e-6 * (self.event(kind).time_us - EPOCH_US)
+
+
+class BetweenFlight(Watched, commanded.BetweenFlight):
+    """The guard is the link."""
+
+    def __init__(
+        self, config: GuardConfig | None = None, parameters: dict[str, float] | None = None, **scene: Any
+    ) -> None:
+        super().__init__(config, parameters, **scene)
+        self.texts_heard: list[tuple[float, str]] = []
+        self.on_heard: Callable[[Any], None] = lambda message: None
+
+    def others_heard(self, message: Any) -> None:
+        super().others_heard(message)
+        self.on_heard(message)
+        if message.get_type() == "STATUSTEXT":
+            self.texts_heard.append((self.time_s, message.text))
+
+
+class GuardedFlight(Watched):
     """The guard on one link, the pilot or the program on another; `others_last` is what that one has heard.
 
     `forward` is where a pilot holds the stick, once there is one.
@@ -68,7 +122,8 @@ class GuardedFlight(Commanded):
             ("guard", self._guards, self._guards_link),
             ("other", self._others, self._others_link),
         ):
-            self.on_wire += [(self.time_s, sender, decoded(packet)) for packet in packets]
+            for packet in packets:
+                self.passes(sender, packet)
             link.push(b"".join(packets))
         self._guards, self._others = [], []
         self.vehicle.advance()
@@ -85,7 +140,7 @@ class GuardedFlight(Commanded):
         return list(result.events)
 
 
-class AttachedFlight(Commanded):
+class AttachedFlight(Watched):
     """What the program sends goes through the guard's gate, as MAVSDK's does; `sender` is "guard" or "program"."""
 
     def __init__(self, config: GuardConfig | None = None) -> None:
@@ -119,7 +174,7 @@ class AttachedFlight(Commanded):
         for sender, name, fields in outgoing:
             if self.guard.lets_pass(name, fields, self.now_us):
                 packets += packet_of(name, fields)
-                self.on_wire.append((self.time_s, sender, decoded(packet_of(name, fields))))
+                self.passes(sender, packet_of(name, fields))
         for packet in self.vehicle.step(packets):
             self.hear(decoded(packet), self.now_us)
 

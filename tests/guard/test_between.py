@@ -16,7 +16,6 @@ from bench.fly.commanded import (
     MANUAL_POSITION,
     OFFBOARD,
     REPEATED_EVERY_S,
-    BetweenFlight,
     by_places,
     by_sticks,
     fly_a_mission,
@@ -29,6 +28,7 @@ from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS, would_move
 from companion.mavlink.packet import message_id_of, packet_length
 from companion.mavlink.signing import Signing
+from tests.guard.flying import BetweenFlight
 
 TOO_LATE_S = 0.15
 LINK_BYTES_S = 2_000_000

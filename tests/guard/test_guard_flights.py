@@ -303,7 +303,7 @@ def test_a_failsafe_that_flies_is_not_taken_over_from():
     """AUTO.RTL may be guarded; while a failsafe has chosen it, the vehicle's own judgement goes first."""
     air = Air(parameters={"NAV_DLL_ACT": 2.0, "COM_DL_LOSS_T": 5.0})
     air.take_off()
-    air.does_beat = False
+    air.stop_all()
     air.run_until(lambda: air.mode == "AUTO.RTL", 15.0)
     air.run_for(1.2)
     assert air.state is State.STANDING_BY and "standing by: a failsafe flies" in air.told("standing_by")

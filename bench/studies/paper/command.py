@@ -9,17 +9,17 @@ from matplotlib.figure import Figure
 from bench.fly.campaign import Results
 from bench.rows.paper import fly
 from bench.rows.tables import table
-from bench.studies.paper import rigid, scenarios, single, walls
-from bench.studies.paper.study import Claim, sampling_text, verdict_text
+from bench.studies.paper import flights, rigid, single
+from bench.studies.paper.study import Claim, verdict_text
 from bench.studies.study import Shown, run_study
 
 STUDIES = (
     single.ARM,
-    scenarios.SAMPLE,
-    scenarios.EXPERIMENT,
-    walls.FLIGHT_TESTS,
+    flights.SAMPLE,
+    flights.EXPERIMENT,
+    flights.FLIGHT_TESTS,
     rigid.WHY,
-    walls.ANY_SIDE,
+    flights.ANY_SIDE,
     rigid.SAMPLING,
     single.OTHERS,
 )
@@ -39,7 +39,7 @@ def shown(results: Results) -> Shown:
     for study in STUDIES:
         flown = rows[rows["study"] == study.title]
         found = study.conclude(flown)
-        parts[study.title] = (f"{sampling_text(flown)}\n\n" if len(flown) else "") + table(found.rows)
+        parts[study.title] = table(found.rows)
         parts |= found.tables
         pictures |= found.pictures
         claims += found.rows

@@ -20,7 +20,7 @@ from bench.studies.paper.figures import (
     mark_paper,
     new_figure,
 )
-from bench.studies.paper.study import Findings, Study, claim, safety_text
+from bench.studies.paper.study import Findings, Study, claim
 from rebound_cli.results.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.setpoint import TrajectorySetpoint
@@ -182,7 +182,7 @@ def _conclude(flights: pd.DataFrame) -> Findings:
             "pulse at half of its peak [ms]": f"{1e3 * each['width_s']:.2f}",
             "whole contact [ms]": f"{1e3 * each['contact_s']:.2f}",
             "peak force [N]": f"{each['peak_n']:.0f}",
-            "factor of safety": safety_text(each["peak_n"]),
+            "factor of safety": f"{BREAKING_FORCE_N / each['peak_n']:.2f}",
         }
         for (name, speed_m_s), each in pulses.items()
     ]

@@ -42,12 +42,6 @@ class Study:
     conclude: Callable[[pd.DataFrame], Findings]
 
 
-def safety_text(peak_force_n: float) -> str:
-    """The paper's factor of safety at this force, flagged where the arm would not hold."""
-    factor = BREAKING_FORCE_N / peak_force_n
-    return f"{factor:.2f}" if factor >= 1.0 else f"**{factor:.2f}**"
-
-
 def flown_table(flights: pd.DataFrame, **names: str) -> str:
     """Of flights that hit the wall: a row for those alike in some columns, under these headings."""
     groups = flights[flights["hits"] > 0].groupby(list(names), sort=False)
@@ -71,18 +65,9 @@ def _cells(flights: pd.DataFrame) -> dict[str, object]:
         "setpoint from true x(t_c) [m]": f"{np.mean(back_m):.2f}" if back_m else "",
         "overshoot, max [m]": number(round(float(flights["past_m"].max()), 3)),
         "by its own estimate [m]": number(round(float(flights["own_past_m"].max()), 3)),
-        "lean into the wall, max [°]": f"{np.degrees(flights['lean_rad'].max()):.0f}",
         "peak force, max [N]": f"{flights['peak_n'].max():.0f}",
-        "factor of safety": safety_text(flights["peak_n"].max()),
+        "factor of safety": f"{BREAKING_FORCE_N / flights['peak_n'].max():.2f}",
     }
-
-
-def sampling_text(flights: pd.DataFrame) -> str:
-    """How the inertial sensor was received: the range over these flights."""
-    lengths = " or ".join(f"{1e-3 * us:g}" for us in sorted(flights["interval_us"].unique()))
-    rate, most = (f"{hz:.0f}" for hz in (flights["imu_hz"].min(), flights["imu_hz"].max()))
-    rate = rate if rate == most else f"{rate} to {most}"
-    return f"`HIGHRES_IMU` as received: {rate} Hz, each sample the mean of {lengths} ms."
 
 
 # --- verdicts

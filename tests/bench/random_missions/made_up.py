@@ -7,11 +7,11 @@ from companion.mission.model import Mission
 from companion.reflex.collision import CollisionReport
 from companion.report import Event, FlightReport
 from rebound_cli.results.truth_match import FlightTruth
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
-from sim_vehicle.world import plate
 
 EPOCH_US = 1_000_000_000
-ARM_M, GUARD_M = 0.145, 0.1
 STANDING_M = 0.08
 # Seconds: armed, up, there, told to land, stands.
 ARMED_S, UP_S, THERE_S, LANDING_S, DONE_S = 5.0, 8.0, 12.0, 12.1, 17.0
@@ -126,7 +126,10 @@ def flight(
     )
     truth = FlightTruth(tuple(hits), series or plain_path(), EPOCH_US)
     events = tuple(plain_events() if events is None else events)
-    wall = plate("wall", (2.2, 0.0, -2.0), (-1.0, 0.0, 0.0), (10.0, 10.0), 0.1)
-    told = mission(**mission_changes)
-    start = (0.0, 0.0, 0.0)
-    return JudgedFlight(told, report, events, truth, start, STANDING_M, ARM_M, GUARD_M, {"wall": wall})
+    return JudgedFlight(mission(**mission_changes), report, events, truth, room(), load_built_in("foldable"))
+
+
+def room(place=(2.2, 0.0, -2.0), normal=(-1.0, 0.0, 0.0)):
+    """A wall across the way, or elsewhere."""
+    wall = {"name": "wall", "point_ned_m": place, "normal_ned": normal, "width_m": 10.0, "height_m": 10.0}
+    return Scene.model_validate({"walls": [wall]})

@@ -9,7 +9,6 @@ import pytest
 from bench.rows.contacts import Role, contacts_of
 from bench.rows.judge import failures
 from bench.rows.recovered import recoveries
-from sim_vehicle.world import plate
 from tests.bench.random_missions.made_up import (
     DONE_S,
     collision,
@@ -19,6 +18,7 @@ from tests.bench.random_missions.made_up import (
     hit,
     path,
     plain_path,
+    room,
 )
 
 # At the wall at 10 s, back half a metre, down there.
@@ -166,8 +166,8 @@ def test_a_goal_called_out_of_reach_is_one_behind_something():
     judged = bounced(*told, policy=DETOUR)
     assert causes(judged) == []
     # with the wall 2 m beside the straight way, which is the line east = 0
-    beside = plate("wall", (2.2, 2.0, -2.0), (0.0, -1.0, 0.0), (10.0, 10.0), 0.1)
-    assert causes(replace(judged, obstacles={"wall": beside})) == ["gave up a goal in the open"]
+    beside = room((2.2, 2.0, -2.0), (0.0, -1.0, 0.0))
+    assert causes(replace(judged, scene=beside)) == ["gave up a goal in the open"]
 
 
 def test_contacts_in_a_recovery_are_the_same_surface_again_or_another():
