@@ -75,8 +75,10 @@ DOES: dict[str, Callable[..., Injector]] = {
     "thinned": lambda c, names, every: injectors.thinned(When.flying(c), _numbers(names), every),
     "jumped": lambda c, jump_s: Injector(When.flying(c), ahead_s=jump_s),
     "anew": lambda c: _once(lambda air: air.inject(clock_jump(-air.now_s)), c),
-    "stalled": lambda c, seconds, moment="flying": _once(injectors.stall(seconds), c, moment),
-    "signalled": lambda c, reason, moment="flying": _once(injectors.signal(reason), c, moment),
+    "stalled": lambda c, seconds, moment="flying": _once(lambda air: setattr(air, "stall_s", seconds), c, moment),
+    "signalled": lambda c, reason, moment="flying": _once(
+        lambda air: setattr(air.interrupts, "reason", reason), c, moment
+    ),
     "killed": partial(_once, Air.kill),
     "step_breaks": partial(_once, injectors.break_step),
     "memory_ends": partial(_once, lambda air: injectors.break_step(air, MemoryError())),

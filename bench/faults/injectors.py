@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+import operator
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from bench.fly.air import Air, Injector, When
@@ -38,19 +39,16 @@ def rewritten(when: When, numbers: Sequence[int], change: Change) -> Injector:
 
 def stuck(when: When, numbers: Sequence[int]) -> Injector:
     """Messages come at their rate, with the stamps of their time, and say for ever what they said at first."""
-    first: dict[int, bytes] = {}
+    first: dict[int, dict[str, Any]] = {}
 
-    def restamp(message: Any, air: Air) -> None:
-        for name, unit_us in (("time_usec", 1), ("time_boot_ms", 1000)):
-            if hasattr(message, name):
-                setattr(message, name, air.vehicle.time_boot_us // unit_us)
+    def repeat(message: Any, air: Air) -> None:
+        said = {
+            name: getattr(message, name) for name in message.fieldnames if name not in ("time_usec", "time_boot_ms")
+        }
+        for name, value in first.setdefault(message.get_msgId(), said).items():
+            setattr(message, name, value)
 
-    def one(air: Air, frame: bytes) -> bytes:
-        if message_id_of(frame) not in numbers:
-            return frame
-        return changed(first.setdefault(message_id_of(frame), frame), lambda message: restamp(message, air))
-
-    return Injector(when, to_companion=lambda air, frames: [one(air, frame) for frame in frames])
+    return rewritten(when, numbers, repeat)
 
 
 def thinned(when: When, numbers: Sequence[int], keep_every: int) -> Injector:
@@ -65,20 +63,18 @@ def thinned(when: When, numbers: Sequence[int], keep_every: int) -> Injector:
 
 def setting(**fields: Any) -> Change:
     """A change that gives fields these values."""
-
-    def change(message: Any, air: Air) -> None:
-        for name, value in fields.items():
-            setattr(message, name, value)
-
-    return change
+    return _changing(lambda now, value: value, fields)
 
 
 def adding(**fields: float) -> Change:
     """A change that adds to fields."""
+    return _changing(operator.add, fields)
 
+
+def _changing(new: Callable[[Any, Any], Any], fields: Mapping[str, Any]) -> Change:
     def change(message: Any, air: Air) -> None:
         for name, value in fields.items():
-            setattr(message, name, getattr(message, name) + value)
+            setattr(message, name, new(getattr(message, name), value))
 
     return change
 
@@ -167,22 +163,6 @@ def taken(when: When, stall_s: float = 0.0, cut_s: float = 0.0) -> Injector:
 
 
 # --- the process
-
-
-def stall(seconds: float) -> Callable[[Air], None]:
-    """It gets no time."""
-
-    def do(air: Air) -> None:
-        air.stall_s = seconds
-
-    return do
-
-
-def signal(reason: str) -> Callable[[Air], None]:
-    def do(air: Air) -> None:
-        air.interrupts.reason = reason
-
-    return do
 
 
 class _BrokenError(Exception):

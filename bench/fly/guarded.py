@@ -17,8 +17,8 @@ from bench.cases.hits import (
     velocity_towards,
 )
 from bench.cases.vehicles import AIRFRAMES
-from bench.fly.cruise import FOLLOWED_S, PATIENCE_S
 from bench.fly.virtual_time import Stepped
+from bench.fly.wire import FOLLOWED_S, PATIENCE_S
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.physics.layout import HIT_ACTIVE

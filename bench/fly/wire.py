@@ -1,24 +1,26 @@
-"""What a companion hears of a recorded flight of the plant alone, at other rates; what detectors find.
+"""Hits of the plant alone, recorded; what a companion hears of them at other rates; what detectors find.
 
 The simulated vehicle's own streams and encoders send it, the companion's decoder reads it.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from bench.cases.hits import HEIGHT_M, POLE_OFFSET_SHARES, Floats, HitCase, coming, obstacle_before, velocity_towards
 from bench.detectors.config import BaselineConfig
 from companion.link.streams import wanted_streams
 from companion.mavlink.decode import Decoder
-from companion.messages import MessageId, Sample
+from companion.messages import LandedState, MessageId, Sample
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Situation
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import advance, start_monitor
+from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.estimator.estimate import Estimate
@@ -26,10 +28,12 @@ from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.streams.streams import KINDS, LateLoops, Stream, interval_from_request
 from sim_vehicle.mavlink.streams.topics import Topic
 from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
-from sim_vehicle.physics.layout import HIT_IMPULSE, HIT_START_US
+from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_IMPULSE, HIT_START_US
+from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.scene import Scene
+from sim_vehicle.truth import Hit
 
-Floats = npt.NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 Packets = tuple[int, int, Sequence[bytes]]
 """The interval's number, the boot time, and what is on the wire then."""
@@ -118,6 +122,76 @@ def _sent(recording: VehicleRecording, asked_hz: Mapping[MessageId, float], seed
                     packets.append(encoder.packet(stream.kind.build(state)))
         yield index, now_us, packets
 
+
+# --- the flight
+
+# The detector learns the vehicle: its shaking in 0.5 s, how its velocity keeps to its accelerometer in 20 velocities at
+# 30 Hz; the velocity filter looks back 0.5 s.
+FREE_FLIGHT_S = (1.5, 1.9)
+SWITCHED_ON_AFTER_S = 0.5
+# Touches later than planned: a slow vehicle whose last centimetres were not in the plan.
+PATIENCE_S = 3.0
+# From the first touch on: the longest contact is 0.12 s, its aftermath is in the velocity after 0.1 s more.
+FOLLOWED_S = 0.45
+
+
+class NoTouch(Exception):  # noqa: N818 - reads as the sentence it is
+    """The vehicle went past the obstacle: the case is at fault, not a detector."""
+
+
+def hit_of(case: HitCase, airframe: Airframe) -> tuple[VehicleRecording, Hit]:
+    """The case's flight; one past a pole is flown again nearer to its middle. Raises NoTouch."""
+    for share in POLE_OFFSET_SHARES[:-1] if case.approach == "pole" else ():
+        with suppress(NoTouch):
+            return fly_hit(case, airframe, share)
+    return fly_hit(case, airframe, POLE_OFFSET_SHARES[-1])
+
+
+def fly_hit(
+    case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET_SHARES[0]
+) -> tuple[VehicleRecording, Hit]:
+    """Straight on into the obstacle, or hovering until it comes, and on for a moment. Raises NoTouch."""
+    rng = np.random.default_rng([case.seed, 1])
+    towards = velocity_towards(case, airframe, rng)
+    velocity = 0.0 * towards if case.is_struck else towards
+    free_s = float(rng.uniform(*FREE_FLIGHT_S))
+    start = np.array([0.0, 0.0, -HEIGHT_M])
+    yaw_rad = float(rng.uniform(-math.pi, math.pi))
+    obstacle = obstacle_before(case, airframe, start + free_s * velocity, towards, rng, offset_share)
+    scene = Scene.model_validate(coming(obstacle, -towards, free_s) if case.is_struck else obstacle)
+    cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
+    recording, interval_s = VehicleRecording(), 1e-6 * airframe.imu.integration_interval_us
+    plant, truth, hit_row = cruise.plant, cruise.plant.truth, cruise.plant.state.hit
+    left = round((free_s + PATIENCE_S) / interval_s)
+    touched = False
+    steps = 0
+    while left > 0:
+        output = cruise.step()
+        steps += 1
+        left -= 1
+        situation = _in_air(output, steps * interval_s, _triple(start + steps * interval_s * velocity))
+        recording.add(plant, output, situation, airframe.mass_kg)
+        if not touched and hit_row[HIT_ACTIVE] == 1.0:
+            touched, left = True, round(FOLLOWED_S / interval_s)
+    if not touched:
+        raise NoTouch(f"{case.approach} at {case.speed_m_s} m/s was missed")
+    if not truth.hits:
+        # Still leaning on it: what has happened so far is the hit.
+        truth.add_hit(hit_row, scene.world())
+    return recording, truth.hits[0]
+
+
+def _in_air(output: Estimate, flown_s: float, asked_ned_m: Vector3 | None) -> Situation:
+    off_reason = "takeoff" if flown_s < SWITCHED_ON_AFTER_S else None
+    height_m = -output.position_ned_m[2]
+    return Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
+
+
+def _triple(vector: Floats) -> Vector3:
+    return float(vector[0]), float(vector[1]), float(vector[2])
+
+
+# --- what detectors find
 
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}

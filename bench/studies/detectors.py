@@ -10,7 +10,6 @@ import pandas as pd
 from bench.cases.hits import SPEEDS_M_S, HitCase, draw_case, vehicle_of_hit
 from bench.detectors.config import BaselineConfig
 from bench.fly.campaign import Json, Results
-from bench.fly.cruise import hit_of
 from bench.fly.wire import (
     ASKED_HZ,
     FLOWN_WITH,
@@ -20,6 +19,7 @@ from bench.fly.wire import (
     VehicleRecording,
     configuration,
     heard,
+    hit_of,
     streams_asked_hz,
     watch_all,
 )

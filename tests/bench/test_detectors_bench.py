@@ -5,8 +5,7 @@ import math
 import pytest
 
 from bench.cases.hits import draw_case, vehicle_of_hit
-from bench.fly.cruise import fly_hit
-from bench.fly.wire import ASKED_HZ, VehicleRecording, heard, streams_asked_hz
+from bench.fly.wire import ASKED_HZ, VehicleRecording, fly_hit, heard, streams_asked_hz
 from bench.studies.detectors import first_possible, work_out_hit
 from companion.mavlink.decode import Decoder
 from companion.messages import ExtendedState

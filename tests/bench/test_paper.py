@@ -9,7 +9,6 @@ import pytest
 
 from bench.cases.walls import approach
 from bench.detectors.config import BaselineMission
-from bench.fly.cruise import head_on
 from bench.rows.paper import StudyFlight, ends_the_one_before, fly, share_received
 from bench.studies.paper import command, flights, single
 from bench.studies.paper.study import CLAIMS, FAILED, PASSED, claim
@@ -87,7 +86,7 @@ def test_a_rigid_pulse_is_a_millisecond_and_a_foldable_one_is_fifty_times_longer
 
 
 def hit_between(start_us, end_us):
-    (template,) = [head_on(load_built_in("rigid"), 1.0).hit]
+    (template,) = [single.head_on(load_built_in("rigid"), 1.0).hit]
     return dataclasses.replace(template, contact_at_boot_us=start_us, ended_at_boot_us=end_us)
 
 
@@ -138,7 +137,7 @@ def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
 
 def test_a_guard_that_swings_in_while_the_arms_unfold_ends_the_same_collision():
     # Given a second touch while an arm is folded by 12 mm and the centre moves away
-    arriving = head_on(load_built_in("rigid"), 1.0).hit
+    arriving = single.head_on(load_built_in("rigid"), 1.0).hit
     leaving = dataclasses.replace(arriving, impact_velocity_ned_m_s=(-0.05, 0.0, 0.0))
     # Then it is no second hit; with the arms out, or with the centre moving in, it is one
     assert ends_the_one_before(leaving, 0.012)

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import approach
-from bench.fly.cruise import AFTER_S, HeadOnHit, head_on
 from bench.rows.paper import Floats, StudyFlight
 from bench.rows.tables import table
 from bench.studies.paper.figures import (
@@ -26,6 +25,7 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
+from sim_vehicle.truth import Hit
 
 # The paper, section IV.
 DAMPING_PER_S, STIFFNESS_PER_S2, FOLD_MAX_M = 30.0, 500.0, 0.03
@@ -67,6 +67,40 @@ class SpringResponse:
         phase, left = self._frequency_rad_s * np.asarray(time_s), self.speed_m_s * np.exp(-self._decay_per_s * time_s)
         turn = np.sin(phase) / self._frequency_rad_s
         return left * turn, left * (np.cos(phase) - self._decay_per_s * turn)
+
+
+# The wall is far above the ground and met at once, so that the fall counts for nothing.
+THROWN_M, GAP_M, AFTER_S = 5.0, 0.02, 0.35
+
+
+@dataclass(frozen=True, slots=True)
+class HeadOnHit:
+    """What eq. 2 and the stop of the arms alone make of a hit, without drag and friction."""
+
+    hit: Hit
+    time_s: Floats
+    """Since the first touch."""
+    fold_m: Floats
+    """Of the arm that folds the most."""
+    speed_m_s: Floats
+    """Into the wall."""
+
+
+def head_on(airframe: Airframe, speed_m_s: float) -> HeadOnHit:
+    """Throw the vehicle at a wall and follow it for `AFTER_S`. Without friction, as the falling vehicle would turn."""
+    data = airframe.model_dump()
+    data["drag_n_s_m"] = 0.0
+    data["surface"]["guard_friction"] = 0.0
+    wall = {"point_ned_m": [0, 0, -THROWN_M], "normal_ned": [-1, 0, 0]}
+    plant = Plant(Airframe.model_validate(data), Scene.model_validate({"walls": [wall]}), seed=1)
+    geometry = airframe.geometry
+    touch_m = geometry.motor_radius_m / math.sqrt(2.0) + geometry.guard_radius_m
+    plant.place((-touch_m - GAP_M, 0.0, -THROWN_M), (speed_m_s, 0.0, 0.0))
+    for _ in range(round((GAP_M / speed_m_s + AFTER_S) * 1e6 / plant.interval_us)):
+        plant.step(None, armed=False)
+    hit, series = plant.truth.hits[0], plant.truth.series()
+    time_s = 1e-6 * (series["time_boot_us"] - hit.contact_at_boot_us)
+    return HeadOnHit(hit, time_s, series["arm_fold_m"].max(axis=1), series["velocity_ned_m_s"][:, 0])
 
 
 PAPERS = SpringResponse(DAMPING_PER_S, STIFFNESS_PER_S2, IMPACT_M_S)
