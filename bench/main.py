@@ -13,15 +13,9 @@ import yaml
 from rebound_cli.arguments import count, runs
 from rebound_cli.main import run
 
-STUDIES, RULES = (
-    yaml.safe_load((Path(__file__).parent / name).read_text("utf-8")) for name in ("studies.yaml", "studies/rules.yaml")
-)
+STUDIES = yaml.safe_load(Path(__file__).with_name("studies.yaml").read_text("utf-8"))
 # What the file names, and what it cannot know.
-TYPES = {
-    "count": count,
-    "path": Path,
-}
-KNOWN_HERE = {"cores": os.cpu_count() or 1, "rules": tuple(RULES)}
+TYPES = {"count": count, "path": Path}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,5 +51,5 @@ def build_parser() -> ArgumentParser:
 
 def _settings(written: Mapping[str, Any]) -> dict[str, Any]:
     """As argparse wants them."""
-    known = {key: KNOWN_HERE.get(value, value) if isinstance(value, str) else value for key, value in written.items()}
-    return known | ({"type": TYPES[written["type"]]} if "type" in written else {})
+    known = {"type": TYPES[written["type"]]} if "type" in written else {}
+    return {**written, **known, **({"default": os.cpu_count() or 1} if written.get("default") == "cores" else {})}

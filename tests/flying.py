@@ -15,8 +15,21 @@ from companion.mavlink.packet import message_id_of
 from companion.report import Event, FlightReport
 
 
+class Told(VirtualTime):
+    """What has been told, for who looks for it."""
+
+    def kinds(self) -> list[str]:
+        return [event.kind for event in self.events]
+
+    def told(self, kind: str) -> list[str]:
+        return [event.text for event in self.events if event.kind == kind]
+
+    def event(self, kind: str, index: int = 0) -> Event:
+        return [event for event in self.events if event.kind == kind][index]
+
+
 @dataclass
-class Flight(VirtualTime):
+class Flight(Told):
     """A companion and a vehicle; what the one sends arrives at the other an interval later."""
 
     companion: Companion

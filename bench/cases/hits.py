@@ -18,8 +18,6 @@ SPEEDS_M_S = (0.5, 5.0)
 # Below the speeds that are asked for, to see where it ends.
 SLOW_SPEEDS_M_S = (0.3, 0.5)
 SLOW_SHARE = 0.06
-# Of an obstacle that comes towards a hovering vehicle: a person who walks, a door that swings.
-STRUCK_SPEEDS_M_S = (0.5, 3.0)
 # Off the ground by more than any fall within a hit; nothing about the ground is wanted here.
 HEIGHT_M = 30.0
 SLANT_MAX_DEG = 60.0
@@ -35,48 +33,28 @@ POLE_OFFSET_SHARES = (0.8, 0.4, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class HitCase:
-    """One hit; everything that is not here is drawn from the seed. `family` says what is varied."""
+    """One hit; everything that is not here is drawn from the seed."""
 
-    family: str
     seed: int
     airframe: str
     approach: str
     speed_m_s: float
-    detectors: tuple[str, ...]
-    vibration_m_s2: float | None = None
-    """Standard deviation of an IMU sample on each axis; None: the airframe's own."""
-    is_struck: bool = False
-    """The vehicle hovers, and the obstacle comes at it with the speed."""
     is_drawn: bool = False
     """Whether the vehicle, too, is drawn from the seed: one of the airframe's kind, with other numbers."""
     imu_hz: int | None = None
     """The rate asked for of HIGHRES_IMU; None: each that there is."""
 
 
-def draw_case(family: str, seed: int, detectors: tuple[str, ...], **settings: Any) -> HitCase:
+def draw_case(seed: int, is_drawn: bool) -> HitCase:
     """The case that belongs to a seed: airframes and approaches in turn, speeds at random."""
     rng = np.random.default_rng([seed, 0])
-    speeds = SLOW_SPEEDS_M_S if rng.random() < SLOW_SHARE else SPEEDS_M_S
-    if settings.get("is_struck"):
-        speeds = STRUCK_SPEEDS_M_S
-    return HitCase(
-        family=family,
-        seed=seed,
-        airframe=AIRFRAMES[seed % 2],
-        approach=APPROACHES[seed // 2 % len(APPROACHES)],
-        speed_m_s=round(float(rng.uniform(*speeds)), 3),
-        detectors=detectors,
-        **settings,
-    )
+    speed_m_s = float(rng.uniform(*(SLOW_SPEEDS_M_S if rng.random() < SLOW_SHARE else SPEEDS_M_S)))
+    approach = APPROACHES[seed // 2 % len(APPROACHES)]
+    return HitCase(seed, AIRFRAMES[seed % 2], approach, round(speed_m_s, 3), is_drawn)
 
 
 def vehicle_of_hit(case: HitCase) -> BenchVehicle:
-    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
-    airframe = vehicle.airframe
-    if case.vibration_m_s2 is not None:
-        imu = airframe.imu.model_copy(update={"accelerometer_noise_m_s2": case.vibration_m_s2})
-        airframe = airframe.model_copy(update={"imu": imu})
-    return BenchVehicle(airframe, vehicle.settings)
+    return vehicle_of(case.airframe, case.seed if case.is_drawn else None)
 
 
 def velocity_towards(case: HitCase, airframe: Airframe, rng: np.random.Generator) -> Floats:
@@ -125,15 +103,3 @@ def obstacle_before(
     extent_m = math.hypot(reach_m * sideways, airframe.geometry.guard_height_m * upward)
     point = at_ned_m - extent_m * normal
     return {"walls": [{"point_ned_m": point.tolist(), "normal_ned": normal.tolist(), "width_m": 60, "height_m": 40}]}
-
-
-def coming(scene: Mapping[str, Any], velocity: Floats, after_s: float) -> dict[str, Any]:
-    """The scene with its obstacle on the way at a velocity, where it was asked to be after so long."""
-    motion = {"velocity_ned_m_s": velocity.tolist()}
-    return {
-        kind: [
-            {**one, "point_ned_m": (np.array(one["point_ned_m"]) - after_s * velocity).tolist(), "motion": motion}
-            for one in obstacles
-        ]
-        for kind, obstacles in scene.items()
-    }

@@ -48,7 +48,7 @@ def draw_flown(seed: int, is_drawn: bool) -> HitCase:
     """Airframes, rates and approaches in turn, speeds at random."""
     speed_m_s = round(float(np.random.default_rng([seed, 0]).uniform(*SPEEDS_M_S)), 3)
     approach, imu_hz = APPROACHES[seed // 4 % len(APPROACHES)], IMU_HZ[seed // 2 % 2]
-    return HitCase("flown", seed, AIRFRAMES[seed % 2], approach, speed_m_s, (), is_drawn=is_drawn, imu_hz=imu_hz)
+    return HitCase(seed, AIRFRAMES[seed % 2], approach, speed_m_s, is_drawn, imu_hz)
 
 
 def fly(hit: HitCase) -> tuple[SimulatedVehicle, Guard, int | None]:

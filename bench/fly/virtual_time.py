@@ -43,17 +43,8 @@ class VirtualTime(ABC):
     def run_to(self, state: Any, limit_s: float = 60.0) -> float:
         return self.run_until(lambda: self.state == state, limit_s)
 
-    def kinds(self) -> list[str]:
-        return [event.kind for event in self.events]
-
     def texts(self) -> list[str]:
         return [f"{event.kind}: {event.text}" for event in self.events]
-
-    def told(self, kind: str) -> list[str]:
-        return [event.text for event in self.events if event.kind == kind]
-
-    def event(self, kind: str, index: int = 0) -> Event:
-        return [event for event in self.events if event.kind == kind][index]
 
 
 class Stepped(VirtualTime):

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from bench.cases.hits import HEIGHT_M, POLE_OFFSET_SHARES, Floats, HitCase, coming, obstacle_before, velocity_towards
+from bench.cases.hits import HEIGHT_M, POLE_OFFSET_SHARES, Floats, HitCase, obstacle_before, velocity_towards
 from bench.detectors.config import BaselineConfig
 from companion.link.streams import wanted_streams
 from companion.mavlink.decode import Decoder
@@ -150,15 +150,14 @@ def hit_of(case: HitCase, airframe: Airframe) -> tuple[VehicleRecording, Hit]:
 def fly_hit(
     case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET_SHARES[0]
 ) -> tuple[VehicleRecording, Hit]:
-    """Straight on into the obstacle, or hovering until it comes, and on for a moment. Raises NoTouch."""
+    """Straight on into the obstacle, and on for a moment. Raises NoTouch."""
     rng = np.random.default_rng([case.seed, 1])
-    towards = velocity_towards(case, airframe, rng)
-    velocity = 0.0 * towards if case.is_struck else towards
+    velocity = velocity_towards(case, airframe, rng)
     free_s = float(rng.uniform(*FREE_FLIGHT_S))
     start = np.array([0.0, 0.0, -HEIGHT_M])
     yaw_rad = float(rng.uniform(-math.pi, math.pi))
-    obstacle = obstacle_before(case, airframe, start + free_s * velocity, towards, rng, offset_share)
-    scene = Scene.model_validate(coming(obstacle, -towards, free_s) if case.is_struck else obstacle)
+    obstacle = obstacle_before(case, airframe, start + free_s * velocity, velocity, rng, offset_share)
+    scene = Scene.model_validate(obstacle)
     cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
     recording, interval_s = VehicleRecording(), 1e-6 * airframe.imu.integration_interval_us
     plant, truth, hit_row = cruise.plant, cruise.plant.truth, cruise.plant.state.hit
@@ -169,7 +168,12 @@ def fly_hit(
         output = cruise.step()
         steps += 1
         left -= 1
-        situation = _in_air(output, steps * interval_s, _triple(start + steps * interval_s * velocity))
+        flown_s, height_m = steps * interval_s, -output.position_ned_m[2]
+        asked_ned_m, off_reason = (
+            _triple(start + flown_s * velocity),
+            "takeoff" if flown_s < SWITCHED_ON_AFTER_S else None,
+        )
+        situation = Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
         recording.add(plant, output, situation, airframe.mass_kg)
         if not touched and hit_row[HIT_ACTIVE] == 1.0:
             touched, left = True, round(FOLLOWED_S / interval_s)
@@ -179,12 +183,6 @@ def fly_hit(
         # Still leaning on it: what has happened so far is the hit.
         truth.add_hit(hit_row, scene.world())
     return recording, truth.hits[0]
-
-
-def _in_air(output: Estimate, flown_s: float, asked_ned_m: Vector3 | None) -> Situation:
-    off_reason = "takeoff" if flown_s < SWITCHED_ON_AFTER_S else None
-    height_m = -output.position_ned_m[2]
-    return Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
 
 
 def _triple(vector: Floats) -> Vector3:
@@ -210,11 +208,6 @@ class Found:
     time_boot_us: int
     first: ImpactEstimate
     final: ImpactEstimate
-
-
-def configuration(detector: str, settings: Mapping[str, Any]) -> BaselineConfig:
-    """The vehicle's settings with the detector's name."""
-    return BaselineConfig.model_validate({**settings, "detector": detector})
 
 
 def streams_asked_hz(rate: int) -> dict[MessageId, float]:

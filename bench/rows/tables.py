@@ -38,9 +38,7 @@ def summary_text(bars: Sequence[Bar]) -> str:
     """For the terminal: how many are met, and which are not."""
     judged = [bar for bar in bars if bar.is_met is not None]
     missed = [bar for bar in judged if not bar.is_met]
-    lines = [f"{len(judged) - len(missed)} of {len(judged)} bars are met."]
-    lines += [f"  missed: {bar.what}: wanted {bar.wanted}, measured {bar.measured} ({bar.of})" for bar in missed]
-    return "\n".join(lines)
+    return f"{len(judged) - len(missed)} of {len(judged)} bars are met. Missed: {bars_text(missed)}"
 
 
 def table(rows: pd.DataFrame | Sequence[Mapping[str, object]]) -> str:

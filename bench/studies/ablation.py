@@ -131,36 +131,25 @@ def _watched(rule: Rule, copies: Copies, original: Any) -> Any:
 # --- the flights
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A mission, and the names of the rules that are looked at in it."""
-
-    mission: MissionCase
-    rules: tuple[str, ...]
-
-
 def run_ablation(options: Namespace) -> int:
     """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
-    names = tuple(options.rule or (rule.name for rule in RULES))
     seeds = seeds_of(options, options.missions)
-    cases = [Case(MissionCase(seed, kind, is_drawn=True), names) for seed in seeds for kind in AIRFRAMES]
+    cases = [MissionCase(seed, kind, is_drawn=True) for seed in seeds for kind in AIRFRAMES]
     title = "What each special rule is worth: with it, less without"
-    return run_study(options, "ablation", title, cases, work_out, lambda results: shown(results, names))
+    return run_study(options, "ablation", title, cases, work_out, shown)
 
 
-def shown(results: Results, names: tuple[str, ...]) -> Shown:
-    flights = [flight for _, flight in results.found]
-    return Shown({"Flights": flights_table([rule for rule in RULES if rule.name in names], flights)})
+def shown(results: Results) -> Shown:
+    return Shown({"Flights": flights_table([flight for _, flight in results.found])})
 
 
-def work_out(case: Case) -> Json:
+def work_out(case: MissionCase) -> Json:
     """What became of the flight, and of its copies by rule."""
-    drawn = random_mission(case.mission)
-    rules = [rule for rule in RULES if rule.name in case.rules]
-    with tempfile.TemporaryDirectory() as folder, switched(rules) as copies:
+    drawn = random_mission(case)
+    with tempfile.TemporaryDirectory() as folder, switched(RULES) as copies:
         flight: JudgedFlight | None = None
         try:
-            flight = fly(*flyable(case.mission, drawn), Path(folder))
+            flight = fly(*flyable(case, drawn), Path(folder))
         finally:
             copies.leave(lambda: {"error": "the companion failed"} if flight is None else verdict(flight))
         return {"with": verdict(flight), "without": copies.found}
@@ -204,10 +193,10 @@ def _rests_after_s(flight: JudgedFlight, hit: Hit) -> float | None:
     return round(float(began_s[long[0]]), 3) if long.size else None
 
 
-def flights_table(rules: Sequence[Rule], flights: Sequence[Json]) -> str:
+def flights_table(flights: Sequence[Json]) -> str:
     """Of each rule the flights in which it changed an answer: how they end, how hits recover, medians of changes."""
     rows: list[dict[str, object]] = []
-    for rule in rules:
+    for rule in RULES:
         known = [(one["with"], one["without"][rule.name]) for one in flights if rule.name in one["without"]]
         flown = [(kept, left) for kept, left in known if "hits" in left]
         # A copy that died says nothing of its end.

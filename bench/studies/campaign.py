@@ -19,7 +19,6 @@ from companion.errors import ConfigurationError
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
 
-SPEED_BINS_M_S = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.5]
 AIRFRAME_AS_GIVEN = "airframe-as-given.yaml"
 # The share of missions that must end as they say; of vehicles drawn at random it is another one.
 MISSIONS_WANTED = {"foldable": 0.995, "rigid": 0.95}
@@ -48,7 +47,7 @@ def run_missions(options: Namespace) -> int:
 def shown(results: Results, wanted: Mapping[str, float]) -> Shown:
     flights, hits = mission_rows(results), hit_rows(results)
     bars = mission_bars(flights, hits, wanted)
-    parts = {"What must be shown": bars_text(bars), **tables(flights, hits)}
+    parts = {"What must be shown": bars_text(bars), **tables(flights)}
     return Shown(parts, summary_text(bars), flights)
 
 
@@ -68,7 +67,7 @@ def hit_rows(results: Results) -> pd.DataFrame:
     return pd.DataFrame(hits).astype(dict.fromkeys(UNANSWERED, float))
 
 
-def tables(flights: pd.DataFrame, hits: pd.DataFrame) -> dict[str, str]:
+def tables(flights: pd.DataFrame) -> dict[str, str]:
     """By their headings."""
     first = flights["failures"].map(lambda causes: causes[0][0] if causes else None)
     causes = pd.crosstab(first[~flights["is_good"]], flights["airframe"]).rename_axis("first cause")
@@ -76,28 +75,7 @@ def tables(flights: pd.DataFrame, hits: pd.DataFrame) -> dict[str, str]:
     return {
         "Missions that did not end as they say": table(causes.reset_index()) + "\n" + failures_table(flights),
         "By room and stream: flown, and ended as they say": table(kinds.reset_index()),
-        "Recoveries by speed": table(speed_rows(hits)),
     }
-
-
-def speed_rows(hits: pd.DataFrame) -> pd.DataFrame:
-    bands = pd.cut(hits["speed_m_s"], SPEED_BINS_M_S, right=False).rename("speed [m/s]")
-    found = hits.assign(
-        noticed=hits["seen"].where(noticeable(hits)).astype(float), far=hits["past_m"] > OVERSHOOT_MOST_M
-    ).groupby(["airframe", bands], observed=True)
-    figures = found.agg(
-        **{
-            "hits": ("seen", "size"),
-            "noticed": ("noticed", "mean"),
-            "settled [s]": ("settled_s", "median"),
-            "past 5 cm": ("far", "sum"),
-            "past, worst [m]": ("past_m", "max"),
-            "touched again": ("again", lambda counts: (counts > 0).sum()),
-            "other surface": ("others", lambda counts: (counts > 0).sum()),
-            "lost, worst [m]": ("lost_m", "max"),
-        }
-    )
-    return figures.round(4).reset_index()
 
 
 def failures_table(flights: pd.DataFrame) -> str:
@@ -164,15 +142,7 @@ def _hits(airframe: str, hits: pd.DataFrame) -> Iterator[Bar]:
     yield share_bar(what, is_near & (answered["again"] == 0), CLEAN_WANTED if is_judged else None)
     what = f"{where}: the same, but for other guards that swing in while the vehicle leaves"
     yield share_bar(what, is_near & (answered["returned"] == 0))
-    yield _lost_bar(airframe, level(hits[hits["speed_m_s"] < LOST_UP_TO_M_S])["lost_m"])
+    lost_m = level(hits[hits["speed_m_s"] < LOST_UP_TO_M_S])["lost_m"]
+    yield share_bar(f"{airframe}, level, up to 2.5 m/s: at most 10 cm of height lost", lost_m <= LOST_MOST_M, 1.0)
     into = hits[noticeable(hits)]
     yield share_bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", into["seen"])
-
-
-def _lost_bar(airframe: str, lost_m: "pd.Series[float]") -> Bar:
-    what, wanted = f"{airframe}, level, up to 2.5 m/s: height lost", f"≤ {100 * LOST_MOST_M:g} cm"
-    if not len(lost_m):
-        return Bar(what, wanted, "-", None, "no hit")
-    over = int((lost_m > LOST_MOST_M).sum())
-    measured = f"{100 * lost_m.max():.1f} cm at most, {100 * lost_m.median():.1f} in the median"
-    return Bar(what, wanted, measured, over == 0, f"{len(lost_m)} hits, {over} beyond")

@@ -3,7 +3,7 @@
 import math
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 
 import pandas as pd
 
@@ -17,7 +17,6 @@ from bench.fly.wire import (
     Found,
     HeardStep,
     VehicleRecording,
-    configuration,
     heard,
     hit_of,
     streams_asked_hz,
@@ -25,17 +24,10 @@ from bench.fly.wire import (
 )
 from bench.rows.contacts import angle_deg
 from bench.rows.tables import Bar, bars_text, per_cent, rms, share_bar, summary_text, table, text_of
-from bench.studies.study import Shown, run_study
+from bench.studies.study import Shown, run_study, seeds_of
 from companion.messages import ImuSample
 from sim_vehicle.truth import Hit
 
-# Tried on everything. The others are compared on at least so many hits, and on one in eight at most sizes:
-# all seven take three times as long as these two.
-THOROUGH = ("fused", "threshold")
-COMPARED_HITS, COMPARED_EVERY_AT_MOST = 400, 8
-# Of a hovering vehicle: one in so many, by the default detector and the baseline alone. No more than these, which take
-# a minute of one core; a missed one in a hundred shows.
-SIDE_SHARE, SIDE_AT_MOST = 16, 240
 # What the drone's own detector must show, by airframe and rate received.
 DEFAULT, SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
 FOUND_BARS = {("foldable", rate): 1.0 for rate in ASKED_HZ}
@@ -54,9 +46,7 @@ OF_FOUND = ("latency_ms", "samples_late", "speed_error_m_s", "normal_error_deg")
 
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
-    cases = [
-        replace(case, is_drawn=options.vehicles == "drawn") for case in hit_cases(options.hits, options.first_seed)
-    ]
+    cases = [draw_case(seed, options.vehicles == "drawn") for seed in seeds_of(options, options.hits)]
     return run_study(options, "detectors", "Detection", cases, work_out_hit, shown)
 
 
@@ -69,49 +59,20 @@ def shown(results: Results) -> Shown:
 def rows(results: Results) -> pd.DataFrame:
     """One for each case, rate and detector: the case's own numbers, the truth's, and what was reported."""
     found = [{"case": at, **asdict(case), **row} for at, (case, hit) in enumerate(results.found) for row in hit["rows"]]
-    return pd.DataFrame(found).drop(columns="detectors").astype(dict.fromkeys(OF_FOUND, float))
-
-
-def hit_cases(hits: int, first: int) -> list[HitCase]:
-    """So many hits in cruise, and some in hover. In pairs, so that both airframes have their turns at all detectors."""
-    every = max(1, min(COMPARED_EVERY_AT_MOST, hits // COMPARED_HITS))
-    compared = {seed: seed // 2 % every == 0 for seed in range(first, first + hits)}
-    everyone = tuple(BaselineConfig.detectors)
-    cases = [draw_case("plain", seed, everyone if is_for_all else THOROUGH) for seed, is_for_all in compared.items()]
-    # Where these seeds have always been.
-    first += 4 * hits
-    side = range(first, first + 2 * max(1, min(SIDE_AT_MOST, hits // SIDE_SHARE) // 2))
-    return cases + [draw_case("struck", seed, THOROUGH, is_struck=True) for seed in side]
+    return pd.DataFrame(found).astype(dict.fromkeys(OF_FOUND, float))
 
 
 # --- one hit
 
 
-@dataclass(frozen=True, slots=True)
-class Possible:
-    """The first sample that shows the contact, or None where the contact fell between the samples."""
-
-    time_boot_us: int | None
-    imu_times_boot_us: Sequence[int]
-
-    def samples_late(self, found_boot_us: int) -> int | None:
-        """How many IMU samples the report came after the first possible one; 0: with it."""
-        first = self.time_boot_us
-        if first is None:
-            return None
-        if found_boot_us <= first:
-            return 0
-        return sum(first < time_us <= found_boot_us for time_us in self.imu_times_boot_us)
-
-
 def first_possible(
     recording: VehicleRecording, arrived: Sequence[HeardStep], touch_boot_us: float, floor_m_s2: float
-) -> Possible:
-    """By the truth: the first received sample whose averaging window holds the contact's force above the floor."""
-    contact_m_s2 = {
-        sample.time_boot_us: force for sample, force in zip(recording.samples, recording.contact_m_s2, strict=True)
-    }
-    times, first = [], None
+) -> tuple[int | None, list[int]]:
+    """The first received sample whose averaging window holds the contact's force above the floor, by the truth; None
+    where the contact fell between the samples. And when each sample arrived."""
+    forces = zip(recording.samples, recording.contact_m_s2, strict=True)
+    contact_m_s2 = {sample.time_boot_us: force for sample, force in forces}
+    times, first = list[int](), None
     for step in arrived:
         stamps_heard = [sample.time_boot_us for sample in step.samples if isinstance(sample, ImuSample)]
         if not stamps_heard:
@@ -120,7 +81,7 @@ def first_possible(
         shows = any(stamp >= touch_boot_us and contact_m_s2[stamp] > floor_m_s2 for stamp in stamps_heard)
         if shows and first is None:
             first = step.time_boot_us
-    return Possible(first, times)
+    return first, times
 
 
 def work_out_hit(case: HitCase) -> Json:
@@ -133,17 +94,26 @@ def work_out_hit(case: HitCase) -> Json:
     rows = []
     for rate in ASKED_HZ:
         arrived = heard(recording, streams_asked_hz(rate), case.seed + rate)
-        possible = first_possible(recording, arrived, touch_us, floor_m_s2)
-        possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
-        for name in case.detectors:
-            found, touches = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
+        possible_us, times_us = first_possible(recording, arrived, touch_us, floor_m_s2)
+        possible_ms = None if possible_us is None else 1e-3 * (possible_us - touch_us)
+        for name in BaselineConfig.detectors:
+            found, touches = watch_all(
+                BaselineConfig.model_validate({**vehicle.settings, "detector": name}), arrived, recording.situations
+            )
             told = sum(touch.impact.sample_time_boot_us >= touch_us for touch in touches)
-            entry = _entry(found, hit, possible) | {"touches": told}
+            entry = _entry(found, hit, possible_us, times_us) | {"touches": told}
             rows.append({**truth, "rate": rate, "possible_ms": possible_ms, "detector": name, **entry})
     return {"rows": rows}
 
 
-def _entry(found: Sequence[Found], hit: Hit, possible: Possible) -> Json:
+def samples_late(found_boot_us: int, possible_us: int | None, times_us: Sequence[int]) -> int | None:
+    """How many IMU samples the report came after the first possible one; 0: with it."""
+    if possible_us is None:
+        return None
+    return sum(possible_us < time_us <= found_boot_us for time_us in times_us)
+
+
+def _entry(found: Sequence[Found], hit: Hit, possible_us: int | None, times_us: Sequence[int]) -> Json:
     """One detector's report on one hit."""
     touch_us = hit.contact_at_boot_us
     false = sum(f.time_boot_us < touch_us for f in found)
@@ -154,7 +124,7 @@ def _entry(found: Sequence[Found], hit: Hit, possible: Possible) -> Json:
     return {
         "false": false,
         "latency_ms": 1e-3 * (first.time_boot_us - touch_us),
-        "samples_late": possible.samples_late(first.time_boot_us),
+        "samples_late": samples_late(first.time_boot_us, possible_us, times_us),
         "evidence": first.first.impact.evidence.value,
         "speed_error_m_s": math.hypot(*velocity) - math.hypot(*true_velocity),
         "normal_error_deg": angle_deg(first.final.normal.direction_ned, hit.normal_ned),
@@ -171,8 +141,7 @@ def all_tables(hits: pd.DataFrame) -> dict[str, str]:
     return {
         "Every detector on simulated hits": by(usual(hits), "detector", *USUAL),
         "By obstacle": by(usual(ours), "approach", *USUAL),
-        "By speed": by(ours[ours["family"] == "plain"], "band", *USUAL),
-        "Struck in hover": by(hits[hits["family"] == "struck"], "detector", *USUAL),
+        "By speed": by(ours, "band", *USUAL),
     }
 
 
@@ -203,16 +172,13 @@ def _figures(hits: pd.DataFrame) -> dict[str, object]:
 def all_bars(hits: pd.DataFrame) -> list[Bar]:
     bars: list[Bar] = []
     for (airframe, rate), ours in hits[hits["detector"] == DEFAULT].groupby(list(USUAL)):
-        where, least = f"{airframe}, {rate} Hz", FOUND_BARS[airframe, rate]
-        bars += _hit_bars(where, least, usual(ours))
-        struck = ours[ours["family"] == "struck"]["latency_ms"].notna()
-        bars.append(share_bar(f"{where}, struck in hover at 0.5 to 3 m/s: detected", struck, least))
+        bars += _hit_bars(f"{airframe}, {rate} Hz", FOUND_BARS[airframe, rate], usual(ours))
     return bars
 
 
 def usual(hits: pd.DataFrame) -> pd.DataFrame:
-    """By the airframe as it is, at the speeds that count."""
-    return hits[(hits["family"] == "plain") & (hits["speed_m_s"] >= SLOWEST_M_S)]
+    """At the speeds that count."""
+    return hits[hits["speed_m_s"] >= SLOWEST_M_S]
 
 
 def _hit_bars(where: str, least: float, hits: pd.DataFrame) -> Iterator[Bar]:

@@ -34,7 +34,8 @@ ONE_EVENT_US = 2_000_000
 LABEL_S = 1.0
 # The label of what was told where nothing was, with the reason above it.
 NOTHING = "nothing"
-SUMS = ("flown_h", "watched_h", "collisions", "touchdowns", "crashes", "promised")
+COLUMNS = ["log", "vehicle", "flown_h", "watched_h", "imu_hz"]
+COLUMNS += ["collisions", "touchdowns", "crashes", "promised", "wrong"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,16 +110,16 @@ def row_of(name: str, replay: Replay, labels: Mapping[float, str]) -> Json:
     }
 
 
-def sums_text(rows: Sequence[Json]) -> str:
+def sums_text(rows: pd.DataFrame) -> str:
     """Of the logs of which anything was watched."""
-    sums = {name: sum(row[name] for row in rows) for name in SUMS}
-    hours, false = sums["watched_h"], sum(wrong.endswith("where nothing was") for row in rows for wrong in row["wrong"])
-    if not hours:
+    if not len(rows):
         return "Nothing was watched.\n"
+    sums, hours = rows.sum(numeric_only=True), rows["watched_h"].sum()
+    false = sum(wrong.endswith("where nothing was") for wrong in rows["wrong"].explode().dropna())
     return (
-        f"{len(rows)} logs, {sums['flown_h']:.2f} h flown, {hours:.2f} h watched: {sums['collisions']} collisions, "
-        f"{sums['touchdowns']} touchdowns, {sums['crashes']} crashes. {false} collisions or crashes where nothing was: "
-        f"{false / hours:.1f} an hour, at most {at_most_an_hour(false, hours):.1f} with 95 % confidence; "
+        f"{len(rows)} logs, {sums['flown_h']:.2f} h flown, {hours:.2f} h watched: {sums['collisions']:.0f} collisions, "
+        f"{sums['touchdowns']:.0f} touchdowns, {sums['crashes']:.0f} crashes. {false} collisions or crashes where "
+        f"nothing was: {false / hours:.1f} an hour, at most {at_most_an_hour(false, hours):.1f} with 95 % confidence; "
         f"{sums['promised']:.2g} in these hours promised by Gaussian noise.\n"
     )
 
@@ -140,11 +141,12 @@ def run_flights(options: Namespace) -> int:
             shown = page.parent / f"{path.parent.name}-{path.stem}.html"
             report_page.write_page(replayed_flight(replay, config), shown)
         print(f"{name}: {rows[-1]['watched_h'] * 60:.1f} min watched, {rows[-1]['collisions']} collisions")
-    seen = [row for row in rows if row["watched_h"] > 0.0]
-    idle = "\n".join(row["log"] for row in rows if row not in seen) or "None."
-    written = [{**row, "promised": f"{row['promised']:.2g}", "wrong": "; ".join(row["wrong"])} for row in seen]
-    parts = {"": f"{sums_text(seen)}\n{table(pd.DataFrame(written).round(3))}"}
-    parts |= {"No evidence, because nothing of it was watched": f"{idle}\n", "Not replayed": "\n".join(refused) + "\n"}
-    write_page(page, "Recorded flights", options.typed, Shown(parts, rows=pd.DataFrame(rows)))
+    found = pd.DataFrame(rows, columns=COLUMNS)
+    seen, idle = found[found["watched_h"] > 0.0], found[found["watched_h"] == 0.0]["log"]
+    shown = seen.assign(promised=seen["promised"].map("{:.2g}".format), wrong=seen["wrong"].map("; ".join)).round(3)
+    parts = {"": f"{sums_text(seen)}\n{table(shown)}"}
+    parts["No evidence, because nothing of it was watched"] = "\n".join(idle) + "\n"
+    parts["Not replayed"] = "\n".join(refused) + "\n"
+    write_page(page, "Recorded flights", options.typed, Shown(parts, rows=found))
     print(sums_text(seen) if rows else "no log found")
     return 0 if rows else 1

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bench.studies.kills import KILLED_S, SPEEDS_M_S, cases, guards_table, killed, kills_table, work_out
+from bench.studies.kills import KILLED_S, SPEEDS_M_S, cases, killed, kills_table, work_out
 from tests.bench.random_missions.made_up import hit
 
 
@@ -56,14 +56,6 @@ def test_a_second_contact_is_the_hardest_after_the_kill_the_touch_itself_apart(k
     assert kill["again_m_s"] == pytest.approx(again_m_s) and kill["ground_m_s"] == pytest.approx(0.5)
 
 
-def test_the_table_counts_the_hard_contacts_by_the_instant_of_the_kill():
-    # Given two kills in one bin, one of which ended in a second contact, and one before the touch
-    kills = pd.DataFrame({"kill_s": [0.61, 0.69, -0.05], "again_m_s": [0.9, 0.2, 1.5], "ground_m_s": [0.7, 1.1, None]})
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in kills_table(kills).splitlines()]
-    assert ["600 to 700 ms", "2", "1 (50.0 %)", "0.90", "2", "0.90", "1.10"] in rows
-    assert ["**before the touch**", "1", "1 (100.0 %)", "1.50", "0", "–", "–"] in rows
-
-
 @pytest.mark.slow
 def test_a_guard_in_between_that_dies_in_a_recovery_leaves_the_vehicle_to_px4s_failsafe_which_lands():
     case = replace(cases(10, first_seed=1, of_guard=True)[0], kills_s=(0.5,))
@@ -73,10 +65,10 @@ def test_a_guard_in_between_that_dies_in_a_recovery_leaves_the_vehicle_to_px4s_f
     assert kill["ground_m_s"] == pytest.approx(0.7, abs=0.2), "MPC_LAND_SPEED"
 
 
-def test_the_table_of_the_guard_has_a_row_for_each_program_before_and_after_the_touch():
+def test_the_table_has_a_row_for_each_program_before_and_after_the_touch():
     kills = pd.DataFrame(
         {
-            "kill_s": [-0.1, 0.4, 0.6],
+            "kill_s": [-0.1, 0.04, 0.6],
             "again_m_s": [0.9, 0.2, 0.0],
             "mode": ["POSCTL", "POSCTL", "AUTO.LOITER"],
             "ground_m_s": [0.7, 1.1, None],
@@ -84,7 +76,8 @@ def test_the_table_of_the_guard_has_a_row_for_each_program_before_and_after_the_
             "loss_s": [0.3] * 3,
         }
     )
-    lines = guards_table(kills).splitlines()[2:]
-    before, after = ([cell.strip() for cell in line.split("|")[1:-1]] for line in lines)
-    assert before[3:] == ["1", "1 (100.0 %)", "0.90", "1", "0.70", "0.70", "POSCTL 1"]
+    lines = kills_table(kills).splitlines()[2:]
+    before, after, soon = ([cell.strip() for cell in line.split("|")[1:-1]] for line in lines)
+    assert before == ["sticks", "0.3", "before the touch", "1", "1 (100.0 %)", "0.90", "1", "0.70", "0.70", "POSCTL 1"]
     assert after[3:] == ["2", "0 (0.0 %)", "–", "1", "1.10", "1.10", "POSCTL 1, AUTO.LOITER 1"]
+    assert soon[2:4] == ["within 0.1 s of it", "1"]

@@ -21,11 +21,12 @@ from companion.guard.guard import Guard
 from companion.guard.states import State
 from companion.report import Event
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from tests.flying import Told
 
 VELOCITY_ONLY = 0xDC7
 
 
-class Watched(Commanded):
+class Watched(Told, Commanded):
     """`on_wire` has all that reaches the vehicle: when, from whom and what."""
 
     def __init__(self, *arguments: Any, **scene: Any) -> None:

@@ -79,12 +79,12 @@ def test_one_hit_that_loses_too_much_height_is_enough_if_it_was_on_something_upr
 
 
 def test_every_failure_is_listed_with_seed_cause_and_the_command_to_see_it_again():
-    flights, hits = frames(made_up(failing=[17]))
+    flights = mission_rows(made_up(failing=[17]))
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in failures_table(flights).splitlines()]
     again = "`python -m bench campaign --only 17`"
     assert ["17", "foldable", "corner", "50", "3.0", "fell: at 3.00 s", again] in rows
     assert rows[-1][-1] == "`python -m bench campaign --only 17 --airframe rigid`"
-    assert "fell" in tables(flights, hits)["Missions that did not end as they say"]
+    assert "fell" in tables(flights)["Missions that did not end as they say"]
 
 
 @pytest.fixture(scope="module")
