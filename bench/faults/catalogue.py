@@ -132,8 +132,8 @@ def _read(file: Path) -> dict[str, tuple[Fault, ...]]:
 
 
 def _fault(name: str, row: Row, expectations: Mapping[str, Expected]) -> Fault:
-    expected = expectations[row.get("expected", "lands")]
-    return Fault(name, row["injected"], partial(_injected, row), expected, from_the_start="when" in row)
+    word = row.get("expected", "lands")
+    return Fault(name, row["injected"], partial(_injected, row), expectations[word], word, from_the_start="when" in row)
 
 
 GROUPS = _read(Path(__file__).with_name("faults.yaml"))

@@ -280,13 +280,6 @@ class Expected:
     """While it acts nothing shows a hit. What the wall does to a vehicle that meets it then shows PX4 and the airframe,
     not this program; the hit may be told when the sensor is back, as late as any other after its touch."""
 
-    def text(self) -> str:
-        parts = [" or ".join(ENDS[outcome] for outcome in self.outcomes)]
-        parts += ["the hit found"] if self.finds else [] if self.has_wall else ["(no wall in the way)"]
-        parts += [] if self.false_hits else ["nothing else taken for one"]
-        parts += ["who meets the wall meanwhile is PX4's and the airframe's"] if self.blinds else []
-        return "; ".join(parts)
-
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -296,5 +289,7 @@ class Fault:
     injected: str
     inject: Callable[[random.Random], Injector]
     expected: Expected = Expected()
+    expects: str = "lands"
+    """The same in a word of `faults.yaml`."""
     from_the_start: bool = False
     """Whether the fault acts before the first item."""

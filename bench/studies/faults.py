@@ -208,7 +208,7 @@ def _of_fault(name: str, flights: pd.DataFrame) -> dict[str, object]:
         "kind": GROUP_OF[name],
         "fault": name,
         "injected": FLOWN[name].injected,
-        "expected": FLOWN[name].expected.text(),
+        "expected": FLOWN[name].expects,
         "n": len(flights),
         "happened": happened,
         "worst": ", ".join(worst) if flights["tilt_deg"].notna().any() else "–",

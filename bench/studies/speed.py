@@ -1,27 +1,38 @@
-"""From a hit's datagram to the setpoint on the wire, in real time at 250 Hz, quiet and beside two busy loops."""
+"""`bench speed`: how many times real time a flight in lockstep goes; or how soon a hit is answered in real time."""
 
 import contextlib
+import gc
 import io
 import math
 import multiprocessing
+import os
 import socket
+import statistics
 import tempfile
 import time
+from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter_ns, process_time
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
+from bench.fly.lockstep import flown_in
 from bench.fly.virtual_time import Stepped
+from bench.rows.tables import table
+from bench.studies.study import Shown, page_path, write_page
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
 from companion.shell.connection import udp_out
 from rebound_cli.background import Background
+from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop
@@ -31,6 +42,69 @@ from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
+
+MISSION = Path(__file__).parents[2] / "missions" / "wall.yaml"
+REPEATS = 2000
+
+
+def fly() -> tuple[float, float]:
+    """One flight as `rebound fly wall --lockstep` flies it, with its log: virtual time over wall clock, and over what
+    this process had of a processor.
+    """
+    document = load_mission_document(MISSION, [], None, None)
+    world = world_from(document)
+    with tempfile.TemporaryDirectory() as folder:
+        # What flights before have left is not this one's.
+        gc.collect()
+        mission, begun_s = mission_from(document, world), process_time()
+        flown, _ = flown_in(Path(folder), mission, world.scene, world.airframe)
+        processor_s = process_time() - begun_s
+    virtual_s = (flown.report.ended_at_us - flown.report.started_at_us) * 1e-6
+    return virtual_s / flown.wall_clock_s, virtual_s / processor_s
+
+
+def parse_us() -> float:
+    """One HIGHRES_IMU through pymavlink's own parser, whose checksum is fastcrc's: median microseconds."""
+    link = dialect.MAVLink(None, 1, 1)
+    force, rates, field, air = (0.1, -0.2, -9.8), (0.01, 0.02, -0.03), (0.2, 0.0, 0.4), (950.0, 0.0, 490.0, 20.0)
+    packet = bytes(dialect.MAVLink_highres_imu_message(12_345_678, *force, *rates, *field, *air, 0x3F, 0).pack(link))
+    spent = []
+    for _ in range(REPEATS):
+        begun = perf_counter_ns()
+        link.parse_buffer(packet)
+        spent.append(perf_counter_ns() - begun)
+    return statistics.median(spent) / 1e3
+
+
+def run_speed(options: Namespace) -> int:
+    """0 when it is measured, whatever it says."""
+    page = page_path(options.out, "speed")
+    if options.latency:
+        # Milliseconds.
+        parts = {"From the hit to the setpoint": table(measured(options.latency))}
+    else:
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        fly()
+        parts = {"Times real time": flights_table(options.flights)}
+    write_page(page, "Speed", options.typed, Shown(parts))
+    print("\n".join(parts.values()))
+    return 0
+
+
+def flights_table(flights: int) -> str:
+    """The best and the worst. A product with the parser's time is the same on a fast machine and on a slow one."""
+    flown = []
+    for _ in range(flights):
+        before_us, (factor, processor_factor) = parse_us(), fly()
+        parsed_us = (before_us + parse_us()) / 2
+        flown.append((factor * parsed_us, factor, processor_factor, parsed_us))
+    # The first is the product of the second and the last.
+    names = ["product", "times real time", "by the processor's time", "a parse of HIGHRES_IMU [µs]"]
+    rows = pd.DataFrame({"": names, "best": max(flown), "worst": min(flown)})
+    return table(rows.round(2))
+
+
+# --- from a hit's datagram to the setpoint on the wire, at 250 Hz, quiet and beside two busy loops
 
 SET_ATTITUDE_TARGET = 82
 BUSY_LOOPS = 2
