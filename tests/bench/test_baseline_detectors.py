@@ -2,16 +2,13 @@
 
 import math
 import random
-from copy import copy
 
 import pytest
 
 from bench.detectors.config import BaselineConfig
-from bench.detectors.contact import Threshold
-from bench.detectors.force import LateralDetector
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.motion.vector import plus
-from companion.reflex.detector import Phase, Situation
+from companion.reflex.detector import Situation
 from companion.reflex.monitor import advance, start_monitor
 
 TICK_US = 4_000
@@ -125,61 +122,19 @@ def test_the_horizontal_threshold_looks_sideways_alone():
 # --- `lateral`
 
 
-def run(samples, off=lambda sample: None):
-    detector = LateralDetector(Threshold(threshold_m_s2=4.0), TICK_US)
-    state, impacts, states = detector.initial(), [], []
-    for sample in samples:
-        state, impact = detector.step(state, sample, Situation(off(sample)))
-        states.append(copy(state))
-        if impact is not None:
-            impacts.append(impact)
-    return impacts, states
-
-
-def hits(*times_us, level=10.0, length_us=20_000):
-    for t in range(4000, 2_000_000, 4000):
-        loud = any(start <= t < start + length_us for start in times_us)
-        yield ImuSample(t, (0.0, level if loud else 0.0, -9.81), (0.0, 0.0, 0.0))
-
-
-def test_a_sideways_force_is_a_hit_from_its_threshold_on_and_a_gap_before_it_may_have_been_contact():
+def test_a_sideways_force_is_a_hit_from_its_threshold_on():
     assert fly("lateral", wall(3.6)) == [] and len(fly("lateral", wall(4.4))) == 1
-    # Given the same contact at 50 Hz
-    seldom = [sample for sample in hits(400_000) if sample.time_boot_us % 20_000 == 0]
-    (impact,) = run(seldom)[0]
-    assert (impact.contact_free_until_boot_us, impact.sample_time_boot_us) == (380_000, 400_000)
 
 
 def test_one_contact_is_one_detection_and_the_next_one_another():
-    assert len(run(hits(400_000, 440_000))[0]) == 1, "20 ms of quiet is still the same contact"
-    assert len(run(hits(400_000, 500_000))[0]) == 2
+    def twice(gap_us):
+        return lambda t: wall(10.0, 20_000)(t) if t < HIT_US + 20_000 else wall(10.0, 20_000)(t - 20_000 - gap_us)
+
+    assert len(fly("lateral", twice(20_000))) == 1, "20 ms of quiet is still the same contact"
+    assert len(fly("lateral", twice(80_000))) == 2
 
 
-def test_switched_on_in_the_middle_of_a_shake_it_waits_for_quiet():
-    def off(sample):
-        return "takeoff" if sample.time_boot_us < 405_000 else None
-
-    impacts, states = run(hits(400_000, 700_000, level=30.0), off=off)
-
-    assert [impact.sample_time_boot_us for impact in impacts] == [700_000]
-    assert Phase.QUIET in {s.phase for s in states}
-    assert states[-1].phase is Phase.ARMED
-
-
-def shaking(spread_m_s2, seconds=4.0, drag_m_s2=0.0, seed=7):
-    """A vehicle in flight that shakes normally on both axes, 250 Hz; the seed is fixed."""
-    rng = random.Random(seed)
-    for t in range(4000, round(seconds * 1e6), 4000):
-        f_x, f_y = rng.gauss(-drag_m_s2, spread_m_s2), rng.gauss(0.0, spread_m_s2)
-        yield ImuSample(t, (f_x, f_y, -9.81), (0.0, 0.0, 0.0))
-
-
-def off_at_first(sample):
-    return "takeoff" if sample.time_boot_us < 1_000_000 else None
-
-
-@pytest.mark.parametrize("spread_m_s2", [0.25, 1.0, 1.7, 3.0])
+@pytest.mark.parametrize("spread_m_s2", [1.0, 3.0])
 def test_a_shaking_vehicle_raises_its_own_threshold_and_sees_nothing(spread_m_s2):
-    impacts, states = run(shaking(spread_m_s2, seconds=40.0), off=off_at_first)
-    assert impacts == []
-    assert states[-1].threshold_m_s2 == pytest.approx(max(4.0, 6 * spread_m_s2), rel=0.35)
+    chance = random.Random(7)
+    assert fly("lateral", lambda t: (chance.gauss(0.0, spread_m_s2), chance.gauss(0.0, spread_m_s2), 0.0)) == []

@@ -1,28 +1,24 @@
 """The campaign engine: who computes, in what order and how often it was broken off changes nothing."""
 
+import importlib
 import json
 import os
 import random
 import signal
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from bench.fly import campaign as running
-from bench.fly.campaign import CampaignError, record_path, run_campaign
+from bench.fly.campaign import CODE, CampaignError, record_path, run_campaign
+from bench.rows.judge import work_out_mission
+from bench.studies import kills
+from bench.studies.detectors import work_out_hit
+from bench.studies.faults import work_out_fault
+from bench.studies.hits import work_out_flown
+from tests.import_graph import module_imports
 from tests.rebound_cli.command import ROOT
-
-SCRIPT = """\
-import sys
-from pathlib import Path
-from tests.bench.test_campaign import campaign, table, throw, throw_and_die_once
-if __name__ == "__main__":
-    work_out, jobs, folder = sys.argv[1:]
-    print(table(campaign(Path(folder), {"throw": throw}.get(work_out, throw_and_die_once), int(jobs))))
-"""
 
 
 @dataclass(frozen=True)
@@ -58,23 +54,17 @@ def table(results):
     return json.dumps([[case.seed, result] for case, result in results.found]), len(results.failures)
 
 
-def in_a_process(*words):
-    command = [sys.executable, "-c", SCRIPT, *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False, timeout=100)
-
-
 @pytest.mark.slow
-def test_one_worker_two_or_one_that_is_killed_give_the_same_bytes(tmp_path):
+def test_one_worker_two_or_one_that_is_killed_give_the_same_results(tmp_path):
     # Given the same campaign in folders of its own, worked out by one process, by two, and by two of which one dies
-    killed = "throw_and_die_once", 2, tmp_path / "killed"
-    one, two = (in_a_process("throw", jobs, tmp_path / str(jobs)).stdout for jobs in (1, 2))
-    broken_off = in_a_process(*killed)
+    one, two = (table(campaign(tmp_path / str(jobs), jobs=jobs)) for jobs in (1, 2))
+    killed = tmp_path / "killed", throw_and_die_once, 2
     # Then a worker's death is a sentence, and the same command goes on from there
-    assert broken_off.returncode == 1 and "A worker died; the same command goes on from there." in broken_off.stderr
+    with pytest.raises(CampaignError, match="A worker died; the same command goes on from there"):
+        campaign(*killed)
     assert (tmp_path / "killed" / "died").exists()
-    # and the results are the same to the byte, with the failures among them
-    assert one == two == in_a_process(*killed).stdout
-    assert one == f"{table(campaign(tmp_path))}\n"
+    # and the results are the same, with the failures among them
+    assert one == two == table(campaign(*killed))
 
 
 def test_a_failing_case_is_listed_with_its_seed_and_cause_and_stops_nothing(tmp_path):
@@ -110,3 +100,28 @@ def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
     record_path("throws", throw, tmp_path).write_bytes(line + b"\n")
     with pytest.raises(CampaignError, match=r"is damaged in line 1; move it away\.$"):
         campaign(tmp_path)
+
+
+# --- its version is made of all code that its rows follow from
+
+
+@pytest.fixture(scope="module")
+def imports():
+    return module_imports(ROOT)
+
+
+@pytest.mark.parametrize(
+    "work_out",
+    [work_out_mission, work_out_hit, work_out_flown, work_out_fault, kills.work_out],
+    ids=lambda function: function.__module__,
+)
+def test_all_code_that_a_row_follows_from_is_in_its_version(work_out, imports):
+    # Given all that the function's module imports, by whatever way
+    reached, left = set(), {work_out.__module__}
+    while left:
+        reached |= left
+        left = {name for module in left for name in imports.get(module, ())} - reached
+    # Then each lies in a package whose code the version is made of, or only shows or names what was found
+    packages = [str(importlib.import_module(room).__package__) for room in CODE]
+    beside = [name for name in reached if not any(f"{name}.".startswith(f"{package}.") for package in packages)]
+    assert {*beside} <= {work_out.__module__, "bench", "bench.studies", "bench.studies.study"}

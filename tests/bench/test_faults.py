@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from bench.faults.catalogue import FLOWN, GROUPS
-from bench.faults.injectors import rewritten, setting, simulated, taken
+from bench.faults.injectors import simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
-from bench.fly.packets import ARM, SET_MODE, made, number_of, outside
+from bench.fly.packets import ARM, SET_MODE, made, outside
 from bench.studies.faults import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
 from rebound_cli.live.interrupts import Interrupts
@@ -46,20 +46,6 @@ def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong
     core = flying_in("mission").companion.core
     assert core is not None
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
-
-
-@pytest.mark.slow
-def test_each_flight_has_its_own_fault() -> None:
-    # Given a sensor that says nothing true any more, and nothing at all
-    change = setting(xgyro=math.nan)
-    blind = Fault("blind", "", lambda _: rewritten(When("mission"), (number_of("HIGHRES_IMU"),), change))
-    calm = Fault("calm", "", lambda _: Injector())
-    # When both are flown with one seed
-    # (a wall that the blind one falls beside at once, and does not scratch along for half a minute)
-    seeing, blinded = flown_with(calm, 3), flown_with(blind, 3)
-    # Then the hit is found by the one that could, and the other is told as what it is
-    assert seeing["found"] and seeing["complaints"] == []
-    assert not blinded["found"] and "hit not found" in blinded["complaints"]
 
 
 @pytest.fixture

@@ -4,10 +4,9 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-import pandas as pd
 import pytest
 
-from bench.studies.kills import KILLED_S, SPEEDS_M_S, cases, killed, kills_table, work_out
+from bench.studies.kills import KILLED_S, SPEEDS_M_S, cases, killed, work_out
 from tests.bench.random_missions.made_up import hit
 
 
@@ -63,21 +62,3 @@ def test_a_guard_in_between_that_dies_in_a_recovery_leaves_the_vehicle_to_px4s_f
     (kill,) = flight["kills"]
     assert kill["again_m_s"] == 0.0 and kill["mode"] == "POSCTL"
     assert kill["ground_m_s"] == pytest.approx(0.7, abs=0.2), "MPC_LAND_SPEED"
-
-
-def test_the_table_has_a_row_for_each_program_before_and_after_the_touch():
-    kills = pd.DataFrame(
-        {
-            "kill_s": [-0.1, 0.04, 0.6],
-            "again_m_s": [0.9, 0.2, 0.0],
-            "mode": ["POSCTL", "POSCTL", "AUTO.LOITER"],
-            "ground_m_s": [0.7, 1.1, None],
-            "program": ["sticks"] * 3,
-            "loss_s": [0.3] * 3,
-        }
-    )
-    lines = kills_table(kills).splitlines()[2:]
-    before, after, soon = ([cell.strip() for cell in line.split("|")[1:-1]] for line in lines)
-    assert before == ["sticks", "0.3", "before the touch", "1", "1 (100.0 %)", "0.90", "1", "0.70", "0.70", "POSCTL 1"]
-    assert after[3:] == ["2", "0 (0.0 %)", "–", "1", "1.10", "1.10", "POSCTL 1, AUTO.LOITER 1"]
-    assert soon[2:4] == ["within 0.1 s of it", "1"]

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from bench.fly.by_hand.ways_down import FALLS, FALLS_FROM_M, LANDINGS, GroundCase
-from bench.studies.landings import fly_to_the_ground, judged, text_of
+from bench.studies.landings import fly_to_the_ground, judged
 
 TOUCHED_S = 5.0
 LANDED, FALLEN = False, True
@@ -39,15 +39,6 @@ def test_a_way_to_the_ground_is_judged_by_all_that_was_reported(is_fall, reporte
 
 def test_a_flight_that_never_touches_the_ground_shows_nothing():
     assert judged(False, None, None, []) == ("not there", "the ground was not reached")
-
-
-def test_the_table_counts_landings_and_falls_apart():
-    def row(way, outcome, wrong):
-        return {"way": way, "imu_hz": 50, "ground": "soft", "outcome": outcome, "wrong": wrong}
-
-    lines = text_of([row("POSCTL", "landing", ""), row("one motor", "wall", "wall in a crash")]).splitlines()
-    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
-    assert ["landings", "1", "0", "landing 1"] in cells and ["falls", "1", "1", "wall 1"] in cells
 
 
 @pytest.mark.slow

@@ -42,11 +42,6 @@ def test_a_tolerance_catches_a_wrong_sign_and_a_factor_of_two(name):
     assert {verdict(name, factor * expected) for factor in (-1.0, 2.0, 0.5)} == {FAILED}
 
 
-def test_limits_are_judged_from_one_side():
-    assert verdict("error of v_c", 0.1) == verdict("bouncing", 3.0) == PASSED
-    assert verdict("error of v_c", 0.101) == verdict("bouncing", 2.0) == FAILED
-
-
 def test_a_row_that_is_not_a_number_differs():
     assert {verdict(name, float("nan")) for name in CLAIMS} == {FAILED}
 
@@ -101,13 +96,11 @@ def test_the_share_of_a_hit_that_was_received():
 # --- the studies --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("study", command.STUDIES)
-def test_every_study_states_the_papers_detector_law_and_gain(study):
-    for flight in study.flights(2):
-        mission = BaselineMission.model_validate(dict(flight.mission))
-        assert (mission.companion.detector, mission.recovery.law, mission.recovery.gamma) == ("lateral", "paper", 0.5)
-        assert flight.mission["companion"]["detector"] == "lateral"
-        assert flight.mission["recovery"] == {"law": "paper", "gamma": 0.5}
+def test_every_flight_states_the_papers_detector_law_and_gain():
+    for mission in (flight.mission for study in command.STUDIES for flight in study.flights(1)):
+        assert mission["companion"]["detector"] == "lateral"
+        assert mission["recovery"] == {"law": "paper", "gamma": 0.5}
+        BaselineMission.model_validate(dict(mission))
 
 
 @pytest.fixture(scope="module")
@@ -116,15 +109,11 @@ def sample():
     return fly(flights.SAMPLE.flights(1)[0])
 
 
-def test_the_sample_scenario_agrees_and_its_picture_marks_everything(sample):
+def test_the_sample_scenario_agrees_and_its_picture_marks_the_moments(sample):
     findings = flights.SAMPLE.conclude(pd.DataFrame([sample]))
     assert {row["verdict"] for row in findings.rows} == {PASSED}
-    figure = findings.pictures["sample_scenario.png"]
-    names = {text.get_text() for text in figure.legends[0].get_texts()}
-    assert {"wall", "vehicle's centre", "setpoint sent", "recovery setpoint (eq. 3)", "first contact"} <= names
-    assert any(name.startswith("hit detected") for name in names)
-    for axis in figure.axes:
-        assert re.search(r"\[s\]", axis.get_xlabel()) and re.search(r"\[(m|mm|m/s)\]", axis.get_ylabel())
+    names = {text.get_text() for text in findings.pictures["sample_scenario.png"].legends[0].get_texts()}
+    assert {"wall", "setpoint sent", "recovery setpoint (eq. 3)", "first contact", "hit detected"} <= names
 
 
 def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):

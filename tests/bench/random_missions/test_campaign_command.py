@@ -10,28 +10,14 @@ from bench.fly.campaign import Results
 from bench.main import main
 from bench.rows.tables import MET, MISSED
 from bench.studies import study
-from bench.studies.campaign import MISSIONS_WANTED, failures_table, hit_rows, mission_bars, mission_rows, tables
+from bench.studies.campaign import MISSIONS_WANTED, failures_table, hit_rows, mission_bars, mission_rows
 
 pytestmark = pytest.mark.slow
 
 # A short mission in which a pole is hit.
 SEED = "4"
-HIT = {
-    "obstacle": "wall",
-    "kind": "wall",
-    "phase": "item",
-    "speed_m_s": 2.0,
-    "closing_m_s": 2.0,
-    "climbing_m_s": 0.0,
-    "steepness": 0.0,
-    "seen": True,
-    "again": 0,
-    "returned": 0,
-    "others": 0,
-    "settled_s": 1.4,
-    "past_m": 0.01,
-    "lost_m": 0.02,
-}
+HIT = {"kind": "wall", "speed_m_s": 2.0, "closing_m_s": 2.0, "climbing_m_s": 0.0, "steepness": 0.0, "seen": True}
+HIT |= {"again": 0, "returned": 0, "others": 0, "settled_s": 1.4, "past_m": 0.01, "lost_m": 0.02}
 
 
 def made_up(count=200, failing=(), **changes):
@@ -50,13 +36,8 @@ def made_up(count=200, failing=(), **changes):
     return Results(found)
 
 
-def frames(flown):
-    return mission_rows(flown), hit_rows(flown)
-
-
 def bars_of(flown):
-    flights, hits = frames(flown)
-    return mission_bars(flights, hits, MISSIONS_WANTED)
+    return mission_bars(mission_rows(flown), hit_rows(flown), MISSIONS_WANTED)
 
 
 def verdicts(bars, word):
@@ -78,13 +59,10 @@ def test_one_hit_that_loses_too_much_height_is_enough_if_it_was_on_something_upr
     assert verdicts(bars_of(made_up(lost_m=0.11, steepness=0.8)), "height lost") == [MET, MET]
 
 
-def test_every_failure_is_listed_with_seed_cause_and_the_command_to_see_it_again():
-    flights = mission_rows(made_up(failing=[17]))
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in failures_table(flights).splitlines()]
-    again = "`python -m bench campaign --only 17`"
-    assert ["17", "foldable", "corner", "50", "3.0", "fell: at 3.00 s", again] in rows
-    assert rows[-1][-1] == "`python -m bench campaign --only 17 --airframe rigid`"
-    assert "fell" in tables(flights)["Missions that did not end as they say"]
+def test_every_failure_is_listed_with_its_cause_and_the_command_to_see_it_again():
+    rows = failures_table(mission_rows(made_up(failing=[17]))).splitlines()
+    assert "fell: at 3.00 s" in rows[2] and rows[2].rstrip(" |").endswith("`python -m bench campaign --only 17`")
+    assert rows[-1].rstrip(" |").endswith("`python -m bench campaign --only 17 --airframe rigid`")
 
 
 @pytest.fixture(scope="module")
