@@ -23,14 +23,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else arguments
     for gone, instead in STUDIES["gone"].items():
         if [*words][: len(gone.split())] == gone.split():
-            print(f"bench: `{gone}` is no more: {instead}.", file=sys.stderr)
-            return 2
+            return _refused(gone, instead)
     options = build_parser().parse_args(words)
     options.typed = shlex.join(("python", "-m", "bench", *words))
     for gone, instead in options.gone.items():
         if any(word.partition("=")[0] == gone for word in words):
-            print(f"{gone} is no more: {instead}.", file=sys.stderr)
+            return _refused(f"{options.command} {gone}", instead)
     return run(options, "bench")
+
+
+def _refused(gone: str, instead: str) -> int:
+    print(f"bench: `{gone}` is no more: {instead}.", file=sys.stderr)
+    return 2
 
 
 def build_parser() -> ArgumentParser:

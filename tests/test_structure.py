@@ -187,8 +187,3 @@ def test_every_command_runs_a_function_that_there_is(main: Any) -> None:
     assert len(runs) > 5
     for module, function in (run.args for run in runs):
         assert callable(getattr(importlib.import_module(module), function)), function
-
-
-@pytest.mark.parametrize("path", sources("tests/benchmarks"), ids=lambda path: path.stem)
-def test_a_benchmark_can_be_started(path: Path) -> None:
-    importlib.import_module(f"tests.benchmarks.{path.stem}")

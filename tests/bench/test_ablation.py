@@ -55,16 +55,8 @@ def test_every_rule_is_a_function_of_the_companion(rule):
 
 def test_the_table_counts_what_is_lost_without_a_rule():
     well = {"ends": True, "hits": [RECOVERED]}
-    flights = [
-        {
-            "with": well,
-            "without": {"trust": {"ends": False, "hits": [RECOVERED | NOT_RECOVERED]}},
-        },
-        {
-            "with": well,
-            "without": {"trust": {"ends": True, "hits": [RECOVERED | NOT_RECOVERED]}},
-        },
-    ]
+    lost = [{"ends": ends, "hits": [RECOVERED | NOT_RECOVERED]} for ends in (False, True)]
+    flights = [{"with": well, "without": {"trust": without}} for without in lost]
     lines = flights_table(flights).splitlines()
     trust = next(line for line in lines if line.startswith("| trust"))
     assert [cell.strip() for cell in trust.split("|")][3:6] == ["2", "+1", "+2"]

@@ -6,7 +6,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from bench import pictures
-from bench.main import main
 from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL, run_here
 
@@ -25,13 +24,3 @@ def test_arms_turn_red_as_they_fold_and_the_moment_of_detection_stays(tmp_path):
     flight = recorded_flight(tmp_path / "wall")
     before, folded, after = map(red_share, (-0.1, 0.025, 1.5))
     assert before == 0.0 and folded > 3.0 * after > 0.0
-
-
-@pytest.mark.slow
-def test_a_command_makes_all_pictures(tmp_path, monkeypatch):
-    monkeypatch.setattr(pictures, "write_animation", lambda flight, path: path.write_text(flight.name))
-    monkeypatch.setattr(pictures, "write_screens", lambda page, folder: (folder / "report.png").write_bytes(b"x"))
-    monkeypatch.setattr(pictures, "browser_path", lambda: "")
-    assert main(["pictures", "--out", str(tmp_path)]) == 0
-    images = tmp_path / pictures.FOLDER
-    assert (images / "hit.webp").read_text() == "wall" and (images / "wall.png").stat().st_size > 10_000

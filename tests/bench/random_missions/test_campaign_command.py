@@ -108,8 +108,10 @@ def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsy
     assert "cannot be made" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", [["corpus", "judge", "FOLDER"], ["campaign", "page"], ["soak", "--minutes", "2"]])
-def test_a_study_that_is_gone_says_so_in_a_sentence(capsys, words):
-    assert main(words) == 2
+@pytest.mark.parametrize(
+    "words", ["corpus judge FOLDER", "campaign page", "stamps", "detectors --hours 1", "hits --growth"]
+)
+def test_what_is_gone_says_so_in_a_sentence_and_flies_nothing(capsys, words):
+    assert main(words.split()) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"bench: `{words[0]}") and line.endswith(".")
+    assert line.startswith("bench: `") and " is no more: " in line and line.endswith(".")

@@ -21,20 +21,18 @@ from tests.bench.random_missions.made_up import (
     room,
 )
 
-# At the wall at 10 s, back half a metre, down there.
-BOUNCED = path(
-    (0, 0, 0, 0),
-    (5, 0, 0, 0),
-    (8, 0, 0, 2),
-    (10, 2, 0, 2),
-    (11, 1.5, 0, 2),
-    (13, 1.5, 0, 2),
-    (16.5, 1.5, 0, 0),
-    (17, 1.5, 0, 0),
-)
 LANDS_THERE = [event(12.0, "landing"), event(DONE_S, "done")]
 LANDS_LATER = [event(13.6, "landing"), event(DONE_S, "done")]
 LAND, DETOUR = {"then": "land"}, {"then": "detour"}
+
+
+def way(*points):
+    """Up, by these places, which are (seconds, north, east, height), and 2 s on the ground of the last."""
+    return path((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), *points, (17, *points[-1][1:]))
+
+
+# At the wall at 10 s, back half a metre, down there.
+BOUNCED = way((10, 2, 0, 2), (11, 1.5, 0, 2), (13, 1.5, 0, 2), (16.5, 1.5, 0, 0))
 
 
 def causes(judged):
@@ -57,11 +55,6 @@ def test_a_vehicle_that_leans_by_more_than_a_right_angle_has_tumbled():
     half = math.radians(100.0) / 2
     series["attitude_wxyz"][500] = [math.cos(half), math.sin(half), 0.0, 0.0]
     assert causes(flight(series=series)) == ["tumbled"]
-
-
-def way(*points):
-    """Up, by these places, which are (seconds, north, east, height), and 2 s on the ground of the last."""
-    return path((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), *points, (17, *points[-1][1:]))
 
 
 SMALL_FENCE = {"fence": {"radius_m": 4.0}}
@@ -93,9 +86,7 @@ def test_home_is_where_it_started(north_m, found):
 
 
 def test_a_guard_of_a_leaning_vehicle_touches_the_ground_before_its_feet():
-    dips = path(
-        (0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 2, 0, 0.1), (12, 4, 0, 2), (15.5, 4, 0, 0), (17, 4, 0, 0)
-    )
+    dips = way((10, 2, 0, 0.1), (12, 4, 0, 2), (15.5, 4, 0, 0))
     assert causes(flight(series=dips)) == []
     at_the_lowest = int(np.argmin(np.abs(dips["time_boot_us"] - 10e6)))
     half = math.radians(75.0) / 2
@@ -132,8 +123,7 @@ def test_a_vehicle_that_drifts_while_it_holds_is_a_failure():
 
 def _held_at(north_m):
     """At 1.5 m when the hold begins, there when it ends."""
-    up = ((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 2, 0, 2), (12, 1.5, 0, 2))
-    return path(*up, (14, north_m, 0, 2), (16.5, north_m, 0, 0), (17, north_m, 0, 0))
+    return way((10, 2, 0, 2), (12, 1.5, 0, 2), (14, north_m, 0, 2), (16.5, north_m, 0, 0))
 
 
 def test_the_same_place_hit_twice_is_a_failure_unless_it_was_tried_again_on_purpose():
