@@ -49,6 +49,7 @@ class MotionEstimator:
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
+    has_agreed: bool = False  # with a receiver's velocity: no model is needed any more
     tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
@@ -75,7 +76,8 @@ class MotionEstimator:
 
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
-        self._newest, self.has_converged = None, False
+        self._newest, self._agrees_since_boot_us = None, None
+        self.has_converged = self.has_agreed = False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
@@ -145,7 +147,7 @@ class MotionEstimator:
             return
         if self.is_fully_measured:
             self.has_converged = True
-        elif self.has_converged or sample.time_boot_us > self.pushed_boot_us:
+        elif not self.has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
             self._filter(sample, at_us)
         if self.has_converged:
             self._correct(sample)
@@ -225,7 +227,7 @@ class MotionEstimator:
         estimate, spread_m_s, left_m_s = bank.estimate(left)
         if self.is_measured_apart:
             self._believe(estimate, spread_m_s)
-            self.has_converged = self._agrees(velocity, sample.time_boot_us)
+            self.has_agreed = self.has_converged = self._agrees(velocity, sample.time_boot_us)
             self.position_error_m = plus(place, -1.0, estimate.position_ned_m)
             return
         self.has_converged = self.has_converged or left_m_s <= SAME_M_S
