@@ -60,6 +60,7 @@ class MessageId(IntEnum):
     """MAVLink ids of the streams the companion asks for and of the messages it requests."""
 
     HEARTBEAT = 0
+    GPS_RAW_INT = 24
     ATTITUDE_QUATERNION = 31
     LOCAL_POSITION_NED = 32
     MANUAL_CONTROL = 69
@@ -108,6 +109,13 @@ class LocalPosition(Sample):
     time_boot_us: int
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class GpsVelocity(Sample):
+    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift. Its time stamp is no boot time."""
+
+    velocity_ne_m_s: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

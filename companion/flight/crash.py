@@ -5,7 +5,7 @@ import math
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
 from companion.flight.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
-from companion.messages import LocalPosition, SetArmed
+from companion.messages import SetArmed
 from companion.motion.rotation import tilt_rad
 from companion.motion.vector import along, plus
 
@@ -21,7 +21,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
         how = "tipped over"
     elif has_unsettled and not goes_down and watch.is_low:
         how = "on the floor after a hit"
-    elif has_unsettled and _is_pressed(flight, latest, now_us):
+    elif has_unsettled and _is_pressed(flight, now_us):
         how = "pressed to what was hit"
     else:
         return None
@@ -44,13 +44,14 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
     return flight.crashed
 
 
-def _is_pressed(flight: FlightContext, latest: LocalPosition, now_us: int) -> bool:
+def _is_pressed(flight: FlightContext, now_us: int) -> bool:
     """Whether the time for the recovery is over, and the vehicle is still where it touches."""
     recovery, settled = flight.reflex.in_one_recovery(), flight.mission.companion.settled
     if not recovery or now_us - recovery[-1].detected_at_us <= settled.timeout_s * 1e6:
         return False
-    contact = recovery[0].contact
-    off_m = along(plus(latest.position_ned_m, -1.0, contact.position_ned_m), recovery[0].normal.direction_ned)
+    # Not where the vehicle reports to be: a hit may have put that off by more than a metre.
+    newest, place = recovery[0], recovery[0].estimator.motion.position_ned_m
+    off_m = along(plus(place, -1.0, newest.contact.position_ned_m), newest.normal.direction_ned)
     return off_m < settled.distance_m
 
 

@@ -132,6 +132,19 @@ def _text(*values: float) -> str:
     return " ".join(f"{value:g}" for value in values)
 
 
+# GPS_FIX_TYPE of a place in three dimensions; a speed or a course that is not known.
+FIX_3D, UNKNOWN = 3, 0xFFFF
+
+
+def _gps_raw(fix_type: int, vel: int, cog: int) -> Sample | None:
+    if fix_type < FIX_3D or UNKNOWN in (vel, cog):
+        return None
+    speed_m_s, course_rad = 0.01 * vel, math.radians(0.01 * cog)
+    if speed_m_s > messages.VELOCITY_M_S:
+        return Refused("GPS_RAW_INT", f"speed {speed_m_s:g} m/s")
+    return messages.GpsVelocity((speed_m_s * math.cos(course_rad), speed_m_s * math.sin(course_rad)))
+
+
 def _heartbeat(
     source: tuple[int, int], type: int, autopilot: int, base_mode: int, custom_mode: int, system_status: int
 ) -> Sample:
@@ -294,6 +307,7 @@ READERS = _readers(
         dialect.MAVLink_local_position_ned_message: _local_position,
         dialect.MAVLink_attitude_quaternion_message: _attitude,
         dialect.MAVLink_odometry_message: _odometry,
+        dialect.MAVLink_gps_raw_int_message: _gps_raw,
         dialect.MAVLink_heartbeat_message: _heartbeat,
         dialect.MAVLink_attitude_target_message: _attitude_target,
         dialect.MAVLink_vibration_message: _vibration,

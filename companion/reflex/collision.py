@@ -96,6 +96,7 @@ class CollisionRecord:
             self.contact_normal = level(estimate.normal)
             self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us)
         self.estimator.imu(strapdown)
+        self.estimator.measure(source.doppler)
         if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US:
             for sample in positions:
                 self.estimator.update(sample)

@@ -62,6 +62,8 @@ class VelocityValidity:
     """Time of the latest hit that was not measured whole."""
     _is_again: bool = False
     """Whether the velocity was invalid already when the latest hit came: an earlier hit's part stays hidden."""
+    is_disproved: bool = False
+    """Whether a receiver's velocity shows that the vehicle's own is not right yet."""
     _speed_m_s: float = 0.0
     """Of the latest hit, or of the hardest of those."""
 
@@ -82,7 +84,7 @@ class VelocityValidity:
         stood still may have done so at any speed."""
         if self.invalid_since_boot_us is None:
             return 0.0
-        if self._speed_m_s < APPROACH_M_S:
+        if self._speed_m_s < APPROACH_M_S or self.is_disproved:
             return math.inf
         *before, newest = (error_response(1e-6 * (each - self.invalid_since_boot_us))[0] for each in times_us)
         return 2.0 * self._speed_m_s * float(np.abs(newest - sum(before) / len(before)).max())
@@ -101,5 +103,7 @@ class VelocityValidity:
 
     def update(self, time_us: int) -> None:
         """Take the present time."""
-        if self.invalid_since_boot_us is not None and time_us - self.invalid_since_boot_us > CORRECTED_US:
+        if self.invalid_since_boot_us is None or self.is_disproved:
+            return
+        if time_us - self.invalid_since_boot_us > CORRECTED_US:
             self.invalid_since_boot_us = None

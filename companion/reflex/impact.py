@@ -3,8 +3,9 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
+from companion.messages import Attitude, GpsVelocity, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
 from companion.motion.config import STAMP_RESOLUTION_US
+from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import Strapdown
@@ -99,6 +100,7 @@ class ImpactEstimator:
     history: MotionHistory = field(default_factory=MotionHistory)
     strapdown: Strapdown = field(default_factory=Strapdown)
     validity: VelocityValidity = field(default_factory=VelocityValidity)
+    doppler: Doppler = field(default_factory=Doppler)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
@@ -117,6 +119,9 @@ class ImpactEstimator:
                 self.history.add(sample)
             self.strapdown.velocity(sample)
             self.validity.update(sample.time_boot_us)
+        elif isinstance(sample, GpsVelocity):
+            is_free = self.validity.is_valid and (self.estimate is None or self.estimate.is_final)
+            self.doppler.take(sample, self.strapdown, is_free)
         elif isinstance(sample, Attitude):
             time_us = sample.time_boot_us
             self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.tilt_error_rad(time_us))

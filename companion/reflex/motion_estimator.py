@@ -14,93 +14,26 @@ innovations (Magill 1965). Before the first report v is the expected rebound, wi
 import math
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from companion.messages import LocalPosition, Quaternion, Vector3
-from companion.motion.config import DELAY_S, GRAVITY_M_S2, LATEST_S, LONGEST_GAP_US, SAME_M_S, STAMP_RESOLUTION_US
+from companion.motion.config import (
+    CURRENT_US,
+    DELAY_S,
+    GRAVITY_M_S2,
+    LATEST_S,
+    LONGEST_GAP_US,
+    SAME_M_S,
+    STAMP_RESOLUTION_US,
+)
+from companion.motion.doppler import Doppler
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, along, limited, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
-from companion.reflex.correction import MODELS, Floats, error_response, tilt_response
+from companion.reflex.correction import error_response
+from companion.reflex.filter_bank import ALL_AXES, DOWN_AXIS, NOTHING, FilterBank
 from companion.reflex.laws import Contact, MotionState
-
-
-class FilterBank:
-    """Kalman filters of x, v, e: states (models, axes, 3), covariances of each axis (models, 3, 3); in the last e = 0.
-
-    Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
-    """
-
-    __slots__ = ("covariance", "leaves", "log_likelihoods", "state", "tilted")
-
-    def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
-        """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
-        models, state = MODELS, np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
-        spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
-        self.state = np.tile(state, (models, 1, 1))
-        self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
-        self.log_likelihoods, self.leaves = np.zeros(models), np.ones(models)
-        self.tilted = np.zeros((2, models, 3))  # errors of what is reported by a tilt that is wrong across e
-        self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
-        self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
-
-    def predict(self, elapsed_s: float, faster_m_s: Vector3, level_m_s2: Vector3) -> None:
-        """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong.
-
-        `level_m_s2`: acceleration of a vehicle that is level by its own tilt. Along e the models contain it.
-        """
-        hidden, pushed = self.state[..., 2], np.array(level_m_s2)
-        along_e = hidden @ pushed / np.maximum((hidden**2).sum(axis=1), 1e-9)
-        self.tilted = tilt_response(self.tilted, pushed - along_e[:, None] * hidden, elapsed_s)
-        leads, added = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array(faster_m_s)
-        self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0]
-        self.covariance = leads @ self.covariance @ leads.T
-        self.covariance[:, 1, 1] += reflex.DRIFT_M2_S3 * elapsed_s
-
-    def update(self, which: int, share: Floats, measured: Vector3, variance: float) -> None:
-        """Take a reported position (0) or velocity (1), with each model's share of e in it."""
-        missed = np.array(measured) - self.state[..., which] - share[:, None] * self.state[..., 2] - self.tilted[which]
-        with_it = self.covariance[:, which] + share[:, None] * self.covariance[:, 2]
-        size = with_it[:, which] + share * with_it[:, 2] + variance
-        gain = with_it / size[:, None]
-        self.state = self.state + missed[..., None] * gain[:, None]
-        self.covariance = self.covariance - with_it[..., None] * gain[:, None]
-        self.log_likelihoods = self.log_likelihoods - (missed**2).sum(axis=1) / size - 3.0 * np.log(size)
-
-    def leave(self, normal: Vector3, along_m_s: float, error_rad: float) -> None:
-        """Take that no vehicle goes on into what it has hit: the probability that a model's velocity left it.
-
-        `along_m_s`: what the vehicle's own thrust has added since; `error_rad`: of the normal.
-        """
-        velocity, variance = self.state[..., 1], self.covariance[:, 1, 1]
-        off_m_s = velocity @ np.array(normal) - along_m_s
-        spread2 = variance + error_rad**2 * (velocity**2).sum(axis=1)
-        self.leaves = np.maximum(0.5 + 0.5 * np.tanh(0.5 * reflex.LOGISTIC * off_m_s / np.sqrt(spread2)), 1e-9)
-
-    def estimate(self, left: Floats) -> tuple[MotionState, float, float]:
-        """Motion, largest standard deviation of its velocity, largest further swing of the reported velocity.
-
-        `left` is each model's remaining amplitude.
-        """
-        share = self._probabilities()
-        (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
-        spread2 = (share @ (self.covariance[:, 1, 1, None] + (self.state[..., 1] - [u, v, w]) ** 2)).max()
-        left2 = share @ (left**2 * (3.0 * self.covariance[:, 2, 2] + (self.state[..., 2] ** 2).sum(axis=1)))
-        return MotionState((x, y, z), (u, v, w)), math.sqrt(spread2), math.sqrt(left2)
-
-    def mean_error(self, which: int, share: Floats) -> Vector3:
-        """Mean error of the reported position (0) or velocity (1), with each model's share of e in it."""
-        n, e, d = (self._probabilities() @ (share[:, None] * self.state[..., 2] + self.tilted[which])).tolist()
-        return (n, e, d)
-
-    def _probabilities(self) -> Floats:
-        """Probability of each model."""
-        share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max())) * self.leaves
-        share /= share.sum()
-        return share
 
 
 @dataclass(slots=True)
@@ -116,11 +49,13 @@ class MotionEstimator:
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
+    has_agreed: bool = False  # with a receiver's velocity: no model is needed any more
     tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
+    unseen_m_s2: Vector3 = ZERO  # acceleration that the accelerometer does not show, as a receiver does
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
     _bank: FilterBank | None = None  # from the first report on
@@ -131,6 +66,9 @@ class MotionEstimator:
     _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
     _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
+    _measured_boot_us: int = -CURRENT_US  # when a receiver's velocity was last taken
+    _was_odd: bool = False  # whether the last one was beyond belief: a second one counts
+    _agrees_since_boot_us: int | None = None  # for so long the reported velocity agrees with it
 
     def __post_init__(self) -> None:
         self.motion, self.pushed_boot_us = self.start, self.hit_boot_us
@@ -138,7 +76,8 @@ class MotionEstimator:
 
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
-        self._newest, self.has_converged = None, False
+        self._newest, self._agrees_since_boot_us = None, None
+        self.has_converged = self.has_agreed = False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
@@ -164,7 +103,7 @@ class MotionEstimator:
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
         self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
-        if time_us - self.hit_boot_us < reflex.CORRECTED_US:
+        if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
             # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
             self.level_m_s2 = strapdown.level_acceleration_m_s2
         self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
@@ -196,7 +135,7 @@ class MotionEstimator:
             self.wind_m_s2,
             self.attitude_wxyz,
             self.yaw_rate_rad_s,
-            self.level_m_s2,
+            plus(self.level_m_s2, 1.0, self.unseen_m_s2),
         )
 
     def update(self, sample: LocalPosition) -> None:
@@ -208,10 +147,59 @@ class MotionEstimator:
             return
         if self.is_fully_measured:
             self.has_converged = True
-        elif self.has_converged or sample.time_boot_us > self.pushed_boot_us:
+        elif not self.has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
             self._filter(sample, at_us)
         if self.has_converged:
             self._correct(sample)
+
+    def measure(self, doppler: Doppler) -> None:
+        """Take a receiver's velocity. From then on what the vehicle reports counts for its height alone, until both
+        have agreed for a while: then its estimate has converged.
+        """
+        if (
+            self.is_fully_measured
+            or self.has_converged
+            or doppler.taken_boot_us <= max(self._measured_boot_us, self.pushed_boot_us)
+        ):
+            return
+        bank = self._bank = self._bank or self._first_bank()
+        self._predict(bank)
+        velocity, variance = doppler.velocity_ned_m_s, doppler.trusted_variance_m2_s2
+        off = plus(velocity, -1.0, self.motion.velocity_ned_m_s)
+        is_odd = math.hypot(off[0], off[1]) > reflex.DOPPLER_GATE * math.hypot(self.spread_m_s, math.sqrt(variance))
+        was_odd, self._was_odd = self._was_odd, is_odd
+        if is_odd and not was_odd:
+            return
+        self._measured_boot_us = doppler.taken_boot_us
+        bank.measure(velocity, variance)
+        self.unseen_m_s2 = bank.unseen()
+        self._believe(*bank.estimate(NOTHING)[:2])
+
+    @property
+    def is_measured_apart(self) -> bool:
+        """Whether a receiver shows the velocity, and the vehicle's own has not come to agree with it."""
+        return not self.has_converged and self._time_boot_us - self._measured_boot_us < CURRENT_US
+
+    def _first_bank(self) -> FilterBank:
+        return FilterBank(self.start, self.spread_m_s, self._half_hidden_m_s)
+
+    @property
+    def _half_hidden_m_s(self) -> Vector3:
+        """Clipping hides between none and all of the change of velocity."""
+        return plus(ZERO, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
+
+    def _predict(self, bank: FilterBank) -> float:
+        """As of the newest sample; the time since the last prediction, s."""
+        elapsed_s = 1e-6 * (self._time_boot_us - self._at_boot_us)
+        # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
+        level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
+        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
+        self._at_boot_us, self._moved_m_s = self._time_boot_us, self._summed_m_s
+        return elapsed_s
+
+    def _believe(self, motion: MotionState, spread_m_s: float) -> None:
+        self.motion = replace(motion, acceleration_ned_m_s2=self.motion.acceleration_ned_m_s2)
+        self.spread_m_s = spread_m_s
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
         """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
@@ -219,14 +207,9 @@ class MotionEstimator:
         if abs(now_us - at_us) > LONGEST_GAP_US or now_us <= self._at_boot_us:
             # The report's time is outside the integrated interval.
             return
-        config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - self._at_boot_us), 1e-6 * (now_us - at_us)
-        # Clipping hides between none and all of the change of velocity.
-        half = plus(ZERO, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
-        bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
-        # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
-        level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
-        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
-        self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
+        config, behind_s = self.config, 1e-6 * (now_us - at_us)
+        bank = self._bank = self._bank or self._first_bank()
+        elapsed_s = self._predict(bank)
         g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
         # The report as of now.
         place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)
@@ -234,19 +217,33 @@ class MotionEstimator:
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * STAMP_RESOLUTION_US))
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
-        off_m_s = math.hypot(*half) * reflex.MODEL_ERROR
+        off_m_s = math.hypot(*self._half_hidden_m_s) * reflex.MODEL_ERROR
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
-        bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
-        bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
+        axes = DOWN_AXIS if self.is_measured_apart else ALL_AXES
+        bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2), axes)
+        bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2), axes)
         normal = self.contact.normal_ned
         bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
         estimate, spread_m_s, left_m_s = bank.estimate(left)
+        if self.is_measured_apart:
+            self._believe(estimate, spread_m_s)
+            self.has_agreed = self.has_converged = self._agrees(velocity, sample.time_boot_us)
+            self.position_error_m = plus(place, -1.0, estimate.position_ned_m)
+            return
         self.has_converged = self.has_converged or left_m_s <= SAME_M_S
         if self.has_converged:
             self.position_error_m, self._hidden_error_m_s = bank.mean_error(0, way_s), bank.mean_error(1, g)
             return
-        self.motion = replace(estimate, acceleration_ned_m_s2=self.motion.acceleration_ned_m_s2)
-        self.spread_m_s = spread_m_s
+        self._believe(estimate, spread_m_s)
+
+    def _agrees(self, reported_m_s: Vector3, time_boot_us: int) -> bool:
+        """Whether the reported velocity has been the measured one for a while: a swing only passes it."""
+        off = plus(reported_m_s, -1.0, self.motion.velocity_ned_m_s)
+        if math.hypot(off[0], off[1]) > SAME_M_S:
+            self._agrees_since_boot_us = None
+            return False
+        self._agrees_since_boot_us = self._agrees_since_boot_us or time_boot_us
+        return time_boot_us - self._agrees_since_boot_us > 1e6 * reflex.COMPARED_S
 
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter."""

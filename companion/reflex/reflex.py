@@ -191,6 +191,7 @@ class Reflex:
         if self.hits:
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             self.hits[-1].follow(self.monitor.state, self.monitor.estimator, positions)
+            self.monitor.estimator.validity.is_disproved = self.hits[-1].estimator.is_measured_apart
         self.crash.update(samples, height_m, landed)
 
     def left_wrong(self, time_boot_us: int) -> LeftWrong | None:

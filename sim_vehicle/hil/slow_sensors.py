@@ -13,6 +13,9 @@ from sim_vehicle.quantities import Floats, Vector3
 MAGNETOMETER_PERIOD_US = 64_000
 BAROMETER_PERIOD_US = 48_000
 GPS_PERIOD_US = 124_000
+# How late a receiver's fix is, less than a period: PX4's default EKF2_GPS_DELAY.
+GPS_DELAY_US = 110_000
+NEVER_US = 1 << 62
 
 
 class SlowSensors:
@@ -23,7 +26,8 @@ class SlowSensors:
         rng = random.Random(seed)
         self._magnetometer, self._gps, self._rng = Magnetometer(rng, origin.place), Gps(airframe, rng, origin), rng
         self._altitude_m = origin.place.altitude_m
-        self._due_us = [0, 0, 0]
+        self._due_us = [0, 0, 0, NEVER_US]
+        self._fix: HilGps | None = None
         self.due_us = 0
         """When any of them has its next sample."""
         self.magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
@@ -42,8 +46,10 @@ class SlowSensors:
         if now_us >= due_us[1]:
             due_us[1] = now_us + BAROMETER_PERIOD_US
             self.air = air_at(self._altitude_m - down, self._rng.gauss(0, BAROMETER_NOISE_PA))
+        if now_us >= due_us[3]:
+            due_us[3] = NEVER_US
+            self.gps = None if self.gps_is_blocked else self._fix
         if now_us >= due_us[2]:
-            due_us[2] = now_us + GPS_PERIOD_US
-            fix = self._gps.sample(now_us, (north, east, down), (v_north, v_east, v_down))
-            self.gps = None if self.gps_is_blocked else fix
+            due_us[2], due_us[3] = now_us + GPS_PERIOD_US, now_us + GPS_DELAY_US
+            self._fix = self._gps.sample(now_us, (north, east, down), (v_north, v_east, v_down))
         self.due_us = min(due_us)

@@ -111,7 +111,7 @@ def test_streams_are_asked_for_at_the_stated_rates_and_those_that_the_detector_u
     f = flight(confirmed=False)
     f.run_until(f.companion.plan_is_ready)
     asked = {int(m.param1): m.param2 for _, m in f.vehicle.commands if m.command == 511}
-    always = {105: 4000, 32: 20_000, 31: 20_000, 245: 200_000, 436: 100_000}
+    always = {105: 4000, 32: 20_000, 31: 20_000, 245: 200_000, 436: 100_000, 24: 100_000}
     assert asked == always | {83: 33_333, 331: 33_333}
 
 

@@ -1,0 +1,71 @@
+"""The velocity that a satellite receiver measures by Doppler shift, carried on to now by the accelerometer.
+
+No accelerometer has a part in it: after a clipped hit it shows what the vehicle's own estimate lacks. What is received
+now was measured earlier. Delay and noise are learnt in free flight. With the vehicle's own velocity v, its acceleration
+a by the accelerometer and the delay d
+
+    u(t) = v(t - d) + noise,    u(t) - v(t) = -d a + noise
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from companion.messages import GpsVelocity, Vector3
+from companion.motion.config import CERTAIN, DOPPLER_M_S, DOPPLER_MEMORY, FINEST_DOPPLER_M_S
+from companion.motion.delay import RECEIVER, Delay
+from companion.motion.strapdown import Strapdown
+from companion.motion.vector import ZERO, plus
+
+
+@dataclass(slots=True)
+class Doppler:
+    """Changed only by its methods. Local NED, SI, the vehicle's boot clock; nothing is measured of the climb."""
+
+    taken_boot_us: int = -1  # the newest velocity was measured later than this
+    velocity_ned_m_s: Vector3 = ZERO  # as of the newest IMU sample; horizontal
+    variance_m2_s2: float = DOPPLER_M_S**2
+    known: int = 1
+    delay: Delay = field(default_factory=lambda: Delay(RECEIVER))
+
+    def take(self, sample: GpsVelocity, strapdown: Strapdown, is_free: bool) -> None:
+        """Take one velocity; `is_free`: the vehicle's own is right. What cannot be carried on to now is left out."""
+        if is_free:
+            self._learn(sample, strapdown)
+        late_s = self.delay.delay_s(self.variance_m2_s2)
+        faster = _faster_by(strapdown, late_s)
+        if faster is None:
+            return
+        n, e = sample.velocity_ne_m_s
+        surely_s = late_s + CERTAIN * self.delay.error_s(self.variance_m2_s2)
+        self.taken_boot_us = strapdown.time_boot_us - round(1e6 * surely_s)
+        self.velocity_ned_m_s = (n + faster[0], e + faster[1], 0.0)
+
+    def _learn(self, sample: GpsVelocity, strapdown: Strapdown) -> None:
+        faster = _faster_by(strapdown, RECEIVER.expected_s)
+        if faster is None:
+            return
+        (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, strapdown.sum_ned_m_s)
+        behind: Vector3 = (n - own[0], e - own[1], 0.0)
+        change = plus(ZERO, 1.0 / RECEIVER.expected_s, faster)
+        self.delay.learn(behind, change)
+        noise = plus(behind, self.delay.delay_s(self.variance_m2_s2), change)
+        self.known = min(self.known + 1, DOPPLER_MEMORY)
+        self.variance_m2_s2 += (0.5 * math.hypot(*noise) ** 2 - self.variance_m2_s2) / self.known
+
+    @property
+    def trusted_variance_m2_s2(self) -> float:
+        """On an axis; no better than the best receivers'."""
+        return max(self.variance_m2_s2, FINEST_DOPPLER_M_S**2)
+
+
+def _faster_by(strapdown: Strapdown, since_s: float) -> Vector3 | None:
+    """What the accelerometer has added to the horizontal velocity in so long; None where that is not kept."""
+    now_us, sum_m_s = strapdown.time_boot_us, strapdown.sum_ned_m_s
+    at_us, later_us, later_m_s = now_us - round(1e6 * since_s), now_us, sum_m_s
+    for fix in reversed(strapdown.fixes):
+        if fix.time_boot_us <= at_us:
+            share = (at_us - fix.time_boot_us) / max(later_us - fix.time_boot_us, 1)
+            then_m_s = plus(fix.sum_ned_m_s, share, plus(later_m_s, -1.0, fix.sum_ned_m_s))
+            return (sum_m_s[0] - then_m_s[0], sum_m_s[1] - then_m_s[1], 0.0)
+        later_us, later_m_s = fix.time_boot_us, fix.sum_ned_m_s
+    return None

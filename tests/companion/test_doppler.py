@@ -1,0 +1,171 @@
+"""A satellite receiver's velocity: its delay and noise learnt in flight, and what it makes of a clipped hit."""
+
+import math
+import random
+
+import pytest
+
+from companion.mavlink.readers import sample_from
+from companion.messages import GpsVelocity, LocalPosition, Refused
+from companion.motion.config import FINEST_DOPPLER_M_S, SAME_M_S
+from companion.motion.delay import RECEIVER
+from companion.motion.doppler import Doppler
+from companion.motion.strapdown import Strapdown
+from companion.reflex.config import EstimateConfig
+from companion.reflex.laws import Contact
+from companion.reflex.motion_estimator import MotionEstimator
+
+G = 9.80665
+SOUTH, HIT_US = (-1.0, 0.0, 0.0), 10_000_000
+
+
+class Air:
+    """A vehicle without tilt that speeds up north as it is told; IMU 250 Hz, reports 50 Hz, receiver 10 Hz."""
+
+    def __init__(self, late_s, noise_m_s=0.0, began_us=0):
+        self.strapdown, self.doppler, self.draw = Strapdown(), Doppler(), random.Random(1)
+        self.late, self.noise_m_s = round(late_s / 0.004), noise_m_s
+        self.now_us, self.velocities, self.reported_off_m_s = began_us, [0.0], 0.0
+
+    def step(self, acceleration_m_s2=0.0, is_free=True, receives=True):
+        self.now_us += 4_000
+        self.velocities.append(self.velocities[-1] + 0.004 * acceleration_m_s2)
+        self.strapdown.imu(self.now_us, (acceleration_m_s2, 0.0, -G), (0.0, 0.0, 0.0))
+        tick, sample = len(self.velocities), None
+        if tick % 5 == 0:
+            velocity = (self.velocities[-1] + self.reported_off_m_s, 0.0, 0.0)
+            sample = LocalPosition(self.now_us, (4.0 + 0.004 * sum(self.velocities), 0.0, -2.0), velocity)
+            self.strapdown.velocity(sample)
+        if receives and tick % 25 == 0 and tick > self.late:
+            noise = [self.draw.gauss(0.0, self.noise_m_s) for _ in range(2)]
+            self.doppler.take(
+                GpsVelocity((self.velocities[-1 - self.late] + noise[0], noise[1])), self.strapdown, is_free
+            )
+        return sample
+
+
+@pytest.mark.parametrize("late_s", [0.012, 0.06, 0.2])
+def test_the_delay_is_learnt_where_the_vehicle_speeds_up_and_brakes(late_s):
+    # Given a receiver that is late by another time than most, and a flight that speeds up and brakes for half a minute
+    air = Air(late_s, noise_m_s=0.05)
+    for tick in range(7_500):
+        air.step(2.0 * math.sin(2.0e-3 * tick))
+    # Then its delay is known, and its velocity is the vehicle's own as of now
+    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(late_s, abs=0.015)
+    assert air.doppler.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.2)
+    assert air.doppler.trusted_variance_m2_s2 == pytest.approx(FINEST_DOPPLER_M_S**2, rel=0.2)
+
+
+def test_a_steady_flight_teaches_no_delay_and_the_receivers_noise():
+    air = Air(0.2, noise_m_s=0.4)
+    for _ in range(7_500):
+        air.step()
+    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(RECEIVER.expected_s, abs=0.02)
+    assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.4, rel=0.25)
+
+
+def test_nothing_is_learnt_while_the_vehicles_own_velocity_is_not_valid():
+    air = Air(0.11)
+    air.reported_off_m_s = 3.0
+    for _ in range(1_000):
+        air.step(is_free=False)
+    assert air.doppler.variance_m2_s2 == Doppler().variance_m2_s2
+
+
+def clipped(off_m_s=6.0, rebound_m_s=-3.0):
+    """A vehicle just after a hit of which its estimate knows nothing, and its belief."""
+    air = Air(0.112, noise_m_s=0.02, began_us=HIT_US)
+    contact = Contact(HIT_US, (4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
+    found = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
+    air.velocities, air.reported_off_m_s = [rebound_m_s], off_m_s
+    return air, found
+
+
+def go_on(air, found, seconds, **settings):
+    for _ in range(round(seconds / 0.004)):
+        sample = air.step(is_free=False, **settings)
+        found.imu(air.strapdown)
+        found.measure(air.doppler)
+        if sample is not None:
+            found.update(sample)
+
+
+def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_a_while():
+    # Given an estimate that is wrong by 6 m/s, in no way that any model has
+    air, found = clipped()
+    go_on(air, found, 0.5)
+    # Then the receiver is believed, for as long as the two contradict each other
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-3.0, abs=0.25)
+    go_on(air, found, 3.0)
+    assert found.is_measured_apart
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-3.0, abs=0.15)
+    # When the reported velocity passes the true one, as a swing does
+    air.reported_off_m_s = 0.0
+    go_on(air, found, 0.2)
+    assert found.is_measured_apart
+    air.reported_off_m_s = -1.0
+    go_on(air, found, 0.5)
+    assert found.is_measured_apart
+    # When it stays there
+    air.reported_off_m_s = 0.0
+    go_on(air, found, 0.7)
+    # Then it counts again
+    assert found.has_converged
+    assert abs(found.velocity_error_m_s[0]) < SAME_M_S
+
+
+def test_an_acceleration_that_the_accelerometer_does_not_show_is_found():
+    # Given gyroscopes whose tilt is wrong by 3 degrees
+    air, found = clipped()
+    for _ in range(1_000):
+        air.velocities[-1] += 0.004 * 0.5
+        go_on(air, found, 0.004)
+    # Then the belief does not lag behind, and the law is told what to lean against
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.15)
+    assert found.belief.level_m_s2[0] == pytest.approx(0.5, abs=0.15)
+
+
+def test_one_velocity_beyond_belief_does_not_count_and_two_do():
+    air, found = clipped()
+    go_on(air, found, 1.0)
+    belief_m_s = found.motion.velocity_ned_m_s[0]
+    for expected_m_s in (belief_m_s, 20.0):
+        air.now_us += 4_000
+        air.strapdown.imu(air.now_us, (0.0, 0.0, -G), (0.0, 0.0, 0.0))
+        found.imu(air.strapdown)
+        air.doppler.take(GpsVelocity((30.0, 0.0)), air.strapdown, is_free=False)
+        found.measure(air.doppler)
+        shown_m_s = found.motion.velocity_ned_m_s[0]
+        assert shown_m_s == pytest.approx(expected_m_s, abs=0.1) if expected_m_s < 0.0 else shown_m_s > expected_m_s / 4
+
+
+def test_a_velocity_measured_before_the_hit_does_not_count():
+    air, found = clipped()
+    go_on(air, found, 0.12)  # the newest one received is from before it
+    assert not found.is_measured_apart
+
+
+def test_a_receiver_that_falls_silent_leaves_the_belief_to_the_reports():
+    air, found = clipped()
+    go_on(air, found, 1.0)
+    assert found.is_measured_apart
+    go_on(air, found, 0.7, receives=False)
+    assert not found.is_measured_apart
+
+
+def gps(**fields):
+    return sample_from("GPS_RAW_INT", (1, 1), {"fix_type": 3, "vel": 250, "cog": 9000, **fields})
+
+
+def test_gps_raw_int_is_read_as_a_velocity():
+    assert gps().velocity_ne_m_s == pytest.approx((0.0, 2.5))
+    for unknown in ({"fix_type": 2}, {"vel": 0xFFFF}, {"cog": 0xFFFF}):
+        assert gps(**unknown) is None
+    assert isinstance(gps(vel=10_100), Refused)
+
+
+def test_imu_samples_are_not_needed_to_read_a_velocity():
+    """Before the first sample there is nothing that it could be carried on by."""
+    doppler = Doppler()
+    doppler.take(GpsVelocity((1.0, 0.0)), Strapdown(), is_free=True)
+    assert doppler.taken_boot_us < 0
