@@ -325,17 +325,6 @@ def add_check(commands: Commands) -> None:
     _flag(check, "--no-picture", "draw nothing")
 
 
-def add_plan(commands: Commands) -> None:
-    text = "Reads QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
-    plan = commands.add_parser("plan", help="missions from QGroundControl", description=text)
-    ways = plan.add_subparsers(required=True, metavar="import")
-    text = "Makes a mission of a .plan."
-    reading = _command(ways, "import", "plan.command:run_import", "a mission file from a .plan", text)
-    _option(reading, "plan", "QGroundControl's file", "PLAN", type=Path)
-    _option(reading, "--name", "name of the mission (default: the file's)")
-    _option(reading, "--out", "default: standard output", "FILE")
-
-
 def add_replay(commands: Commands) -> None:
     text = "The detector over a .ulg, .bin, .log or .tlog, or a run's folder; see docs/how-to/recorded-flights.md."
     replay = _command(commands, "replay", "replaying:run_replay", "look for collisions in a recorded flight", text)
@@ -432,7 +421,6 @@ COMMANDS = (
         add_guard,
         add_init,
         add_check,
-        add_plan,
         add_sim,
         add_preflight,
         add_status,
