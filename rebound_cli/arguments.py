@@ -69,6 +69,12 @@ def _expected(text: str) -> int:
     return 0 if text == "none" else int(text)
 
 
+def _export_format(text: str) -> str:
+    if text == "ulg":
+        raise argparse.ArgumentTypeError("ulg is gone: give mcap, which Foxglove and PlotJuggler read")
+    return text
+
+
 def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
@@ -267,9 +273,9 @@ def add_logs(commands: Commands) -> None:
         _add_runs(parser)
     _add_json(listed, "flights")
     _add_json(shown, "flight")
-    text = "archive: all its files (default); mcap: for Foxglove; ulg: for Flight Review and PlotJuggler"
-    _option(exported, "--format", text, choices=("archive", "mcap", "ulg"), default="archive")
-    _option(exported, "--out", "the file (default: FLIGHT.tar.gz, .mcap or .ulg)", "FILE")
+    text = "archive: all its files (default); mcap: for Foxglove and PlotJuggler"
+    _option(exported, "--format", text, type=_export_format, choices=("archive", "mcap"), default="archive")
+    _option(exported, "--out", "the file (default: FLIGHT.tar.gz or .mcap)", "FILE")
     _add_no_position(exported)
 
 
@@ -339,7 +345,7 @@ def add_replay(commands: Commands) -> None:
     replay.add_argument("--any-mode", action="store_true", help=text)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
-    _gone(replay, "--merge", "`rebound logs export RUN --format ulg` writes a log with a flight's events and hits")
+    _gone(replay, "--merge", "`rebound logs export RUN --format mcap` writes a file with a flight's events and hits")
     _option(replay, "--out", "folder of the page (default: runs/replay-<name of the log>)", "DIR")
     _add_json(replay, "findings")
 

@@ -15,12 +15,10 @@ def run_export(options: Namespace) -> int:
     """Raises FlightError, RunFolderError, LogError."""
     flight, kind = flight_named(runs_folder(options.runs), options.flight), options.format
     out = options.out or Path(f"{flight.name}.{'tar.gz' if kind == 'archive' else kind}")
-    if kind != "archive":
+    if kind == "mcap":
         if options.no_position:
-            raise ConfigurationError(
-                f"a .{kind} is little else than places: --no-position goes with the archive alone."
-            )
-        write_whole(out, _exported(flight.folder, kind))
+            raise ConfigurationError("a .mcap is little else than places: --no-position goes with the archive alone.")
+        write_whole(out, _mcap(flight.folder))
     else:
         with new_archive(out, options.no_position) as archive:
             add_flight(archive, flight, "")
@@ -28,18 +26,12 @@ def run_export(options: Namespace) -> int:
     return 0
 
 
-def _exported(folder: Path, kind: str) -> bytes:
-    """A run's folder as .mcap or .ulg. A drone has neither mcap nor pyulog, and need not have."""
+def _mcap(folder: Path) -> bytes:
+    """A run's folder as .mcap. A drone has no mcap, and need not have."""
+    from rebound_cli.export.foxglove import write_mcap
     from rebound_cli.logs.reader import read_telemetry
     from rebound_cli.report.shown_flight import recorded_flight
 
-    flight, log = recorded_flight(folder), read_telemetry(folder / TLOG_NAME)
-    if kind == "mcap":
-        from rebound_cli.export.foxglove import write_mcap
-
-        content = io.BytesIO()
-        write_mcap(flight, log, content)
-        return content.getvalue()
-    from rebound_cli.export.ulog import new_ulog
-
-    return new_ulog(flight, log)
+    content = io.BytesIO()
+    write_mcap(recorded_flight(folder), read_telemetry(folder / TLOG_NAME), content)
+    return content.getvalue()

@@ -13,17 +13,18 @@ from operator import itemgetter
 from typing import IO, Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from mcap.writer import Writer
 
 from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPosition, Quaternion, Vector3
 from rebound_cli import __version__
-from rebound_cli.export.ulog import boot_us, positions_us, true_rows
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.content import finite
 from rebound_cli.report.scene import surfaces
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.run_folder import HIT_KINDS
+from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
 from sim_vehicle.world import Obstacle, Pole
 
@@ -86,6 +87,29 @@ def _kind(value: Any) -> Json:
     return {}
 
 
+def boot_us(log: Log, at_us: Sequence[float]) -> npt.NDArray[np.int64]:
+    """The vehicle's clock at times of the log's: the newest heard IMU sample's, and what went by since."""
+    imu = log.imu()
+    heard = np.array([heard_us for heard_us, _ in imu], np.int64)
+    sampled = np.array([sample.time_boot_us for _, sample in imu], np.int64)
+    wanted = np.asarray(at_us).astype(np.int64)
+    newest = np.maximum(np.searchsorted(heard, wanted, side="right") - 1, 0)
+    times: npt.NDArray[np.int64] = sampled[newest] + wanted - heard[newest]
+    return times
+
+
+def _true_rows(truth: FlightTruth, log: Log) -> Sequence[int]:
+    """Which rows of the simulator's truth are kept: as many as the vehicle says where it is."""
+    times_us = truth.series["time_boot_us"]
+    rows = np.unique(np.searchsorted(times_us, boot_us(log, _positions_us(log))))
+    return [int(row) for row in rows if row < len(times_us)]
+
+
+def _positions_us(log: Log) -> list[int]:
+    """When the vehicle said where it is."""
+    return [heard.at_us for heard in log.heard if isinstance(heard.sample, LocalPosition)]
+
+
 def _heard(log: Log) -> Iterator[Message]:
     attitude = _LEVEL
     for heard in log.heard:
@@ -110,7 +134,7 @@ def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
     if flight.truth is None:
         return
     series = flight.truth.series
-    for row in true_rows(flight.truth, log):
+    for row in _true_rows(flight.truth, log):
         at_us = float(flight.truth.at_us(float(series["time_boot_us"][row])))
         pose = _pose(series["position_ned_m"][row].tolist(), series["attitude_wxyz"][row].tolist())
         yield at_us, "/truth", {"timestamp": _time(at_us), "frame_id": "local", "pose": pose}
@@ -144,7 +168,7 @@ def _scene(flight: ShownFlight, log: Log) -> Iterator[Message]:
     standing = [_obstacle(began_us, one, (0.0, 0.0, 0.0)) for one in obstacles if one.motion is None]
     yield _update(began_us, "/scene", [_entity(began_us, "vehicle", "vehicle", cylinders=hoops), *standing])
     moving = [(one, one.motion) for one in obstacles if one.motion is not None]
-    moving_us = positions_us(log) if moving else []
+    moving_us = _positions_us(log) if moving else []
     for at_us, boot_s in zip(moving_us, (boot_us(log, moving_us) * 1e-6).tolist(), strict=True):
         moved = [_obstacle(at_us, one, motion.offset_ned_m(boot_s)) for one, motion in moving]
         yield _update(at_us, "/scene/moving", moved)
