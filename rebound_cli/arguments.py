@@ -332,9 +332,9 @@ def add_check(commands: Commands) -> None:
 
 
 def add_replay(commands: Commands) -> None:
-    text = "The detector over a .ulg, .bin, .log or .tlog, or a run's folder; see docs/how-to/recorded-flights.md."
+    text = "The detector over a .ulg, .bin or .tlog, or a run's folder; see docs/how-to/recorded-flights.md."
     replay = _command(commands, "replay", "replaying:run_replay", "look for collisions in a recorded flight", text)
-    _option(replay, "log", "a .ulg, .bin, .log or .tlog, or a run's folder", "LOG", type=Path)
+    _option(replay, "log", "a .ulg, .bin or .tlog, or a run's folder", "LOG", type=Path)
     _option(replay, "--detector", "another detector than the mission's, or than the default", "NAME")
     text = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
     _option(replay, "--rate", text, "HZ", type=rate_hz)
@@ -353,7 +353,7 @@ def add_replay(commands: Commands) -> None:
 def add_tune(commands: Commands) -> None:
     text = "Noise floor, margins, the smallest hit that shows, settings; see docs/how-to/recorded-flights.md."
     tune = _command(commands, "tune", "tune:run_tune", "settings for a vehicle from its healthy flights", text)
-    text = "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders"
+    text = "flights without a collision: .ulg, .bin, .tlog or runs' folders"
     _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
     _gone(tune, "--airframe", "the smallest hit that shows is the detector's own promise, whatever the arms")
