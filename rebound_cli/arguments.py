@@ -276,7 +276,7 @@ def add_logs(commands: Commands) -> None:
     text = "archive: all its files (default); mcap: for Foxglove and PlotJuggler"
     _option(exported, "--format", text, type=_export_format, choices=("archive", "mcap"), default="archive")
     _option(exported, "--out", "the file (default: FLIGHT.tar.gz or .mcap)", "FILE")
-    _add_no_position(exported)
+    _gone(exported, "--no-position", "`rebound report FLIGHT --no-position` makes a page without coordinates")
 
 
 def add_report(commands: Commands) -> None:
@@ -285,7 +285,7 @@ def add_report(commands: Commands) -> None:
     _option(report, "flight", "a run's folder, or a flight's name (default: last)", "RUN", nargs="?", default="last")
     _add_runs(report)
     _option(report, "--out", "the page (default: report.html in the run's folder)", "FILE")
-    _add_no_position(report)
+    _flag(report, "--no-position", "without coordinates: no places, in texts and the summary either")
 
 
 def add_watch(commands: Commands) -> None:
@@ -299,24 +299,8 @@ def add_watch(commands: Commands) -> None:
     _option(watch, "--port", "TCP port (default: any free one)", type=port, default=0)
 
 
-def add_doctor(commands: Commands) -> None:
-    text = "Configuration without keys, versions, machine, journal, last flights; see docs/how-to/flights.md."
-    summary = "one archive for whoever is asked for help"
-    doctor = _command(commands, "doctor", "service.doctor:run_doctor", summary, text)
-    _option(doctor, "--out", "the archive (default: %(default)s)", "FILE", default=Path("rebound-doctor.tar.gz"))
-    _option(doctor, "--config", "settings beside those of /etc/rebound", "FILE", action="append", default=[])
-    _option(doctor, "--preflight", "what `rebound preflight --json` printed", "FILE")
-    _option(doctor, "--flights", "how many of the last (default: 3)", "N", type=count, default=3)
-    _add_runs(doctor)
-    _add_no_position(doctor)
-
-
 def _add_runs(parser: Parser) -> None:
     _option(parser, "--runs", "where the flights are (default: runs here, or the service's)", "DIR")
-
-
-def _add_no_position(parser: Parser) -> None:
-    _flag(parser, "--no-position", "without coordinates: no packets, no places in events and summary")
 
 
 def add_check(commands: Commands) -> None:
@@ -434,5 +418,5 @@ COMMANDS = (
         add_report,
         add_watch,
     ),
-    *(add_doctor, add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
+    *(add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
 )

@@ -25,6 +25,7 @@ GONE = {
         *(("results", "paper results"), ("recoveries", "campaign recoveries")),
     )
 }
+GONE["doctor"] = "is gone: send what 'rebound logs export' and 'journalctl --unit=rebound' give"
 GONE["plan"] = "is gone: upload the plan to the vehicle by QGroundControl, and fly it under 'rebound guard'"
 
 

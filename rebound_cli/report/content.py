@@ -6,6 +6,7 @@ Columns of numbers are text: whole multiples of a resolution, little-endian, bas
 import base64
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -14,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.reflex.detector import Phase
-from rebound_cli.flights.archive import without_places
 from rebound_cli.replay.listening import PHASES
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
@@ -48,6 +48,10 @@ _ROWS, _ROWS_PER_S = 7_000, 10.0
 # Around a moment all rows are kept: the microscope's 150 ms, and the slow motion's way there and back.
 AROUND_S = 1.0
 
+# The names of all quantities end in frame and unit: these are the places. In texts they are [north, east, down].
+_PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")
+_PLACES_IN_TEXT = re.compile(r"\[-?\d[\d.]*(?:, -?\d[\d.]*)+\]")
+
 
 def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
     """Without coordinates where they are not wanted."""
@@ -76,6 +80,14 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
     # Texts and the summary hold places of their own; what is drawn has none by then.
     shown = ("name", "sentence", "lines", "events", "summary", "moments")
     return data | {key: without_places(data[key]) for key in shown} if no_position else data
+
+
+def without_places(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_places(value) for key, value in data.items() if not _PLACE_KEYS.fullmatch(str(key))}
+    if isinstance(data, list):
+        return [without_places(value) for value in data]
+    return _PLACES_IN_TEXT.sub("[left out]", data) if isinstance(data, str) else data
 
 
 def live_content(flight: ShownFlight) -> dict[str, Any]:

@@ -170,13 +170,6 @@ def entities_of(rows):
     return [(at_ns, entity) for _, at_ns, data in rows for entity in data["entities"]]
 
 
-def test_places_are_not_left_out_of_a_file_full_of_them(wall_folder, tmp_path, capsys):
-    out = tmp_path / "wall.mcap"
-    words = ["logs", "export", str(wall_folder), "--format", "mcap", "--no-position", "--out", str(out)]
-    assert main(words) == 1
-    assert "--no-position" in capsys.readouterr().err and not out.exists()
-
-
 def test_an_event_stands_at_the_newest_sample_that_was_heard_by_then(flight):
     # Given samples that came 3 ms after their stamps, a gap, and a time 5 ms after the newest
     _, log = flight
