@@ -335,8 +335,12 @@ def add_replay(commands: Commands) -> None:
 
 
 def add_tune(commands: Commands) -> None:
-    text = "Noise floor, margins, the smallest hit that shows, settings; see docs/how-to/recorded-flights.md."
-    tune = _command(commands, "tune", "tune:run_tune", "settings for a vehicle from its healthy flights", text)
+    text = (
+        "False alarms, the smallest hit that shows, settings with their margins; see docs/how-to/recorded-flights.md."
+    )
+    tune = _command(
+        commands, "tune", "identification.tune:run_tune", "settings for a vehicle from its healthy flights", text
+    )
     text = "flights without a collision: .ulg, .bin, .tlog or runs' folders"
     _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")

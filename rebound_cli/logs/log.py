@@ -29,6 +29,8 @@ QUADROTOR = 2
 _LONGEST_US = 24 * 3600 * 1_000_000
 # Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
 _SLOW_HZ = 15.0
+# PX4's limit of the accelerometer it was made for: +-16 g. A sample this near to it holds clipped readings.
+_CLIPPED_M_S2 = 150.0
 
 
 class LogError(ReboundError):
@@ -125,3 +127,11 @@ def slow_velocity(name: str, rate_hz: float) -> Iterator[str]:
     """What is lost where a log holds fewer velocities than the wire carries."""
     if rate_hz < _SLOW_HZ:
         yield f"{name} is logged at {rate_hz:.0f} Hz where the wire carries 30 or more: v_c is coarser than in flight"
+
+
+def clipped(log: Log) -> tuple[int, str]:
+    """IMU samples with clipped readings in them, and how that is known."""
+    if log.clipped_at_us is not None:
+        return len(log.clipped_at_us), "by the sensor's own flags"
+    count = sum(max(map(abs, sample.specific_force_frd_m_s2)) >= _CLIPPED_M_S2 for _, sample in log.imu())
+    return count, f"samples of {_CLIPPED_M_S2:g} m/s^2 or more"

@@ -9,8 +9,7 @@ from typing import Any
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Evidence, ImpactKind
-from rebound_cli.logs.log import WANTED, Log, LogError
-from rebound_cli.logs.shaking import clipped
+from rebound_cli.logs.log import WANTED, Log, LogError, clipped
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
 from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
 

@@ -8,7 +8,6 @@ from companion.messages import ExtendedState, LandedState, LocalPosition, Positi
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind, Situation
 from rebound_cli.logs.log import LoggedSample
-from rebound_cli.logs.shaking import Stage, shaking
 from rebound_cli.replay.watching import Circumstances, thinned, watch_log
 from tests.rebound_cli.replay.flying import HIT_US, LATERAL, SECOND, beat, flight, position
 
@@ -80,14 +79,6 @@ def test_one_old_setpoint_does_not_make_a_crash_a_landing():
     log = replace(log, heard=tuple(sorted([*log.heard, *told], key=lambda item: item.at_us)))
     findings = watch_log(log, CompanionConfig(detector="fused"))
     assert [finding.is_collision for finding in findings.impacts] == [False]
-
-
-def test_noise_is_told_for_each_stage_of_a_flight():
-    log = flight(hit_us=None)
-    noise = shaking(log).noise_m_s2()
-    assert set(noise) == {Stage.GROUND, Stage.TAKEOFF, Stage.UNDER_WAY}
-    for values in noise.values():
-        assert values == pytest.approx([0.3, 0.3, 0.3], rel=0.15)
 
 
 def test_a_touchdown_begins_the_next_take_off_and_without_a_position_nothing_is_watched():
