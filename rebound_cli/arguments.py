@@ -42,8 +42,6 @@ count = number(int, 1, math.inf, "a count: give a whole number from 1 on")
 # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
 instance = number(int, 0, 9, "an instance: give a number from 0 to 9")
 speed = number(float, 0, 1000, "a speed: give a number from 0 to 1000, here or in PX4_SIM_SPEED_FACTOR")
-# PX4's own integration is no faster than this.
-rate_hz = number(float, 1, 1000, "a rate: give a number of hertz from 1 to 1000")
 share = number(float, 0, 1, "a share: give a number from 0 to 1")
 mass_kg = number(float, math.ulp(0.0), 1000, "a mass: give kilograms, such as 1.1")
 
@@ -320,8 +318,7 @@ def add_replay(commands: Commands) -> None:
     replay = _command(commands, "replay", "replaying:run_replay", "look for collisions in a recorded flight", text)
     _option(replay, "log", "a .ulg, .bin or .tlog, or a run's folder", "LOG", type=Path)
     _option(replay, "--detector", "another detector than the mission's, or than the default", "NAME")
-    text = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
-    _option(replay, "--rate", text, "HZ", type=rate_hz)
+    _gone(replay, "--rate", "a log is searched as it was recorded")
     _add_companion(replay)
     _add_set(replay, "change a setting, e.g. companion.fused.side_threshold_m_s2=6")
     _option(replay, "--expect", "exit 1 unless there are exactly so many collisions", "none|N", type=_expected)

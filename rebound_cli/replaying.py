@@ -41,7 +41,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     file = log_file(options.log)
     folder = options.log if is_run_folder(options.log) else None
     # Options under which a flight is no longer the one that was flown.
-    changing = ("detector", "rate", "companion", "set", "any_mode")
+    changing = ("detector", "companion", "set", "any_mode")
     changed = [f"--{name.replace('_', '-')}" for name in changing if getattr(options, name) not in (None, [], False)]
     if folder is not None and not changed:
         recording = read_recording(folder)
@@ -59,7 +59,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     config = companion_settings(settings, options.set, options.detector)
     log = read_log(file)
     modes = None if options.any_mode else GuardConfig().modes
-    replay = replay_log(log, config, options.rate, modes)
+    replay = replay_log(log, config, modes)
     return replay, partial(replayed_flight, replay, config)
 
 

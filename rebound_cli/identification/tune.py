@@ -87,7 +87,7 @@ def read_healthy(path: Path, config: CompanionConfig) -> Replay:
     Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing.
     """
     log = read_log(log_file(path))
-    flight, hits = replay_log(log, config, None), len((read_summary(path) or {}).get("collisions", ()))
+    flight, hits = replay_log(log, config), len((read_summary(path) or {}).get("collisions", ()))
     wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else ""
     for crash in flight.findings.crashes:
         wrong = f"it crashed at {log.seconds(crash.at_us):.1f} s"

@@ -9,9 +9,9 @@ from typing import Any
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Evidence, ImpactKind
-from rebound_cli.logs.log import WANTED, Log, LogError, clipped
+from rebound_cli.logs.log import WANTED, Log, clipped
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
-from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
+from rebound_cli.replay.watching import Finding, Findings, Span, watch_log
 
 SCHEMA = 1
 
@@ -25,18 +25,16 @@ _HOW = {
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What was looked at, with what, and what was found. `log` is as the detector heard it."""
+    """What was looked at, with what, and what was found."""
 
     log: Log
     detector: str
-    recorded_rate_hz: float
     findings: Findings
     losses: tuple[str, ...]
     reproduction: Reproduction | None
 
     @property
     def imu_rate_hz(self) -> float:
-        """As the detector heard it."""
         return 1e6 / self.log.imu_interval_us
 
     @property
@@ -45,18 +43,12 @@ class Replay:
         return max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in self.log.imu())
 
 
-def replay_log(log: Log, config: CompanionConfig, rate_hz: float | None, modes: Sequence[str] | None = None) -> Replay:
-    """What a guard's detector makes of the log. Raises LogError when the rate leaves nothing.
+def replay_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = None) -> Replay:
+    """What a guard's detector makes of the log.
 
     `modes`: those in which the guard may take over; None: it watches whoever flies.
     """
-    recorded_hz = 1e6 / log.imu_interval_us
-    if rate_hz is not None:
-        log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
-        if len(log.imu()) < 2:
-            raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
-    findings = watch_log(log, config, modes)
-    return Replay(log, config.detector, recorded_hz, findings, _losses(log, config), None)
+    return Replay(log, config.detector, watch_log(log, config, modes), _losses(log, config), None)
 
 
 def replay_flight(log: Log, recording: Recording) -> Replay:
@@ -65,8 +57,7 @@ def replay_flight(log: Log, recording: Recording) -> Replay:
     reproduction = reproduce(recording)
     # The flight's own zero, so that times are those of its timeline.
     log = replace(log, started_at_us=recording.steps[0].time_us)
-    recorded_hz, losses = 1e6 / log.imu_interval_us, _losses(log, config)
-    return Replay(log, config.detector, recorded_hz, reproduction.findings, losses, reproduction)
+    return Replay(log, config.detector, reproduction.findings, _losses(log, config), reproduction)
 
 
 def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
@@ -83,9 +74,8 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
 
 def report_text(replay: Replay) -> str:
     """The whole report; times in seconds since the log's start."""
-    log, rate_hz = replay.log, replay.imu_rate_hz
-    recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
-    headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
+    log = replay.log
+    headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {replay.imu_rate_hz:.0f} Hz"
     told: list[tuple[int, list[str]]] = [(at_us, [text]) for at_us, text in replay.findings.happenings]
     told += [(at_us, [f"the vehicle's own log: {text}"]) for at_us, text in log.marks]
     if replay.reproduction is None:
@@ -196,7 +186,6 @@ def report_data(replay: Replay) -> dict[str, Any]:
         "duration_s": round(log.duration_s, 3),
         "detector": replay.detector,
         "imu_rate_hz": round(replay.imu_rate_hz, 2),
-        "recorded_imu_rate_hz": round(replay.recorded_rate_hz, 2),
         "collisions": len(findings.collisions),
         "crashes": len(findings.crashes),
         "impacts": [_finding_data(replay, finding) for finding in findings.impacts],

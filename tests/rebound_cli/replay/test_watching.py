@@ -1,4 +1,4 @@
-"""A log through the watch: what the flight would have known, at the recorded and at other rates."""
+"""A log through the watch: what the flight would have known."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from companion.messages import ExtendedState, LandedState, LocalPosition, Positi
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind, Situation
 from rebound_cli.logs.log import LoggedSample
-from rebound_cli.replay.watching import Circumstances, thinned, watch_log
+from rebound_cli.replay.watching import Circumstances, watch_log
 from tests.rebound_cli.replay.flying import HIT_US, LATERAL, SECOND, beat, flight, position
 
 
@@ -42,21 +42,6 @@ def test_a_gap_in_the_log_is_a_blind_time():
     assert blind.start_us == pytest.approx(5.25e6, abs=60_000)
     # and is over when the rate has been judged anew, within a second of the samples' return
     assert 7 * SECOND <= blind.end_us <= 8 * SECOND
-
-
-@pytest.mark.parametrize(("asked_hz", "received_hz"), [(250, 250), (200, 125), (100, 100), (50, 50), (25, 25)])
-def test_a_requested_rate_is_what_px4_would_send(asked_hz, received_hz):
-    # measured on PX4 with a 4 ms IMU: 200 asked for gives 124
-    log = flight(hit_us=None)
-    kept = replace(log, heard=tuple(thinned(log.heard, asked_hz)))
-    assert len(kept.imu()) / 10.0 == pytest.approx(received_hz, rel=0.015)
-    # nothing but IMU samples is left out
-    assert len(log.heard) - len(kept.heard) == len(log.imu()) - len(kept.imu())
-
-
-def test_a_hit_between_the_samples_of_a_slow_stream_is_not_seen_by_its_force():
-    log = flight()
-    assert watch_log(replace(log, heard=tuple(thinned(log.heard, 25))), LATERAL).impacts == []
 
 
 DOWN = PositionTarget((0.0, 0.0, 0.0), 2.0)

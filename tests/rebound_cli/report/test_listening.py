@@ -45,7 +45,7 @@ def test_a_simulated_flight_has_its_page_without_being_flown_again(wall, wall_fo
 
 def of_a_log(log):
     config = CompanionConfig()
-    return replayed_flight(replay_log(log, config, None), config)
+    return replayed_flight(replay_log(log, config), config)
 
 
 def test_a_log_of_anybodys_has_a_page_too():
