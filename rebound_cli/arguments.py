@@ -328,7 +328,7 @@ def add_replay(commands: Commands) -> None:
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
     _gone(replay, "--merge", "`rebound logs export RUN --format mcap` writes a file with a flight's events and hits")
     _option(replay, "--out", "folder of the page (default: runs/replay-<name of the log>)", "DIR")
-    _add_json(replay, "findings")
+    _gone(replay, "--json", "--expect sets the exit code, and the page has the data as CSV and JSON")
 
 
 def add_tune(commands: Commands) -> None:

@@ -1,6 +1,5 @@
 """`rebound replay`: from a log to its collisions."""
 
-import json
 import re
 from argparse import Namespace
 from collections.abc import Callable
@@ -11,7 +10,7 @@ from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.recording import is_run_folder, log_file, read_recording, settings_file
-from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
+from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_text
 from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
 from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
@@ -22,14 +21,11 @@ def run_replay(options: Namespace) -> int:
 
     1 when they are not what was expected, when a flight did not come again, or when nothing was watched.
     """
-    console = console_for(options.json)
+    console = console_for(False)
     replay, shown = _replay(options, console)
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
     folder = options.out or RUNS_FOLDER / f"replay-{slug}"
-    if options.json:
-        print(json.dumps(report_data(replay), indent=2))
-    else:
-        console.print(report_text(replay).rstrip())
+    console.print(report_text(replay).rstrip())
     if replay.findings.impacts:
         folder.mkdir(parents=True, exist_ok=True)
         console.print(f"page: {write_page(shown(), folder / REPORT_NAME)}")

@@ -38,7 +38,7 @@ _HEAD = b"\xa3\x95"
 _FORMAT = re.compile(re.escape(_HEAD) + b"\x80.(.)", re.DOTALL)
 _HEADER_SIZE = 3
 
-_NAMES = ("MSG", "PARM", "IMU", "ATT", "CTUN", "VIBE", "MODE", "EV", "ERR", "RCIN", "PSCD", "XKF1", "XKF4")
+_NAMES = ("MSG", "PARM", "IMU", "ATT", "CTUN", "VIBE", "MODE", "EV", "PSCD", "XKF1", "XKF4")
 # What a missing message costs, in the words of docs/how-to/recorded-flights.md.
 _COSTS = {
     "XKF1": "height and velocity are not known: no v_c, and landings are told by the land detector",
@@ -80,21 +80,10 @@ _MODES = {
 _ARMED, _DISARMED, _LAND_COMPLETE, _NOT_LANDED = 10, 11, 18, 28
 _LANDED = dict.fromkeys((_ARMED, _DISARMED, _LAND_COMPLETE), messages.LandedState.ON_GROUND)
 _LANDED[_NOT_LANDED] = messages.LandedState.IN_AIR
-# By ERR.Subsys (LogErrorSubsystem); ECode 0 says that it is over.
-_TROUBLES = [
-    *("unknown", "main loop", "radio", "compass", "optical flow", "radio failsafe", "battery failsafe"),
-    *("GPS failsafe", "ground station failsafe", "fence", "mode refused", "GPS", "crash check", "flip", "autotune"),
-    *("parachute", "EKF check", "EKF failsafe", "barometer", "CPU", "ADS-B failsafe", "terrain data", "navigation"),
-    *("terrain failsafe", "EKF primary", "thrust loss", "sensor failsafe", "leak", "pilot input"),
-    *("vibration failsafe", "internal error", "dead reckoning failsafe"),
-]
 # The estimator's own word, SS (nav_filter_status): horizontal and vertical velocity are good.
 _GOOD = {"horizontal velocity": 2, "vertical velocity": 4}
 # INS_ACCEL_FILTER's default.
 _LOW_PASS_HZ = 20.0
-# Channels of the sticks and their ends, where the log does not hold RCMAP_x and RCn_MIN, TRIM and MAX.
-_STICKS = (("PITCH", 2), ("ROLL", 1), ("THROTTLE", 3), ("YAW", 4))
-_ENDS = (("MIN", 1100.0), ("TRIM", 1500.0), ("MAX", 1900.0))
 
 _Topics = Mapping[str, Topic]
 _Parameters = Mapping[str, float]
@@ -133,7 +122,6 @@ def read_dataflash(path: Path) -> Log:
         *_vibration(topics["VIBE"]),
         *_heartbeats(topics["EV"], topics["MODE"]),
         *_landed_states(topics["EV"], int(imu.time_us[0])),
-        *_sticks(topics["RCIN"], parameters),
         *_demand(topics["PSCD"]),
     ]
     low_pass_hz = parameters.get("INS_ACCEL_FILTER", 0.0)
@@ -144,7 +132,6 @@ def read_dataflash(path: Path) -> Log:
         heard=in_order(heard, float(np.median(imu.time_us))),
         losses=(),
         low_pass_hz=low_pass_hz if low_pass_hz >= 1.0 else _LOW_PASS_HZ,
-        marks=tuple(_marks(topics["ERR"])),
     )
     return replace(log, losses=tuple(_losses(topics, estimate, log.window_us)))
 
@@ -290,32 +277,7 @@ def _landed_states(topic: Topic, started_us: int) -> Iterator[LoggedSample]:
         yield LoggedSample(time_us, messages.ExtendedState(_LANDED[event]))
 
 
-def _sticks(topic: Topic, parameters: _Parameters) -> Iterator[LoggedSample]:
-    """Each from its lowest pulse over its middle to its highest; forward gives the pitch stick's lowest."""
-    columns = []
-    for stick, usual in _STICKS:
-        channel = int(parameters.get(f"RCMAP_{stick}", usual))
-        pulses = topic.column(f"C{channel}")
-        if pulses is None:
-            return
-        low, middle, high = (parameters.get(f"RC{channel}_{end}", value) for end, value in _ENDS)
-        if stick == "THROTTLE" or not low < middle < high:
-            middle = (low + high) / 2.0
-        is_reversed = parameters.get(f"RC{channel}_REVERSED", 0.0) > 0
-        sign = -1.0 if is_reversed != (stick == "PITCH") else 1.0
-        columns.append(sign * np.interp(pulses, (low, middle, high), (-1.0, 0.0, 1.0)))
-    for _, time_us, (pitch, roll, throttle, yaw) in topic.rows(np.column_stack(columns)):
-        yield LoggedSample(time_us, messages.Sticks((pitch, roll, throttle, yaw)))
-
-
 def _demand(topic: Topic) -> Iterator[LoggedSample]:
     """The climb rate that pilot or mission ask for."""
     for _, time_us, (speed_down_m_s,) in topic.rows(topic.vector("DVD")):
         yield LoggedSample(time_us, messages.PositionTarget(None, speed_down_m_s))
-
-
-def _marks(topic: Topic) -> Iterator[tuple[int, str]]:
-    for _, time_us, (part, code) in topic.rows(topic.vector("Subsys", "ECode")):
-        if code > 0:
-            name = _TROUBLES[int(part)] if part < len(_TROUBLES) else f"subsystem {part:.0f}"
-            yield time_us, f"{name} (code {code:.0f})"

@@ -52,7 +52,6 @@ class Log:
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
     `low_pass_hz`: where samples are not means but points behind a low-pass filter of second order, its cut-off.
-    `marks`: what the vehicle's own log says of its health, with the time.
     """
 
     path: Path
@@ -63,7 +62,6 @@ class Log:
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None
     low_pass_hz: float | None = None
-    marks: tuple[tuple[int, str], ...] = ()
 
     @property
     def window_us(self) -> float | None:

@@ -23,9 +23,7 @@ FORMATS = {
     "XKF1": ("QBccCffffff", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,PN,PE,PD"),
     "XKF4": ("QBIb", "TimeUS,C,SS,PI"),
     "EV": ("QB", "TimeUS,Id"),
-    "ERR": ("QBB", "TimeUS,Subsys,ECode"),
     "MODE": ("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
-    "RCIN": ("QHHHH", "TimeUS,C1,C2,C3,C4"),
     "VIBE": ("QBfffI", "TimeUS,IMU,VibeX,VibeY,VibeZ,Clip"),
     "PSCD": ("Qfff", "TimeUS,TPD,DVD,TVD"),
 }

@@ -15,7 +15,6 @@ from companion.messages import (
     LandedState,
     LocalPosition,
     PositionTarget,
-    Sticks,
     Vibration,
 )
 from companion.motion.rotation import body_to_ned
@@ -68,7 +67,7 @@ def test_a_sample_holds_what_its_low_pass_filter_has_not_forgotten(tmp_path):
 
 @pytest.mark.parametrize("told", [0.0, -5.0, math.nan])
 def test_what_no_parameter_tells_is_the_default_filter(tmp_path, told):
-    rows = [COPTER, *[("PARM", 0, name, told, 0) for name in ("INS_ACCEL_FILTER", "FRAME_CLASS", "RCMAP_YAW")], *IMU]
+    rows = [COPTER, *[("PARM", 0, name, told, 0) for name in ("INS_ACCEL_FILTER", "FRAME_CLASS")], *IMU]
     assert read(tmp_path, rows).low_pass_hz == 20.0
 
 
@@ -133,23 +132,6 @@ def test_modes_are_those_of_px4_that_do_the_same(tmp_path):
     assert [mode_name(beat.custom_mode) for beat in beats] == ["STABILIZED", "POSCTL", "AUTO.LOITER"]
 
 
-@pytest.mark.parametrize(
-    ("parameters", "deflections"),
-    [
-        # Forward, right and up are positive
-        ({}, (0.5, 1.0, 1.0, 0.0)),
-        ({"RC2_REVERSED": 1.0}, (0.5, -1.0, 1.0, 0.0)),
-        ({"RC1_MIN": 700.0, "RC4_TRIM": 1700.0, "RC4_MIN": 1300.0}, (0.25, 1.0, 1.0, -0.5)),
-    ],
-)
-def test_sticks_go_by_the_radios_calibration(tmp_path, parameters, deflections):
-    # Given roll on channel 2 to the right, pitch on channel 1 forward, throttle up, and yaw in the middle
-    given = {"RCMAP_ROLL": 2.0, "RCMAP_PITCH": 1.0} | parameters
-    rows = [COPTER, *[("PARM", 0, name, value, value) for name, value in given.items()], *IMU]
-    (sticks,) = of(read(tmp_path, [*rows, ("RCIN", 1_000_000, 1300, 1900, 1900, 1500)]), Sticks)
-    assert sticks.deflections == pytest.approx(deflections)
-
-
 def test_the_climb_rate_that_is_asked_for(tmp_path):
     log = read(tmp_path, [COPTER, *IMU, ("PSCD", 1_000_000, -3.0, 0.25, 9.0)])
     assert of(log, PositionTarget) == [PositionTarget(None, 0.25)]
@@ -161,9 +143,7 @@ def test_clipped_samples_are_counted(tmp_path):
 
 
 def test_what_the_vehicle_says_of_itself(tmp_path):
-    rows = [COPTER, *IMU, ("ERR", 1_100_000, 12, 1), ("ERR", 1_200_000, 5, 0), ("ERR", 1_300_000, 200, 3)]
-    log = read(tmp_path, [*rows, ("PARM", 0, "FRAME_CLASS", 4.0, 0.0)])
-    assert log.marks == ((1_100_000, "crash check (code 1)"), (1_300_000, "subsystem 200 (code 3)"))
+    log = read(tmp_path, [COPTER, *IMU, ("PARM", 0, "FRAME_CLASS", 4.0, 0.0)])
     assert log.vehicle == "ArduCopter V4.5.7 (2a3dc4b7), octorotor"
 
 
