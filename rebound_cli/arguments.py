@@ -242,7 +242,7 @@ def add_preflight(commands: Commands) -> None:
     _add_companion(preflight)
     _option(preflight, "--card", "write the card of the first flight, to be printed", "FILE")
     _flag(preflight, "--fix", "offer to set the parameters that would mend it")
-    _flag(preflight, "--yes", "with --fix: set them without asking")
+    _gone(preflight, "--yes", "--fix asks before it sets a parameter")
     _add_json(preflight, "findings")
 
 
@@ -356,8 +356,12 @@ def add_identify(commands: Commands) -> None:
     _option(identify, "--mass", "of the vehicle; known for simulated runs", "KG", type=mass_kg)
     _gone(identify, "--axis", "it belonged to CSV files of motion capture; a log tells where the wall is")
     _option(identify, "--out", "write an airframe file", "FILE")
-    _option(identify, "--name", "name of the airframe (default: the file's)")
-    _option(identify, "--based-on", "airframe for all else (default: foldable, rigid where no spring is seen)", "NAME")
+    _gone(identify, "--name", "the airframe has the file's name")
+    _gone(
+        identify,
+        "--based-on",
+        "all else is that of foldable, or of rigid where no spring is seen; change it in the file",
+    )
 
 
 def add_airframe(commands: Commands) -> None:

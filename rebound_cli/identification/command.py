@@ -25,8 +25,8 @@ def run_identify(options: Namespace) -> int:
         return 0
     if mass_kg is None:
         raise IdentificationError("the data do not say how heavy the vehicle is: give --mass KG.")
-    base_name = options.based_on or ("foldable" if found.spring is not None else "rigid")
-    text = airframe_text(found, options.name or out.stem, mass_kg, base_name, load_built_in(base_name))
+    base_name = "foldable" if found.spring is not None else "rigid"
+    text = airframe_text(found, out.stem, mass_kg, base_name, load_built_in(base_name))
     # The file is read as `--airframe` will read it before anybody finds it on the disk.
     document = parse_document(text, str(out))
     validated(Airframe, document, with_base(document.data))
