@@ -5,14 +5,18 @@ import json
 
 import jsonschema
 import matplotlib.image
+import numpy as np
 import pytest
 import yaml
+from matplotlib.figure import Figure
 
 from rebound_cli.check.legs import flown_legs
 from rebound_cli.check.picture import ends
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.documents import parse_document
+from rebound_cli.figure.ground import draw_obstacles, footprint
 from rebound_cli.inputs import mission_from, world_from
+from sim_vehicle.scene import Scene
 from tests.rebound_cli.command import ROOT, WALL, run_here
 
 SCHEMA = ROOT / "missions" / "schema.json"
@@ -102,6 +106,31 @@ sim:
     # its western side is met on the way east, the end of its way, and its southern side where it stands at first
     assert met[1][1] == pytest.approx(1.5 - 0.2, abs=0.15) and met[2][0] == 0.0
     assert met[4][0] == pytest.approx(-10.5 - 0.2, abs=0.15)
+
+
+def test_a_moving_obstacle_is_drawn_where_it_begins_and_ends_with_its_way_between():
+    box = {"centre_ned_m": [-5, 0, -2], "size_m": [0.6, 1, 1]}
+    motion = {"velocity_ned_m_s": [1.5, 0.5, 0], "from_s": 12, "until_s": 14}
+    axis = Figure().subplots()
+    draw_obstacles(axis, Scene.model_validate({"boxes": [{**box, "motion": motion}]}), np.zeros(3), "obstacles", 0.7)
+    middles = [patch.get_xy()[:-1].mean(axis=0).tolist() for patch in axis.patches]
+    # east first: 2 s later it is 3 m north and 1 m east
+    assert np.ptp(middles, axis=0).tolist() == pytest.approx([1.0, 3.0])
+    assert [text.get_text() for text in axis.texts] == ["", "12 s", "14 s"]
+
+
+def test_obstacles_seen_from_above():
+    scene = Scene.model_validate(
+        {
+            "walls": [{"point_ned_m": [4, 0, -2], "normal_ned": [-1, 0, 0], "width_m": 4, "thickness_m": 0.2}],
+            "poles": [{"point_ned_m": [1, 2, 0], "radius_m": 0.5}],
+            "boxes": [{"centre_ned_m": [0, 0, -1], "size_m": [2, 1, 1], "yaw_deg": 90}],
+        }
+    )
+    corners = [footprint(obstacle) for _, obstacle in scene.obstacles()]
+    spans = [np.ptp(outline, axis=0) for outline in corners]
+    assert np.allclose(spans[0], [0.2, 4.0]) and np.allclose(spans[1], [1.0, 1.0]) and np.allclose(spans[2], [1.0, 2.0])
+    assert np.allclose((corners[1].min(axis=0) + corners[1].max(axis=0)) / 2, [1.0, 2.0])
 
 
 def test_a_person_reads_what_would_be_flown(tmp_path):

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import os
 from collections import namedtuple
 
 import pytest
@@ -16,6 +17,7 @@ from rebound_cli.flights.kept import (
     Ring,
     folder_with_room,
     kept_flights,
+    limits_of,
 )
 from rebound_cli.results.run_folder import EVENTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
@@ -44,6 +46,21 @@ def disk(monkeypatch):
         monkeypatch.setattr(ring.shutil, "disk_usage", usage)
 
     return of
+
+
+@pytest.mark.parametrize(
+    ("config", "disk_bytes", "limits"),
+    [
+        # A 32 GB card: a tenth of it for flights, and 300 MiB free.
+        ({}, 32 * 10**9, DiskLimits(3_200_000_000, 300 * MIB)),
+        # On a large disk no more than 4 GiB, on a small one a tenth is left free.
+        ({}, 1000 * GIB, DiskLimits(4 * GIB, 300 * MIB)),
+        ({}, 1 * GIB, DiskLimits(GIB // 10, GIB // 10)),
+        ({"max_use_mb": 500, "keep_free_mb": 50}, GIB, DiskLimits(500 * MB, 50 * MB)),
+    ],
+)
+def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_others(config, disk_bytes, limits):
+    assert limits_of(DiskConfig.model_validate(config), disk_bytes) == limits
 
 
 @pytest.mark.parametrize(
@@ -185,6 +202,25 @@ def test_on_a_disk_that_is_as_good_as_full_packets_end_events_go_on_and_it_is_to
     assert (folder / TLOG_NAME).stat().st_size == 0
     assert len((folder / EVENTS_NAME).read_text().splitlines()) == len(recorder.events) > 2
     assert recorder.writer.loss.startswith("log has gaps: less than 10 MiB of the disk are free")
+
+
+def test_a_folder_that_cannot_be_removed_does_not_end_the_flight(tmp_path, disk, monkeypatch):
+    # Given two old flights, of which the older is another user's
+    pretend(tmp_path, "20260101T000000Z-guard", MB)
+    pretend(tmp_path, "20260102T000000Z-guard", MB)
+    present = pretend(tmp_path, PRESENT, BLOCK)
+    disk(tmp_path, 50 * GIB)
+    rename = os.rename
+
+    def refuse(source, target):
+        if source.name == "20260101T000000Z-guard":
+            raise PermissionError(errno.EPERM, "Operation not permitted")
+        rename(source, target)
+
+    monkeypatch.setattr(ring.os, "rename", refuse)
+    # When a MB too much is there, then the next one goes
+    Ring(present, DiskConfig.model_validate({"max_use_mb": 1.1})).make_room(EPOCH_US)
+    assert names(tmp_path) == ["20260101T000000Z-guard", PRESENT]
 
 
 def test_room_is_made_before_a_flight_has_a_folder(tmp_path, disk, monkeypatch):
