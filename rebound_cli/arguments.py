@@ -42,8 +42,6 @@ count = number(int, 1, math.inf, "a count: give a whole number from 1 on")
 # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
 instance = number(int, 0, 9, "an instance: give a number from 0 to 9")
 speed = number(float, 0, 1000, "a speed: give a number from 0 to 1000, here or in PX4_SIM_SPEED_FACTOR")
-# PX4's own integration is no faster than this.
-rate_hz = number(float, 1, 1000, "a rate: give a number of hertz from 1 to 1000")
 share = number(float, 0, 1, "a share: give a number from 0 to 1")
 mass_kg = number(float, math.ulp(0.0), 1000, "a mass: give kilograms, such as 1.1")
 
@@ -67,6 +65,12 @@ def _expected(text: str) -> int:
     if text != "none" and not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of collisions: give none or a whole number")
     return 0 if text == "none" else int(text)
+
+
+def _export_format(text: str) -> str:
+    if text == "ulg":
+        raise argparse.ArgumentTypeError("ulg is gone: give mcap, which Foxglove and PlotJuggler read")
+    return text
 
 
 def runs(function: str) -> Run:
@@ -238,7 +242,7 @@ def add_preflight(commands: Commands) -> None:
     _add_companion(preflight)
     _option(preflight, "--card", "write the card of the first flight, to be printed", "FILE")
     _flag(preflight, "--fix", "offer to set the parameters that would mend it")
-    _flag(preflight, "--yes", "with --fix: set them without asking")
+    _gone(preflight, "--yes", "--fix asks before it sets a parameter")
     _add_json(preflight, "findings")
 
 
@@ -267,10 +271,10 @@ def add_logs(commands: Commands) -> None:
         _add_runs(parser)
     _add_json(listed, "flights")
     _add_json(shown, "flight")
-    text = "archive: all its files (default); mcap: for Foxglove; ulg: for Flight Review and PlotJuggler"
-    _option(exported, "--format", text, choices=("archive", "mcap", "ulg"), default="archive")
-    _option(exported, "--out", "the file (default: FLIGHT.tar.gz, .mcap or .ulg)", "FILE")
-    _add_no_position(exported)
+    text = "archive: all its files (default); mcap: for Foxglove and PlotJuggler"
+    _option(exported, "--format", text, type=_export_format, choices=("archive", "mcap"), default="archive")
+    _option(exported, "--out", "the file (default: FLIGHT.tar.gz or .mcap)", "FILE")
+    _gone(exported, "--no-position", "`rebound report FLIGHT --no-position` makes a page without coordinates")
 
 
 def add_report(commands: Commands) -> None:
@@ -279,7 +283,7 @@ def add_report(commands: Commands) -> None:
     _option(report, "flight", "a run's folder, or a flight's name (default: last)", "RUN", nargs="?", default="last")
     _add_runs(report)
     _option(report, "--out", "the page (default: report.html in the run's folder)", "FILE")
-    _add_no_position(report)
+    _flag(report, "--no-position", "without coordinates: no places, in texts and the summary either")
 
 
 def add_watch(commands: Commands) -> None:
@@ -293,24 +297,8 @@ def add_watch(commands: Commands) -> None:
     _option(watch, "--port", "TCP port (default: any free one)", type=port, default=0)
 
 
-def add_doctor(commands: Commands) -> None:
-    text = "Configuration without keys, versions, machine, journal, last flights; see docs/how-to/flights.md."
-    summary = "one archive for whoever is asked for help"
-    doctor = _command(commands, "doctor", "service.doctor:run_doctor", summary, text)
-    _option(doctor, "--out", "the archive (default: %(default)s)", "FILE", default=Path("rebound-doctor.tar.gz"))
-    _option(doctor, "--config", "settings beside those of /etc/rebound", "FILE", action="append", default=[])
-    _option(doctor, "--preflight", "what `rebound preflight --json` printed", "FILE")
-    _option(doctor, "--flights", "how many of the last (default: 3)", "N", type=count, default=3)
-    _add_runs(doctor)
-    _add_no_position(doctor)
-
-
 def _add_runs(parser: Parser) -> None:
     _option(parser, "--runs", "where the flights are (default: runs here, or the service's)", "DIR")
-
-
-def _add_no_position(parser: Parser) -> None:
-    _flag(parser, "--no-position", "without coordinates: no packets, no places in events and summary")
 
 
 def add_check(commands: Commands) -> None:
@@ -325,24 +313,12 @@ def add_check(commands: Commands) -> None:
     _flag(check, "--no-picture", "draw nothing")
 
 
-def add_plan(commands: Commands) -> None:
-    text = "Reads QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
-    plan = commands.add_parser("plan", help="missions from QGroundControl", description=text)
-    ways = plan.add_subparsers(required=True, metavar="import")
-    text = "Makes a mission of a .plan."
-    reading = _command(ways, "import", "plan.command:run_import", "a mission file from a .plan", text)
-    _option(reading, "plan", "QGroundControl's file", "PLAN", type=Path)
-    _option(reading, "--name", "name of the mission (default: the file's)")
-    _option(reading, "--out", "default: standard output", "FILE")
-
-
 def add_replay(commands: Commands) -> None:
-    text = "The detector over a .ulg, .bin, .log or .tlog, or a run's folder; see docs/how-to/recorded-flights.md."
+    text = "The detector over a .ulg, .bin or .tlog, or a run's folder; see docs/how-to/recorded-flights.md."
     replay = _command(commands, "replay", "replaying:run_replay", "look for collisions in a recorded flight", text)
-    _option(replay, "log", "a .ulg, .bin, .log or .tlog, or a run's folder", "LOG", type=Path)
+    _option(replay, "log", "a .ulg, .bin or .tlog, or a run's folder", "LOG", type=Path)
     _option(replay, "--detector", "another detector than the mission's, or than the default", "NAME")
-    text = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
-    _option(replay, "--rate", text, "HZ", type=rate_hz)
+    _gone(replay, "--rate", "a log is searched as it was recorded")
     _add_companion(replay)
     _add_set(replay, "change a setting, e.g. companion.fused.side_threshold_m_s2=6")
     _option(replay, "--expect", "exit 1 unless there are exactly so many collisions", "none|N", type=_expected)
@@ -350,15 +326,19 @@ def add_replay(commands: Commands) -> None:
     replay.add_argument("--any-mode", action="store_true", help=text)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
-    _gone(replay, "--merge", "`rebound logs export RUN --format ulg` writes a log with a flight's events and hits")
+    _gone(replay, "--merge", "`rebound logs export RUN --format mcap` writes a file with a flight's events and hits")
     _option(replay, "--out", "folder of the page (default: runs/replay-<name of the log>)", "DIR")
-    _add_json(replay, "findings")
+    _gone(replay, "--json", "--expect sets the exit code, and the page has the data as CSV and JSON")
 
 
 def add_tune(commands: Commands) -> None:
-    text = "Noise floor, margins, the smallest hit that shows, settings; see docs/how-to/recorded-flights.md."
-    tune = _command(commands, "tune", "tune:run_tune", "settings for a vehicle from its healthy flights", text)
-    text = "flights without a collision: .ulg, .bin, .log, .tlog or runs' folders"
+    text = (
+        "False alarms, the smallest hit that shows, settings with their margins; see docs/how-to/recorded-flights.md."
+    )
+    tune = _command(
+        commands, "tune", "identification.tune:run_tune", "settings for a vehicle from its healthy flights", text
+    )
+    text = "flights without a collision: .ulg, .bin, .tlog or runs' folders"
     _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
     _gone(tune, "--airframe", "the smallest hit that shows is the detector's own promise, whatever the arms")
@@ -376,8 +356,12 @@ def add_identify(commands: Commands) -> None:
     _option(identify, "--mass", "of the vehicle; known for simulated runs", "KG", type=mass_kg)
     _gone(identify, "--axis", "it belonged to CSV files of motion capture; a log tells where the wall is")
     _option(identify, "--out", "write an airframe file", "FILE")
-    _option(identify, "--name", "name of the airframe (default: the file's)")
-    _option(identify, "--based-on", "airframe for all else (default: foldable, rigid where no spring is seen)", "NAME")
+    _gone(identify, "--name", "the airframe has the file's name")
+    _gone(
+        identify,
+        "--based-on",
+        "all else is that of foldable, or of rigid where no spring is seen; change it in the file",
+    )
 
 
 def add_airframe(commands: Commands) -> None:
@@ -432,7 +416,6 @@ COMMANDS = (
         add_guard,
         add_init,
         add_check,
-        add_plan,
         add_sim,
         add_preflight,
         add_status,
@@ -440,5 +423,5 @@ COMMANDS = (
         add_report,
         add_watch,
     ),
-    *(add_doctor, add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
+    *(add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
 )

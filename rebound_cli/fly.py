@@ -15,7 +15,7 @@ from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
 from rebound_cli import inputs
 from rebound_cli.background import Background
-from rebound_cli.figure.showing import offer_page, show_flight, show_later
+from rebound_cli.figure.showing import offer_page, show_flight
 from rebound_cli.flights.kept import folder_with_room
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
@@ -210,16 +210,11 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
 
 
 def _draw(flight: Flight) -> None:
-    """Picture and page of the flight, beside and later where the person wants the prompt back."""
+    """Picture and page of the flight; Ctrl-C leaves them out."""
     try:
-        if flight.interrupts.reason is None:
-            show_flight(flight.folder, flight.followed)
-            return
+        show_flight(flight.folder, flight.followed)
     except KeyboardInterrupt:
-        pass
+        offer_page(flight.folder, flight.console)
     except ReboundError as error:
         # Of a flight in which nothing was heard there is nothing to show.
         flight.console.print(f"\nNo {run_folder.REPORT_NAME}: {error}")
-        return
-    show_later(flight.folder)
-    flight.console.print(f"\n{run_folder.FIGURE_NAME} and {run_folder.REPORT_NAME} follow.")

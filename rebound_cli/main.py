@@ -25,16 +25,17 @@ GONE = {
         *(("results", "paper results"), ("recoveries", "campaign recoveries")),
     )
 }
-GONE["plan export"] = "is gone: what follows a hit has no place in a .plan; fly the mission with 'rebound fly'"
+GONE["doctor"] = "is gone: send what 'rebound logs export' and 'journalctl --unit=rebound' give"
+GONE["plan"] = "is gone: upload the plan to the vehicle by QGroundControl, and fly it under 'rebound guard'"
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = _with_plain_sim(sys.argv[1:] if words is None else words)
-    for command in (" ".join(words[:1]), " ".join(words[:2])):
-        if command in GONE:
-            print(f"rebound: 'rebound {command}' {GONE[command]}.", file=sys.stderr)
-            return exit_codes.ERROR
+    command = next(iter(words), "")
+    if command in GONE:
+        print(f"rebound: 'rebound {command}' {GONE[command]}.", file=sys.stderr)
+        return exit_codes.ERROR
     return run(build_parser().parse_args(words), "rebound")
 
 

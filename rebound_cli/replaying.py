@@ -1,6 +1,5 @@
 """`rebound replay`: from a log to its collisions."""
 
-import json
 import re
 from argparse import Namespace
 from collections.abc import Callable
@@ -11,7 +10,7 @@ from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.recording import is_run_folder, log_file, read_recording, settings_file
-from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
+from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_text
 from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
 from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
@@ -22,14 +21,11 @@ def run_replay(options: Namespace) -> int:
 
     1 when they are not what was expected, when a flight did not come again, or when nothing was watched.
     """
-    console = console_for(options.json)
+    console = console_for(False)
     replay, shown = _replay(options, console)
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
     folder = options.out or RUNS_FOLDER / f"replay-{slug}"
-    if options.json:
-        print(json.dumps(report_data(replay), indent=2))
-    else:
-        console.print(report_text(replay).rstrip())
+    console.print(report_text(replay).rstrip())
     if replay.findings.impacts:
         folder.mkdir(parents=True, exist_ok=True)
         console.print(f"page: {write_page(shown(), folder / REPORT_NAME)}")
@@ -41,7 +37,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     file = log_file(options.log)
     folder = options.log if is_run_folder(options.log) else None
     # Options under which a flight is no longer the one that was flown.
-    changing = ("detector", "rate", "companion", "set", "any_mode")
+    changing = ("detector", "companion", "set", "any_mode")
     changed = [f"--{name.replace('_', '-')}" for name in changing if getattr(options, name) not in (None, [], False)]
     if folder is not None and not changed:
         recording = read_recording(folder)
@@ -59,7 +55,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     config = companion_settings(settings, options.set, options.detector)
     log = read_log(file)
     modes = None if options.any_mode else GuardConfig().modes
-    replay = replay_log(log, config, options.rate, modes)
+    replay = replay_log(log, config, modes)
     return replay, partial(replayed_flight, replay, config)
 
 

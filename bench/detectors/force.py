@@ -9,7 +9,6 @@ from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO
 from companion.reflex.detector import Phase, Situation
-from rebound_cli.logs.shaking import MEMORY_US
 
 # Samples, as in its authors' program.
 WINDOW = 10
@@ -17,6 +16,9 @@ WINDOW = 10
 # Of samples with a normal spread not one in 10^8 is beyond six; four public PX4 logs of healthy flights, with
 # spreads of 1.2 to 4 m/s^2, stay below five but for one sample.
 NOISE_FACTOR = 6.0
+# The noise floor's memory. Long enough for 25 samples at 50 Hz (a spread good to 15 %), short enough to have forgotten
+# the ground by the top of a take-off and to follow drag as the speed changes.
+MEMORY_US = 500_000
 
 
 @dataclass(slots=True)

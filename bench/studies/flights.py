@@ -132,7 +132,7 @@ def run_flights(options: Namespace) -> int:
         name = f"{path.parent.name}/{path.name}"
         config = CompanionConfig()
         try:
-            replay = replay_log(read_log(path), config, None)
+            replay = replay_log(read_log(path), config)
         except LogError as error:
             refused.append(str(error))
             continue

@@ -182,12 +182,6 @@ def _time_ms(time_us: int) -> int:
     return time_us // 1000 & 0xFFFFFFFF
 
 
-def command_name(number: int) -> str:
-    """A command as MAVLink calls it, for people: "176 (DO_SET_MODE)"."""
-    entry = dialect.enums["MAV_CMD"].get(number)
-    return str(number) if entry is None else f"{number} ({entry.name.removeprefix('MAV_CMD_')})"
-
-
 def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None

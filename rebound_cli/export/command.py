@@ -1,13 +1,12 @@
 """`rebound logs export`: one file of a flight."""
 
 import io
+import tarfile
 from argparse import Namespace
 from pathlib import Path
 
-from companion.errors import ConfigurationError
 from companion.shell.files import write_whole
-from rebound_cli.flights.archive import add_flight, new_archive
-from rebound_cli.flights.kept import flight_named, runs_folder
+from rebound_cli.flights.kept import KeptFlight, flight_named, runs_folder
 from rebound_cli.results.run_folder import TLOG_NAME
 
 
@@ -15,31 +14,32 @@ def run_export(options: Namespace) -> int:
     """Raises FlightError, RunFolderError, LogError."""
     flight, kind = flight_named(runs_folder(options.runs), options.flight), options.format
     out = options.out or Path(f"{flight.name}.{'tar.gz' if kind == 'archive' else kind}")
-    if kind != "archive":
-        if options.no_position:
-            raise ConfigurationError(
-                f"a .{kind} is little else than places: --no-position goes with the archive alone."
-            )
-        write_whole(out, _exported(flight.folder, kind))
+    if kind == "mcap":
+        write_whole(out, _mcap(flight.folder))
     else:
-        with new_archive(out, options.no_position) as archive:
-            add_flight(archive, flight, "")
+        _write_archive(out, flight)
     print(f"{flight.name} is in {out}")
     return 0
 
 
-def _exported(folder: Path, kind: str) -> bytes:
-    """A run's folder as .mcap or .ulg. A drone has neither mcap nor pyulog, and need not have."""
+def _write_archive(path: Path, flight: KeptFlight) -> None:
+    """Whole or not at all; its files as long as they are now: the present flight goes on meanwhile."""
+    unfinished = path.with_name(f"{path.name}.part")
+    try:
+        with tarfile.open(unfinished, "w:gz") as tar:
+            for file in sorted(flight.folder.iterdir()):
+                tar.add(file, f"{flight.name}/{file.name}", recursive=False)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _mcap(folder: Path) -> bytes:
+    """A run's folder as .mcap. A drone has no mcap, and need not have."""
+    from rebound_cli.export.foxglove import write_mcap
     from rebound_cli.logs.reader import read_telemetry
     from rebound_cli.report.shown_flight import recorded_flight
 
-    flight, log = recorded_flight(folder), read_telemetry(folder / TLOG_NAME)
-    if kind == "mcap":
-        from rebound_cli.export.foxglove import write_mcap
-
-        content = io.BytesIO()
-        write_mcap(flight, log, content)
-        return content.getvalue()
-    from rebound_cli.export.ulog import new_ulog
-
-    return new_ulog(flight, log)
+    content = io.BytesIO()
+    write_mcap(recorded_flight(folder), read_telemetry(folder / TLOG_NAME), content)
+    return content.getvalue()

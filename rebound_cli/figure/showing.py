@@ -1,9 +1,5 @@
-"""A flight's picture and page in its folder: at once, or by a process beside what a person does next."""
+"""A flight's picture and page in its folder."""
 
-import os
-import subprocess
-import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 from rebound_cli.live.console import Console
@@ -27,28 +23,7 @@ def show_flight(folder: Path, followed: Followed | None = None) -> None:
     write_page(flight, folder / REPORT_NAME)
 
 
-def show_later(folder: Path) -> None:
-    """Returns at once; each file is there when it is whole."""
-    nobody = subprocess.DEVNULL
-    command = [sys.executable, "-m", "rebound_cli.figure.showing", str(folder)]
-    subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody, start_new_session=True)
-
-
 def offer_page(folder: Path, console: Console) -> None:
-    """Of a real vehicle's flight: where a person sits at a terminal of more than a drone's install, else how to.
-
-    Of a flight in which nothing was heard there is none.
-    """
-    if (folder / TLOG_NAME).stat().st_size == 0:
-        return
-    if console.is_terminal and find_spec("matplotlib") is not None:
-        show_later(folder)
-        console.print(f"{REPORT_NAME} follows.")
-    else:
+    """How to make it; of a flight in which nothing was heard there is none."""
+    if (folder / TLOG_NAME).stat().st_size > 0:
         console.print(f"A page to look at: rebound report {folder}")
-
-
-if __name__ == "__main__":
-    # Everything else on the computer goes before it.
-    os.nice(19)
-    show_flight(Path(sys.argv[1]))

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from rebound_cli.documents import load_document, parse_document, refuse_existing, validated, write_text
-from rebound_cli.identification.fit import Identified, Number, Spring, identify
+from rebound_cli.identification.fit import Identified, Spring, identify
 from rebound_cli.identification.hit import IdentificationError, flight_hit
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.recording import log_file
@@ -15,23 +15,26 @@ from sim_vehicle.airframe import Airframe, load_built_in, with_base
 
 
 def run_identify(options: Namespace) -> int:
-    """Print what the hits show and, with --out, write it as an airframe file. Raises IdentificationError."""
+    """Print the hits and the airframe that they show; with --out write it. Raises IdentificationError."""
     out: Path | None = options.out
     refuse_existing(out)
     found = identify([flight_hit(read_log(log_file(path))) for path in options.data])
     mass_kg = _mass_kg(options)
-    print(report_text(found), end="")
-    if out is None:
-        return 0
     if mass_kg is None:
         raise IdentificationError("the data do not say how heavy the vehicle is: give --mass KG.")
-    base_name = options.based_on or ("foldable" if found.spring is not None else "rigid")
-    text = airframe_text(found, options.name or out.stem, mass_kg, base_name, load_built_in(base_name))
-    # The file is read as `--airframe` will read it before anybody finds it on the disk.
-    document = parse_document(text, str(out))
+    for hit in found.hits:
+        speeds = f"{hit.speed_in_m_s:.3f} m/s in, {hit.speed_out_m_s:.3f} ± {hit.speed_sigma_m_s:.3f} m/s out"
+        print(f"{hit.name} at {hit.at_s:.2f} s: {speeds}, on {hit.guards} guard{'s' if hit.guards > 1 else ''}")
+    base_name = "foldable" if found.spring is not None else "rigid"
+    name = "mine" if out is None else out.stem
+    text = airframe_text(found, name, mass_kg, base_name, load_built_in(base_name))
+    # Read as `--airframe` will read it before anybody has it.
+    document = parse_document(text, str(out or "the airframe"))
     validated(Airframe, document, with_base(document.data))
-    write_text(out, text)
-    print(f"\nWritten to {out}. Fly it: rebound fly missions/wall.yaml --lockstep --airframe {out}")
+    print(f"\n{text}", end="")
+    if out is not None:
+        write_text(out, text)
+        print(f"\nWritten to {out}. Fly it: rebound fly missions/wall.yaml --lockstep --airframe {out}")
     return 0
 
 
@@ -42,38 +45,6 @@ def _mass_kg(options: Namespace) -> float | None:
     stored = next((file for path in options.data if (file := path / run_folder.AIRFRAME_NAME).is_file()), None)
     mass_kg = None if stored is None else load_document(stored).data.get("mass_kg")
     return float(mass_kg) if isinstance(mass_kg, int | float) else None
-
-
-def report_text(found: Identified) -> str:
-    """Markdown: the hits and the numbers."""
-    rows = [
-        f"{hit.name} | {hit.at_s:.2f} s | {hit.guards} | {hit.speed_in_m_s:.3f} m/s | {hit.speed_out_m_s:.3f} ± "
-        f"{hit.speed_sigma_m_s:.3f} m/s | {hit.ratio:.2f}"
-        for hit in found.hits
-    ]
-    head = "hit | at | guards | in | out | ratio"
-    table = [f"| {head} |", "|" + "---|" * (head.count("|") + 1), *(f"| {row} |" for row in rows), ""]
-    return "\n".join([*table, *_numbers(found)]) + "\n"
-
-
-def _numbers(found: Identified) -> list[str]:
-    lines = [f"- restitution {_text(found.restitution, 3)}"]
-    if found.spring is None:
-        lines.append("- spring: not shown; every contact is over within the time between a few samples")
-    else:
-        spring = found.spring
-        lines.append(
-            f"- spring: k_s = {_text(spring.stiffness_per_s2, 0)} 1/s2, b_s = {_text(spring.damping_per_s, 1)} 1/s, "
-            f"from {spring.hits} of {len(found.hits)} hits; contact {1e3 * spring.contact_time_s():.0f} ms head-on, "
-            f"pressed {1e3 * found.deepest_m:.0f} mm at most"
-        )
-    if found.stop_m is not None:
-        lines.append(f"- stop of the arms met after {1e3 * found.stop_m:.0f} mm")
-    return lines
-
-
-def _text(number: Number, digits: int) -> str:
-    return f"{number.value:.{digits}f} ± {number.sigma:.{digits}f}"
 
 
 def airframe_text(found: Identified, name: str, mass_kg: float, base_name: str, base: Airframe) -> str:

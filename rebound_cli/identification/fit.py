@@ -38,13 +38,6 @@ class Spring:
         share = math.sqrt(guards / 2)
         return self.natural_rad_s.value * share, min(self.ratio.value * share, 0.999)
 
-    def contact_time_s(self) -> float:
-        """First touch until the force is back at zero, on both guards."""
-        natural, ratio = self.on(2)
-        # The phase of the damped oscillation at that moment.
-        phase_rad = math.atan2(2 * ratio * math.sqrt(1 - ratio**2), 2 * ratio**2 - 1)
-        return phase_rad / (natural * math.sqrt(1 - ratio**2))
-
     def depth_m(self, hit: Hit) -> float:
         """How far the hit presses the spring."""
         natural, ratio = self.on(hit.guards)

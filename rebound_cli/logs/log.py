@@ -29,6 +29,8 @@ QUADROTOR = 2
 _LONGEST_US = 24 * 3600 * 1_000_000
 # Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
 _SLOW_HZ = 15.0
+# PX4's limit of the accelerometer it was made for: +-16 g. A sample this near to it holds clipped readings.
+_CLIPPED_M_S2 = 150.0
 
 
 class LogError(ReboundError):
@@ -50,7 +52,6 @@ class Log:
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
     `low_pass_hz`: where samples are not means but points behind a low-pass filter of second order, its cut-off.
-    `marks`: what the vehicle's own log says of its health, with the time.
     """
 
     path: Path
@@ -61,7 +62,6 @@ class Log:
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None
     low_pass_hz: float | None = None
-    marks: tuple[tuple[int, str], ...] = ()
 
     @property
     def window_us(self) -> float | None:
@@ -125,3 +125,11 @@ def slow_velocity(name: str, rate_hz: float) -> Iterator[str]:
     """What is lost where a log holds fewer velocities than the wire carries."""
     if rate_hz < _SLOW_HZ:
         yield f"{name} is logged at {rate_hz:.0f} Hz where the wire carries 30 or more: v_c is coarser than in flight"
+
+
+def clipped(log: Log) -> tuple[int, str]:
+    """IMU samples with clipped readings in them, and how that is known."""
+    if log.clipped_at_us is not None:
+        return len(log.clipped_at_us), "by the sensor's own flags"
+    count = sum(max(map(abs, sample.specific_force_frd_m_s2)) >= _CLIPPED_M_S2 for _, sample in log.imu())
+    return count, f"samples of {_CLIPPED_M_S2:g} m/s^2 or more"

@@ -64,9 +64,6 @@ _MAIN = {0: 1, 1: 2, 2: 3, 8: 11, 10: 5, 13: 1, 14: 6, 15: 7}
 _AUTO = {3: 4, 4: 3, 5: 5, 12: 6, 17: 2, 18: 6, 19: 8, 20: 9, 22: 10} | {state: state - 12 for state in range(23, 31)}
 _MODES = {state: main << 16 for state, main in _MAIN.items()} | {21: 3 << 16 | 1 << 24, 6: 3 << 16 | 2 << 24}
 _MODES |= {state: 4 << 16 | sub << 24 for state, sub in _AUTO.items()}
-# The other way round, without what shows as another state's mode.
-NAV_STATES = {mode: state for state, mode in _MODES.items() if state not in (12, 13)} | {10 << 16: 13}
-
 
 _Topics = Mapping[tuple[str, int], Topic]
 

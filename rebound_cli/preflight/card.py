@@ -40,7 +40,7 @@ FLIGHT 2, THE FIRST HIT
 [ ] Turn each propeller by hand: no chip, no wobble, no play. Guards and arms whole.
 [ ] `rebound logs show`: one hit, on the right side, as fast as it was flown.
 
-Not as written here? Land, and keep the flight: rebound doctor --out help.tar.gz
+Not as written here? Land, and keep the flight: rebound logs export
 """
 
 

@@ -28,8 +28,6 @@ SETTING_TAKES_S = 1.0
 def run_preflight(options: Namespace) -> int:
     """Print the findings; 0 when none of them is bad. Raises ConfigurationError, ConnectionSetupError."""
     console, clock = console_for(options.json), Clock()
-    if options.yes and not options.fix:
-        raise ConfigurationError("--yes answers the question of --fix: give both.")
     config = companion_settings(options.companion, (), None)
     connection = open_signed(options)
     try:
@@ -46,7 +44,7 @@ def run_preflight(options: Namespace) -> int:
         if options.json:
             print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
         if options.fix:
-            found = _fix(console, preflight, connection, clock, found, options.yes)
+            found = _fix(console, preflight, connection, clock, found)
         if options.card is not None:
             write_text(options.card, card(preflight.survey, found, options.connect))
             console.print(f"\nThe card of the first flight is {options.card}.")
@@ -96,7 +94,6 @@ def _fix(
     connection: Connection,
     clock: Clock,
     found: list[PreflightItem],
-    is_agreed: bool,
 ) -> list[PreflightItem]:
     """Set what can be set, one by one as the person agrees; the findings afterwards."""
     if preflight.survey.vehicle.armed:
@@ -105,11 +102,10 @@ def _fix(
         if finding.fix is None:
             continue
         name, value = finding.fix
-        if not is_agreed:
-            console.ask(f"Set {name} = {value:g}? [y/N] ")
-            # The end of input is a no.
-            if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-                continue
+        console.ask(f"Set {name} = {value:g}? [y/N] ")
+        # The end of input is a no.
+        if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+            continue
         for frame in preflight.set_parameter(name, value, clock.now_us()):
             connection.send(frame)
         until_us = clock.now_us() + round(SETTING_TAKES_S * 1e6)

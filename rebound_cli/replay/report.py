@@ -1,43 +1,34 @@
-"""One replay, whichever kind of log it is: from the log to findings, in words for a person and as data."""
+"""One replay, whichever kind of log it is: from the log to findings, in words for a person."""
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from companion.messages import LandedState
+from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import Evidence, ImpactKind
-from rebound_cli.logs.log import WANTED, Log, LogError
-from rebound_cli.logs.shaking import clipped
+from companion.reflex.detector import ImpactKind
+from companion.reflex.surface import Normal
+from rebound_cli.logs.log import WANTED, Log, clipped
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
-from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
-
-SCHEMA = 1
+from rebound_cli.replay.watching import Finding, Findings, watch_log
 
 _WIDTH = 110
-
-_HOW = {
-    Evidence.FORCE: "the contact's own force",
-    Evidence.VELOCITY_JUMP: "what followed a contact between the samples",
-}
 
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What was looked at, with what, and what was found. `log` is as the detector heard it."""
+    """What was looked at, with what, and what was found."""
 
     log: Log
     detector: str
-    recorded_rate_hz: float
     findings: Findings
     losses: tuple[str, ...]
     reproduction: Reproduction | None
 
     @property
     def imu_rate_hz(self) -> float:
-        """As the detector heard it."""
         return 1e6 / self.log.imu_interval_us
 
     @property
@@ -46,18 +37,12 @@ class Replay:
         return max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in self.log.imu())
 
 
-def replay_log(log: Log, config: CompanionConfig, rate_hz: float | None, modes: Sequence[str] | None = None) -> Replay:
-    """What a guard's detector makes of the log. Raises LogError when the rate leaves nothing.
+def replay_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = None) -> Replay:
+    """What a guard's detector makes of the log.
 
     `modes`: those in which the guard may take over; None: it watches whoever flies.
     """
-    recorded_hz = 1e6 / log.imu_interval_us
-    if rate_hz is not None:
-        log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
-        if len(log.imu()) < 2:
-            raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
-    findings = watch_log(log, config, modes)
-    return Replay(log, config.detector, recorded_hz, findings, _losses(log, config), None)
+    return Replay(log, config.detector, watch_log(log, config, modes), _losses(log, config), None)
 
 
 def replay_flight(log: Log, recording: Recording) -> Replay:
@@ -66,8 +51,7 @@ def replay_flight(log: Log, recording: Recording) -> Replay:
     reproduction = reproduce(recording)
     # The flight's own zero, so that times are those of its timeline.
     log = replace(log, started_at_us=recording.steps[0].time_us)
-    recorded_hz, losses = 1e6 / log.imu_interval_us, _losses(log, config)
-    return Replay(log, config.detector, recorded_hz, reproduction.findings, losses, reproduction)
+    return Replay(log, config.detector, reproduction.findings, _losses(log, config), reproduction)
 
 
 def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
@@ -84,11 +68,9 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
 
 def report_text(replay: Replay) -> str:
     """The whole report; times in seconds since the log's start."""
-    log, rate_hz = replay.log, replay.imu_rate_hz
-    recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
-    headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
+    log = replay.log
+    headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {replay.imu_rate_hz:.0f} Hz"
     told: list[tuple[int, list[str]]] = [(at_us, [text]) for at_us, text in replay.findings.happenings]
-    told += [(at_us, [f"the vehicle's own log: {text}"]) for at_us, text in log.marks]
     if replay.reproduction is None:
         # Each interval in which a guard would have left a hit to whoever flies.
         spans = replay.findings.off
@@ -131,28 +113,47 @@ def _verdict(replay: Replay) -> str:
 
 
 def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
-    first, final, situation = finding.first, finding.final, finding.situation
-    kind = "" if final.impact.kind in (ImpactKind.UNKNOWN, ImpactKind.CRASH) else f": {final.impact.kind.value}"
-    at_least = "at least " if final.is_lower_bound else ""
     what = "CRASH" if finding.is_crash else "HIT" if finding.is_collision else "contact, no collision"
-    yield f"{what}{kind}, confidence {final.impact.confidence:.2f}"
-    force = math.hypot(*first.impact.specific_force_frd_m_s2)
-    how = _HOW[first.impact.evidence]
-    yield f"seen by {how}: {force:.1f} m/s^2, a hit from {finding.threshold_m_s2:.1f} on"
-    v_c = f"{math.hypot(*first.velocity_ned_m_s):.2f} m/s {_vector(first.velocity_ned_m_s)}"
-    yield f"v_c {v_c} NED, normal {_vector(final.normal.direction_ned)}"
-    yield f"contact since {replay.log.seconds(_on_log(finding)):.3f} s +-{first.time_error_us / 1e3:.1f} ms"
-    yield f"peak {at_least}{final.peak_specific_force_m_s2:.1f} m/s^2, impulse {at_least}{final.impulse_m_s:.2f} m/s"
-    height = "height unknown" if situation.height_m is None else f"{situation.height_m:.2f} m up"
-    landed = f"vehicle says {situation.landed_state.name.lower().replace('_', ' ')}"
-    landed = "landed or not unknown" if situation.landed_state is LandedState.UNDEFINED else landed
-    descent = "descending to land" if situation.descent_commanded else "no descent asked for"
-    yield f"at the time: {height}, {landed}, {descent}"
+    force_m_s2 = math.hypot(*finding.first.impact.specific_force_frd_m_s2)
+    yield f"{what}: {kind_text(finding)}, seen by {force_m_s2:.1f} m/s², a hit from {finding.threshold_m_s2:.1f} on"
+    yield from (
+        f"{name.lower()}: {text}" for name, text in impact_facts(finding, finding.final.normal, replay.log.seconds)
+    )
 
 
-def _on_log(finding: Finding) -> float:
-    """t_c on the log's clock: as long before the detection as on the vehicle's."""
-    return finding.at_us - (finding.first.impact.sample_time_boot_us - finding.first.time_boot_us)
+def impact_facts(finding: Finding, normal: Normal, seconds: Callable[[float], float]) -> list[tuple[str, str]]:
+    """What was measured of it; `seconds`: since the flight began, of a time on the log's clock."""
+    first, final = finding.first, finding.final
+    # As long before the detection as on the vehicle's clock.
+    contact_at_us = finding.at_us - (first.impact.sample_time_boot_us - final.time_boot_us)
+    least = "at least " if final.is_lower_bound else ""
+    return [
+        ("Detected", f"{seconds(finding.at_us):.3f} s"),
+        ("Contact began", f"{seconds(contact_at_us):.4f} s ± {final.time_error_us / 1e3:.1f} ms"),
+        ("Speed before it", speed_text(finding)),
+        ("Largest force in a sample", f"{least}{final.peak_specific_force_m_s2:.1f} m/s²"),
+        ("Impulse", f"{least}{final.impulse_m_s:.2f} m/s"),
+        ("Normal", f"{bearing(normal.direction_ned)} ± {math.degrees(normal.error_rad):.0f}°"),
+        ("Taken for", f"{kind_text(finding)}, confidence {first.impact.confidence:.2f}"),
+    ]
+
+
+def kind_text(finding: Finding) -> str:
+    kind = finding.final.impact.kind
+    return kind.value if kind is not ImpactKind.UNKNOWN else "something"
+
+
+def speed_text(finding: Finding) -> str:
+    first = finding.first
+    return f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
+
+
+def bearing(normal_ned: Vector3) -> str:
+    """Where a surface faces."""
+    north, east, down = normal_ned
+    if abs(down) > math.hypot(north, east):
+        return "faces down" if down > 0.0 else "faces up"
+    return f"faces {math.degrees(math.atan2(east, north)) % 360.0:.0f}°"
 
 
 def _facts(replay: Replay) -> Iterator[str]:
@@ -181,49 +182,8 @@ def _reproduction_text(again: Reproduction) -> str:
     return f"NOT identical ({extent}): {again.first_difference}"
 
 
-def _vector(vector: Sequence[float]) -> str:
-    # adding 0.0 turns a rounded -0.0 into 0.0
-    return "({})".format(", ".join(f"{round(value, 2) + 0.0:.2f}" for value in vector))
-
-
-def report_data(replay: Replay) -> dict[str, Any]:
-    """The same for a program; vectors NED unless named FRD, SI units, times in seconds since the log's start."""
-    log, findings, again = replay.log, replay.findings, replay.reproduction
-    count, how = clipped(log)
-    return {
-        "schema": SCHEMA,
-        "log": str(log.path),
-        "vehicle": log.vehicle,
-        "duration_s": round(log.duration_s, 3),
-        "detector": replay.detector,
-        "imu_rate_hz": round(replay.imu_rate_hz, 2),
-        "recorded_imu_rate_hz": round(replay.recorded_rate_hz, 2),
-        "collisions": len(findings.collisions),
-        "crashes": len(findings.crashes),
-        "impacts": [_finding_data(replay, finding) for finding in findings.impacts],
-        "happenings": [{"at_s": _seconds(replay, at_us), "text": text} for at_us, text in findings.happenings],
-        "watched_share": findings.watched_share,
-        **{name: [_span_data(replay, span) for span in getattr(findings, name)] for name in ("blind", "off")},
-        "clipped_samples": count,
-        "clipping_known_by": how,
-        "peak_specific_force_m_s2": round(replay.peak_m_s2, 3),
-        "notes": list(replay.losses),
-        "reproduction": again and _reproduction_data(again),
-    }
-
-
-def _reproduction_data(again: Reproduction) -> dict[str, Any]:
-    told = {"identical": again.first_difference is None, "first_difference": again.first_difference}
-    return {**told, **again.extent, "cut": again.is_cut}
-
-
-def _finding_data(replay: Replay, finding: Finding) -> dict[str, Any]:
-    times = {"at_s": _seconds(replay, finding.at_us), "contact_at_s": _seconds(replay, _on_log(finding))}
-    return {**times, "contact_error_s": finding.first.time_error_us / 1e6, **finding_data(finding)}
-
-
 def finding_data(finding: Finding) -> dict[str, Any]:
-    """Of an impact, without the times that are some log's own."""
+    """An impact for a program, without the times that are some log's own. NED unless named FRD, SI units."""
     first, final, situation = finding.first, finding.final, finding.situation
     return {
         "sample_time_boot_us": first.impact.sample_time_boot_us,
@@ -244,14 +204,6 @@ def finding_data(finding: Finding) -> dict[str, Any]:
         "landed_state": situation.landed_state.name,
         "descent_commanded": situation.descent_commanded,
     }
-
-
-def _span_data(replay: Replay, span: Span) -> dict[str, Any]:
-    return {"at_s": _seconds(replay, span.start_us), "duration_s": round(span.duration_s, 6), "reason": span.reason}
-
-
-def _seconds(replay: Replay, at_us: float) -> float:
-    return round(replay.log.seconds(at_us), 6)
 
 
 def _rounded(vector: Sequence[float]) -> list[float]:

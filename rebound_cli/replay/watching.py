@@ -1,6 +1,6 @@
-"""A log through the watch: the same detector code as in flight, at the recorded or at a requested rate."""
+"""A log through the watch: the same detector code as in flight."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -18,9 +18,8 @@ from companion.reflex.health import Promise
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
 from companion.reflex.reflex import start_reflex
-from rebound_cli.logs.log import Log, LoggedSample
+from rebound_cli.logs.log import Log
 from rebound_cli.replay.listening import Listener
-from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
 _MOST_POLLS = 20
@@ -216,19 +215,3 @@ def _sampled_as(log: Log, config: CompanionConfig) -> CompanionConfig:
         return config
     estimate = config.estimate.model_copy(update={"imu_averaging_interval_s": log.window_us * 1e-6})
     return config.model_copy(update={"estimate": estimate})
-
-
-def thinned(heard: tuple[LoggedSample, ...], rate_hz: float) -> Iterator[LoggedSample]:
-    """What PX4's link would have sent of the IMU samples, asked for this rate; all other samples as they are.
-
-    A sample stays the mean over its own interval: a lower rate does not average, it leaves samples out.
-    """
-    kind = next(kind for kind in KINDS if kind.message_id == messages.MessageId.HIGHRES_IMU)
-    stream = Stream(kind, heard[0].at_us)
-    stream.set_interval(interval_from_request(1e6 / rate_hz))
-    for item in heard:
-        if isinstance(item.sample, messages.ImuSample):
-            if item.at_us <= stream.due_after_us:
-                continue
-            stream.sent(item.at_us)
-        yield item

@@ -6,6 +6,7 @@ Columns of numbers are text: whole multiples of a resolution, little-endian, bas
 import base64
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -14,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.reflex.detector import Phase
-from rebound_cli.flights.archive import without_places
 from rebound_cli.replay.listening import PHASES
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
@@ -48,6 +48,10 @@ _ROWS, _ROWS_PER_S = 7_000, 10.0
 # Around a moment all rows are kept: the microscope's 150 ms, and the slow motion's way there and back.
 AROUND_S = 1.0
 
+# The names of all quantities end in frame and unit: these are the places. In texts they are [north, east, down].
+_PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")
+_PLACES_IN_TEXT = re.compile(r"\[-?\d[\d.]*(?:, -?\d[\d.]*)+\]")
+
 
 def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
     """Without coordinates where they are not wanted."""
@@ -59,13 +63,13 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "lines": lines(flight),
         "duration_s": flight.ended_s,
         "averaging_ms": flight.config.estimate.imu_averaging_interval_s * 1e3,
-        "tables": _tables(flight, moments, no_position),
-        "moments": [_moment(flight, moment, no_position) for moment in moments],
+        "tables": _tables(flight, moments),
+        "moments": [_moment(flight, moment) for moment in moments],
         "overviews": [asdict(overview) for overview in OVERVIEWS],
         "modes": modes(flight),
         "recovering": recovering(flight),
-        "obstacles": [] if no_position else obstacles(flight),
-        "surfaces": [] if no_position else surfaces(flight),
+        "obstacles": obstacles(flight),
+        "surfaces": surfaces(flight),
         "vehicle": vehicle(flight),
         "has_places": not no_position,
         "link": link_rows(flight),
@@ -73,9 +77,26 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "summary": flight.summary,
         "versions": flight.versions,
     }
-    # Texts and the summary hold places of their own; what is drawn has none by then.
+    return _without_places(data) if no_position else data
+
+
+def _without_places(data: dict[str, Any]) -> dict[str, Any]:
+    """Neither in what is drawn nor in texts and in the summary."""
     shown = ("name", "sentence", "lines", "events", "summary", "moments")
-    return data | {key: without_places(data[key]) for key in shown} if no_position else data
+    kept = data | {key: without_places(data[key]) for key in shown} | {"obstacles": [], "surfaces": []}
+    for moment in kept["moments"]:
+        moment["place"] = None
+    for table in kept["tables"].values():
+        table["columns"] = {name: column for name, column in table["columns"].items() if name not in PLACES}
+    return kept
+
+
+def without_places(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_places(value) for key, value in data.items() if not _PLACE_KEYS.fullmatch(str(key))}
+    if isinstance(data, list):
+        return [without_places(value) for value in data]
+    return _PLACES_IN_TEXT.sub("[left out]", data) if isinstance(data, str) else data
 
 
 def live_content(flight: ShownFlight) -> dict[str, Any]:
@@ -101,7 +122,7 @@ def _event(flight: ShownFlight, event: Mapping[str, Any]) -> dict[str, Any]:
 # --- tables -----------------------------------------------------------------------------------------------------
 
 
-def _tables(flight: ShownFlight, moments: Sequence[Moment], no_position: bool) -> dict[str, Any]:
+def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     """Of each stream; `t` is seconds since the flight began, `boot` those of the vehicle's clock since its first."""
     log, truth = flight.log, flight.truth
     near_s = np.array([flight.seconds(moment.at_us) for moment in moments])
@@ -128,10 +149,7 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment], no_position: bool) -
             | vector(TURN, true["attitude_wxyz"], UNIT)
             | vector(("fold1", "fold2", "fold3", "fold4"), true["arm_fold_m"], FOLD_M)
         )
-    return {
-        name: _packed(table, loud if name == "imu" else None, near_s, most, no_position)
-        for name, table in columns.items()
-    }
+    return {name: _packed(table, loud if name == "imu" else None, near_s, most) for name, table in columns.items()}
 
 
 def _on_both_clocks(columns: Columns, boot_us: Floats) -> Columns:
@@ -155,31 +173,20 @@ def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
     return {name: np.append(column, np.nan)[rows] for name, column in columns.items()}
 
 
-def _packed(
-    columns: Columns,
-    loudness: Floats | None,
-    near_s: Floats,
-    most: int,
-    no_position: bool,
-) -> dict[str, Any]:
+def _packed(columns: Columns, loudness: Floats | None, near_s: Floats, most: int) -> dict[str, Any]:
     seconds = columns["t"][0]
     rows = kept_rows(seconds, np.zeros(len(seconds)) if loudness is None else loudness, near_s, AROUND_S, most)
     return {
         "of": len(seconds),
         "rows": len(rows),
-        "columns": {
-            name: packed(values[rows], resolution)
-            for name, (values, resolution) in columns.items()
-            if not (no_position and name in PLACES)
-        },
+        "columns": {name: packed(values[rows], resolution) for name, (values, resolution) in columns.items()},
     }
 
 
-def _moment(flight: ShownFlight, moment: Moment, no_position: bool) -> dict[str, Any]:
+def _moment(flight: ShownFlight, moment: Moment) -> dict[str, Any]:
     boot_us = flight.log.imu_time_boot_us
     first_us = boot_us[0] if len(boot_us) else 0.0
     touched_us = moment.touched_boot_us
-    place = None if no_position or moment.position_ned_m is None else moment.position_ned_m
     return {
         "kind": moment.kind,
         "title": moment.title,
@@ -188,7 +195,7 @@ def _moment(flight: ShownFlight, moment: Moment, no_position: bool) -> dict[str,
         "touched_ms": None if touched_us is None else round((touched_us - moment.boot_us) / 1e3, 3),
         "facts": moment.facts,
         "reasons": moment.reasons,
-        "place": place,
+        "place": moment.position_ned_m,
         "normal": moment.normal_ned,
         "error_deg": round(moment.normal_error_deg, 1),
     }

@@ -15,6 +15,7 @@ from companion.messages import Vector3
 from companion.reflex.detector import Evidence, ImpactKind, Phase
 from companion.reflex.surface import Normal
 from rebound_cli.replay.listening import PHASES, Shown, Tested
+from rebound_cli.replay.report import bearing, impact_facts, kind_text, speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import impact_text
@@ -59,41 +60,28 @@ def moments_of(flight: ShownFlight) -> list[Moment]:
 
 
 def _impact(flight: ShownFlight, finding: Finding) -> Moment:
-    first, final = finding.first, finding.final
+    first = finding.first
     boot_us = first.impact.sample_time_boot_us
     touch = flight.contact_at(boot_us)
     normal = _normal(flight, finding)
-    error_deg = math.degrees(normal.error_rad)
-    kind = "hit" if finding.is_collision else "contact"
-    what = final.impact.kind.value if final.impact.kind is not ImpactKind.UNKNOWN else "something"
-    speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
-    contact_s = flight.seconds(finding.at_us - (boot_us - final.time_boot_us))
-    least = "at least " if final.is_lower_bound else ""
-    facts = [
-        ("Detected", f"{flight.seconds(finding.at_us):.3f} s"),
-        ("Contact began", f"{contact_s:.4f} s ± {final.time_error_us / 1e3:.1f} ms"),
-        ("Speed before it", speed),
-        ("Largest force in a sample", f"{least}{final.peak_specific_force_m_s2:.1f} m/s²"),
-        ("Impulse", f"{least}{final.impulse_m_s:.2f} m/s"),
-        ("Normal", f"{_bearing(normal.direction_ned)} ± {error_deg:.0f}°"),
-        ("Taken for", f"{what}, confidence {first.impact.confidence:.2f}"),
-    ]
+    kind, what = "hit" if finding.is_collision else "contact", kind_text(finding)
+    facts = impact_facts(finding, normal, flight.seconds)
     if touch is not None and flight.truth is not None:
         late_ms = (boot_us - touch.contact_at_boot_us) / 1e3
         facts.append(
             ("Simulator", f"{impact_text(touch.kind, touch.impact_velocity_ned_m_s)}, {late_ms:.1f} ms before")
         )
-        facts.append(("Simulator's normal", f"{_bearing(touch.normal_ned)}; {touch.peak_force_n:.0f} N at most"))
+        facts.append(("Simulator's normal", f"{bearing(touch.normal_ned)}; {touch.peak_force_n:.0f} N at most"))
     return Moment(
         kind=kind,
-        title=f"{what.capitalize()} at {speed}" if kind == "hit" else f"Touched, no collision: {what}",
+        title=f"{what.capitalize()} at {speed_text(finding)}" if kind == "hit" else f"Touched, no collision: {what}",
         at_us=finding.at_us,
         boot_us=boot_us,
         facts=facts,
         reasons=list(_reasons(flight, finding, touch)),
         position_ned_m=first.position_ned_m,
         normal_ned=normal.direction_ned,
-        normal_error_deg=error_deg,
+        normal_error_deg=math.degrees(normal.error_rad),
         touched_boot_us=None if touch is None else touch.contact_at_boot_us,
     )
 
@@ -246,11 +234,3 @@ def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Momen
 def _loudest(ratios: Floats) -> int:
     """NaN is never the loudest."""
     return int(np.argmax(np.nan_to_num(ratios, nan=-np.inf)))
-
-
-def _bearing(normal_ned: Vector3) -> str:
-    """Where a surface faces."""
-    north, east, down = normal_ned
-    if abs(down) > math.hypot(north, east):
-        return "faces down" if down > 0.0 else "faces up"
-    return f"faces {math.degrees(math.atan2(east, north)) % 360.0:.0f}°"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from companion.reflex.detector import ImpactKind
+from rebound_cli.replay.report import speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import ending_text
@@ -31,11 +32,10 @@ def sentence(flight: ShownFlight) -> str:
 
 
 def _hit_text(flight: ShownFlight, hit: Finding) -> str:
-    kind, first = hit.first.impact.kind, hit.first
+    kind = hit.first.impact.kind
     struck = {ImpactKind.UNKNOWN: "Hit something", ImpactKind.STRUCK: "Struck by something, itself"}
     what = struck.get(kind, f"Hit a {kind.value}")
-    speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
-    return f"{what} at {speed}, {flight.seconds(hit.at_us):.2f} s into the flight"
+    return f"{what} at {speed_text(hit)}, {flight.seconds(hit.at_us):.2f} s into the flight"
 
 
 def _end(flight: ShownFlight) -> str:

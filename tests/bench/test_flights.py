@@ -42,7 +42,7 @@ def test_a_crash_that_is_told_long_after_its_hardest_moment_is_told_late():
 
 
 def test_how_late_a_crash_is_told_counts_from_its_hardest_sample():
-    replay = replay_log(flight(), CompanionConfig(), None)
+    replay = replay_log(flight(), CompanionConfig())
     (hit,) = replay.findings.impacts
     assert not hit.is_crash and next(events(replay)).late_s is None
     crash = replace(hit.first, impact=replace(hit.first.impact, kind=ImpactKind.CRASH))
@@ -52,7 +52,7 @@ def test_how_late_a_crash_is_told_counts_from_its_hardest_sample():
 
 
 def test_what_follows_within_two_seconds_is_one_event():
-    replay = replay_log(flight(), CompanionConfig(), None)
+    replay = replay_log(flight(), CompanionConfig())
     (hit,) = replay.findings.impacts
     replay.findings.impacts += [replace(hit, at_us=hit.at_us + 1_500_000), replace(hit, at_us=hit.at_us + 4_000_000)]
     first, second = events(replay)

@@ -137,3 +137,9 @@ def test_a_study_that_moved_names_its_new_place(command, capsys):
     assert main([command, "--out", "docs"]) == 1
     complaint = capsys.readouterr().err
     assert "is now 'python -m bench " in complaint and complaint.count("\n") == 1
+
+
+def test_a_plan_of_qgroundcontrol_is_flown_by_px4_under_the_guard(capsys):
+    assert main(["plan", "import", "survey.plan"]) == 1
+    complaint = capsys.readouterr().err
+    assert "'rebound plan' is gone" in complaint and "'rebound guard'" in complaint and complaint.count("\n") == 1

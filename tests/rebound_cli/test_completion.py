@@ -1,6 +1,5 @@
 """The shell's own completion, asked as the shell asks it."""
 
-import shutil
 import subprocess
 
 import pytest
@@ -32,11 +31,3 @@ def test_bash_completes_commands_options_choices_and_files(typed, offered, capsy
     asked = ["bash", "-c", ASK, "bash", "rebound", *typed]
     answer = subprocess.run(asked, input=script, cwd=ROOT, capture_output=True, text=True, check=True)
     assert set(answer.stdout.split()) == offered, answer.stderr
-
-
-def test_zsh_reads_its_script(capsys):
-    assert main(["completion", "zsh"]) == 0
-    script = capsys.readouterr().out
-    assert script.startswith("#compdef rebound")
-    if shutil.which("zsh"):
-        subprocess.run(["zsh", "-n"], input=script, text=True, check=True)

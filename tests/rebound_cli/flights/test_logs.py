@@ -76,31 +76,3 @@ def test_what_is_not_there_or_cannot_be_written_is_one_sentence(runs, tmp_path, 
     for words in (("show", "yesterday"), ("export", LAST, "--out", tmp_path / "no" / "out.tar.gz")):
         assert logs(*words, "--runs", runs) == 1
         assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_without_coordinates_there_is_no_place_in_what_is_handed_over(runs, tmp_path, capsys):
-    # Given a flight whose events, summary and settings say where it was
-    folder = runs / LAST
-    event = {
-        "time_us": 1,
-        "kind": "detection",
-        "text": "hit 1: 30.0 m/s^2, v_c [1.00, 0.00, 0.00] (1.00 m/s) at [47.11, -8.15, -1.50]; recovery setpoint",
-        "data": {"position_ned_m": [47.11, -8.15, -1.5], "impact_speed_m_s": 1.0},
-    }
-    (folder / "events.jsonl").write_text(json.dumps(event) + "\n" + '{"time_us": 2, "ki')
-    summary = {"outcome": "stopped", "collisions": [{"recovery_setpoint_ned_m": [47.11, 0, 0], "overshoot_m": 0.25}]}
-    (folder / "summary.json").write_text(json.dumps(summary))
-    (folder / "guard.yaml").write_text("fence: {polygon_ne_m: [[47.11, 1], [2, 3], [4, 5]], max_height_m: 6}\n")
-    (folder / "obstacles.json").write_text('{"patches": [{"touches_ned_m": [[47.11, 0, 0]]}]}')
-    archive = tmp_path / "out.tar.gz"
-    # When it is exported without coordinates
-    assert logs("export", LAST, "--runs", runs, "--no-position", "--out", archive) == 0
-    with tarfile.open(archive) as tar:
-        files = {member.name.split("/")[1]: tar.extractfile(member).read().decode() for member in tar.getmembers()}
-    # Then packets and obstacles are left out, places are gone, and the rest is there
-    assert sorted(files) == ["events.jsonl", "guard.yaml", "inputs.jsonl", "summary.json", "versions.json"]
-    assert "47.11" not in "".join(files.values()) and "8.15" not in "".join(files.values())
-    assert json.loads(files["events.jsonl"])["data"] == {"impact_speed_m_s": 1.0}
-    assert "hit 1: 30.0 m/s^2" in json.loads(files["events.jsonl"])["text"]
-    assert json.loads(files["summary.json"])["collisions"] == [{"overshoot_m": 0.25}]
-    assert "max_height_m: 6" in files["guard.yaml"]

@@ -96,15 +96,3 @@ def test_a_recorder_brings_lines_and_packets_to_the_disk_in_that_order(tmp_path,
     assert names == [EVENTS_NAME, INPUTS_NAME, TLOG_NAME] * rounds
     assert 5 <= rounds <= 8
     assert recorder.writer.loss is None
-
-
-def test_a_whole_file_is_never_seen_half_written(tmp_path, monkeypatch):
-    # Given a summary, and a power cut while another takes its place
-    path = tmp_path / "summary.json"
-    run_folder.write_json(path, {"outcome": "first"})
-    monkeypatch.setattr(os, "fsync", lambda file: (_ for _ in ()).throw(OSError("power cut")))
-    # When that is written
-    with pytest.raises(OSError, match="power cut"):
-        run_folder.write_json(path, {"outcome": "second"})
-    # Then the first is whole
-    assert path.read_text() == '{\n  "outcome": "first"\n}\n'

@@ -65,12 +65,12 @@ def test_a_flight_becomes_an_airframe(wall_flight, tmp_path):
     # Given a flight of the foldable vehicle into the wall, above the speed that reaches the stop
     folder, _ = wall_flight
     # When it is identified from its telemetry, whatever the file is called
-    file = tmp_path / "a: #b.yaml"
-    identified = run_here("identify", folder, "--out", file, "--name", 'an "own": vehicle')
+    file = tmp_path / 'an "own": #vehicle.yaml'
+    identified = run_here("identify", folder, "--out", file)
     assert identified.returncode == 0, identified.stderr
     # Then the file has the vehicle's springs and stop
     document = load_document(file)
-    assert document.data["name"] == 'an "own": vehicle'
+    assert document.data["name"] == 'an "own": #vehicle'
     airframe = validated(Airframe, document, with_base(document.data))
     assert airframe.mass_kg == 1.112
     assert airframe.arms.damping_per_s == pytest.approx(DAMPING_PER_S, rel=0.1)

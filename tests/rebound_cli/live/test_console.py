@@ -1,11 +1,7 @@
 """What a person sees while something flies or is compiled: on a terminal, and in a pipe."""
 
 import io
-import os
-import subprocess
 import sys
-from typing import Any
-from unittest.mock import Mock
 
 import pytest
 
@@ -13,9 +9,7 @@ from companion.report import Event, Status
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.timing import LinkRate
-from rebound_cli.simulation.compiling import prepare_vehicle
 from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
-from tests.rebound_cli.command import ROOT
 
 EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))
 FLYING = Status("mission", "OFFBOARD", True, (1.0, 2.0, -1.5), 2.0, "armed at 1.8 m/s^2", 4_000)
@@ -75,40 +69,6 @@ def test_a_terminal_that_is_gone_is_written_to_once_and_keeps_nothing_for_later(
         with pytest.raises(OSError, match="Input/output"):
             console.print("text")
     assert screen.tries == 1
-
-
-def test_who_waits_for_kernels_to_be_compiled_is_told_and_nobody_else(tmp_path, monkeypatch):
-    numba = pytest.importorskip("numba")
-    monkeypatch.setattr("sim_vehicle.vehicle.SimulatedVehicle", lambda *_, **__: None)
-    world: Any = Mock()
-
-    def told():
-        stream = io.StringIO()
-        prepare_vehicle(Console(stream), world)
-        return stream.getvalue()
-
-    # Given the folder of this version's kernels, with a folder for each file of them and none in it at first
-    (tmp_path / "physics").mkdir()
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    assert "half a minute, once for this machine" in told()
-    (tmp_path / "physics" / "kernel.nbc").touch()
-    assert told() == ""
-    # And where nothing can be kept
-    monkeypatch.setattr("sim_vehicle.physics.jit.NOT_KEPT", "a disk that is read-only")
-    assert "half a minute, at every start" in told() and "is not kept (a disk that is read-only)" in told()
-
-
-def test_kernels_are_kept_in_the_users_cache_and_without_a_place_there_is_a_reason_and_no_fault(tmp_path):
-    code = "import numba, sim_vehicle.physics.jit as j; print(j.NOT_KEPT, numba.config.CACHE_DIR)\n"
-    code += "print(j.NOT_KEPT and j.njit(lambda: 7)())"
-    users = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    for environment, said, value in (
-        ({**users, "XDG_CACHE_HOME": str(tmp_path)}, f"None {tmp_path}/px4-rebound/kernels-", "None"),
-        ({**users, "NUMBA_CACHE_DIR": "/dev/null/cache"}, "/dev/null/cache", "7"),
-    ):
-        asked = [sys.executable, "-c", code]
-        done = subprocess.run(asked, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120)
-        assert done.stdout.startswith(said) and done.stdout.splitlines()[1] == value, done.stderr
 
 
 def test_what_a_vehicle_compiles_is_told_by_who_waits_for_it_and_ctrl_c_ends_that(tmp_path, monkeypatch):

@@ -1,12 +1,10 @@
 """Disks, terminals, garbage and faults beside the control path: none of them ends a flight in the air."""
 
-import gc
 import itertools
 import json
 import resource
 import sys
 import threading
-import time
 from typing import Any
 from unittest.mock import Mock
 
@@ -18,7 +16,6 @@ from companion.mavlink.packet import message_id_of
 from companion.messages import ComputerStatus
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from companion.shell.tlog import read_tlog
-from rebound_cli import background
 from rebound_cli import fly as command
 from rebound_cli.background import MOST_WAITING, Background
 from rebound_cli.live.console import Console
@@ -26,14 +23,13 @@ from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import (
     COMPUTER_EVERY_US,
     HANDING_OVER_US,
-    Computer,
     ConfirmAtOnce,
     FlightFaultError,
     Loop,
 )
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
-from rebound_cli.results.timing import TOO_LATE_US, Timing, undisturbed
+from rebound_cli.results.timing import TOO_LATE_US, Timing
 from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, run_here, start, wait_for_event
 from tests.rebound_cli.live.flying import EPOCH_US, fly
 
@@ -88,23 +84,6 @@ class Unplugged(ConfirmAtOnce):
             world.told.append("connected again: /dev/ttyACM1")
 
 
-class Restarted(ConfirmAtOnce):
-    """Restarts the vehicle while the plan is shown; the person says yes to that one, too."""
-
-    def __init__(self, world):
-        super().__init__()
-        self._world, self._since_us = world, None
-
-    def poll(self, companion):
-        world, now_us = self._world, self._world.vehicle.time_boot_us
-        if self._since_us is None and companion.plan_is_ready():
-            self._since_us, world.is_cut = now_us, True
-        silent_us = now_us - (self._since_us or now_us)
-        world.is_cut &= silent_us < 2_000_000
-        if silent_us > 1_800_000:
-            super().poll(companion)
-
-
 class EverySecond:
     """A computer that is the same every second."""
 
@@ -132,18 +111,6 @@ def test_the_ground_station_is_told_of_the_computer_every_second_and_a_replay_te
     # And the flight is decided again to the bit, with what the computer said then
     assert_comes_again(tmp_path)
     assert recorder.writer.loss is None
-
-
-def test_the_computer_is_read_aside_and_told_a_second_later(tmp_path):
-    # Given a computer that is asked for the first time
-    computer = Computer(tmp_path)
-    assert computer.status(5) is None
-    # When it has been read
-    computer.close()
-    # Then that is told once, when the next is due
-    assert computer.status(4 + COMPUTER_EVERY_US) is None
-    assert computer.status(5 + COMPUTER_EVERY_US).at_us == 5
-    assert computer.status(6 + COMPUTER_EVERY_US) is None
 
 
 def test_a_full_disk_ends_no_flight_and_is_told(tmp_path):
@@ -195,14 +162,6 @@ def test_a_link_that_is_back_within_a_second_is_told_and_the_flight_goes_on(tmp_
         "connected again: /dev/ttyACM1",
     ]
     assert any(b"Connected again: /dev/ttyACM1" in frame for frame in world.sent)
-    assert_comes_again(tmp_path)
-
-
-def test_a_plan_that_is_made_anew_after_a_silence_is_agreed_to_twice_and_the_log_says_so(tmp_path):
-    companion, _, recorder, _, _ = fly(tmp_path, confirm=Restarted)
-    assert companion.report().outcome == "completed"
-    assert [event.kind for event in recorder.events].count("plan") == 2
-    assert (tmp_path / run_folder.INPUTS_NAME).read_text().count('"confirm"') == 2
     assert_comes_again(tmp_path)
 
 
@@ -283,23 +242,6 @@ class Queued:
         return self.datagrams.pop(0) if self.datagrams else b""
 
 
-def test_what_comes_while_a_writer_rests_is_made_together_and_the_end_waits_for_no_rest(monkeypatch):
-    monkeypatch.setattr(background, "REST_S", 60.0)
-    writer, done, first = Background("log"), [], threading.Event()
-    # Given one that has made its first call at once, and rests
-    writer.give(first.set)
-    assert first.wait(10.0)
-    time.sleep(0.2)
-    # When more comes, then it waits for the rest's end
-    for number in range(3):
-        writer.give(done.append, number)
-    time.sleep(0.1)
-    assert done == []
-    # And is made at the end, at once
-    writer.close(10.0)
-    assert done == [0, 1, 2]
-
-
 LATE = ("late", "setpoints 3000 ms late, PX4 needs two a second")
 
 
@@ -334,18 +276,6 @@ def test_lateness_is_measured_and_told_each_time_it_doubles():
     summary = timing.summary()
     assert summary["tick_lateness_ms"] == {"p50": 0.1, "p99": 950.0, "max": 1500.0}
     assert summary["step_ms"]["p50"] == 0.2 and summary["step_ms"]["max"] == 0.9
-
-
-def test_garbage_is_collected_while_disarmed_only():
-    switch_interval_s = sys.getswitchinterval()
-    assert gc.isenabled()
-    with undisturbed() as allow_collecting:
-        assert not gc.isenabled() and gc.get_freeze_count() > 0
-        allow_collecting(True)
-        assert gc.isenabled()
-        allow_collecting(False)
-        assert not gc.isenabled() and sys.getswitchinterval() < switch_interval_s
-    assert gc.isenabled() and gc.get_freeze_count() == 0 and sys.getswitchinterval() == switch_interval_s
 
 
 def test_a_fault_around_the_flight_leaves_a_summary_and_is_told_then(tmp_path, monkeypatch):

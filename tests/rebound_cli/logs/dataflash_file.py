@@ -13,6 +13,22 @@ LETTERS |= {"M": ("B", 1), "c": ("h", 100), "C": ("H", 100), "L": ("i", 10_000_0
 FORMAT = ("BBnNZ", "Type,Length,Name,Format,Columns")
 
 
+# Copter 4.3: an instance in I, a core in C.
+FORMATS = {
+    "MSG": ("QZ", "TimeUS,Message"),
+    "PARM": ("QNff", "TimeUS,Name,Value,Default"),
+    "IMU": ("QBffffff", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"),
+    "ATT": ("Qccccff", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw"),
+    "CTUN": ("Qffhh", "TimeUS,ThO,Alt,DCRt,CRt"),
+    "XKF1": ("QBccCffffff", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,PN,PE,PD"),
+    "XKF4": ("QBIb", "TimeUS,C,SS,PI"),
+    "EV": ("QB", "TimeUS,Id"),
+    "MODE": ("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
+    "VIBE": ("QBfffI", "TimeUS,IMU,VibeX,VibeY,VibeZ,Clip"),
+    "PSCD": ("Qfff", "TimeUS,TPD,DVD,TVD"),
+}
+
+
 def structure(letters):
     return struct.Struct("<" + "".join(LETTERS[letter][0] for letter in letters))
 
@@ -32,8 +48,8 @@ def packed(number, letters, row):
     return HEAD + bytes([number]) + structure(letters).pack(*values)
 
 
-def dataflash(formats, rows):
-    """Formats: name -> (letters, columns). Rows: (name, value, ...), as they were written."""
+def dataflash(rows, formats=FORMATS):
+    """Rows: (name, value, ...), as they were written. Formats: name -> (letters, columns)."""
     numbers = {name: 129 + number for number, name in enumerate(formats)}
     parts = [described(128, "FMT", *FORMAT)]
     parts += [described(numbers[name], name, *described_by) for name, described_by in formats.items()]
@@ -41,48 +57,5 @@ def dataflash(formats, rows):
     return b"".join(parts)
 
 
-def text(formats, rows):
-    """The same as a ground station writes it in text."""
-    lines = [f"FMT, 128, 89, FMT, {FORMAT[0]}, {FORMAT[1]}"]
-    for number, (name, (letters, columns)) in enumerate(formats.items()):
-        lines.append(f"FMT, {129 + number}, {3 + structure(letters).size}, {name}, {letters}, {columns}")
-    lines += [", ".join(map(str, row)) for row in rows]
-    return ("\n".join(lines) + "\n").encode()
-
-
-# Copter 4: stamps in microseconds, an instance in I and a core in C.
-NEW = {
-    "MSG": ("QZ", "TimeUS,Message"),
-    "PARM": ("QNff", "TimeUS,Name,Value,Default"),
-    "IMU": ("QBffffff", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"),
-    "ATT": ("Qccccff", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw"),
-    "CTUN": ("Qffhh", "TimeUS,ThO,Alt,DCRt,CRt"),
-    "XKF1": ("QBccCffffff", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,PN,PE,PD"),
-    "XKF4": ("QBIb", "TimeUS,C,SS,PI"),
-    "EV": ("QB", "TimeUS,Id"),
-    "ERR": ("QBB", "TimeUS,Subsys,ECode"),
-    "MODE": ("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
-    "RCIN": ("QHHHH", "TimeUS,C1,C2,C3,C4"),
-    "VIBE": ("QBfffI", "TimeUS,IMU,VibeX,VibeY,VibeZ,Clip"),
-    "PSCD": ("Qfff", "TimeUS,TPD,DVD,TVD"),
-}
-# Copter 3.2: milliseconds, and no stamp at all on what happens.
-OLD = {
-    "MSG": ("Z", "Message"),
-    "PARM": ("Nf", "Name,Value"),
-    "IMU": ("Iffffff", "TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"),
-    "ATT": ("IccccCC", "TimeMS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw"),
-    "CTUN": ("Ihffhh", "TimeMS,ThrOut,DAlt,Alt,DCRt,CRt"),
-    "EV": ("B", "Id"),
-    "ERR": ("BB", "Subsys,ECode"),
-    "MODE": ("Mh", "Mode,ThrCrs"),
-    "GPS": ("BIHLLffI", "Status,TimeMS,Week,Lat,Lng,Spd,GCrs,T"),
-}
-
-
-def new_imu(times_us, force=(0.0, 0.0, -9.81), instance=0):
+def imu(times_us, force=(0.0, 0.0, -9.81), instance=0):
     return [("IMU", t, instance, 0.1, 0.2, 0.3, *force) for t in times_us]
-
-
-def old_imu(times_ms, force=(0.0, 0.0, -9.81)):
-    return [("IMU", t, 0.1, 0.2, 0.3, *force) for t in times_ms]

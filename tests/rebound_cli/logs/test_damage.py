@@ -34,18 +34,17 @@ def telemetry():
 
 
 TELEMETRY = telemetry()
-EVENTS = [("EV", 1_010_000, 10), ("MODE", 1_010_000, 2, 2, 1), ("EV", 1_020_000, 28), ("ERR", 1_150_000, 12, 1)]
-PILOTED = [("CTUN", 1_010_000, 0.4, 1.0, 0, 0), ("ATT", 1_011_000, *[0.0] * 6), ("RCIN", 1_012_000, *[1500] * 4)]
+EVENTS = [("EV", 1_010_000, 10), ("MODE", 1_010_000, 2, 2, 1), ("EV", 1_020_000, 28)]
+PILOTED = [("CTUN", 1_010_000, 0.4, 1.0, 0, 0), ("ATT", 1_011_000, *[0.0] * 6)]
 ESTIMATED = [("XKF1", 1_010_000, 0, *[0.0] * 9), ("XKF4", 1_010_000, 0, 7, 0)]
-DATAFLASH = (
-    dataflash_file.NEW,
+DATAFLASH = dataflash_file.dataflash(
     [
         ("MSG", 0, "ArduCopter V4.5.7"),
         ("PARM", 0, "INS_ACCEL_FILTER", 20.0, 20.0),
         *EVENTS,
         *PILOTED,
         *ESTIMATED,
-        *dataflash_file.new_imu(every(5000, 1_000_000, 1_200_000)),
+        *dataflash_file.imu(every(5000, 1_000_000, 1_200_000)),
     ],
 )
 
@@ -74,8 +73,7 @@ def read_or_refused(path, content):
 LOGS = {
     "log.ulg": ULOG,
     "log.tlog": TELEMETRY,
-    "log.bin": dataflash_file.dataflash(*DATAFLASH),
-    "log.log": dataflash_file.text(*DATAFLASH),
+    "log.bin": DATAFLASH,
 }
 
 

@@ -103,17 +103,6 @@ def test_bytes_that_are_no_log_are_one_sentence(path):
         read_log(path)
 
 
-def test_damage_in_the_middle_costs_only_what_it_hit(path):
-    log = Writer()
-    log.heartbeat()
-    for _ in range(50):
-        log.imu()
-    damaged = bytearray(log.content)
-    damaged[len(damaged) // 2 : len(damaged) // 2 + 30] = b"\xfd" * 30
-    path.write_bytes(damaged)
-    assert 46 <= len(read_log(path).imu()) < 50
-
-
 def test_a_clock_that_is_set_back_loses_nothing(path):
     log = Writer()
     log.heartbeat()

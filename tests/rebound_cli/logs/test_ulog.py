@@ -83,13 +83,6 @@ def test_a_position_is_both_messages_of_the_wire_with_the_jumps_counted(tmp_path
     assert (odometry.time_boot_us, odometry.reset_counter) == (START + 123_456, (1 + 2 + 3 + 255) % 256)
 
 
-def test_an_invalid_velocity_is_said(tmp_path):
-    rows = [(START + 1000 * n, *[0.0] * 6, n % 2 == 0, True, 0, 0, 0, 0) for n in range(10)]
-    log = read(tmp_path, {**IMU, "vehicle_local_position": (POSITION, rows)})
-    assert any("horizontal velocity is invalid" in loss and "50 %" in loss for loss in log.losses)
-    assert not any("vertical velocity" in loss for loss in log.losses)
-
-
 def test_attitude_thrust_and_vibration(tmp_path):
     topics = {
         **IMU,
@@ -199,10 +192,3 @@ def test_what_is_missing_is_said_with_its_cost(tmp_path):
 def test_a_log_without_inertial_samples_is_one_sentence(tmp_path):
     with pytest.raises(LogError, match=r"flight\.ulg: neither sensor_combined nor vehicle_imu"):
         read(tmp_path, {"vehicle_attitude": ("q", [(START, (1.0, 0.0, 0.0, 0.0))])})
-
-
-def test_a_log_cut_short_in_its_data_is_read_to_there(tmp_path):
-    whole = ulog(IMU, started_us=START)
-    path = tmp_path / "cut.ulg"
-    path.write_bytes(whole[: len(whole) * 2 // 3])
-    assert 40 < len(read_log(path).imu()) < 100

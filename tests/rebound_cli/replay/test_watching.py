@@ -1,4 +1,4 @@
-"""A log through the watch: what the flight would have known, at the recorded and at other rates."""
+"""A log through the watch: what the flight would have known."""
 
 from dataclasses import replace
 
@@ -8,8 +8,7 @@ from companion.messages import ExtendedState, LandedState, LocalPosition, Positi
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import ImpactKind, Situation
 from rebound_cli.logs.log import LoggedSample
-from rebound_cli.logs.shaking import Stage, shaking
-from rebound_cli.replay.watching import Circumstances, thinned, watch_log
+from rebound_cli.replay.watching import Circumstances, watch_log
 from tests.rebound_cli.replay.flying import HIT_US, LATERAL, SECOND, beat, flight, position
 
 
@@ -45,21 +44,6 @@ def test_a_gap_in_the_log_is_a_blind_time():
     assert 7 * SECOND <= blind.end_us <= 8 * SECOND
 
 
-@pytest.mark.parametrize(("asked_hz", "received_hz"), [(250, 250), (200, 125), (100, 100), (50, 50), (25, 25)])
-def test_a_requested_rate_is_what_px4_would_send(asked_hz, received_hz):
-    # measured on PX4 with a 4 ms IMU: 200 asked for gives 124
-    log = flight(hit_us=None)
-    kept = replace(log, heard=tuple(thinned(log.heard, asked_hz)))
-    assert len(kept.imu()) / 10.0 == pytest.approx(received_hz, rel=0.015)
-    # nothing but IMU samples is left out
-    assert len(log.heard) - len(kept.heard) == len(log.imu()) - len(kept.imu())
-
-
-def test_a_hit_between_the_samples_of_a_slow_stream_is_not_seen_by_its_force():
-    log = flight()
-    assert watch_log(replace(log, heard=tuple(thinned(log.heard, 25))), LATERAL).impacts == []
-
-
 DOWN = PositionTarget((0.0, 0.0, 0.0), 2.0)
 
 
@@ -80,14 +64,6 @@ def test_one_old_setpoint_does_not_make_a_crash_a_landing():
     log = replace(log, heard=tuple(sorted([*log.heard, *told], key=lambda item: item.at_us)))
     findings = watch_log(log, CompanionConfig(detector="fused"))
     assert [finding.is_collision for finding in findings.impacts] == [False]
-
-
-def test_noise_is_told_for_each_stage_of_a_flight():
-    log = flight(hit_us=None)
-    noise = shaking(log).noise_m_s2()
-    assert set(noise) == {Stage.GROUND, Stage.TAKEOFF, Stage.UNDER_WAY}
-    for values in noise.values():
-        assert values == pytest.approx([0.3, 0.3, 0.3], rel=0.15)
 
 
 def test_a_touchdown_begins_the_next_take_off_and_without_a_position_nothing_is_watched():

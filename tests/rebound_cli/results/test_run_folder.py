@@ -30,11 +30,6 @@ def test_a_folder_below_a_file_or_with_a_flight_is_refused_at_once(command, tmp_
     assert "already holds a flight" in capsys.readouterr().err
 
 
-def test_a_folder_is_looked_for_above_the_ones_to_be_made(tmp_path):
-    check_place(tmp_path / "a" / "b")
-    assert not any(tmp_path.iterdir())
-
-
 def test_a_folder_that_nobody_may_write_to_is_refused(tmp_path, monkeypatch):
     # Root may write everywhere.
     monkeypatch.setattr(os, "access", lambda place, _: place != tmp_path)

@@ -153,16 +153,6 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
     assert (second["overshoot_m"], second["height_lost_m"]) == pytest.approx((0.3, 0.3))
 
 
-def test_the_papers_stress_analysis_is_of_the_papers_frame():
-    truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
-    flown = Flown(report_of(collision(10_004)), 0.5, truth)
-    foldable, rigid = (
-        build_summary(flown, dataclasses.replace(FACTS, airframe=name))["collisions"][0]["truth"]["factor_of_safety"]
-        for name in ("foldable", "rigid")
-    )
-    assert foldable == pytest.approx(185.0 / hit(10_000).peak_force_n, abs=1e-3) and rigid is None
-
-
 def test_without_truth_nothing_is_counted_and_without_a_contact_zero():
     summary = build_summary(Flown(report_of(collision(10_004)), 25.0, None), FlightFacts("wall", None, None, 0.5))
     unknown = ("false_detections", "missed_contacts", "recontacts", "seed", "airframe")

@@ -15,14 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import numpy as np
-
 from companion.mission.config import CompanionConfig
 from rebound_cli.documents import parse_document, refuse_existing, validated, write_text
 from rebound_cli.inputs import companion_settings
-from rebound_cli.logs.log import Log, LogError
+from rebound_cli.logs.log import Log, LogError, clipped
 from rebound_cli.logs.reader import read_log
-from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
 from rebound_cli.replay.recording import log_file
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import watch_log
@@ -31,8 +28,8 @@ from rebound_cli.results.run_folder import read_summary
 Place: TypeAlias = tuple[str, ...]
 
 _WIDTH = 110
-# The detector learns its floor in half a second (`shaking.MEMORY_US`): six times that show how it varies.
-_LEAST_FLYING_S = 3.0
+# PX4's take-off ramp lasts 3 s (MPC_TKO_RAMP_T) and a landing some 4 s: as long again shows how the noise varies.
+_LEAST_FLYING_S = 14.0
 # What settings of a detector are compared with the flight, by the words in their names.
 _COMPARED = re.compile(r"threshold|factor|step")
 # Below the first share a setting is far from mattering; above the last one the vehicle needs another detector. Two
@@ -66,75 +63,52 @@ def run_tune(options: Namespace) -> int:
     refuse_existing(out)
     config = companion_settings(options.companion, (), options.detector)
     flights = [read_healthy(path, config) for path in options.logs]
-    logs = [flight.log for flight, _ in flights]
+    logs = [flight.log for flight in flights]
     found = margins(logs, config)
     advice = advise(logs, config, found)
     text = settings_text(advice, ", ".join(path.name for path in options.logs))
     # Read as `rebound fly` will read it before anybody has it.
     document = parse_document(text, str(out or "the settings"))
     validated(CompanionConfig, document, document.data["companion"], ("companion",))
-    parts = [*(_flight_rows(*flight) for flight in flights), _margin_rows(found, advice)]
-    print("\n\n".join("\n".join(part) for part in parts) + f"\n\n{text}", end="")
+    for flight in flights:
+        print("\n".join(textwrap.fill(row, _WIDTH, subsequent_indent="    ") for row in _flight_rows(flight)) + "\n")
+    if left := advice.false_alarms_left:
+        print(f"With these settings still {left} false alarms: this vehicle is not made quiet by thresholds.\n")
+    print(text, end="")
     if out is not None:
         write_text(out, text)
         print(f"\nWritten to {out}. Fly with it: rebound fly MISSION --companion {out} ...")
     return 0
 
 
-def read_healthy(path: Path, config: CompanionConfig) -> tuple[Replay, Shaking]:
-    """A flight without a collision: what the detector made of it, and how it shakes.
+def read_healthy(path: Path, config: CompanionConfig) -> Replay:
+    """A flight without a collision: what the detector made of it.
 
     Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing.
     """
     log = read_log(log_file(path))
-    flight, hits = replay_log(log, config, None), len((read_summary(path) or {}).get("collisions", ()))
+    flight, hits = replay_log(log, config), len((read_summary(path) or {}).get("collisions", ()))
     wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else ""
     for crash in flight.findings.crashes:
         wrong = f"it crashed at {log.seconds(crash.at_us):.1f} s"
     if wrong:
         raise LogError(f"{path}: not a healthy flight, {wrong}; tune learns from flights without a hit or a crash.")
-    shakes = shaking(log)
-    flying_s = shakes.lasted_s(*FLYING)
-    if not flying_s:
-        raise LogError(f"{path}: no flight in it, only the ground, a take-off and a landing.")
-    if flying_s < _LEAST_FLYING_S:
-        raise LogError(f"{path}: too short a flight to learn from; a minute in the air is a good one.")
-    return flight, shakes
+    if (flying_s := flight.findings.flown_us * 1e-6) < _LEAST_FLYING_S:
+        text = f"too short a flight to learn from, {flying_s:.0f} s in the air; a minute is a good one"
+        raise LogError(f"{path}: {text}.")
+    return flight
 
 
-def _flight_rows(flight: Replay, shakes: Shaking) -> Iterator[str]:
+def _flight_rows(flight: Replay) -> Iterator[str]:
     log, found = flight.log, flight.findings
-    in_air_s = shakes.lasted_s(*(stage for stage in Stage if stage is not Stage.GROUND))
-    rows = [
-        f"{log.path}: {log.vehicle}, {in_air_s:.0f} s in the air, IMU at {flight.imu_rate_hz:.0f} Hz",
-        f"  {'':<16}{'noise x, y, z, RMS':<26}{'largest departure sideways, along z':<36}[m/s^2]",
-    ]
-    for stage, noise in shakes.noise_m_s2().items():
-        x, y, z = shakes.during(stage).T
-        values = ", ".join(f"{value:.2f}" for value in noise)
-        rows.append(f"  {stage.value:<16}{values:<26}{np.hypot(x, y).max():.1f}, {np.abs(z).max():.1f}")
+    yield f"{log.path}: {log.vehicle}, {found.flown_us * 1e-6:.0f} s in the air, IMU at {flight.imu_rate_hz:.0f} Hz"
     count, how = clipped(log)
     alarms, blind_s = len(found.collisions), sum(span.duration_s for span in found.blind)
     blind = f"blind for {blind_s:.2f} s, first: {found.blind[0].reason}" if found.blind else "never blind"
-    rows += [
-        f"  clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how})",
-        f"  as set now: {alarms or 'no'} false alarm{'s' if alarms > 1 else ''}, {blind}",
-        f"  smallest hit that shows: {found.promise.text() if found.promise else 'not known'}",
-        *(f"  note: {loss}" for loss in log.losses),
-    ]
-    for row in rows:
-        yield textwrap.fill(row, _WIDTH, subsequent_indent="    ") if len(row) > _WIDTH else row
-
-
-def _margin_rows(found: Sequence[Margin], advice: Advice) -> Iterator[str]:
-    title = "the largest sign of a hit in these flights, as a share of each threshold"
-    yield f"detector '{advice.config.detector}': {title}"
-    for margin in found:
-        share = f"below {SHARES[0]:g}" if margin.share is None else f"{margin.share:.2f}"
-        alarm = "   a false alarm" if (margin.share or 0.0) >= 1.0 else ""
-        yield f"  {margin.setting:<28}{margin.value:<10g}{share}{alarm}"
-    if left := advice.false_alarms_left:
-        yield f"  with the settings below still {left} false alarms: this vehicle is not made quiet by thresholds"
+    yield f"  clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how})"
+    yield f"  as set now: {alarms or 'no'} false alarm{'s' if alarms > 1 else ''}, {blind}"
+    yield f"  smallest hit that shows: {found.promise.text() if found.promise else 'not known'}"
+    yield from (f"  note: {loss}" for loss in log.losses)
 
 
 def margins(logs: Sequence[Log], config: CompanionConfig) -> list[Margin]:
