@@ -23,8 +23,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
-from bench.fly.lockstep import flown_in
-from bench.fly.virtual_time import Stepped
+from bench.fly.lockstep import Stepped, flown_in
 from bench.rows.tables import table
 from bench.studies.study import Shown, page_path, write_page
 from companion.companion import Companion
