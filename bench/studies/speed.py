@@ -106,12 +106,11 @@ def flights_table(flights: int) -> str:
 # --- from a hit's datagram to the setpoint on the wire, at 250 Hz, quiet and beside two busy loops
 
 SET_ATTITUDE_TARGET = 82
-BUSY_LOOPS = 2
+BUSY_LOOPS, _FLIGHTS = 2, 5
 # Intervals in real time before the hit.
 LEAD = 30
 # Intervals after the hit in which a setpoint is waited for: half a second.
 AFTER = 125
-_FLIGHTS = 5
 
 
 @dataclass(frozen=True, slots=True)
