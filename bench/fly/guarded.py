@@ -17,7 +17,7 @@ from bench.cases.hits import (
     velocity_towards,
 )
 from bench.cases.vehicles import AIRFRAMES
-from bench.fly.virtual_time import Stepped
+from bench.fly.lockstep import Stepped
 from bench.fly.wire import FOLLOWED_S, PATIENCE_S
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard

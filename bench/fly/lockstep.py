@@ -1,4 +1,4 @@
-"""A mission flown in lockstep through the whole wire, and what is known of the flight afterwards."""
+"""Flights in lockstep through the whole wire: a mission with its log, for a judge; or programs step by step."""
 
 import tempfile
 from collections.abc import Sequence
@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from bench.fly.virtual_time import VirtualTime
+from companion.companion import Companion, StepResult
+from companion.guard.guard import Guard
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
 from rebound_cli.inputs import SimulatedWorld
@@ -15,9 +18,11 @@ from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
 from rebound_cli.results.truth_match import FlightTruth
-from rebound_cli.simulation.lockstep import fly_mission_lockstep
+from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle
 
 Floats = npt.NDArray[np.float64]
@@ -84,3 +89,39 @@ def fly(mission: Mission, scene: Scene, airframe: Airframe, folder: Path | None 
     flown, events = flown_in(folder, mission, scene, airframe)
     assert flown.truth is not None, "a lockstep flight has its truth"
     return JudgedFlight(mission, flown.report, events, flown.truth, scene, airframe)
+
+
+class Stepped(VirtualTime):
+    """A simulated vehicle and programs, each on a link of its own, without a log: all bytes both ways."""
+
+    def __init__(self, vehicle: SimulatedVehicle, *programs: Companion | Guard) -> None:
+        self.vehicle, self.programs = vehicle, programs
+        self.links = [vehicle.add_link(LinkKind.ONBOARD) for _ in programs]
+        self.events = []
+
+    @property
+    def time_s(self) -> float:
+        """Of the vehicle, since it was switched on."""
+        return 1e-6 * self.vehicle.time_boot_us
+
+    @property
+    def state(self) -> str:
+        return str(self.programs[0].status().state)
+
+    def step(self) -> list[StepResult]:
+        """One interval; what each program made of it, where there was something to hear or to send."""
+        self.vehicle.advance()
+        now_us, results = EPOCH_US + self.vehicle.time_boot_us, []
+        for program, link in zip(self.programs, self.links, strict=True):
+            heard = b"".join(link.take())
+            if heard or now_us >= program.next_deadline_us():
+                result = program.step(heard, now_us)
+                link.push(b"".join(result.sent_frames))
+                self.events += result.events
+                results.append(result)
+        return results
+
+    def step_alone(self) -> bytes:
+        """One interval in which nobody answers; what the vehicle said to the first."""
+        self.vehicle.advance()
+        return b"".join(self.links[0].take())

@@ -1,18 +1,14 @@
-"""Virtual time: a vehicle and whoever flies or guards it go on by intervals, until something is so."""
+"""Virtual time: flights that go on by intervals of the vehicle's, until something is so."""
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-from companion.companion import Companion, StepResult
-from companion.guard.guard import Guard
 from companion.report import Event
-from rebound_cli.simulation.lockstep import EPOCH_US as EPOCH_US
-from sim_vehicle.mavlink.streams.stream_rates import LinkKind
-from sim_vehicle.vehicle import SimulatedVehicle
 
 INTERVAL_US = 4_000
+EPOCH_US = 1_600_000_000_000_000
 
 
 class VirtualTime(ABC):
@@ -45,39 +41,3 @@ class VirtualTime(ABC):
 
     def texts(self) -> list[str]:
         return [f"{event.kind}: {event.text}" for event in self.events]
-
-
-class Stepped(VirtualTime):
-    """A simulated vehicle and programs, each on a link of its own, without a log: all bytes both ways."""
-
-    def __init__(self, vehicle: SimulatedVehicle, *programs: Companion | Guard) -> None:
-        self.vehicle, self.programs = vehicle, programs
-        self.links = [vehicle.add_link(LinkKind.ONBOARD) for _ in programs]
-        self.events = []
-
-    @property
-    def time_s(self) -> float:
-        """Of the vehicle, since it was switched on."""
-        return 1e-6 * self.vehicle.time_boot_us
-
-    @property
-    def state(self) -> str:
-        return str(self.programs[0].status().state)
-
-    def step(self) -> list[StepResult]:
-        """One interval; what each program made of it, where there was something to hear or to send."""
-        self.vehicle.advance()
-        now_us, results = EPOCH_US + self.vehicle.time_boot_us, []
-        for program, link in zip(self.programs, self.links, strict=True):
-            heard = b"".join(link.take())
-            if heard or now_us >= program.next_deadline_us():
-                result = program.step(heard, now_us)
-                link.push(b"".join(result.sent_frames))
-                self.events += result.events
-                results.append(result)
-        return results
-
-    def step_alone(self) -> bytes:
-        """One interval in which nobody answers; what the vehicle said to the first."""
-        self.vehicle.advance()
-        return b"".join(self.links[0].take())

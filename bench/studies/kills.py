@@ -14,8 +14,8 @@ from bench.cases.walls import into_a_wall
 from bench.fly.campaign import Json, Results
 from bench.fly.commanded import BetweenFlight, by_places, by_sticks, fly_a_mission
 from bench.fly.copies import in_a_copy
-from bench.fly.lockstep import STANDS_M
-from bench.fly.virtual_time import INTERVAL_US, Stepped
+from bench.fly.lockstep import STANDS_M, Stepped
+from bench.fly.virtual_time import INTERVAL_US
 from bench.rows.tables import table
 from bench.studies.study import Shown, run_study
 from companion.companion import Companion

@@ -23,8 +23,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.campaign import Json
 from bench.fly.faulted import mission_of
-from bench.fly.lockstep import flown_in
-from bench.fly.virtual_time import Stepped
+from bench.fly.lockstep import Stepped, flown_in
 from bench.rows.tables import table
 from bench.studies.study import Shown, page_path, write_page
 from companion.companion import Companion
@@ -107,12 +106,11 @@ def flights_table(flights: int) -> str:
 # --- from a hit's datagram to the setpoint on the wire, at 250 Hz, quiet and beside two busy loops
 
 SET_ATTITUDE_TARGET = 82
-BUSY_LOOPS = 2
+BUSY_LOOPS, _FLIGHTS = 2, 5
 # Intervals in real time before the hit.
 LEAD = 30
 # Intervals after the hit in which a setpoint is waited for: half a second.
 AFTER = 125
-_FLIGHTS = 5
 
 
 @dataclass(frozen=True, slots=True)

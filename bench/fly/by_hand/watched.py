@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from bench.fly.lockstep import Stepped
 from bench.fly.station import GroundStation
-from bench.fly.virtual_time import Stepped
 from companion.companion import Companion, StepResult
 from companion.guard.guard import Guard
 from companion.motion.config import GRAVITY_M_S2
