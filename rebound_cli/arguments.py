@@ -169,6 +169,7 @@ def add_fly(commands: Commands) -> None:
     _add_companion(fly)
     _option(fly, "--resume", "go on with the mission where the flight in this folder was interrupted", "RUN")
     _option(fly, "--obstacles", "what is known beforehand, e.g. another run's obstacles.json", "FILE")
+    _flag(fly, "--watch", "open the flight in a browser while it is flown, as `rebound watch` shows it")
     _add_json(fly, "summary")
     _add_peer_and_key(fly)
     _add_wait(fly, "with --connect: ")

@@ -68,6 +68,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("sim", "--set", "sim.walls=3"), ("sim.walls: must be a list, not 3",)),
         ((*CONNECTED, "udpin://:14540", "--seed", "2"), ("--seed",)),
         (("fly", SQUARE, "--lockstep", "--wait"), ("--wait belongs to --connect",)),
+        (("fly", SQUARE, "--lockstep", "--watch"), ("--watch belongs to flights in real time",)),
         (("fly", SQUARE, "--lockstep", "--signing-key", "key"), ("--signing-key belongs to --connect",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
         (("identify", "missing.tlog"), ("missing.tlog: No such file",)),

@@ -4,6 +4,9 @@ import io
 import shutil
 import subprocess
 import sys
+from queue import Queue
+from urllib.error import URLError
+from urllib.request import urlopen
 
 import pytest
 
@@ -63,3 +66,15 @@ def test_a_process_beside_makes_picture_and_page_whole(wall_flight, tmp_path):
     assert done.returncode == 0
     assert (folder / "flight.png").read_bytes().endswith(b"IEND\xaeB`\x82")
     assert (folder / "report.html").read_text().rstrip().endswith("</html>")
+
+
+def test_a_flight_to_watch_is_opened_in_the_browser_until_it_is_over(wall_folder, monkeypatch):
+    opened, told = Queue(), io.StringIO()
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(showing.webbrowser, "open", opened.put)
+    with showing.watched_page(wall_folder, Console(told), is_to_open=True):
+        address = opened.get(timeout=60)
+        assert f"Run folder {wall_folder}/; the flight in a browser: {address}" in told.getvalue()
+        assert b"<html" in urlopen(address).read()
+    with pytest.raises(URLError):
+        urlopen(address)
