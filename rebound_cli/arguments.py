@@ -194,11 +194,12 @@ def add_guard(commands: Commands) -> None:
 
 
 def add_init(commands: Commands) -> None:
-    text = "A copy, to be changed, of one of the missions that ship with the program; see docs/how-to/missions.md."
-    init = _command(commands, "init", "beginning.init:run_init", "write a mission to begin with", text)
+    text = "A copy, to be changed, of a mission or an example that ships with the program; see docs/how-to/missions.md."
+    init = _command(commands, "init", "beginning.init:run_init", "write a mission or an example to begin with", text)
     _option(init, "file", "the file to write, such as my-mission.yaml", "FILE", nargs="?")
     _flag(init, "--list", "show the names to begin from, and write nothing")
     _option(init, "--from", "which one (default: wall)", "MISSION", dest="model", default="wall")
+    _option(init, "--example", "write this example instead, by default under its own name", "NAME")
 
 
 def add_sim(commands: Commands) -> None:

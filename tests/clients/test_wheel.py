@@ -78,10 +78,11 @@ def drone(folder, *arguments):
         (("fly", "square", "--connect", "udpin://127.0.0.1:0"), 1, "The run folder runs cannot be made: nothing can"),
         (("fly", "wall"), 1, "The run folder runs cannot be made: nothing can be written"),
         (("guard", "--connect", "udpin://127.0.0.1:0", "--out", "OUT", *QUICK), 1, "No HEARTBEAT from an autopilot"),
-        (("fly", "wall", "--lockstep", "--out", "OUT"), 1, "this needs numba: pip install 'px4-rebound[sim]'."),
-        (("sim",), 1, "this needs numba: pip install 'px4-rebound[sim]'."),
+        (("fly", "wall", "--lockstep", "--out", "OUT"), 1, "this needs numba, of the extra [sim]: "),
+        (("sim",), 1, "this needs numba, of the extra [sim]: "),
+        (("init", "--list"), 0, "--example guarded_offboard"),
         (("key", "new", "vehicle.key"), 1, "vehicle.key: cannot be written: Permission denied."),
-        (("replay", "flight.ulg"), 1, "this needs pyulog: pip install 'px4-rebound[logs]'."),
+        (("replay", "flight.ulg"), 1, "-m pip install 'pyulog>=1.2' 'mcap>=1.3'"),
     ],
 )
 def test_a_command_works_or_says_in_one_sentence_why_not(arguments, exit_code, words, nowhere, tmp_path):
