@@ -232,7 +232,7 @@ def add_sim(commands: Commands) -> None:
 
 
 def add_preflight(commands: Commands) -> None:
-    text = "Parameters, streams, time, estimate and vibration, each with its remedy; see docs/how-to/preflight.md."
+    text = "Parameters, streams, time, estimate and vibration, each with what to do; see docs/how-to/preflight.md."
     summary = "look at a connected vehicle before its first flight"
     preflight = _command(commands, "preflight", "preflight.command:run_preflight", summary, text)
     _add_connect(preflight, required=True)
