@@ -102,7 +102,6 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition
         return None
     # A vehicle that has been told to land is already doing what is safe.
     landing = state is State.LANDING and flight.expected_mode == flight.vehicle.autopilot.land
-    flight.report(now_us, "link", text, silent_s=round(silent_s, 3))
     return Transition(Trigger.INTERRUPTED, text, hand_over=not landing)
 
 
