@@ -69,6 +69,19 @@ def _expected(text: str) -> int:
     return 0 if text == "none" else int(text)
 
 
+def speeds_m_s(text: str) -> list[float]:
+    """`1..4` in whole steps, or a list."""
+    first, dots, last = text.partition("..")
+    try:
+        found = [float(first) + step for step in range(int(float(last) - float(first)) + 1)] if dots else []
+        found = found or [float(word) for word in text.split(",")]
+    except ValueError:
+        found = []
+    if not found or min(found) <= 0 or not math.isfinite(sum(found)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not speeds: give 1..4 or a list such as 1,2.5, in m/s")
+    return found
+
+
 def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
@@ -327,6 +340,22 @@ def add_check(commands: Commands) -> None:
     _flag(check, "--no-picture", "draw nothing")
 
 
+def add_compare(commands: Commands) -> None:
+    text = "Simulated flights on all cores: a table, a CSV and a page; see docs/how-to/missions.md."
+    summary = "fly a mission by several laws, speeds and seeds"
+    compare = _command(commands, "compare", "compare.command:run_compare", summary, text)
+    _option(compare, "mission", "mission file, or the name of one that ships", "MISSION", type=mission_file)
+    _option(compare, "--airframe", "foldable, rigid, hexa, octo, racer or an airframe file", "NAME|FILE")
+    _option(compare, "--laws", "e.g. paper,adaptive (default: the mission's)", "A,B", type=lambda text: text.split(","))
+    text = "of the first item that has a speed, e.g. 1..4 or 1,2.5 (default: the mission's)"
+    _option(compare, "--speeds", text, "M/S", type=speeds_m_s)
+    _option(
+        compare, "--seeds", "flights of each, with seeds from 1 on (default: %(default)s)", "N", type=count, default=10
+    )
+    _add_set(compare, _SET_MISSION)
+    _option(compare, "--out", "folder of all (default: runs/<time>-compare-<mission>)", "DIR")
+
+
 def add_plan(commands: Commands) -> None:
     text = "Reads QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
     plan = commands.add_parser("plan", help="missions from QGroundControl", description=text)
@@ -434,6 +463,7 @@ COMMANDS = (
         add_guard,
         add_init,
         add_check,
+        add_compare,
         add_plan,
         add_sim,
         add_preflight,
