@@ -43,7 +43,8 @@ def _charts(rows: Sequence[Row]) -> str:
             if not flights:
                 continue
             speeds, figures = [row.impact_speed_m_s or 0.0 for row in flights], [getattr(row, name) for row in flights]
-            points = axis.scatter(speeds, figures, s=25, color=f"C{number}", label=group)
+            # Above grid and crosses, which would be pressed in its place.
+            points = axis.scatter(speeds, figures, s=25, color=f"C{number}", label=group, zorder=3)
             points.set_urls([row.report for row in flights])
             axis.plot(statistics.median(speeds), statistics.median(figures), "+", color=f"C{number}", markersize=14)
         axis.set_xlabel("speed of the hit [m/s]")
