@@ -127,7 +127,7 @@ def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path, home):
 
 
 def typed(page):
-    """What README or a tutorial has somebody type after `rebound`, and what it then shows; `service` changes a system."""
+    """What a page has somebody type after `rebound`, and what it then shows; `service` changes a system."""
     shown = {shlex.join(shlex.split(command)): text for command, text in consoles(ROOT / page)}
     lines = (words for words in command_lines(ROOT / page) if words and Path(words[0]).name == "rebound")
     return [(words[1:], shown.get(shlex.join(words))) for words in lines if words[1] != "service"]
