@@ -37,21 +37,25 @@ def write_page(path: Path, title: str, rows: Sequence[Row]) -> None:
 def _charts(rows: Sequence[Row]) -> str:
     """As SVG, to stand in the page."""
     figure = Figure(figsize=(12, 8), layout="constrained")
+    laws = list(dict.fromkeys(row.law for row in rows))
     for axis, (name, label) in zip(figure.subplots(2, 2).flat, CHARTS.items(), strict=True):
-        for number, (group, some) in enumerate(groupby(rows, key=lambda row: row.group)):
+        for _, some in groupby(rows, key=lambda row: row.group):
             flights = [row for row in some if None not in (row.impact_speed_m_s, getattr(row, name))]
             if not flights:
                 continue
             speeds, figures = [row.impact_speed_m_s or 0.0 for row in flights], [getattr(row, name) for row in flights]
             # Above grid and crosses, which would be pressed in its place.
-            points = axis.scatter(speeds, figures, s=25, color=f"C{number}", label=group, zorder=3)
+            law = flights[0].law
+            colour = f"C{laws.index(law)}"
+            points = axis.scatter(speeds, figures, s=25, color=colour, label=law or "as written", zorder=3)
             points.set_urls([row.report for row in flights])
-            axis.plot(statistics.median(speeds), statistics.median(figures), "+", color=f"C{number}", markersize=14)
+            axis.plot(statistics.median(speeds), statistics.median(figures), "+", color=colour, markersize=14)
         axis.set_xlabel("speed of the hit [m/s]")
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)
     handles, labels = figure.axes[2].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    of_law = dict(zip(labels, handles, strict=True))
+    figure.legend(of_law.values(), of_law.keys(), loc="outside lower center", ncols=len(laws))
     text = io.StringIO()
     figure.savefig(text, format="svg")
     return text.getvalue().partition("<!DOCTYPE")[2].partition(">")[2]
