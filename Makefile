@@ -3,11 +3,13 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 WHEEL := $(abspath .venv-wheel)
+FLIES := $(VENV)/.flies
 READY := $(VENV)/.ready
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .PHONY: fly test rest browser sandbox clients check lint types paper schema docs diagrams pictures site release wheel requirements audit aarch64 clean
 
-fly: $(READY)
+fly: $(FLIES)
 	$(BIN)/rebound fly missions/wall.yaml
 
 test: $(READY)
@@ -47,11 +49,16 @@ lint: $(READY)
 types: $(READY)
 	$(BIN)/mypy
 
-# Every version is pinned in requirements.txt, and every file by its hash: a fresh machine gets what was tested, or stops.
-$(READY): pyproject.toml requirements.txt
+# Every version is pinned, and every file by its hash: a fresh machine gets what was tested, or stops. What flying needs
+# comes first, without bytecode: to compile all of scipy and matplotlib would take longer than all else.
+$(FLIES): pyproject.toml requirements/sim.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(INSTALL) --no-compile --require-hashes -r requirements/sim.txt
+	$(INSTALL) --no-deps --no-build-isolation -e .
+	touch $(FLIES)
+
+$(READY): $(FLIES) requirements.txt
+	$(INSTALL) --require-hashes -r requirements.txt
 	touch $(READY)
 
 # The pins made anew, for every platform; versions stay as they are but for `make requirements UPGRADE=--upgrade` (or
@@ -62,7 +69,7 @@ PIN := $(BIN)/uv pip compile --quiet --python-version 3.11 --generate-hashes --n
 requirements: $(READY)
 	$(PIN) --universal --extra dev pyproject.toml -o requirements.txt
 	$(PIN) --universal -c requirements.txt pyproject.toml -o requirements/drone.txt
-	echo pytest | $(PIN) --universal -c requirements.txt --extra sim pyproject.toml - -o requirements/sim.txt
+	printf '%s\n' pytest setuptools==80.9.0 | $(PIN) --universal -c requirements.txt --extra sim pyproject.toml - -o requirements/sim.txt
 	printf '%s\n' mavsdk==3.17.4 pytest==9.2.0 | $(PIN) - -o requirements/mavsdk3.txt
 	printf '%s\n' MAVProxy==1.8.75 pytest==9.2.0 | $(PIN) - -o requirements/mavproxy.txt
 

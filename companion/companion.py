@@ -71,7 +71,9 @@ class Stepped(ABC, Generic[CoreT]):
         return 0 if self._core is None else self._core.next_deadline_us()
 
     def stop(self, reason: str) -> None:
-        """End the flight: a vehicle under control is handed to hold or land first. Done when `finished`."""
+        """End the flight: a vehicle under control is handed to hold or land first, one that recovers from a hit once it
+        is clear or when this is called again. Done when `finished`.
+        """
         self._stop_reason = reason
         if self._core is not None:
             self._core.stop_reason = reason
@@ -80,6 +82,11 @@ class Stepped(ABC, Generic[CoreT]):
     def stop_reason(self) -> str | None:
         """The reason of the last `stop`; None before."""
         return self._stop_reason
+
+    @property
+    def stop_is_put_off(self) -> bool:
+        """Whether that `stop` waits until the vehicle is clear of what it has hit; another does not."""
+        return self._core is not None and self._core.flight.stop_put_off is not None
 
     @property
     def core(self) -> CoreT | None:

@@ -31,7 +31,7 @@ class Fence(StrictModel):
     max_height_m: Positive = 6.0
     """Above the arming position."""
     min_height_m: NotNegative = 0.2
-    """Guards and landing gear reach 0.1 m below the centre of a small vehicle; as much again for its wavering."""
+    """Guards and landing gear reach 0.1 m below the centre of a small vehicle; as much again for a hover's drift."""
 
     @model_validator(mode="before")
     @classmethod

@@ -1,7 +1,7 @@
 """A program of one's own on MAVSDK that flies north by OFFBOARD, with the guard on its own connection.
 
-    rebound sim --mission missions/wall.yaml --set sim.walls.0.height_m=10
-    python examples/guarded_offboard.py udpin://127.0.0.1:14540
+    rebound sim --mission wall --set sim.walls.0.height_m=10
+    python guarded_offboard.py udpin://127.0.0.1:14540
 
 The program knows nothing of the wall. It flies into it, the guard recovers and leaves the vehicle in hold, and the
 program, which has been watching the guard, lands.

@@ -73,6 +73,19 @@ def _export_format(text: str) -> str:
     return text
 
 
+def speeds_m_s(text: str) -> list[float]:
+    """`1..4` in whole steps, or a list."""
+    first, dots, last = text.partition("..")
+    try:
+        found = [float(first) + step for step in range(int(float(last) - float(first)) + 1)] if dots else []
+        found = found or [float(word) for word in text.split(",")]
+    except ValueError:
+        found = []
+    if not found or min(found) <= 0 or not math.isfinite(sum(found)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not speeds: give 1..4 or a list such as 1,2.5, in m/s")
+    return found
+
+
 def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
@@ -173,6 +186,7 @@ def add_fly(commands: Commands) -> None:
     _add_companion(fly)
     _option(fly, "--resume", "go on with the mission where the flight in this folder was interrupted", "RUN")
     _option(fly, "--obstacles", "what is known beforehand, e.g. another run's obstacles.json", "FILE")
+    _flag(fly, "--watch", "open the flight in a browser while it is flown, as `rebound watch` shows it")
     _add_json(fly, "summary")
     _add_peer_and_key(fly)
     _add_wait(fly, "with --connect: ")
@@ -197,11 +211,12 @@ def add_guard(commands: Commands) -> None:
 
 
 def add_init(commands: Commands) -> None:
-    text = "A copy, to be changed, of one of the missions that ship with the program; see docs/how-to/missions.md."
-    init = _command(commands, "init", "beginning.init:run_init", "write a mission to begin with", text)
+    text = "A copy, to be changed, of a mission or an example that ships with the program; see docs/how-to/missions.md."
+    init = _command(commands, "init", "beginning.init:run_init", "write a mission or an example to begin with", text)
     _option(init, "file", "the file to write, such as my-mission.yaml", "FILE", nargs="?")
     _flag(init, "--list", "show the names to begin from, and write nothing")
     _option(init, "--from", "which one (default: wall)", "MISSION", dest="model", default="wall")
+    _option(init, "--example", "write this example instead, by default under its own name", "NAME")
 
 
 def add_sim(commands: Commands) -> None:
@@ -234,7 +249,7 @@ def add_sim(commands: Commands) -> None:
 
 
 def add_preflight(commands: Commands) -> None:
-    text = "Parameters, streams, time, estimate and vibration, each with its remedy; see docs/how-to/preflight.md."
+    text = "Parameters, streams, time, estimate and vibration, each with what to do; see docs/how-to/preflight.md."
     summary = "look at a connected vehicle before its first flight"
     preflight = _command(commands, "preflight", "preflight.command:run_preflight", summary, text)
     _add_connect(preflight, required=True)
@@ -311,6 +326,22 @@ def add_check(commands: Commands) -> None:
     _add_set(check, _SET_MISSION)
     _option(check, "--out", "folder of the pictures (default: runs/check)", "DIR", default=Path("runs/check"))
     _flag(check, "--no-picture", "draw nothing")
+
+
+def add_compare(commands: Commands) -> None:
+    text = "Simulated flights on all cores: a table, a CSV and a page; see docs/how-to/missions.md."
+    summary = "fly a mission by several laws, speeds and seeds"
+    compare = _command(commands, "compare", "compare.command:run_compare", summary, text)
+    _option(compare, "mission", "mission file, or the name of one that ships", "MISSION", type=mission_file)
+    _option(compare, "--airframe", "foldable, rigid, hexa, octo, racer or an airframe file", "NAME|FILE")
+    _option(compare, "--laws", "e.g. paper,adaptive (default: the mission's)", "A,B", type=lambda text: text.split(","))
+    text = "of the first item that has a speed, e.g. 1..4 or 1,2.5 (default: the mission's)"
+    _option(compare, "--speeds", text, "M/S", type=speeds_m_s)
+    _option(
+        compare, "--seeds", "flights of each, with seeds from 1 on (default: %(default)s)", "N", type=count, default=10
+    )
+    _add_set(compare, _SET_MISSION)
+    _option(compare, "--out", "folder of all (default: runs/<time>-compare-<mission>)", "DIR")
 
 
 def add_replay(commands: Commands) -> None:
@@ -416,6 +447,7 @@ COMMANDS = (
         add_guard,
         add_init,
         add_check,
+        add_compare,
         add_sim,
         add_preflight,
         add_status,

@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from operator import eq
 from pathlib import Path
@@ -12,7 +12,6 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from companion.errors import ConfigurationError
-from rebound_cli.shipped import shipped_missions
 
 DocumentPath = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
@@ -92,15 +91,15 @@ class Document:
         self.put(Override(f"{option} {value if given is None else given}", path, value))
 
 
-def load_document(path: Path) -> Document:
-    """Read one YAML file whose top level is a mapping. Raises DocumentError."""
+def load_document(path: Path, shipped_names: Iterable[str] = ()) -> Document:
+    """Read one YAML file whose top level is a mapping; `shipped_names` could have been meant. Raises DocumentError."""
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        shipped = shipped_missions() if path.name == str(path) else {}
-        match = nearest(path.name, [*(entry.name for entry in path.parent.glob("*.yaml")), *shipped])
-        question = f"; did you mean {path.with_name(match)}?" if match else "."
-        raise DocumentError(f"{path}: no such file{question}") from None
+        names = [path.with_name(entry.name) for entry in path.parent.glob("*.yaml")]
+        # A name alone may be meant for one that ships.
+        shipped = shipped_names if path.name == str(path) else ()
+        raise DocumentError(f"{path}: no such file{suggestion(str(path), [*map(str, names), *shipped])}") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise DocumentError(f"{path}: cannot be read: {reason}.") from error
@@ -279,6 +278,12 @@ def nearest(word: str, choices: Sequence[str]) -> str | None:
     """The choice that a person most likely meant, if any is close."""
     found = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
     return found[0] if found else None
+
+
+def suggestion(word: str, choices: Iterable[str]) -> str:
+    """The end of a sentence about a word that is none of these."""
+    match = nearest(word, tuple(choices))
+    return f"; did you mean {match}?" if match else "."
 
 
 def keys_allowed_at(model: type[BaseModel], path: Sequence[str | int]) -> tuple[str, ...]:

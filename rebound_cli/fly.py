@@ -15,7 +15,7 @@ from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
 from rebound_cli import inputs
 from rebound_cli.background import Background
-from rebound_cli.figure.showing import offer_page, show_flight
+from rebound_cli.figure.showing import offer_page, show_flight, watched_page
 from rebound_cli.flights.kept import folder_with_room
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
@@ -70,6 +70,8 @@ def run_fly(options: Namespace) -> int:
         mission = inputs.mission_from(document, world)
     if mission.companion.link.wait and options.yes:
         raise ConfigurationError("--wait with --yes would arm a vehicle whenever it appears: leave one of them out.")
+    if options.watch and options.lockstep:
+        raise ConfigurationError("--watch belongs to flights in real time: this one's page is its report.html.")
     run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
         if world is not None and options.lockstep:
@@ -87,7 +89,7 @@ def run_fly(options: Namespace) -> int:
         recorder = FlightRecorder(
             folder, None if options.lockstep else Background("log"), ring.make_room if ring else None
         )
-        with Interrupts() as interrupts:
+        with watched_page(folder, console, options.watch), Interrupts() as interrupts:
             followed = Followed() if is_simulated else None
             flight = Flight(mission, world, folder, recorder, console, interrupts, followed)
             try:

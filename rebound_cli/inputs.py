@@ -10,7 +10,8 @@ from rebound_cli import documents
 from rebound_cli.documents import Document, DocumentError, DocumentPath, load_document, validated
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
-from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from rebound_cli.shipped import shipped_missions
+from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.faults.spec import check_motor
 from sim_vehicle.mavlink.faulty_link import check_messages
@@ -39,7 +40,7 @@ def load_mission_document(
     """The mission file with every option put in, and the `companion:` part of that file. Raises DocumentError."""
     from companion.mission.config import CompanionConfig
 
-    document = load_document(path)
+    document = load_document(path, shipped_missions())
     if companion is not None:
         settings = load_document(companion)
         validated(CompanionConfig, settings, settings.data.get("companion") or {}, ("companion",))
@@ -140,7 +141,7 @@ def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, see
     for override in map(documents.parse_override, sets):
         if override.path[0] != "sim":
             raise DocumentError(f"{override.text}: only what begins with sim. counts here, such as sim.seed=7.")
-    document = load_document(path) if path is not None else Document("no mission file")
+    document = Document("no mission file") if path is None else load_document(path, shipped_missions())
     _apply_options(document, sets, airframe, seed)
     return world_from(document)
 
@@ -150,7 +151,7 @@ def _load_airframe(name: str, document: Document) -> Airframe:
     try:
         if "/" not in name and not name.endswith((".yaml", ".yml")):
             return load_built_in(name)
-        own = load_document(Path(name))
+        own = load_document(Path(name), built_in_airframes())
         return validated(Airframe, own, with_base(own.data))
     except AirframeError as error:
         raise DocumentError(f"{document.place_of(('sim', 'airframe'))}: {_sentence(error)}") from error

@@ -3,17 +3,23 @@
 import argparse
 import errno
 import itertools
+import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import __version__, arguments, exit_codes
 from rebound_cli.extras import needed_text
+from rebound_cli.shipped import shipped_examples, shipped_missions
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+# Arguments whose values have names that ship, and which.
+_NAMED = dict.fromkeys(("mission", "missions", "model"), "missions")
+_NAMED |= {"airframe": "airframes", "based_on": "airframes", "example": "examples"}
 # Whoever ends these at once leaves a vehicle to itself.
 COMMANDING = ("fly", "guard")
 
@@ -27,6 +33,29 @@ GONE = {
 }
 GONE["doctor"] = "is gone: send what 'rebound logs export' and 'journalctl --unit=rebound' give"
 GONE["plan"] = "is gone: upload the plan to the vehicle by QGroundControl, and fly it under 'rebound guard'"
+
+
+class _Parser(argparse.ArgumentParser):
+    """Of a wrong word it says which one may have been meant."""
+
+    def error(self, message: str) -> NoReturn:
+        given = re.search(r"(?:invalid choice|unrecognized arguments): '?([^' ]+)", message)
+        if given is not None:
+            from rebound_cli.documents import nearest
+
+            _, _, allowed = message.partition("(choose from ")
+            near = nearest(given[1], re.findall(r"'([^']+)'", allowed) or list(_options_of(self)))
+            message += "" if near is None else f"; did you mean {near}?"
+        super().error(message)
+
+
+def _options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """Its own and its commands'."""
+    yield from parser._option_string_actions
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _options_of(command)
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -72,7 +101,7 @@ def run(options: argparse.Namespace, program: str) -> int:
 
 def build_parser() -> argparse.ArgumentParser:
     text = "Detects a collision of a PX4 multicopter in one IMU sample and recovers from it."
-    parser = argparse.ArgumentParser(prog="rebound", description=text)
+    parser: argparse.ArgumentParser = _Parser(prog="rebound", description=text)
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     for add in arguments.COMMANDS:
@@ -92,15 +121,30 @@ def run_completion(options: argparse.Namespace) -> int:
     """What a shell needs to complete commands, options, choices and files."""
     import shtab
 
-    def complete_files(parser: argparse.ArgumentParser) -> None:
+    def complete_values(parser: argparse.ArgumentParser) -> None:
         for action in parser._actions:
             if isinstance(action, argparse._SubParsersAction):
                 for command in action.choices.values():
-                    complete_files(command)
-            elif action.type in (Path, arguments.mission_file):
+                    complete_values(command)
+            elif (names := _NAMED.get(action.dest)) is not None:
+                action.complete = {"bash": f"_rebound_{names}", "zsh": f"_rebound_{names}"}  # type: ignore[attr-defined]
+            elif action.type is Path:
                 action.complete = shtab.FILE  # type: ignore[attr-defined]
 
     parser = build_parser()
-    complete_files(parser)
-    print(shtab.complete(parser, options.shell))
+    complete_values(parser)
+    print(shtab.complete(parser, options.shell, preamble=_names_to_complete()[options.shell]))
     return 0
+
+
+def _names_to_complete() -> dict[str, str]:
+    """Functions of each shell that offer the names that ship, and files."""
+    from sim_vehicle.airframe import built_in_airframes
+
+    shipped = {"missions": shipped_missions(), "airframes": built_in_airframes(), "examples": shipped_examples()}
+    bash, zsh = "", ""
+    for what, names in shipped.items():
+        words = " ".join(names)
+        bash += f'_rebound_{what}() {{\n  compgen -W \'{words}\' -- "$1"\n  compgen -f -- "$1"\n}}\n'
+        zsh += f"_rebound_{what}() {{\n  compadd -- {words}\n  _files\n}}\n"
+    return {"bash": bash, "zsh": zsh}

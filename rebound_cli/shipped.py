@@ -1,4 +1,4 @@
-"""The missions that ship with the program, by their names."""
+"""The missions and examples that ship with the program, by their names."""
 
 import contextlib
 import importlib.resources
@@ -6,8 +6,18 @@ from pathlib import Path
 
 
 def shipped_missions() -> dict[str, Path]:
-    """Without the package of missions, none."""
+    return _files_of("rebound_missions", ".yaml")
+
+
+def shipped_examples() -> dict[str, Path]:
+    """Programs, settings, layouts."""
+    return _files_of("rebound_examples", ".py", ".yaml", ".json", ".xml")
+
+
+def _files_of(package: str, *kinds: str) -> dict[str, Path]:
+    """Without the package, none."""
     with contextlib.suppress(ModuleNotFoundError):
-        folder = Path(str(importlib.resources.files("rebound_missions")))
-        return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+        folder = Path(str(importlib.resources.files(package)))
+        files = (path for path in sorted(folder.iterdir()) if path.suffix in kinds and path.stem != "__init__")
+        return {path.stem: path for path in files}
     return {}

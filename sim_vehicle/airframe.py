@@ -1,5 +1,6 @@
 """What a vehicle is: masses, lengths, springs, motors, sensors and gains, read from a YAML file."""
 
+import difflib
 import math
 from collections.abc import Mapping
 from functools import lru_cache
@@ -347,8 +348,10 @@ def built_in_airframes() -> tuple[str, ...]:
 def load_built_in(name: str) -> Airframe:
     """The airframe of that name; raises AirframeError where there is none."""
     if name not in built_in_airframes():
+        near = difflib.get_close_matches(name, built_in_airframes(), n=1)
+        meant = f"did you mean {near[0]}? There are" if near else "use one of"
         raise AirframeError(
-            f"no airframe is called '{name}': use one of {', '.join(built_in_airframes())} or a file's path"
+            f"no airframe is called '{name}': {meant} {', '.join(built_in_airframes())} or a file's path"
         )
     data = yaml.safe_load((BUILT_IN_FOLDER / f"{name}.yaml").read_text())
     return Airframe.model_validate(with_base(data))

@@ -25,7 +25,9 @@ def test_missions_are_checked_and_what_cannot_be_drawn_is_said(tmp_path):
     code = f"from rebound_cli.main import main\nsys.exit(main(['check', 'wall', 'square', '--out', {str(tmp_path)!r}]))"
     done = alone(code, tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("not drawn: this needs matplotlib: pip install 'px4-rebound[sim]'.") == 2
+    assert done.stdout.count("not drawn: this needs matplotlib, of the extra [sim]: ") == 2
+    # And what is to be typed is the extra, package by package, for the Python that runs
+    assert f"[sim]: {sys.executable} -m pip install 'numba>=" in done.stdout and "'matplotlib>=" in done.stdout
 
 
 def test_a_mission_is_flown_and_a_wall_recovered_from(tmp_path):

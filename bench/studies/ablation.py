@@ -32,7 +32,7 @@ from bench.rows.tables import table
 from bench.studies.study import Shown, run_study, seeds_of
 from sim_vehicle.truth import Hit
 
-# At rest: slower than what a hover wavers by, for longer than a vehicle turns round.
+# At rest: slower than what a hover drifts, for longer than a vehicle turns round.
 RESTS_M_S, RESTS_S = 0.2, 0.4
 # How long a vehicle is waited for.
 LONGEST_S = 8.0

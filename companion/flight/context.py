@@ -172,6 +172,7 @@ class FlightContext:
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     no_data_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
+    stop_put_off: str | None = None  # the reason of a stop that waits until the vehicle is clear of what it has hit
     outcome: Outcome | None = None
     reason: str = ""
     ended_at_us: int | None = None

@@ -1,5 +1,6 @@
 """Detection of a motor damaged by a hit, and the mission's policy for it."""
 
+import math
 from collections.abc import Sequence
 
 from companion.flight.context import FlightContext, Transition
@@ -19,9 +20,7 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
         return
     hits = len(flight.collisions) - flight.motors.earlier_hits
     flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
-    # A vehicle not yet at rest may hang on the obstacle, or lie on the ground: that also loads a motor more.
-    rests = hits == 0 or flight.collisions[-1].settled_after_s is not None
-    was_hit = hits > 0 if flies and rests else None
+    was_hit = hits > 0 if flies and (hits == 0 or _is_free(flight)) else None
     for sample in samples:
         if isinstance(sample, MotorOutputs) and len(sample.outputs) >= rotors:
             damage = flight.motors.take(sample.outputs[:rotors], was_hit, now_us)
@@ -29,6 +28,16 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
                 data = {"motor": damage.motor, "harder": round(damage.harder, 3), "confidence": damage.confidence}
                 wanted = flight.mission.on_damage
                 flight.report(now_us, "damage", damage.text + ("" if wanted == "tell" else f"; then: {wanted}"), **data)
+
+
+def _is_free(flight: FlightContext) -> bool:
+    """Whether it has rested since the hit, or flown off. A vehicle that has not may hang on the obstacle, or lie on the
+    ground: that also loads a motor more. One that has lost a motor rests badly, and flies all the same.
+    """
+    record, latest = flight.collisions[-1], flight.vehicle.history.latest()
+    if record.settled_after_s is not None or latest is None or not record.is_over:
+        return record.settled_after_s is not None
+    return math.dist(latest.position_ned_m, record.contact.position_ned_m) > flight.mission.recovery.clearance_m
 
 
 def after_damage(flight: FlightContext) -> Transition | None:

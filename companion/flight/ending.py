@@ -27,8 +27,9 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
         return lost
     if inputs.refusal is not None:
         return Transition(Trigger.REFUSED, inputs.refusal)
-    if inputs.stop_reason is not None:
-        return Transition(Trigger.INTERRUPTED, inputs.stop_reason, hand_over=state not in ON_THE_GROUND)
+    stop_reason = _stop_reason(flight, state, inputs.stop_reason, now_us)
+    if stop_reason is not None:
+        return Transition(Trigger.INTERRUPTED, stop_reason, hand_over=state not in ON_THE_GROUND)
     silent = _link_silent(flight, state, now_us)
     if silent is not None or state not in ON_SETPOINTS:
         return silent
@@ -37,6 +38,17 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
     if reason is None and inputs.positions and flight.armed_at_us is not None:
         reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
     return None if reason is None else Transition(Trigger.INTERRUPTED, reason, hand_over=True)
+
+
+def _stop_reason(flight: FlightContext, state: State, asked: str | None, now_us: int) -> str | None:
+    """Why to stop now. A hold at what was hit may touch it again: the recovery comes first, unless asked for twice."""
+    put_off = flight.stop_put_off
+    if state is not State.RECOVERING or (asked is not None and put_off is not None):
+        return asked or put_off
+    if asked is not None:
+        flight.stop_put_off = asked
+        flight.report(now_us, "stopping", "the vehicle is handed over once it is clear; asked once more, at once")
+    return None
 
 
 def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transition | None:
@@ -90,7 +102,6 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition
         return None
     # A vehicle that has been told to land is already doing what is safe.
     landing = state is State.LANDING and flight.expected_mode == flight.vehicle.autopilot.land
-    flight.report(now_us, "link", text, silent_s=round(silent_s, 3))
     return Transition(Trigger.INTERRUPTED, text, hand_over=not landing)
 
 

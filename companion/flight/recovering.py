@@ -98,7 +98,8 @@ class Recover:
             flight.report(now_us, "hand_over", text, after_s=shown.rested_s, recovery_setpoint_ned_m=place)
         if shown.rebound_m_s is not None:
             goal, off_m_s = as_text(flight.mission_ned_m(place)), shown.rebound_m_s
-            text = f"away from the obstacle at {off_m_s:.2f} m/s; recovery setpoint {goal}"
+            way = "away from" if off_m_s >= 0.0 else "towards"
+            text = f"{way} the obstacle at {abs(off_m_s):.2f} m/s; recovery setpoint {goal}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
         if shown.settled_s is not None:
             past_m, speed_m_s = record.overshoot_m, record.rebound_speed_m_s

@@ -62,7 +62,7 @@ class ObstaclesConfig(StrictModel):
     known: tuple[KnownPatch, ...] = ()
     """The same, written out here."""
     margin_m: Positive = 0.35
-    """Between the guards and what is known. As recovery.clearance_m: guards 0.3 m clear, and 5 cm for the wavering of
+    """Between the guards and what is known. As recovery.clearance_m: guards 0.3 m clear, and 5 cm for the drift of
     a hover on optical flow."""
     on_unreachable: OnUnreachable = "land"
     """continue: with the next item; abort: hand the vehicle over as `on_interrupt` says."""

@@ -164,10 +164,10 @@ def _level(patch: Patch) -> BaseGeometry:
     return touched.buffer(max(patch.assumed_beyond_m(), THICKNESS_M), quad_segs=2)
 
 
-def _wall(patch: Patch, wavers_m: float) -> BaseGeometry:
+def _wall(patch: Patch, drift_m: float) -> BaseGeometry:
     (north, east, _), (ahead_n, ahead_e, _) = patch.centre_ned_m, patch.normal_ned
     offs_m = [patch.off_m(place) for place in patch.touches_ned_m]
-    back_m, front_m = min(offs_m) - max(THICKNESS_M, wavers_m), max(offs_m) + wavers_m
+    back_m, front_m = min(offs_m) - max(THICKNESS_M, drift_m), max(offs_m) + drift_m
     # A touch without an assumed extent is as wide as it is thick.
     low_m, high_m = patch.assumed_along_m()
     low_m, high_m = min(low_m, high_m - THICKNESS_M), max(high_m, low_m + THICKNESS_M)

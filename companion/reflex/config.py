@@ -345,7 +345,7 @@ class RecoveryConfig(StrictModel):
     tangential: Literal["damped", "kept"] = "damped"
     """Laws `normal` and `adaptive`: what becomes of the motion along the obstacle."""
     clearance_m: Positive = 0.35
-    """Law `adaptive`. The guards stay 0.3 m clear; the wavering of a hover on optical flow takes 5 cm."""
+    """Law `adaptive`. The guards stay 0.3 m clear; the drift of a hover on optical flow takes 5 cm."""
     restitution: Annotated[NotNegative, Field(le=1.0)] = 0.45
     """Of the speed into the obstacle, until the rebound has been measured: vehicles give back anything up to 0.9."""
 

@@ -1,37 +1,57 @@
-"""`rebound init`: a copy of a mission that ships with the program, for somebody to change."""
+"""`rebound init`: a copy of a mission or an example that ships with the program, for somebody to change."""
 
 import json
 import re
 import shlex
 from argparse import Namespace
+from collections.abc import Mapping
+from pathlib import Path
 
 from companion.errors import ConfigurationError
-from rebound_cli.documents import write_text
-from rebound_cli.shipped import shipped_missions
+from rebound_cli.documents import suggestion, write_text
+from rebound_cli.shipped import shipped_examples, shipped_missions
 
 
 def run_init(options: Namespace) -> int:
-    """Raises ConfigurationError for a file that is there or a mission that is not."""
-    missions = shipped_missions()
+    """Raises ConfigurationError for a file that is there or a mission or an example that is not."""
+    missions, examples = shipped_missions(), shipped_examples()
     if options.list:
-        print("\n".join(missions))
-        return 0
-    if options.file is None:
+        print("\n".join([*missions, *(f"--example {name}" for name in examples)]))
+    elif options.example is not None:
+        example = _named(options.example, "example", examples)
+        file = options.file or Path(example.name)
+        _write(file, example.read_text(encoding="utf-8"))
+        print(f"{file} is a copy of the example '{options.example}'.")
+    elif options.file is None:
         raise ConfigurationError("Which file? Such as: rebound init my-mission.yaml")
-    if options.file.exists():
-        raise ConfigurationError(f"{options.file} is there already: nothing was written.")
-    if options.model not in missions:
-        there = ", ".join(missions)
-        raise ConfigurationError(f"No mission {options.model!r} ships with the program; there are {there}.")
-    text = missions[options.model].read_text(encoding="utf-8")
+    else:
+        _copy_mission(options.file, options.model, _named(options.model, "mission", missions))
+    return 0
+
+
+def _named(name: str, kind: str, shipped: Mapping[str, Path]) -> Path:
+    if name not in shipped:
+        there = ", ".join(shipped)
+        raise ConfigurationError(
+            f"No {kind} {name!r} ships with the program{suggestion(name, shipped)} There are {there}."
+        )
+    return shipped[name]
+
+
+def _copy_mission(file: Path, model: str, mission: Path) -> None:
+    text = mission.read_text(encoding="utf-8")
     # The schema lies beside the original.
     text = re.sub(r"^# yaml-language-server:.*\n", "", text)
-    name = json.dumps(re.sub("[^A-Za-z0-9._-]+", "-", options.file.stem))
-    text = re.sub(rf"^name: {options.model}$", f"name: {name}", text, flags=re.MULTILINE)
-    options.file.parent.mkdir(parents=True, exist_ok=True)
-    write_text(options.file, text)
-    print(f"{options.file} is a copy of the mission '{options.model}'. Change it, then:")
-    file = shlex.quote(str(options.file))
-    print(f"    rebound check {file}    # says and draws what it would do")
-    print(f"    rebound fly {file}      # flies it with the simulated vehicle")
-    return 0
+    name = json.dumps(re.sub("[^A-Za-z0-9._-]+", "-", file.stem))
+    _write(file, re.sub(rf"^name: {model}$", f"name: {name}", text, flags=re.MULTILINE))
+    print(f"{file} is a copy of the mission '{model}'. Change it, then:")
+    quoted = shlex.quote(str(file))
+    print(f"    rebound check {quoted}    # says and draws what it would do")
+    print(f"    rebound fly {quoted}      # flies it with the simulated vehicle")
+
+
+def _write(file: Path, text: str) -> None:
+    if file.exists():
+        raise ConfigurationError(f"{file} is there already: nothing was written.")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_text(file, text)

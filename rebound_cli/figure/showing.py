@@ -1,6 +1,13 @@
 """A flight's picture and page in its folder."""
 
+import os
+import subprocess
+import sys
+import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 
 from rebound_cli.live.console import Console
 from rebound_cli.replay.recording import Followed
@@ -21,6 +28,32 @@ def show_flight(folder: Path, followed: Followed | None = None) -> None:
 
         draw_flight(flight, folder / FIGURE_NAME)
     write_page(flight, folder / REPORT_NAME)
+
+
+@contextmanager
+def watched_page(folder: Path, console: Console, is_to_open: bool) -> Iterator[None]:
+    """Until the flight is over a process of its own serves its page, if that is to be opened; says where it is."""
+    if not is_to_open:
+        console.print(f"Run folder {folder}/; to watch the flight in a browser: rebound watch {folder}")
+        yield
+        return
+    command = [sys.executable, "-m", "rebound_cli", "watch", str(folder)]
+    nobody, pipe = subprocess.DEVNULL, subprocess.PIPE
+    with subprocess.Popen(command, stdin=nobody, stdout=pipe, text=True, start_new_session=True) as server:
+        try:
+            assert server.stdout is not None, "it is piped"
+            address = server.stdout.readline().removeprefix(f"{folder}: ").split(" ")[0]
+            console.print(f"Run folder {folder}/; the flight in a browser: {address}")
+            # One in the terminal would take that from the flight; and some are waited for until they are closed.
+            if has_window():
+                Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+            yield
+        finally:
+            server.terminate()
+
+
+def has_window() -> bool:
+    return sys.platform in ("darwin", "win32") or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
 
 
 def offer_page(folder: Path, console: Console) -> None:

@@ -4,7 +4,7 @@ import json
 from argparse import Namespace
 from typing import Any
 
-from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder
+from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder, simulated_text
 from rebound_cli.live.console import console_for
 from rebound_cli.results.run_folder import EVENTS_NAME, RunFolderError, read_records, read_summary
 
@@ -20,7 +20,8 @@ def run_list(options: Namespace) -> int:
         size_mb, lasted_s = flight["size_bytes"] / 1e6, flight["duration_s"] or 0.0
         print(f"{flight['name']:36} {lasted_s:8.1f} s {size_mb:8.1f} MB  {hits:8}  {flight['end']}")
     total_mb = sum(flight["size_bytes"] for flight in flights) / 1e6
-    print(f"{len(flights)} flight{'' if len(flights) == 1 else 's'}, {total_mb:.1f} MB in {runs}")
+    many = "" if len(flights) == 1 else "s"
+    print(f"{len(flights)} flight{many}, {total_mb:.1f} MB in {runs}.{simulated_text(runs)}")
     return 0
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from companion.errors import ReboundError
 from companion.mission.config import DiskConfig
+from rebound_cli.documents import nearest
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_text, whole_lines
 
@@ -125,12 +126,23 @@ def flight_named(runs: Path, name: str) -> KeptFlight:
     if name == "last" and flights:
         return flights[-1]
     if name == "last":
-        raise FlightError(f"No flight of a vehicle is in {runs}.")
+        raise FlightError(f"No flight of a vehicle is in {runs}.{simulated_text(runs)}")
     for folder in (runs / name, Path(name)):
         if (folder / TLOG_NAME).is_file():
             begun = _NAMED_BY_US.fullmatch(folder.name)
             return KeptFlight(folder, begun[1] if begun else "", size_of(folder))
-    raise FlightError(f"No flight {name} is in {runs}; `rebound logs list` names those that are.")
+    near = nearest(name, [flight.name for flight in flights])
+    meant = f"did you mean {near}?" if near else "`rebound logs list` names those that are."
+    raise FlightError(f"No flight {name} is in {runs}; {meant}")
+
+
+def simulated_text(runs: Path) -> str:
+    """Where flights of simulated vehicles lie beside those that are told of."""
+    count = sum((folder / run_folder.AIRFRAME_NAME).exists() for folder in runs.iterdir()) if runs.is_dir() else 0
+    if count == 0:
+        return ""
+    what = "flight of a simulated vehicle is" if count == 1 else "flights of simulated vehicles are"
+    return f" {count} {what} there too: give its folder, as in rebound report {runs}/NAME."
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and SIGHUP: the first hands the vehicle over in good order, the second ends the program at once."""
+"""Ctrl-C, SIGTERM and SIGHUP: the first hands the vehicle over in good order, the last ends the program at once."""
 
 import signal
 from types import FrameType
@@ -12,11 +12,23 @@ _REASONS = {
 
 
 class Interrupts:
-    """Keeps the reason of the first signal for a loop to see; a second one raises KeyboardInterrupt."""
+    """Keeps the reason of a signal for a loop to see. The second one raises KeyboardInterrupt; where the first was put
+    off it is another reason, and the third one raises.
+    """
 
     def __init__(self) -> None:
         self.reason: str | None = None
+        self._count = self._told = 0
+        self._may_insist = False
         self._previous: dict[signal.Signals, object] = {}
+
+    def news(self, is_put_off: bool) -> str | None:
+        """A reason that has come since; `is_put_off`: what the one before asked for still waits."""
+        self._may_insist = is_put_off and self._count < 2
+        if self._told == self._count:
+            return None
+        self._told = self._count
+        return self.reason
 
     def __enter__(self) -> Self:
         for number in _REASONS:
@@ -28,6 +40,8 @@ class Interrupts:
             signal.signal(number, handler)  # type: ignore[arg-type]
 
     def _on_signal(self, number: int, _: FrameType | None) -> None:
-        if self.reason is not None:
+        if self._count > 0 and not self._may_insist:
             raise KeyboardInterrupt
-        self.reason = _REASONS[signal.Signals(number)]
+        self._count += 1
+        self._may_insist = False
+        self.reason = _REASONS[signal.Signals(number)] + (", and once more" if self._count > 1 else "")

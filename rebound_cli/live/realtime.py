@@ -210,9 +210,9 @@ class Loop:
 
     def _look_up(self, now_us: int) -> None:
         """Whether somebody wants an end, and whether all that was to be written was."""
-        if self.interrupts.reason is not None and not self.is_interrupted:
+        if (reason := self.interrupts.news(self.stepped.stop_is_put_off)) is not None:
             self.is_interrupted = True
-            self._stop(self.interrupts.reason)
+            self._stop(reason)
         if (news := self.connection.news()) is not None:
             self._note("link", news, now_us)
         if self.stepped.armed is None:

@@ -52,7 +52,11 @@ def socket_of_this_program(environment: Mapping[str, str] = os.environ) -> Path:
 
 
 def sockets_to_ask(environment: Mapping[str, str] = os.environ) -> list[Path]:
-    return list(dict.fromkeys([socket_of_this_program(environment), SERVICE_SOCKET]))
+    """Of whoever asks, then where others of this user have it: a desktop's session has a folder that cron has not."""
+    user = os.getuid()
+    places = [Path(f"/run/user/{user}/rebound"), Path(tempfile.gettempdir()) / f"rebound-{user}"]
+    others = [place / SERVICE_SOCKET.name for place in places]
+    return list(dict.fromkeys([socket_of_this_program(environment), *others, SERVICE_SOCKET]))
 
 
 class StatusServer:

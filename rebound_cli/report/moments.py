@@ -67,10 +67,11 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
     kind, what = "hit" if finding.is_collision else "contact", kind_text(finding)
     facts = impact_facts(finding, normal, flight.seconds)
     if touch is not None and flight.truth is not None:
-        late_ms = (boot_us - touch.contact_at_boot_us) / 1e3
-        facts.append(
-            ("Simulator", f"{impact_text(touch.kind, touch.impact_velocity_ned_m_s)}, {late_ms:.1f} ms before")
-        )
+        # As `detection_latency_ms` of the summary and the end of the flight in words have it.
+        began_us = flight.truth.at_us(touch.contact_at_boot_us)
+        late_ms = (finding.at_us - began_us) / 1e3
+        hit = impact_text(touch.kind, touch.impact_velocity_ned_m_s)
+        facts.append(("Simulator", f"{hit}, from {flight.seconds(began_us):.4f} s on, seen after {late_ms:.1f} ms"))
         facts.append(("Simulator's normal", f"{bearing(touch.normal_ned)}; {touch.peak_force_n:.0f} N at most"))
     return Moment(
         kind=kind,

@@ -77,7 +77,7 @@ def run_lockstep(
     """Exchange bytes until the companion has finished, its packets one interval later; `look` is told the virtual time
     in seconds now and then. False when virtual time ran out first.
     """
-    is_confirmed = is_stopped = False
+    is_confirmed = False
     limit_us = vehicle.time_boot_us + round(limit_s * 1e6)
     pending, count = b"", 0
     step = companion.step if followed is None else partial(followed.step, companion)
@@ -98,10 +98,9 @@ def run_lockstep(
             continue
         if vehicle.time_boot_us > limit_us:
             return False
-        if interrupts.reason is not None and not is_stopped:
-            is_stopped = True
-            companion.stop(interrupts.reason)
-            recorder.record_stop(now_us, interrupts.reason)
+        if (reason := interrupts.news(companion.stop_is_put_off)) is not None:
+            companion.stop(reason)
+            recorder.record_stop(now_us, reason)
         look_for_file(companion, recorder, now_us)
         look(vehicle.time_boot_us / 1e6)
     return True

@@ -8,7 +8,7 @@ from sim_vehicle.airframe import THRUST_MIN
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
-from sim_vehicle.quantities import Floats
+from sim_vehicle.quantities import Floats, Vector3
 
 POSITION_LOOP_HZ = 100
 # An off-centre hit spins the vehicle by more than a right angle. Past that e_R of eq. 4 no longer tells tilt
@@ -90,16 +90,24 @@ def _thrust(acceleration: Floats, tilt_max_rad: float, most_m_s2: float) -> None
 @njit
 def _attitude(state: PlantState, thrust: Floats) -> None:
     """R_d with b3 against the thrust and the nose towards the asked yaw."""
-    b3 = -thrust / math.sqrt(thrust @ thrust)
+    magnitude = math.sqrt(thrust @ thrust)
+    b3 = -thrust[0] / magnitude, -thrust[1] / magnitude, -thrust[2] / magnitude
     yaw_now = yaw_of(state.estimate)
     error = state.yaw_setpoint_rad - yaw_now
     error -= 2 * math.pi * math.floor((error + math.pi) / (2 * math.pi))
     yaw = yaw_now + min(max(error, -YAW_STEP_MAX_RAD), YAW_STEP_MAX_RAD)
-    nose = np.array([math.cos(yaw), math.sin(yaw), 0.0])
-    b2 = np.cross(b3, nose)
-    b2 /= math.sqrt(b2[0] * b2[0] + b2[1] * b2[1] + b2[2] * b2[2])
-    b1 = np.cross(b2, b3)
+    nose = math.cos(yaw), math.sin(yaw), 0.0
+    b2 = _cross(b3, nose)
+    length = math.sqrt(b2[0] * b2[0] + b2[1] * b2[1] + b2[2] * b2[2])
+    b2 = b2[0] / length, b2[1] / length, b2[2] / length
+    b1 = _cross(b2, b3)
     for i in range(3):
         state.attitude_setpoint[i, 0] = b1[i]
         state.attitude_setpoint[i, 1] = b2[i]
         state.attitude_setpoint[i, 2] = b3[i]
+
+
+@njit
+def _cross(a: Vector3, b: Vector3) -> Vector3:
+    """Numba compiles its own for a second."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -125,7 +125,9 @@ def run_loops(state: PlantState, asked: SetpointRows, constants: Constants) -> N
         if asked.level != ASKED_TRAJECTORY:
             take_thrust(state, constants, asked.thrust)
         if asked.level == ASKED_ATTITUDE:
-            state.attitude_setpoint[:, :] = asked.attitude
+            for row in range(3):
+                for column in range(3):
+                    state.attitude_setpoint[row, column] = asked.attitude[row, column]
         if asked.level == ASKED_RATES:
             rate_control(state, constants, asked.rates_frd_rad_s, constants)
         else:

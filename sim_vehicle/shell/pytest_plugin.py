@@ -7,6 +7,8 @@ On a failed test the report says with which seed and setup, what happened, and w
 """
 
 from collections.abc import Generator, Iterator
+from dataclasses import fields
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -73,7 +75,20 @@ def _options(request: pytest.FixtureRequest) -> dict[str, Any]:
             raise pytest.UsageError("the mark rebound takes settings by name, e.g. rebound(lockstep=True).")
         options.update(mark.kwargs)
     options.update(getattr(request, "param", None) or {})
+    _check_names(options)
     return options
+
+
+def _check_names(options: dict[str, Any]) -> None:
+    from sim_vehicle.bench.bench import Setup
+
+    names = ["lockstep", "streams", *(field.name for field in fields(Setup))]
+    names += [] if options.get("lockstep") else ["links"]
+    for name in options:
+        if name not in (*names, "speed"):
+            near = get_close_matches(name, names, n=1)
+            meant = f"did you mean {near[0]}? There are" if near else "there are"
+            raise pytest.UsageError(f"the mark rebound has no setting {name!r}: {meant} {', '.join(names)}, speed.")
 
 
 @pytest.hookimpl(wrapper=True)

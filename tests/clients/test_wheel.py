@@ -5,12 +5,15 @@
 
 import os
 import re
+import shlex
 import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 from simulator import ROOT, simulator, wait_until
+
+from tests.docs.test_examples import command_lines, consoles, differs
 
 WHEEL = Path(os.environ["WHEEL"])
 # Root may write everywhere; without its capabilities it is a user like any other.
@@ -78,10 +81,11 @@ def drone(folder, *arguments):
         (("fly", "square", "--connect", "udpin://127.0.0.1:0"), 1, "The run folder runs cannot be made: nothing can"),
         (("fly", "wall"), 1, "The run folder runs cannot be made: nothing can be written"),
         (("guard", "--connect", "udpin://127.0.0.1:0", "--out", "OUT", *QUICK), 1, "No HEARTBEAT from an autopilot"),
-        (("fly", "wall", "--lockstep", "--out", "OUT"), 1, "this needs numba: pip install 'px4-rebound[sim]'."),
-        (("sim",), 1, "this needs numba: pip install 'px4-rebound[sim]'."),
+        (("fly", "wall", "--lockstep", "--out", "OUT"), 1, "this needs numba, of the extra [sim]: "),
+        (("sim",), 1, "this needs numba, of the extra [sim]: "),
+        (("init", "--list"), 0, "--example guarded_offboard"),
         (("key", "new", "vehicle.key"), 1, "vehicle.key: cannot be written: Permission denied."),
-        (("replay", "flight.ulg"), 1, "this needs pyulog: pip install 'px4-rebound[logs]'."),
+        (("replay", "flight.ulg"), 1, "-m pip install 'pyulog>=1.2' 'mcap>=1.3'"),
     ],
 )
 def test_a_command_works_or_says_in_one_sentence_why_not(arguments, exit_code, words, nowhere, tmp_path):
@@ -120,6 +124,34 @@ def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path, home):
     code, stdout, stderr = finished(process, 600)
     assert code == 0, stderr
     assert "Hit a wall at" in stdout
+
+
+def typed(page):
+    """What a page has somebody type after `rebound`, and what it then shows; `service` changes a system."""
+    shown = {shlex.join(shlex.split(command)): text for command, text in consoles(ROOT / page)}
+    lines = (words for words in command_lines(ROOT / page) if words and Path(words[0]).name == "rebound")
+    return [(words[1:], shown.get(shlex.join(words))) for words in lines if words[1] != "service"]
+
+
+PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs/tutorials").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if typed(page)])
+def test_what_a_page_has_somebody_type_works_without_a_checkout(page, tmp_path, home):
+    for words, shown in typed(page):
+        process = start("sim", tmp_path, WHEEL / "sim/bin/rebound", *words, HOME=home, COLUMNS="120")
+        if words[0] == "sim":
+            assert process.stdout.readline().startswith("Simulated vehicle"), words
+            process.send_signal(signal.SIGINT)
+        code, stdout, stderr = finished(process, 600)
+        if any("/dev/tty" in word for word in words):
+            # Where there is no drone that is the one thing that is said
+            assert code != 0 and "does not exist" in stderr and stderr.count("\n") == 1, stderr
+        elif words == ["status"]:
+            assert code == 1 and "Nothing answers" in stderr
+        else:
+            assert code == 0, f"{words}\n{stdout}{stderr}"
+            assert differs(shown or "", stdout) is None, f"{words}\n{differs(shown, stdout)}"
 
 
 def test_the_fixture_of_the_documents_is_there(tmp_path, home):

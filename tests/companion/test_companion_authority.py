@@ -94,7 +94,7 @@ def test_ctrl_c_hands_the_vehicle_over_as_the_mission_says(state, on_interrupt, 
     stopped_at = f.now_us
 
     f.companion.stop("Ctrl-C")
-    f.run_to_end(2.0)
+    f.run_to_end(8.0 if state == "recovering" else 2.0)
 
     report = f.report
     assert f.vehicle.mode == mode
@@ -104,6 +104,22 @@ def test_ctrl_c_hands_the_vehicle_over_as_the_mission_says(state, on_interrupt, 
     if state != "landing":
         assert f.setpoints_since(stopped_at), "setpoints go on until the mode is seen to hold"
     assert_silent_from_now(f)
+
+
+def test_ctrl_c_at_a_wall_waits_until_the_vehicle_is_clear_and_once_more_does_not():
+    f = flying_in("recovering")
+    f.companion.stop("Ctrl-C")
+    f.run_for(0.1)
+    assert f.state == "recovering" and f.companion.stop_is_put_off and "stopping" in f.kinds()
+    insisting = f.copy()
+
+    f.run_to_end(8.0)
+    assert "recovered" in f.kinds() and f.report.reason == "Ctrl-C"
+
+    insisting.companion.stop("Ctrl-C, and once more")
+    insisting.run_to_end(2.0)
+    assert insisting.vehicle.mode == LOITER and "recovered" not in insisting.kinds()
+    assert insisting.report.reason == "Ctrl-C, and once more"
 
 
 def test_a_vehicle_that_does_not_answer_the_hand_over_is_left_to_its_own_failsafe():

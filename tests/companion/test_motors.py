@@ -128,3 +128,14 @@ def test_each_motor_that_a_hit_hurts_is_named_and_none_that_it_does_not(airframe
         told = flight.event("damage")
         assert told.data["motor"] == motor + 1 and told.data["harder"] > 0.1
         assert told.text.endswith("; then: land")
+
+
+@pytest.mark.slow
+def test_a_hexarotor_that_loses_a_motor_says_so_and_lands_though_it_never_quite_rests():
+    dead = {"kind": "motor_failure", "motor": 2, "thrust_share": 0.0, "at_s": 13.1}
+    flight = flown_into_a_wall(dead, airframe="hexa", on_damage="land")
+    assert flight.event("detection").data["sample_time_boot_us"] > 13.1e6
+    assert flight.event("recovered").data["settled_after_s"] is None
+    told = flight.event("damage")
+    assert told.data["motor"] == 3 and ", all it has" in told.text
+    assert flight.event("done").data["reason"].startswith("landed and disarmed")

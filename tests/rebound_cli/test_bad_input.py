@@ -54,7 +54,9 @@ CONNECTED = ("fly", SQUARE, "--connect")
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (("fly", WALL, "--lockstep", "--airframe", "foldible"), ("foldible", "foldable, hexa, octo")),
+        (("fly", WALL, "--lockstep", "--airframe", "foldible"), ("foldible", "did you mean foldable?")),
+        (("fly", WALL, "--lockstep", "--airframe", "racer.yaml"), ("racer.yaml: no such file; did you mean racer?",)),
+        (("check", "wal.yaml"), ("wal.yaml: no such file; did you mean wall?",)),
         (("airframe", "px4", "--airframe", "none"), ("foldable", "rigid")),
         (("fly", "--sim", "no-such-mission.yaml"), ("no-such-mission.yaml",)),
         ((*CONNECTED, "serial:///dev/ttyNONE:921600"), ("/dev/ttyNONE does not exist",)),
@@ -68,6 +70,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("sim", "--set", "sim.walls=3"), ("sim.walls: must be a list, not 3",)),
         ((*CONNECTED, "udpin://:14540", "--seed", "2"), ("--seed",)),
         (("fly", SQUARE, "--lockstep", "--wait"), ("--wait belongs to --connect",)),
+        (("fly", SQUARE, "--lockstep", "--watch"), ("--watch belongs to flights in real time",)),
         (("fly", SQUARE, "--lockstep", "--signing-key", "key"), ("--signing-key belongs to --connect",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
         (("identify", "missing.tlog"), ("missing.tlog: No such file",)),
@@ -85,6 +88,8 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
         (("fly",), "MISSION"),
         ((), "COMMAND"),
         (("fly", "a", "--sim", "--lockstep"), "--lockstep"),
+        (("fli", "wall"), "; did you mean fly?"),
+        (("fly", "wall", "--lockstp"), "--lockstp; did you mean --lockstep?"),
         (("sim", "--port", "x"), "'x' is not a port"),
         (("sim", "--speed", "-2"), "'-2' is not a speed: give a number from 0 to 1000"),
         (("sim", "--speed", "fast"), "'fast' is not a speed"),

@@ -22,6 +22,10 @@ printf '%s\\n' "${COMPREPLY[@]}"
         (["fly", "--lo"], {"--lockstep"}),
         (["guard", "--then", ""], {"previous", "hold"}),
         (["fly", "missions/wal"], {"missions/wall.yaml"}),
+        (["check", "wal"], {"wall"}),
+        (["sim", "--mission", "wal"], {"wall"}),
+        (["fly", "--airframe", "rac"], {"racer"}),
+        (["init", "--example", "guarded"], {"guarded_offboard"}),
         (["guard", "--config", "CHANGELO"], {"CHANGELOG.md"}),
     ],
 )

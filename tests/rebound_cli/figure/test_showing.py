@@ -1,6 +1,11 @@
 """Where a page is written by itself after a flight, and where it is only said how to."""
 
 import io
+from queue import Queue
+from urllib.error import URLError
+from urllib.request import urlopen
+
+import pytest
 
 from rebound_cli.figure import showing
 from rebound_cli.live.console import Console
@@ -25,3 +30,15 @@ def test_the_base_install_is_enough_to_write_one(wall_flight, tmp_path):
     done = alone(f"from rebound_cli.main import main\nsys.exit(main({words!r}))", tmp_path)
     assert done.returncode == 0, done.stderr
     assert out.stat().st_size > 1_000_000
+
+
+def test_a_flight_to_watch_is_opened_in_the_browser_until_it_is_over(wall_folder, monkeypatch):
+    opened, told = Queue(), io.StringIO()
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(showing.webbrowser, "open", opened.put)
+    with showing.watched_page(wall_folder, Console(told), is_to_open=True):
+        address = opened.get(timeout=60)
+        assert f"Run folder {wall_folder}/; the flight in a browser: {address}" in told.getvalue()
+        assert b"<html" in urlopen(address).read()
+    with pytest.raises(URLError):
+        urlopen(address)

@@ -128,8 +128,13 @@ def test_a_wrong_mark_is_an_error_that_says_what_to_do(suite: pytest.Pytester) -
         @pytest.mark.rebound("rigid")
         def test_it(rebound_vehicle):
             pass
+
+        @pytest.mark.rebound(lockstep=True, airfram="rigid")
+        def test_that(rebound_vehicle):
+            pass
         """
     )
     result = run(suite)
-    result.assert_outcomes(errors=1)
+    result.assert_outcomes(errors=2)
     result.stdout.fnmatch_lines(["*the mark rebound takes settings by name*"])
+    result.stdout.fnmatch_lines(["*the mark rebound has no setting 'airfram': did you mean airframe?*"])

@@ -1,0 +1,1 @@
+"""The examples that ship: `rebound init --example NAME` writes one."""

@@ -1,0 +1,76 @@
+"""`rebound compare`: the flights, on all cores, and what is written of them."""
+
+import contextlib
+import io
+import multiprocessing
+import os
+import signal
+import time
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from datetime import UTC, datetime
+from pathlib import Path
+
+from companion.errors import ReboundError
+from rebound_cli import inputs
+from rebound_cli.compare.cases import Case, cases_of
+from rebound_cli.compare.page import write_page
+from rebound_cli.compare.rows import Row, row_of, table, write_csv
+from rebound_cli.documents import refuse_existing
+from rebound_cli.live.console import Console, console_for
+from rebound_cli.results.run_folder import RUNS_FOLDER, read_summary
+from rebound_cli.simulation.compiling import prepare_vehicle
+
+
+def run_compare(options: Namespace) -> int:
+    """Fly all, write the CSV and the page, print the table. 0 when every flight was flown to a summary."""
+    refuse_existing(options.out)
+    cases, mission = cases_of(options), options.mission.stem
+    out = options.out or RUNS_FOLDER / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-compare-{mission}"
+    out.mkdir(parents=True)
+    with console_for(False) as console:
+        console.print(f"{len(cases)} flights to {out}/")
+        # Here once, not on every core.
+        prepare_vehicle(console, inputs.load_world(options.mission, (), options.airframe, None))
+        rows = dict(_flown(console, options, cases, out))
+        in_order = [rows[case] for case in cases]
+        write_csv(in_order, out / "compare.csv")
+        write_page(out / "compare.html", f"{mission}, {options.airframe or 'its own airframe'}", in_order)
+        console.print(f"\n{table(in_order)}\n\nEvery figure: {out}/compare.csv. Plots: {out}/compare.html")
+    return 0 if all(row.second_touches is not None for row in in_order) else 1
+
+
+def _flown(console: Console, options: Namespace, cases: Sequence[Case], out: Path) -> Iterator[tuple[Case, Row]]:
+    """In the order in which they are over, each with a line of progress."""
+    began_s, spawn = time.monotonic(), multiprocessing.get_context("spawn")
+    # Ctrl-C ends a flight, not a process that waits for the next one.
+    with ProcessPoolExecutor(os.cpu_count(), spawn, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        given = {pool.submit(_fly, options.mission, options.airframe, case, out): case for case in cases}
+        try:
+            for number, done in enumerate(as_completed(given), start=1):
+                row, case = done.result(), given[done]
+                left_s = (time.monotonic() - began_s) / number * (len(cases) - number)
+                hit = row.reason if row.impact_speed_m_s is None else f"hit at {row.impact_speed_m_s:.2f} m/s"
+                rest = "" if row.at_rest_after_s is None else f", at rest after {row.at_rest_after_s:.1f} s"
+                console.print(f"{number:4} of {len(cases)}, {left_s:4.0f} s to go: {case.folder}, {hit}{rest}")
+                yield case, row
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _fly(mission: Path, airframe: str | None, case: Case, out: Path) -> Row:
+    """One, as `rebound fly --lockstep` does it; in a process of its own."""
+    from rebound_cli.main import build_parser
+
+    words = ["fly", str(mission), "--lockstep", "--seed", str(case.seed), "--out", str(out / case.folder)]
+    words += [] if airframe is None else ["--airframe", airframe]
+    words += [word for one in case.sets for word in ("--set", one)]
+    options, said = build_parser().parse_args(words), io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            options.run(options)
+        except ReboundError as error:
+            return row_of(case, None, str(error))
+    return row_of(case, read_summary(out / case.folder))

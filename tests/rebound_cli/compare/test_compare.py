@@ -1,0 +1,61 @@
+"""`rebound compare`: every law at every speed, and what is told of it."""
+
+import csv
+
+import pytest
+
+from rebound_cli.arguments import speeds_m_s
+from rebound_cli.compare.cases import Case
+from rebound_cli.compare.rows import lines_of, row_of
+from rebound_cli.main import main
+from tests.rebound_cli.command import assert_one_clear_sentence, run, run_here
+
+
+@pytest.mark.flight
+def test_two_laws_are_flown_told_of_and_kept(tmp_path):
+    out = tmp_path / "compared"
+    done = run("compare", "wall", "--laws", "paper,adaptive", "--speeds", "1.5", "--seeds", "1", "--out", out)
+    assert done.returncode == 0, done.stderr
+    # Then there was progress, in a pipe as on a terminal
+    assert "1 of 2," in done.stdout and "2 of 2,    0 s to go:" in done.stdout
+    with (out / "compare.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["law"] for row in rows] == ["paper", "adaptive"]
+    for row in rows:
+        assert float(row["impact_speed_m_s"]) == pytest.approx(1.5, rel=0.1)
+        assert (out / row["report"]).exists() and f'xlink:href="{row["report"]}"' in (out / "compare.html").read_text()
+
+
+def test_what_cannot_be_compared_is_one_sentence_before_anything_is_flown(tmp_path):
+    for words, said in (
+        (("wall", "--laws", "papr"), "must be 'adaptive'"),
+        (("hover", "--speeds", "1"), "no item of"),
+        (("wall", "--airframe", "foldible"), "did you mean foldable?"),
+        (("wall", "--out", tmp_path), f"{tmp_path} exists already"),
+    ):
+        assert_one_clear_sentence(run_here("compare", *words), said)
+
+
+def test_speeds_are_a_range_or_a_list(capsys):
+    assert speeds_m_s("1..4") == [1, 2, 3, 4] and speeds_m_s("1.5..3") == [1.5, 2.5] and speeds_m_s("1,2.5") == [1, 2.5]
+    for wrong in ("4..1", "fast", "0,1", "nan"):
+        with pytest.raises(SystemExit):
+            main(["compare", "wall", "--speeds", wrong])
+        assert f"'{wrong}' is not speeds" in capsys.readouterr().err
+
+
+def hit(speed_m_s, rest_s):
+    truth = {"impact_velocity_ned_m_s": (speed_m_s, 0.0, 0.0), "height_lost_m": 0.1, "stopped_off_m": 0.5}
+    return {"settled_after_s": rest_s, "truth": truth}
+
+
+def test_the_table_has_medians_of_what_is_known_and_the_worst():
+    summaries = [
+        {"outcome": "completed", "reason": "", "recontacts": 1, "collisions": [hit(2.0, 1.0)]},
+        {"outcome": "aborted", "reason": "", "recontacts": 0, "collisions": [hit(3.0, None)]},
+        {"outcome": "completed", "reason": "", "recontacts": 0, "collisions": [{"truth": None}]},
+        None,
+    ]
+    rows = [row_of(Case("paper", 2.0, seed, ()), summary) for seed, summary in enumerate(summaries)]
+    _, line = lines_of(rows)
+    assert line == ("paper-2-m-s", "2 of 4", "2.50 (3.00)", "1.00 (1.00)", "0.10 (0.10)", "1", "0.50 (0.50)")
