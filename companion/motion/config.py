@@ -39,6 +39,11 @@ DELAY_S = 0.01
 # Longest delay that is estimated: compared velocities lie 0.1 s apart (four at PX4's 30 Hz of ODOMETRY).
 LATEST_S = 0.1
 
+# Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
+DRIFT_M2_S3 = 0.03
+# Standard deviation of the acceleration that a tilt makes which is wrong by the gyroscopes, too: 3 degrees.
+LEVEL_SPREAD_M_S2 = 0.5
+
 # --- a receiver's velocity
 # Delay of a satellite receiver's velocity: PX4's default EKF2_GPS_DELAY; the receivers that ArduPilot knows have 0.1 to
 # 0.22 s (AP_GPS's get_lag), a simulated one none.

@@ -11,7 +11,14 @@ import math
 from dataclasses import dataclass, field
 
 from companion.messages import GpsVelocity, Vector3
-from companion.motion.config import CERTAIN, DOPPLER_M_S, DOPPLER_MEMORY, FINEST_DOPPLER_M_S
+from companion.motion.config import (
+    CERTAIN,
+    DOPPLER_M_S,
+    DOPPLER_MEMORY,
+    DRIFT_M2_S3,
+    FINEST_DOPPLER_M_S,
+    LEVEL_SPREAD_M_S2,
+)
 from companion.motion.delay import RECEIVER, Delay
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, plus
@@ -56,6 +63,57 @@ class Doppler:
     def trusted_variance_m2_s2(self) -> float:
         """On an axis; no better than the best receivers'."""
         return max(self.variance_m2_s2, FINEST_DOPPLER_M_S**2)
+
+
+@dataclass(slots=True)
+class MeasuredVelocity:
+    """Kalman filter of the horizontal velocity v and of the acceleration b that the accelerometer does not show, as its
+    attitude is wrong: v' = a + b. Changed only by its methods; local NED, SI, the vehicle's boot clock.
+    """
+
+    velocity_ned_m_s: Vector3
+    variance_m2_s2: float  # of v on an axis
+    summed_m_s: Vector3  # the accelerometer's integral up to its time
+    time_boot_us: int | None = None
+    taken_boot_us: int = -1  # when the newest of its velocities was measured
+    unseen_m_s2: Vector3 = ZERO
+    both_m2_s3: float = 0.0  # covariance of v and b
+    unseen_variance_m2_s4: float = LEVEL_SPREAD_M_S2**2
+
+    def predict(self, time_boot_us: int, summed_m_s: Vector3) -> None:
+        """Up to a time, with the accelerometer's integral until then."""
+        elapsed_s = 0.0 if self.time_boot_us is None else 1e-6 * (time_boot_us - self.time_boot_us)
+        faster = plus(plus(summed_m_s, -1.0, self.summed_m_s), elapsed_s, self.unseen_m_s2)
+        self.velocity_ned_m_s = plus(self.velocity_ned_m_s, 1.0, faster)
+        self.variance_m2_s2 += elapsed_s * (
+            2.0 * self.both_m2_s3 + elapsed_s * self.unseen_variance_m2_s4 + DRIFT_M2_S3
+        )
+        self.both_m2_s3 += elapsed_s * self.unseen_variance_m2_s4
+        self.time_boot_us, self.summed_m_s = time_boot_us, summed_m_s
+
+    def _innovation(self, doppler: Doppler) -> Vector3:
+        off = plus(doppler.velocity_ned_m_s, -1.0, self.velocity_ned_m_s)
+        return (off[0], off[1], 0.0)
+
+    def deviation(self, doppler: Doppler) -> float:
+        """How far a receiver's velocity is from this one, in standard deviations of the difference."""
+        size = self.variance_m2_s2 + doppler.trusted_variance_m2_s2
+        return math.hypot(*self._innovation(doppler)) / math.sqrt(size)
+
+    def update(self, doppler: Doppler) -> None:
+        """Take a receiver's velocity."""
+        innovation, size = self._innovation(doppler), self.variance_m2_s2 + doppler.trusted_variance_m2_s2
+        gain, gain_b = self.variance_m2_s2 / size, self.both_m2_s3 / size
+        self.velocity_ned_m_s = plus(self.velocity_ned_m_s, gain, innovation)
+        self.unseen_m_s2 = plus(self.unseen_m_s2, gain_b, innovation)
+        self.unseen_variance_m2_s4 -= gain_b * self.both_m2_s3
+        self.both_m2_s3 -= gain * self.both_m2_s3
+        self.variance_m2_s2 -= gain * self.variance_m2_s2
+        self.taken_boot_us = doppler.taken_boot_us
+
+    @property
+    def spread_m_s(self) -> float:
+        return math.sqrt(self.variance_m2_s2)
 
 
 def _faster_by(strapdown: Strapdown, since_s: float) -> Vector3 | None:

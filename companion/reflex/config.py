@@ -224,10 +224,6 @@ TILT_PER_S = 0.5
 MODEL_ERROR = 0.03
 # A receiver's velocity further off, in standard deviations, is beyond belief: PX4's EKF2_GPS_V_GATE.
 DOPPLER_GATE = 5.0
-# The same of a tilt by the gyroscopes, which a receiver's velocity shows: 3 degrees.
-LEVEL_SPREAD_M_S2 = 0.5
-# Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
-DRIFT_M2_S3 = 0.03
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
 COMPARED_S = 0.5

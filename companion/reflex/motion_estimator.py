@@ -22,9 +22,10 @@ from companion.motion.config import (
     LATEST_S,
     LONGEST_GAP_US,
     SAME_M_S,
+    SHOWN_US,
     STAMP_RESOLUTION_US,
 )
-from companion.motion.doppler import Doppler
+from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, along, limited, plus, split
@@ -32,7 +33,7 @@ from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
 from companion.reflex.correction import error_response
-from companion.reflex.filter_bank import ALL_AXES, DOWN_AXIS, NOTHING, FilterBank
+from companion.reflex.filter_bank import FilterBank
 from companion.reflex.laws import Contact, MotionState
 
 
@@ -49,14 +50,13 @@ class MotionEstimator:
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
-    has_agreed: bool = False  # with a receiver's velocity: no model is needed any more
     tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
-    unseen_m_s2: Vector3 = ZERO  # acceleration that the accelerometer does not show, as a receiver does
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
+    unseen_m_s2: Vector3 = ZERO  # acceleration that the accelerometer does not show, as a receiver does
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
@@ -65,10 +65,12 @@ class MotionEstimator:
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
     _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
     _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
+    _measured: MeasuredVelocity | None = None  # by a receiver
+    _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
+    _has_agreed: bool = False  # by itself: no model is needed any more
+    # Since when the reported velocity, without a model's error and as it is, is the measured one.
+    _agrees_since_boot_us: tuple[int | None, int | None] = (None, None)
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
-    _measured_boot_us: int = -CURRENT_US  # when a receiver's velocity was last taken
-    _was_odd: bool = False  # whether the last one was beyond belief: a second one counts
-    _agrees_since_boot_us: int | None = None  # for so long the reported velocity agrees with it
 
     def __post_init__(self) -> None:
         self.motion, self.pushed_boot_us = self.start, self.hit_boot_us
@@ -76,8 +78,8 @@ class MotionEstimator:
 
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
-        self._newest, self._agrees_since_boot_us = None, None
-        self.has_converged = self.has_agreed = False
+        self._newest, self._agrees_since_boot_us, self.has_converged = None, (None, None), False
+        self._has_agreed = False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
@@ -138,6 +140,38 @@ class MotionEstimator:
             plus(self.level_m_s2, 1.0, self.unseen_m_s2),
         )
 
+    def measure(self, doppler: Doppler) -> None:
+        """Take a receiver's velocity: the horizontal one from then on, until the vehicle's estimate has converged."""
+        was, begun_us = self._measured, self.pushed_boot_us
+        newest_us = begun_us if was is None else max(begun_us, was.taken_boot_us)
+        if self.is_fully_measured or self.has_converged or doppler.taken_boot_us <= newest_us:
+            return
+        known = was or MeasuredVelocity(self.motion.velocity_ned_m_s, self.spread_m_s**2, self._summed_m_s)
+        known.predict(self._time_boot_us, self._summed_m_s)
+        is_odd = known.deviation(doppler) > reflex.DOPPLER_GATE
+        was_odd, self._was_odd = self._was_odd, is_odd
+        if is_odd and not was_odd:
+            return
+        known.update(doppler)
+        self._measured, self.unseen_m_s2 = known, known.unseen_m_s2
+        self._believe(self.motion, self.spread_m_s)
+
+    @property
+    def is_measured_apart(self) -> bool:
+        """Whether a receiver shows the velocity, and the vehicle's own has not converged."""
+        if self._measured is None or self.is_fully_measured or self.has_converged:
+            return False
+        return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
+
+    def _believe(self, motion: MotionState, spread_m_s: float) -> None:
+        """The motion by the reports; the horizontal velocity by a receiver, where there is one."""
+        velocity, self.spread_m_s = motion.velocity_ned_m_s, spread_m_s
+        if self._measured is not None and self.is_measured_apart:
+            self._measured.predict(self._time_boot_us, self._summed_m_s)
+            n, e, _ = self._measured.velocity_ned_m_s
+            velocity, self.spread_m_s = (n, e, velocity[2]), self._measured.spread_m_s
+        self.motion = MotionState(motion.position_ned_m, velocity, self.motion.acceleration_ned_m_s2)
+
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
         at_us, since_us = sample.time_boot_us - round(1e6 * DELAY_S), sample.time_boot_us - self.hit_boot_us
@@ -147,59 +181,10 @@ class MotionEstimator:
             return
         if self.is_fully_measured:
             self.has_converged = True
-        elif not self.has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
+        elif not self._has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
             self._filter(sample, at_us)
         if self.has_converged:
             self._correct(sample)
-
-    def measure(self, doppler: Doppler) -> None:
-        """Take a receiver's velocity. From then on what the vehicle reports counts for its height alone, until both
-        have agreed for a while: then its estimate has converged.
-        """
-        if (
-            self.is_fully_measured
-            or self.has_converged
-            or doppler.taken_boot_us <= max(self._measured_boot_us, self.pushed_boot_us)
-        ):
-            return
-        bank = self._bank = self._bank or self._first_bank()
-        self._predict(bank)
-        velocity, variance = doppler.velocity_ned_m_s, doppler.trusted_variance_m2_s2
-        off = plus(velocity, -1.0, self.motion.velocity_ned_m_s)
-        is_odd = math.hypot(off[0], off[1]) > reflex.DOPPLER_GATE * math.hypot(self.spread_m_s, math.sqrt(variance))
-        was_odd, self._was_odd = self._was_odd, is_odd
-        if is_odd and not was_odd:
-            return
-        self._measured_boot_us = doppler.taken_boot_us
-        bank.measure(velocity, variance)
-        self.unseen_m_s2 = bank.unseen()
-        self._believe(*bank.estimate(NOTHING)[:2])
-
-    @property
-    def is_measured_apart(self) -> bool:
-        """Whether a receiver shows the velocity, and the vehicle's own has not come to agree with it."""
-        return not self.has_converged and self._time_boot_us - self._measured_boot_us < CURRENT_US
-
-    def _first_bank(self) -> FilterBank:
-        return FilterBank(self.start, self.spread_m_s, self._half_hidden_m_s)
-
-    @property
-    def _half_hidden_m_s(self) -> Vector3:
-        """Clipping hides between none and all of the change of velocity."""
-        return plus(ZERO, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
-
-    def _predict(self, bank: FilterBank) -> float:
-        """As of the newest sample; the time since the last prediction, s."""
-        elapsed_s = 1e-6 * (self._time_boot_us - self._at_boot_us)
-        # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
-        level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
-        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
-        self._at_boot_us, self._moved_m_s = self._time_boot_us, self._summed_m_s
-        return elapsed_s
-
-    def _believe(self, motion: MotionState, spread_m_s: float) -> None:
-        self.motion = replace(motion, acceleration_ned_m_s2=self.motion.acceleration_ned_m_s2)
-        self.spread_m_s = spread_m_s
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
         """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
@@ -207,9 +192,14 @@ class MotionEstimator:
         if abs(now_us - at_us) > LONGEST_GAP_US or now_us <= self._at_boot_us:
             # The report's time is outside the integrated interval.
             return
-        config, behind_s = self.config, 1e-6 * (now_us - at_us)
-        bank = self._bank = self._bank or self._first_bank()
-        elapsed_s = self._predict(bank)
+        config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - self._at_boot_us), 1e-6 * (now_us - at_us)
+        # Clipping hides between none and all of the change of velocity.
+        half = plus(ZERO, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
+        bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
+        # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
+        level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
+        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
+        self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
         g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
         # The report as of now.
         place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)
@@ -217,33 +207,42 @@ class MotionEstimator:
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * STAMP_RESOLUTION_US))
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
-        off_m_s = math.hypot(*self._half_hidden_m_s) * reflex.MODEL_ERROR
+        off_m_s = math.hypot(*half) * reflex.MODEL_ERROR
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
-        axes = DOWN_AXIS if self.is_measured_apart else ALL_AXES
-        bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2), axes)
-        bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2), axes)
+        bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
+        bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
         normal = self.contact.normal_ned
         bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
         estimate, spread_m_s, left_m_s = bank.estimate(left)
+        error_m_s = bank.mean_error(1, g)
         if self.is_measured_apart:
             self._believe(estimate, spread_m_s)
-            self.has_agreed = self.has_converged = self._agrees(velocity, sample.time_boot_us)
-            self.position_error_m = plus(place, -1.0, estimate.position_ned_m)
+            self._compare(velocity, error_m_s if left_m_s <= SAME_M_S else ZERO, sample.time_boot_us)
+        self.has_converged = self.has_converged or (left_m_s <= SAME_M_S and not self.is_measured_apart)
+        if self._has_agreed:
             return
-        self.has_converged = self.has_converged or left_m_s <= SAME_M_S
         if self.has_converged:
-            self.position_error_m, self._hidden_error_m_s = bank.mean_error(0, way_s), bank.mean_error(1, g)
+            self.position_error_m, self._hidden_error_m_s = bank.mean_error(0, way_s), error_m_s
             return
         self._believe(estimate, spread_m_s)
 
-    def _agrees(self, reported_m_s: Vector3, time_boot_us: int) -> bool:
-        """Whether the reported velocity has been the measured one for a while: a swing only passes it."""
-        off = plus(reported_m_s, -1.0, self.motion.velocity_ned_m_s)
-        if math.hypot(off[0], off[1]) > SAME_M_S:
-            self._agrees_since_boot_us = None
-            return False
-        self._agrees_since_boot_us = self._agrees_since_boot_us or time_boot_us
-        return time_boot_us - self._agrees_since_boot_us > 1e6 * reflex.COMPARED_S
+    def _agrees(self, velocity_m_s: Vector3, since_us: int | None, time_boot_us: int) -> int | None:
+        """Since when a velocity has been the measured one; None: it is not."""
+        off = plus(velocity_m_s, -1.0, self.motion.velocity_ned_m_s)
+        return None if math.hypot(off[0], off[1]) > SAME_M_S else since_us or time_boot_us
+
+    def _compare(self, reported_m_s: Vector3, error_m_s: Vector3, time_boot_us: int) -> None:
+        """Converged: a model has known the reported velocity's error for a moment, or there has been none for a while.
+
+        A swing only passes through what was measured.
+        """
+        by_model_us, by_itself_us = self._agrees_since_boot_us
+        by_model_us = self._agrees(plus(reported_m_s, -1.0, error_m_s), by_model_us, time_boot_us)
+        by_itself_us = self._agrees(reported_m_s, by_itself_us, time_boot_us)
+        self._agrees_since_boot_us = (by_model_us, by_itself_us)
+        is_explained = by_model_us is not None and time_boot_us - by_model_us > SHOWN_US
+        is_right = by_itself_us is not None and time_boot_us - by_itself_us > 1e6 * reflex.COMPARED_S
+        self.has_converged, self._has_agreed = is_explained or is_right, is_right and not is_explained
 
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter."""
