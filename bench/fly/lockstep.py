@@ -9,7 +9,6 @@ import numpy as np
 
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
-from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
@@ -17,6 +16,7 @@ from rebound_cli.results.truth_match import FlightTruth, Vector3
 from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle
 
 # The slowest hit into a surface that a detector's bars promise to find.
@@ -59,7 +59,7 @@ def flown_in(folder: Path, mission: Mission, scene: Scene, airframe: Airframe) -
     """From take-off to the end, log and events left in the folder."""
     recorder = FlightRecorder(folder)
     try:
-        flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
+        flown, _ = fly_mission_lockstep(mission, SimulatedVehicle(airframe, scene, scene.seed), recorder, Interrupts())
     finally:
         recorder.close()
     return flown, tuple(recorder.events)
