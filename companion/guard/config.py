@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from companion.autopilot.known import GUARDED_MODES, GUARDED_NAMES, MODE_NAMES
+from companion.autopilot.known import GUARDED_MODES, MODE_NAMES, NAMES
 from companion.fence import Fence
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
@@ -19,7 +19,7 @@ class GuardConfig(StrictModel):
     retired = frozenset({"beside_program"})
 
     modes: Annotated[tuple[str, ...], Field(min_length=1)] = GUARDED_MODES
-    """PX4's modes that the guard may take over."""
+    """The autopilot's modes that the guard may take over."""
     then: Literal["previous", "hold"] = "hold"
     """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
     on_crash: OnCrash = "tell"
@@ -51,7 +51,7 @@ class GuardConfig(StrictModel):
     def _known_modes(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
         for mode in modes:
             if mode not in MODE_NAMES:
-                raise ValueError(f"{mode!r} is no mode of {GUARDED_NAMES}: choose from {', '.join(sorted(MODE_NAMES))}")
+                raise ValueError(f"{mode!r} is no mode of {NAMES}: choose from {', '.join(sorted(MODE_NAMES))}")
         return modes
 
     def as_mission(self) -> Mission:

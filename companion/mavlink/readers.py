@@ -265,6 +265,21 @@ def _cast_parameter(param_id: bytes | str, param_value: float, param_type: int) 
     return messages.Parameter(name, param_value if is_real else int(param_value))
 
 
+# A pulse of a remote control, microseconds: its middle and the way to either end.
+_MIDDLE_US, _WAY_US = 1500, 500
+# One that is not connected has none, or all bits.
+_NO_PULSES = (0, 0xFFFF)
+
+
+def _radio(chan1_raw: int, chan2_raw: int, chan3_raw: int, chan4_raw: int) -> Sample | None:
+    """The pilot's sticks as ArduPilot has them by default: roll, pitch, throttle, yaw. Forward is the short pulse."""
+    pulses = (chan1_raw, chan2_raw, chan3_raw, chan4_raw)
+    if any(pulse in _NO_PULSES for pulse in pulses):
+        return None
+    right, back, up, clockwise = (min(max((pulse - _MIDDLE_US) / _WAY_US, -1.0), 1.0) for pulse in pulses)
+    return messages.Sticks((-back, right, up, clockwise))
+
+
 def _autopilot_version(flight_sw_version: int) -> Sample:
     # major, minor, patch, type: one byte each, from the top
     version = flight_sw_version
@@ -322,6 +337,7 @@ ARDUPILOT_READERS = _readers(
         dialect.MAVLink_attitude_target_message: _unbounded_target,
         dialect.MAVLink_param_value_message: _cast_parameter,
         EkfStatusReport: _ekf_status,
+        dialect.MAVLink_rc_channels_message: _radio,
     }
 )
 

@@ -17,7 +17,7 @@ _MOTOR_SHARE = 0.5
 
 def ardupilot_parameters(airframe: Airframe) -> tuple[Parameter, ...]:
     """Everything that must differ from Copter's defaults, by the names of 4.8."""
-    return (*_motors(airframe), *_gains(airframe), *_setpoints(airframe), *_flight_rules(), *_sensors())
+    return (*_motors(airframe), *_gains(airframe), *_setpoints(airframe), *_flight_rules(), *_estimator(), *_sensors())
 
 
 def _motors(airframe: Airframe) -> Iterable[Parameter]:
@@ -72,11 +72,23 @@ def _flight_rules() -> Iterable[Parameter]:
     yield Parameter("LOG_BACKEND_TYPE", 0, "the simulation has its own log")
 
 
+def _estimator() -> Iterable[Parameter]:
+    """A hit that clips the accelerometer leaves the velocity wrong by all of it: satellites put it right, and soon."""
+    yield Parameter("EK3_ACC_P_NSE", 1.0, "m/s2; leaves room for what a hit hides from the accelerometer")
+    for name in ("EK3_VELNE_M_NSE", "EK3_VELD_M_NSE", "EK3_POSNE_M_NSE"):
+        yield Parameter(name, 0.1, "m/s, m; the fix is an RTK receiver's")
+    for name in ("EK3_VEL_I_GATE", "EK3_POS_I_GATE"):
+        yield Parameter(name, 1000, "hundredths of a standard deviation; a hit must not make the true fix incredible")
+    yield Parameter("GPS1_RATE_MS", 100, "ten fixes a second")
+
+
 def _sensors() -> Iterable[Parameter]:
     """As the SITL simulates them: with these errors a compass and accelerometers are taken for calibrated."""
     for sensor in ("", "2", "3"):
         for axis, offset in (("X", 5), ("Y", 13), ("Z", -18)):
             yield Parameter(f"COMPASS_OFS{sensor}_{axis}", offset, "mG, of the SITL's compasses")
+    yield Parameter("SIM_GPS1_HZ", 10, "fixes a second")
+    yield Parameter("SIM_OPOS_ALT", 0.0, "m; the motors' thrust is that at sea level")
 
 
 def as_parameter_file(airframe: Airframe) -> str:

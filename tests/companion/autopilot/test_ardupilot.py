@@ -18,6 +18,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
+from companion.mavlink.moves import would_move
 from companion.messages import (
     AttitudeSetpoint,
     AttitudeTarget,
@@ -87,8 +88,8 @@ def test_a_hit_is_found_and_flown_away_from_and_the_crash_check_is_in_force_afte
 
 
 def test_force_flying_is_high_only_while_it_is_flown_by_attitude():
-    assert ARDUPILOT.changed_law(True) == (SetAuxFunction(159, 2),)
-    assert ARDUPILOT.changed_law(False) == ARDUPILOT.changed_law(None) == (SetAuxFunction(159, 0),)
+    assert ARDUPILOT.changed_law(True) == SetAuxFunction(159, 2)
+    assert ARDUPILOT.changed_law(False) == ARDUPILOT.changed_law(None) == SetAuxFunction(159, 0)
 
 
 @pytest.mark.parametrize(
@@ -205,14 +206,57 @@ def test_arming_that_is_refused_ends_the_flight_in_one_sentence():
     assert report.outcome == "failed" and report.reason.startswith("not armed: arm: the vehicle answered FAILED")
 
 
-def test_a_guard_refuses_what_it_does_not_fly():
-    guard, vehicle, pending = Guard(GuardConfig()), FakeCopter(), b""
-    while not guard.finished:
+def guarded(vehicle, until, limit_s=30.0):
+    """The guard on a link with the vehicle, until its state or its end."""
+    guard, pending = Guard(GuardConfig()), b""
+    while not (guard.finished or until(guard)):
         result = guard.step(vehicle.step(pending), EPOCH_US + vehicle.time_us)
         pending = b"".join(result.sent_frames)
-        assert vehicle.time_us < 30_000_000
-    assert guard.outcome == "the vehicle's autopilot is ArduPilot: a guard flies PX4 alone"
-    assert "GUIDED" not in MODE_NAMES
+        assert vehicle.time_us < limit_s * 1e6
+    return guard
+
+
+def test_a_guard_meets_a_copter_and_hears_its_sticks_as_pulses():
+    vehicle = FakeCopter()
+    guard = guarded(vehicle, lambda guard: guard.status().state == "standing by")
+    assert not guard.finished
+    streams = {int(message.param1) for _, message in vehicle.commands if message.command == 511}
+    assert {65, 85} <= streams and 69 not in streams
+    assert {"LOITER", "AUTO", "POSHOLD", "GUIDED"} <= MODE_NAMES
+    assert not {"STABILIZE", "ACRO", "LAND"} & set(GuardConfig().modes)
+
+
+def test_a_guard_refuses_a_copter_that_is_too_old():
+    guard = guarded(FakeCopter(flight_version=4 << 24 | 2 << 16 | 3 << 8), lambda _: False)
+    assert guard.outcome == "ArduPilot 4.2.3 is too old: ArduPilot 4.3 is the oldest that flies"
+
+
+def test_what_a_dead_companion_left_high_is_set_low_when_the_next_one_begins():
+    vehicle = FakeCopter()
+    guarded(vehicle, lambda guard: guard.status().state == "standing by")
+    switched = [message.param2 for _, message in vehicle.commands if message.command == AUX_FUNCTION]
+    assert switched == [0.0]
+
+
+def test_a_switch_that_is_not_answered_is_set_again():
+    vehicle = FakeCopter(ack=lambda command, count: [] if command == AUX_FUNCTION and count < 3 else [0])
+    guarded(vehicle, lambda guard: guard.status().state == "standing by" and vehicle.time_us > 4_000_000)
+    switched = [message.confirmation for _, message in vehicle.commands if message.command == AUX_FUNCTION]
+    assert switched == [0, 1, 2]
+
+
+@pytest.mark.parametrize("current", [0, 2, 3])
+def test_a_place_that_dronekit_sends_is_kept_out_while_a_guard_recovers(current):
+    fields = (1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0)
+    item = mav.MAVLink_mission_item_message(*fields, 1.0, 2.0, 3.0)
+    assert would_move(bytes(item.pack(mav.MAVLink(None, 255, 0))), ARDUPILOT) is (current != 0)
+
+
+def test_a_radios_pulses_are_the_pilots_sticks():
+    pulses = (1600, 1300, 1000, 1500, *(0,) * 14)
+    message = mav.MAVLink_rc_channels_message(0, 8, *pulses, 255)
+    assert heard(message).deflections == pytest.approx((0.4, 0.2, -1.0, 0.0))
+    assert heard(mav.MAVLink_rc_channels_message(0, 0, *(0xFFFF,) * 18, 255)) is None
 
 
 # --- preflight
