@@ -60,6 +60,7 @@ class MessageId(IntEnum):
     """MAVLink ids of the streams the companion asks for and of the messages it requests."""
 
     HEARTBEAT = 0
+    RAW_IMU = 27
     ATTITUDE_QUATERNION = 31
     LOCAL_POSITION_NED = 32
     RC_CHANNELS = 65

@@ -85,6 +85,8 @@ class Autopilot:
     """Older ones are refused."""
     streams: tuple[SetMessageInterval, ...]
     """Asked for beside those that all autopilots have."""
+    lesser_imu: MessageId | None
+    """Of boards that do not have HIGHRES_IMU."""
     estimator_message: MessageId
     """In which it tells how good its estimate is."""
     sticks_message: MessageId

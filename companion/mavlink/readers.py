@@ -88,6 +88,17 @@ def _imu(
     return messages.ImuSample(time_usec, force, rates)
 
 
+# What RAW_IMU counts in, SI: thousandths of standard gravity, and of a radian a second.
+_MILLI_G_M_S2, _MILLI_RAD_S = 9.80665e-3, 1e-3
+
+
+def _raw_imu(time_usec: int, xacc: int, yacc: int, zacc: int, xgyro: int, ygyro: int, zgyro: int) -> Sample | None:
+    """As ArduPilot has it: the same samples as in HIGHRES_IMU, rounded."""
+    force = (_MILLI_G_M_S2 * xacc, _MILLI_G_M_S2 * yacc, _MILLI_G_M_S2 * zacc)
+    rates = (_MILLI_RAD_S * xgyro, _MILLI_RAD_S * ygyro, _MILLI_RAD_S * zgyro)
+    return _imu(time_usec, *force, *rates, ACCELEROMETER_UPDATED)
+
+
 def _local_position(time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Sample:
     if not (hypot(x, y, z) <= messages.POSITION_M and hypot(vx, vy, vz) <= messages.VELOCITY_M_S):
         return _moves_too_far("LOCAL_POSITION_NED", x, y, z, vx, vy, vz)
@@ -338,6 +349,7 @@ ARDUPILOT_READERS = _readers(
         dialect.MAVLink_param_value_message: _cast_parameter,
         EkfStatusReport: _ekf_status,
         dialect.MAVLink_rc_channels_message: _radio,
+        dialect.MAVLink_raw_imu_message: _raw_imu,
     }
 )
 

@@ -36,6 +36,7 @@ ARDUPILOT = Autopilot(
     least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
     # It has no CURRENT_MODE: how soon a pilot's mode is seen depends on this alone.
     streams=(SetMessageInterval(MessageId.HEARTBEAT, 50_000),),
+    lesser_imu=MessageId.RAW_IMU,
     estimator_message=MessageId.EKF_STATUS_REPORT,
     sticks_message=MessageId.RC_CHANNELS,
     is_told_to_take_off=True,
@@ -50,7 +51,7 @@ ARDUPILOT = Autopilot(
     judge_vehicle=setup.judge_vehicle,
     judge_parameters=setup.judge_parameters,
     remedies=Remedies(
-        slow_streams="serial: SERIAL2_PROTOCOL 2, SERIAL2_BAUD 921; a board without HIGHRES_IMU cannot be flown",
+        slow_streams="serial: SERIAL2_PROTOCOL 2, SERIAL2_BAUD 921",
         full_link="the link is full: SERIAL2_BAUD 921",
         no_time="MAVLink 2 on the link (SERIAL2_PROTOCOL 2)",
         no_battery="set up the power module (BATT_MONITOR)",
