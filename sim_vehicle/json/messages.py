@@ -20,7 +20,7 @@ class Pulses:
     """ArduPilot's answer to a state."""
 
     count: int
-    """Of the frame. The same once more: it has not heard the state."""
+    """Of the frame. A SITL that has waited for a second says the same once more."""
     widths_us: tuple[int, ...]
     """0 of an output that does not run yet."""
 

@@ -23,8 +23,6 @@ class JsonVehicle:
         self._plant = Plant(sampled_every(airframe, SAMPLE_INTERVAL_US), scene, seed)
         self._motors = airframe.rotor_count
         self._body = self._plant.state.body
-        self._count: int | None = None
-        self._said = b""
         self.time_boot_us = 0
 
     @property
@@ -33,10 +31,7 @@ class JsonVehicle:
         return self._plant.truth
 
     def answer(self, pulses: Pulses) -> bytes:
-        """Advance one sample and tell of it; what ArduPilot has not heard is told once more."""
-        if pulses.count == self._count:
-            return self._said
-        self._count = pulses.count
+        """Advance one sample and tell of it."""
         output = self._plant.drive(pulses.motor_fractions(self._motors))
         self.time_boot_us = output.time_boot_us
         north, east, down, v_north, v_east, v_down, w, x, y, z = self._body[:10].tolist()
@@ -48,5 +43,4 @@ class JsonVehicle:
             attitude_wxyz=(w, x, y, z),
             velocity_ned_m_s=(v_north, v_east, v_down),
         )
-        self._said = state.line()
-        return self._said
+        return state.line()

@@ -7,9 +7,9 @@ from contextlib import closing
 from typing import Self
 
 from sim_vehicle.errors import VehicleEnded
-from sim_vehicle.json.messages import pulses_from
+from sim_vehicle.json.messages import Pulses, pulses_from
 from sim_vehicle.json.vehicle import JsonVehicle
-from sim_vehicle.shell.ports import bound_socket
+from sim_vehicle.shell.ports import Address, bound_socket
 from sim_vehicle.truth import TruthRecorder
 
 # Of the SITL's instance 0; each further one has them ten higher (SITL_cmdline.cpp).
@@ -33,6 +33,7 @@ class ArduPilotVehicle:
     def __init__(self, body: JsonVehicle, instance: int, is_stopped: Callable[[], bool]) -> None:
         """Waits for the SITL to start. Raises PortInUse, and VehicleEnded when stopped."""
         self._body = body
+        self._answered: int | None = None
         self._states = bound_socket(socket.SOCK_DGRAM, "127.0.0.1", JSON_PORT + PORTS_APART * instance)
         self._states.settimeout(_SILENCE_S)
         try:
@@ -67,15 +68,21 @@ class ArduPilotVehicle:
         try:
             if received:
                 self._mavlink.sendall(received)
-            while True:
-                packet, sender = self._states.recvfrom(_RECEIVE_BYTES)
-                if (pulses := pulses_from(packet)) is not None:
-                    break
+            pulses, sender = self._pulses()
             said = self._heard()
             self._states.sendto(self._body.answer(pulses), sender)
         except (TimeoutError, ConnectionError) as problem:
             raise VehicleEnded("ArduPilot's SITL has ended, or does not fly with --model JSON.") from problem
         return said
+
+    def _pulses(self) -> tuple[Pulses, Address]:
+        """The next ones. On one machine no answer is lost: what is said once more has been answered since."""
+        while True:
+            packet, sender = self._states.recvfrom(_RECEIVE_BYTES)
+            pulses = pulses_from(packet)
+            if pulses is not None and pulses.count != self._answered:
+                self._answered = pulses.count
+                return pulses, sender
 
     def _heard(self) -> list[bytes]:
         try:

@@ -67,13 +67,6 @@ def test_full_thrust_lifts_by_what_the_motors_have_over_the_weight() -> None:
     assert climbed_m_s == pytest.approx(0.1 * lifts_m_s2, rel=0.1)
 
 
-def test_a_state_that_was_not_heard_is_told_once_more() -> None:
-    vehicle = JsonVehicle(FOLDABLE, Scene(), 1)
-    first = vehicle.answer(Pulses(1, (STOPPED,) * 4))
-    assert vehicle.answer(Pulses(1, (FULL,) * 4)) == first
-    assert vehicle.time_boot_us == 1000
-
-
 def test_keys_come_in_the_order_in_which_ardupilot_looks_for_their_letters() -> None:
     line = JsonVehicle(FOLDABLE, Scene(), 1).answer(Pulses(1, (STOPPED,) * 4)).decode()
     keys = ("timestamp", "imu", "gyro", "accel_body", "position", "quaternion", "velocity")
