@@ -384,7 +384,7 @@ def add_identify(commands: Commands) -> None:
 
 def add_airframe(commands: Commands) -> None:
     text = "PX4's or ArduPilot's parameters for one of our airframes, on standard output."
-    what = "print an airframe for an autopilot"
+    what = "print an airframe"
     airframe = _command(commands, "airframe", "beginning.airframe:run_airframe", what, text)
     _option(airframe, "target", "for whom", choices=("px4", "ardupilot"))
     _option(airframe, "--airframe", "default: foldable", "NAME|FILE", default="foldable")
