@@ -78,7 +78,7 @@ def _estimator() -> Iterable[Parameter]:
     for name in ("EK3_VELNE_M_NSE", "EK3_VELD_M_NSE", "EK3_POSNE_M_NSE"):
         yield Parameter(name, 0.1, "m/s, m; the fix is an RTK receiver's")
     for name in ("EK3_VEL_I_GATE", "EK3_POS_I_GATE"):
-        yield Parameter(name, 1000, "hundredths of a standard deviation; a hit must not make the true fix incredible")
+        yield Parameter(name, 5000, "hundredths of a standard deviation; a hit must not make the true fix incredible")
     yield Parameter("GPS1_RATE_MS", 100, "ten fixes a second")
 
 
