@@ -111,7 +111,7 @@ class Stepped(ABC, Generic[CoreT]):
     @property
     def finished(self) -> bool:
         """Ended, and nothing left to send."""
-        return self._core is not None and self._core.machine.finished
+        return self._core is not None and self._core.finished
 
     def status(self) -> Status:
         """For the live line."""

@@ -19,6 +19,7 @@ from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.states import FINAL_STATES, State
 from companion.flight.vehicle_update import landed, note_height, situation_of, update_vehicle
+from companion.link.commands import CommandClient
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import (
@@ -27,7 +28,6 @@ from companion.messages import (
     OnboardHeartbeat,
     Outgoing,
     Sample,
-    SendCommand,
     Vector3,
 )
 from companion.mission.model import Mission
@@ -75,6 +75,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self._sample_boot_us = 0
         self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
+        # What the vehicle is told of it, and whether it is still to be told, or to answer.
+        self._law, self._is_met, self._is_telling = CommandClient(), False, True
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
 
@@ -106,6 +108,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
+        if self._is_telling:
+            self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
         self._beat(now_us)
         try:
@@ -186,7 +190,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             return
         interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
         if not holds:
-            self._change_law(None)
+            self._change_law(None, now_us)
         due_us = self._setpoint_due_us + interval_us
         is_on_time = not (moved or follows_imu) and due_us > now_us
         self._setpoint_due_us = due_us if is_on_time else now_us + interval_us
@@ -196,6 +200,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         try:
             target = self.machine.handler.target(now_us)
             if target is None:
+                if self._leans:
+                    self._change_law(None, now_us)
                 return
             # Without control the setpoint is the vehicle's own position, and is not limited.
             if holds:
@@ -213,13 +219,40 @@ class Core(ABC, Generic[FlightT, MachineT]):
             self._note_sent(sent, now_us)
         flight.outbox.append(self.resets.sent(setpoint))
         if holds:
-            self._change_law(target.lean is not None)
+            self._change_law(target.lean is not None, now_us)
 
-    def _change_law(self, leans: bool | None) -> None:
+    def _change_law(self, leans: bool | None, now_us: int) -> None:
         """Tell the vehicle by what it is flown from now on; None: no more by this companion."""
         if leans != self._leans:
             self._leans = leans
-            self.flight.outbox += [SendCommand(told, 0) for told in self.flight.vehicle.autopilot.changed_law(leans)]
+            self._tell_law(now_us)
+
+    def _tell_law(self, now_us: int) -> None:
+        told = self.flight.vehicle.autopilot.changed_law(self._leans)
+        self._law.cancel()
+        self._is_telling = told is not None
+        if told is not None:
+            self._law.begin(told)
+            self._repeat_law((), now_us)
+
+    def _repeat_law(self, samples: Sequence[Sample], now_us: int) -> None:
+        """Until the vehicle has answered. It hears of it first when it is met: a companion may have died before."""
+        if not self._is_met and self.flight.vehicle.identity is not None:
+            self._is_met = True
+            self._tell_law(now_us)
+        elif self._law.busy:
+            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
+            send, outcome = self._law.step(acks, False, now_us)
+            if send is not None:
+                self.flight.outbox.append(send)
+            self._is_telling = outcome is None
+            if outcome is not None and not outcome.succeeded:
+                self.flight.report(now_us, "command", outcome.text)
+
+    @property
+    def finished(self) -> bool:
+        """Ended, and the vehicle has answered the last word, or does not."""
+        return self.machine.finished and not self._law.busy
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         """Note a setpoint that was sent while the companion has the vehicle."""

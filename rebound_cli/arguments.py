@@ -19,7 +19,7 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 Run: TypeAlias = Callable[[argparse.Namespace], int]
 Number = TypeVar("Number", int, float)
 
-SIMULATED_AUTOPILOTS = ("builtin", "px4")
+SIMULATED_AUTOPILOTS = ("builtin", "px4", "ardupilot")
 # What stands for a path in the help.
 _PATHS = ("FILE", "DIR", "PATH", "RUN")
 _SET_MISSION = "change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5"
@@ -174,7 +174,8 @@ def add_fly(commands: Commands) -> None:
     how = fly.add_mutually_exclusive_group()
     text = (
         "start the simulated vehicle and fly it in real time over UDP, as without any of these; "
-        "px4: with your PX4 as its autopilot, see docs/how-to/px4.md"
+        "px4: with your PX4 as its autopilot, see docs/how-to/px4.md; "
+        "ardupilot: with your Copter, in lockstep, see docs/how-to/ardupilot.md"
     )
     own, *_ = SIMULATED_AUTOPILOTS
     _option(how, "--sim", text, "px4", nargs="?", choices=SIMULATED_AUTOPILOTS, const=own, default=own)
@@ -182,7 +183,8 @@ def add_fly(commands: Commands) -> None:
     _add_connect(how, required=False)
     _add_world_options(fly)
     _option(fly, "--out", "folder of this run (default: runs/<time>-<mission>)", "DIR")
-    _option(fly, "--instance", "with --sim px4: PX4's instance (its option -i)", "N", type=instance, default=0)
+    text = "with --sim px4 or ardupilot: the autopilot's instance (its option -i or -I)"
+    _option(fly, "--instance", text, "N", type=instance, default=0)
     _add_companion(fly)
     _option(fly, "--resume", "go on with the mission where the flight in this folder was interrupted", "RUN")
     _option(fly, "--obstacles", "what is known beforehand, e.g. another run's obstacles.json", "FILE")
@@ -225,7 +227,7 @@ def add_sim(commands: Commands) -> None:
     _option(sim, "--mission", "mission whose sim: part describes the world", "MISSION", type=mission_file)
     _add_world_options(sim)
     text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/how-to/px4.md"
-    _option(sim, "--autopilot", text, choices=SIMULATED_AUTOPILOTS, default="builtin")
+    _option(sim, "--autopilot", text, choices=("builtin", "px4"), default="builtin")
     text = (
         "UDP port to listen on for the companion (default 14580 + instance; 0: any free one); "
         "with --autopilot px4 the TCP port (4560)"
@@ -396,14 +398,15 @@ def add_identify(commands: Commands) -> None:
 
 
 def add_airframe(commands: Commands) -> None:
-    text = "PX4's parameters for one of our airframes, on standard output."
-    airframe = _command(commands, "airframe", "beginning.airframe:run_airframe", "print an airframe for PX4", text)
-    _option(airframe, "target", "for whom", choices=("px4",))
+    text = "PX4's or ArduPilot's parameters for one of our airframes, on standard output."
+    what = "print an airframe"
+    airframe = _command(commands, "airframe", "beginning.airframe:run_airframe", what, text)
+    _option(airframe, "target", "for whom", choices=("px4", "ardupilot"))
     _option(airframe, "--airframe", "default: foldable", "NAME|FILE", default="foldable")
-    text = "what PX4 flies by: motion capture, as indoors (default), an RTK GPS, or optical flow and a range finder"
-    _option(airframe, "--position", text, choices=("mocap", "gps", "flow"), default="mocap")
-    text = "env: exports that PX4 SITL reads at start (default); params: for QGroundControl; airframe: for PX4"
-    _option(airframe, "--format", text, choices=("env", "params", "airframe"), default="env")
+    text = "px4: what it flies by: motion capture, as indoors (default), an RTK GPS, or optical flow and a range finder"
+    _option(airframe, "--position", text, choices=("mocap", "gps", "flow"))
+    text = "px4: env, exports that PX4 SITL reads at start (default); params, for QGroundControl; airframe, for PX4"
+    _option(airframe, "--format", text, choices=("env", "params", "airframe"))
 
 
 def add_key(commands: Commands) -> None:

@@ -6,6 +6,7 @@ from argparse import Namespace
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from companion.companion import Companion
 from companion.errors import ConfigurationError, ReboundError
@@ -30,6 +31,9 @@ from rebound_cli.results.summary import FlightFacts, Flown, build_summary
 from rebound_cli.results.truth_match import read_truth
 from rebound_cli.simulation.compiling import prepare_vehicle
 from rebound_cli.simulation.vehicle_process import READY_WORDS, VehicleProcess
+
+if TYPE_CHECKING:
+    from rebound_cli.simulation.lockstep import SteppedVehicle
 
 # Where PX4's SITL sends its onboard streams unasked, plus its instance.
 PX4_COMPANION_PORT = 14540
@@ -70,11 +74,12 @@ def run_fly(options: Namespace) -> int:
         mission = inputs.mission_from(document, world)
     if mission.companion.link.wait and options.yes:
         raise ConfigurationError("--wait with --yes would arm a vehicle whenever it appears: leave one of them out.")
-    if options.watch and options.lockstep:
+    if options.watch and (options.lockstep or options.sim == "ardupilot"):
         raise ConfigurationError("--watch belongs to flights in real time: this one's page is its report.html.")
     run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
-        if world is not None and options.lockstep:
+        is_lockstep = is_simulated and (options.lockstep or options.sim == "ardupilot")
+        if world is not None and is_lockstep:
             prepare_vehicle(console, world)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
         connection = None if is_simulated else open_signed(options, mission.companion.link.wait)
@@ -86,9 +91,7 @@ def run_fly(options: Namespace) -> int:
             folder, ring = folder_with_room(options.out, mission.name, mission.companion.disk)
         _write_inputs(folder, options.mission, mission, world)
         # In lockstep the vehicle waits for the disk as for everything else.
-        recorder = FlightRecorder(
-            folder, None if options.lockstep else Background("log"), ring.make_room if ring else None
-        )
+        recorder = FlightRecorder(folder, None if is_lockstep else Background("log"), ring.make_room if ring else None)
         with watched_page(folder, console, options.watch), Interrupts() as interrupts:
             followed = Followed() if is_simulated else None
             flight = Flight(mission, world, folder, recorder, console, interrupts, followed)
@@ -102,6 +105,8 @@ def run_fly(options: Namespace) -> int:
 def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> Flown:
     if options.lockstep:
         return _fly_lockstep(flight)
+    if options.connect is None and options.sim == "ardupilot":
+        return _fly_ardupilot(flight, options.instance)
     if options.connect is None:
         return _fly_beside_vehicle(flight, connection, options.instance)
     assert connection is not None, "--connect has one"
@@ -172,12 +177,37 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
 
 
 def _fly_lockstep(flight: Flight) -> Flown:
+    from sim_vehicle.vehicle import SimulatedVehicle
+
+    assert flight.world is not None, "a lockstep flight has a simulated world"
+    world = flight.world
+    return _fly_stepped(flight, SimulatedVehicle(world.airframe, world.scene, world.seed))
+
+
+def _fly_ardupilot(flight: Flight, instance: int) -> Flown:
+    """The body of the vehicle, for the ArduPilot that the person starts."""
+    from sim_vehicle.json.vehicle import JsonVehicle
+    from sim_vehicle.shell.json_udp import MAVLINK_PORT, PORTS_APART, ArduPilotVehicle
+
+    assert flight.world is not None, "a simulated flight has a simulated world"
+    world, port = flight.world, MAVLINK_PORT + PORTS_APART * instance
+    body = JsonVehicle(world.airframe, world.scene, world.seed)
+    flight.console.print(f"Waiting for ArduPilot's SITL at TCP port {port} (docs/how-to/ardupilot.md) ...")
+
+    def is_stopped() -> bool:
+        return flight.interrupts.reason is not None
+
+    with ArduPilotVehicle(body, instance, is_stopped) as vehicle:
+        vehicle.start(is_stopped)
+        return _fly_stepped(flight, vehicle)
+
+
+def _fly_stepped(flight: Flight, vehicle: "SteppedVehicle") -> Flown:
     from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
     from sim_vehicle.shell.truth_file import save_truth
 
-    assert flight.world is not None, "a lockstep flight has a simulated world"
     flown, truth = fly_mission_lockstep(
-        flight.mission, flight.world, flight.recorder, flight.interrupts, flight.console, flight.followed
+        flight.mission, vehicle, flight.recorder, flight.interrupts, flight.console, flight.followed
     )
     save_truth(flight.folder / run_folder.TRUTH_NAME, truth, EPOCH_US)
     return flown

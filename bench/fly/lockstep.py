@@ -13,7 +13,6 @@ from companion.companion import Companion, StepResult
 from companion.guard.guard import Guard
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
-from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
@@ -75,7 +74,7 @@ def flown_in(folder: Path, mission: Mission, scene: Scene, airframe: Airframe) -
     """From take-off to the end, log and events left in the folder."""
     recorder = FlightRecorder(folder)
     try:
-        flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
+        flown, _ = fly_mission_lockstep(mission, SimulatedVehicle(airframe, scene, scene.seed), recorder, Interrupts())
     finally:
         recorder.close()
     return flown, tuple(recorder.events)

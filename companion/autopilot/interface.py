@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from companion.autopilot.setup import PreflightItem, SerialLine, Setup, Sight
-from companion.messages import SetMessageInterval, SetMode, VehicleCommand
+from companion.messages import MessageId, SetMessageInterval, SetMode, VehicleCommand
 
 
 class Pilot(Enum):
@@ -74,7 +74,7 @@ class Autopilot:
     """Modes that end on the ground."""
     mode_names: frozenset[str]
     guarded_modes: tuple[str, ...]
-    """Names of the modes that a guard may take over by default; none where no guard flies it."""
+    """Names of the modes that a guard may take over by default."""
     mode_name: Callable[[int], str]
     """As the autopilot's own tools print it."""
     pilot: Callable[[int], Pilot | None]
@@ -85,11 +85,17 @@ class Autopilot:
     """Older ones are refused."""
     streams: tuple[SetMessageInterval, ...]
     """Asked for beside those that all autopilots have."""
-    estimator_message: int
+    lesser_imu: MessageId | None
+    """Of boards that do not have HIGHRES_IMU."""
+    estimator_message: MessageId
     """In which it tells how good its estimate is."""
+    sticks_message: MessageId
+    """In which it tells where the pilot's sticks are."""
     is_told_to_take_off: bool
     """Its setpoints do not lift it off the ground: a command does."""
-    changed_law: Callable[[bool | None], tuple[VehicleCommand, ...]]
+    wants_setpoints_first: bool
+    """It takes the mode that flies them only while they come."""
+    changed_law: Callable[[bool | None], VehicleCommand | None]
     """What it is told when it is flown by attitude from now on (True), by position (False), or no more (None)."""
     attitude_parameters: tuple[str, ...]
     """Read before it is flown by attitude."""

@@ -7,9 +7,5 @@ AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4, ARDUPILO
 # Of a vehicle that has not announced itself yet.
 ASSUMED = PX4
 NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values())
-# Of the autopilots that a guard flies.
-MODE_NAMES = frozenset(
-    name for autopilot in AUTOPILOTS.values() if autopilot.guarded_modes for name in autopilot.mode_names
-)
-GUARDED_NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values() if autopilot.guarded_modes)
+MODE_NAMES = frozenset(name for autopilot in AUTOPILOTS.values() for name in autopilot.mode_names)
 GUARDED_MODES = tuple(mode for autopilot in AUTOPILOTS.values() for mode in autopilot.guarded_modes)

@@ -2,13 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from itertools import chain
 from typing import Generic, TypeVar
 
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
 from companion.flight.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
-from companion.messages import LandedState, MessageId, RequestMessage, VehicleCommand
+from companion.messages import LandedState, MessageId, RequestMessage, SetMessageInterval, VehicleCommand
 
 MoveT = TypeVar("MoveT")
 
@@ -19,6 +20,7 @@ class Meet(NoSetpoint, ABC, Generic[MoveT]):
     def __init__(self, now_us: int) -> None:
         self._started_us = now_us
         self._requests: Iterator[VehicleCommand] | None = None
+        self._asked: VehicleCommand | None = None  # last
         self._measuring_since_us: int | None = None
         self._is_told = False  # what is waited for
 
@@ -62,16 +64,24 @@ class Meet(NoSetpoint, ABC, Generic[MoveT]):
     def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
         if flight.command_client.busy:
-            flight.command_outcome(inputs, False, now_us)
+            outcome = flight.command_outcome(inputs, False, now_us)
+            if outcome is not None and outcome.refused:
+                requests = self._requests = chain(self._in_its_place(flight), requests)
         if flight.command_client.busy:
             return
-        request = next(requests, None)
+        self._asked = request = next(requests, None)
         if request is not None:
             flight.command_client.begin(request)
             flight.command_outcome(Inputs(), False, now_us)
         else:
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
+
+    def _in_its_place(self, flight: FlightContext) -> Iterator[VehicleCommand]:
+        """Of a stream that the vehicle does not have."""
+        asked, imu = self._asked, flight.vehicle.autopilot.lesser_imu
+        if isinstance(asked, SetMessageInterval) and asked.message_id == MessageId.HIGHRES_IMU and imu is not None:
+            yield SetMessageInterval(imu, asked.interval_us)
 
     def _ask_again(self, flight: FlightContext, text: str, now_us: int) -> None:
         """What is missing may come: a vehicle that has just started has no position."""

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from companion.autopilot.known import GUARDED_MODES, GUARDED_NAMES, MODE_NAMES
+from companion.autopilot.known import GUARDED_MODES, MODE_NAMES, NAMES
 from companion.fence import Fence
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
@@ -19,7 +19,7 @@ class GuardConfig(StrictModel):
     retired = frozenset({"beside_program"})
 
     modes: Annotated[tuple[str, ...], Field(min_length=1)] = GUARDED_MODES
-    """PX4's modes that the guard may take over."""
+    """Modes that the guard may take over."""
     then: Literal["previous", "hold"] = "hold"
     """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
     on_crash: OnCrash = "tell"
@@ -34,8 +34,8 @@ class GuardConfig(StrictModel):
     """How long OFFBOARD may take; then the vehicle is asked to hold. The answer takes 10 ms, CURRENT_MODE at 10 Hz 100
     ms; a command lost on the way is repeated after 500 ms."""
     lead_hz: Annotated[Positive, Field(ge=2.0, le=50.0)] = 10.0
-    """Rate of setpoints before there is a hit. PX4 wants 2 Hz to be seen before it takes OFFBOARD; five times that
-    survives a link that loses packets."""
+    """Rate of setpoints before there is a hit. PX4 wants 2 Hz before it takes OFFBOARD; five times that
+    survives lost packets."""
     fence: Fence = Fence(radius_m=100_000.0, max_height_m=10_000.0)
     """Where recoveries may lead. From where the vehicle was armed. Nobody knows a stranger's field: as good as none
     until it is given."""
@@ -51,7 +51,7 @@ class GuardConfig(StrictModel):
     def _known_modes(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
         for mode in modes:
             if mode not in MODE_NAMES:
-                raise ValueError(f"{mode!r} is no mode of {GUARDED_NAMES}: choose from {', '.join(sorted(MODE_NAMES))}")
+                raise ValueError(f"{mode!r} is no mode of {NAMES}: choose from {', '.join(sorted(MODE_NAMES))}")
         return modes
 
     def as_mission(self) -> Mission:

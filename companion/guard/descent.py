@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.autopilot.interface import Pilot
-from companion.autopilot.known import ASSUMED
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.messages import LandedState, PositionTarget, Sample, Sticks
 from companion.motion.config import SAME_M_S
 
-STICK_DEADZONE = ASSUMED.defaults.stick_deadzone
 THROTTLE = 2
 
 
@@ -35,7 +33,8 @@ class Descent:
         """
         if vehicle.landed is LandedState.LANDING or vehicle.descends or vehicle.pilot is Pilot.HAND:
             return True
-        sinks = self.setpoint_us is None if self.throttle is None else self.throttle < -STICK_DEADZONE
+        deadzone = vehicle.autopilot.defaults.stick_deadzone
+        sinks = self.setpoint_us is None if self.throttle is None else self.throttle < -deadzone
         if vehicle.pilot is Pilot.STICKS and sinks:
             return True
         is_current = self.setpoint_us is not None and now_us - self.setpoint_us < OLD_NEWS_US

@@ -9,7 +9,7 @@ from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.states import State
-from companion.guard.watching import OWN_STREAMS, GuardConnect
+from companion.guard.watching import GuardConnect, own_streams
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
 from companion.reflex.collision import CollisionReport
@@ -65,7 +65,8 @@ class Guard(Stepped[GuardCore]):
         if self._core is None:
             return
         flight = self._core.flight
-        for request in (*[stream.request() for stream in flight.streams.streams], *OWN_STREAMS):
+        own = own_streams(flight.vehicle.autopilot)
+        for request in (*[stream.request() for stream in flight.streams.streams], *own):
             is_enough = 0 < asked.interval_us <= request.interval_us
             if request.message_id == asked.message_id and not is_enough:
                 flight.outbox.append(SendCommand(request, 0))

@@ -44,7 +44,8 @@ class TakeOver:
         took_ms = (now_us - self._began_us) / 1e3
         if is_seen:
             guard.expected_mode = guard.vehicle.autopilot.setpoints
-            text = "OFFBOARD already, the program's setpoints kept out" if outcome is None else "OFFBOARD confirmed"
+            name = guard.vehicle.mode_name
+            text = f"{name} already, the program's setpoints kept out" if outcome is None else f"{name} confirmed"
             guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return GuardTransition(Trigger.CONFIRMED)
         recovered(guard, self.recover, inputs, now_us)
@@ -52,9 +53,8 @@ class TakeOver:
             return GuardTransition(Trigger.NOT_CONFIRMED, outcome.text)
         # A late step is no refusal: the answer may not have been read yet.
         if guard.trajectory_us - self._trajectory_began_us > guard.config.confirm_within_s * 1e6:
-            return GuardTransition(
-                Trigger.NOT_CONFIRMED, f"OFFBOARD not seen within {guard.config.confirm_within_s:g} s"
-            )
+            name = guard.vehicle.autopilot.mode_name(guard.vehicle.autopilot.setpoints)
+            return GuardTransition(Trigger.NOT_CONFIRMED, f"{name} not seen within {guard.config.confirm_within_s:g} s")
         return None
 
 

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from companion.autopilot.known import ASSUMED
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
 from companion.flight.crash import crashed
@@ -36,8 +35,6 @@ _KINDS = {
     Trigger.REFUSED: "ended",
 }
 STICKS = "the pilot moved the sticks"
-# Of a deflection, by which the autopilot itself takes a pilot to have taken over.
-MOVED = ASSUMED.defaults.stick_override
 # Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD and takes it again by itself 0.09 s
 # after the next one. Its mode is reported every 0.1 s. A failsafe that lasts for twice all that is for another reason.
 RETURNS_US = 400_000
@@ -159,7 +156,8 @@ class GuardMachine(StateMachine):
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight
         report, expected = guard.vehicle.mode, guard.expected_mode
-        if guard.sticks is not None and any(has_moved(guard.sticks, now) for now in inputs.sticks):
+        override = guard.vehicle.autopilot.defaults.stick_override
+        if guard.sticks is not None and any(has_moved(guard.sticks, now, override) for now in inputs.sticks):
             return STICKS
         if report is None or expected is None:
             return None
@@ -245,14 +243,15 @@ class GuardMachine(StateMachine):
         return Recover(self.flight, recovery)
 
 
-def has_moved(before: Sticks, now: Sticks) -> bool:
-    """Have the pilot's sticks been moved? By PX4's default that ends AUTO modes and not OFFBOARD.
+def has_moved(before: Sticks, now: Sticks, override: float) -> bool:
+    """Have the pilot's sticks been moved, as far as the autopilot itself takes for a takeover? By PX4's default that
+    ends AUTO modes and not OFFBOARD.
 
     A stick pushed to a new place counts; one let go does not: a pilot startled by a hit opens the hand. The throttle's
     middle is PX4's too; one that has no spring lies anywhere, and only its way from there counts.
     """
     for place, (was, deflection) in enumerate(zip(before.deflections, now.deflections, strict=True)):
-        is_pushed = place == THROTTLE or abs(deflection) > MOVED
-        if is_pushed and abs(deflection - was) > MOVED:
+        is_pushed = place == THROTTLE or abs(deflection) > override
+        if is_pushed and abs(deflection - was) > override:
             return True
     return False

@@ -6,7 +6,6 @@ from companion.autopilot.interface import Pilot
 from companion.flight.context import Target
 from companion.flight.obstacle_map import all_known
 from companion.guard.context import GuardContext
-from companion.guard.descent import STICK_DEADZONE
 from companion.guard.watching import OTHERS_STOPPED_US
 from companion.memory.patch import LEAST_SPEED_M_S
 from companion.memory.surroundings import ObstacleMap
@@ -33,7 +32,7 @@ def leads_into(guard: GuardContext, mode: int) -> str | None:
         return None
     contact = guard.collisions[-1].contact
     if autopilot.pilot(mode) is not Pilot.AUTOPILOT:
-        pushed = -along(_sticks_ned(guard), contact.normal_ned) > STICK_DEADZONE
+        pushed = -along(_sticks_ned(guard), contact.normal_ned) > autopilot.defaults.stick_deadzone
         return "the sticks push on into what was hit: release them" if pushed else None
     if -along(contact.velocity_ned_m_s, contact.normal_ned) < LEAST_SPEED_M_S:
         return None

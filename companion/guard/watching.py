@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from companion.autopilot.known import GUARDED_NAMES
+from companion.autopilot.interface import Autopilot
 from companion.flight.connecting import Meet
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target
 from companion.flight.envelope import unattended_text
@@ -16,14 +16,18 @@ from companion.reflex.detector import NO_POSITION, ON_THE_GROUND
 ECHO_HZ = 50.0
 # The pilot is noticed within a twentieth of a second.
 STICKS_HZ = 20.0
-OWN_STREAMS = (
-    SetMessageInterval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
-    SetMessageInterval(MessageId.MANUAL_CONTROL, round(1e6 / STICKS_HZ)),
-)
 # MAVSDK repeats its setpoint at 20 Hz, others at 2 Hz at least: after this somebody has stopped.
 OTHERS_STOPPED_US = 1_000_000
 # A vehicle that was restarted has forgotten what it was asked for; three of its heartbeats tell that it is up again.
 STREAMS_GONE_US = 3_000_000
+
+
+def own_streams(autopilot: Autopilot) -> tuple[SetMessageInterval, ...]:
+    """What a guard asks for beside what a flight does."""
+    return (
+        SetMessageInterval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
+        SetMessageInterval(autopilot.sticks_message, round(1e6 / STICKS_HZ)),
+    )
 
 
 def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str | None:
@@ -83,15 +87,15 @@ class GuardConnect(Meet[GuardTransition]):
         return self._is_first and not self._is_told
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
-        return [*super()._commands(flight), *OWN_STREAMS]
+        return [*super()._commands(flight), *own_streams(flight.vehicle.autopilot)]
 
     def _refused(self, text: str) -> GuardTransition:
         return GuardTransition(Trigger.REFUSED, text)
 
     def _judge(self, flight: FlightContext, now_us: int) -> GuardTransition | None:
-        autopilot = flight.vehicle.autopilot
-        if not autopilot.guarded_modes:
-            return self._refused(f"the vehicle's autopilot is {autopilot.name}: a guard flies {GUARDED_NAMES} alone")
+        too_old = flight.vehicle.version_complaint()
+        if too_old is not None:
+            return self._refused(too_old)
         complaint = flight.streams.too_slow(flight.vehicle.autopilot) or flight.round_trip.complaint()
         if complaint is not None and (flight.mission.companion.link.wait or not self._is_first):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
@@ -139,12 +143,15 @@ class Watching:
         seen_us = guard.others_setpoint_us
         streams_elsewhere = seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US
         streams_elsewhere = streams_elsewhere or guard.program_elsewhere
-        if latest is None or vehicle.flies_setpoints or streams_elsewhere:
+        is_wanted = vehicle.autopilot.wants_setpoints_first and not vehicle.flies_setpoints
+        if latest is None or not is_wanted or streams_elsewhere:
             return None
         return Target(latest.position_ned_m, None)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        if guard.vehicle.flies_setpoints and not guard.keeps_others_out:
+        # Where the mode needs no stream, one that has left it may have been sent somewhere once.
+        streams = guard.vehicle.flies_setpoints and guard.vehicle.autopilot.wants_setpoints_first
+        if streams and not guard.keeps_others_out:
             guard.program_elsewhere = True
         reason = why_not(guard)
         return None if reason is None else GuardTransition(Trigger.NOT_TO_GUARD, reason)

@@ -52,6 +52,7 @@ class Decoder:
         self._readers, self._is_packet = readers, is_packet or checksum_holds
         self._pending = b""
         self._vehicle: tuple[int, int] | None = None
+        self._has_highres_imu = False
         self._boot_us = 0  # newest 64-bit stamp
 
     def listen_to(self, system_id: int, component_id: int, wire: Wire | None = None) -> None:
@@ -92,6 +93,10 @@ class Decoder:
             return None
         sample = reader.from_payload(payload, source)
         if isinstance(sample, ImuSample):
+            if message_id == dialect.MAVLINK_MSG_ID_HIGHRES_IMU:
+                self._has_highres_imu = True
+            elif self._has_highres_imu:
+                return None  # somebody else's stream of the same samples
             self._boot_us = sample.time_boot_us
         elif self._boot_us > WRAP_US // 2 and isinstance(sample, LocalPosition | Attitude | AttitudeTarget):
             wraps = round((self._boot_us - sample.time_boot_us) / WRAP_US)

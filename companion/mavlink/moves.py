@@ -66,6 +66,15 @@ def _moves(autopilot: Autopilot, command: int, parameters: list[float], has_plac
     return command in (dialect.MAV_CMD_DO_ORBIT, dialect.MAV_CMD_DO_FIGURE_EIGHT)
 
 
+# MISSION_ITEM and MISSION_ITEM_INT: where `current` lies, and its values for a place to fly to now and a height.
+_CURRENT, _FLOWN_AT_ONCE = 35, (2, 3)
+
+
+def _is_flown_at_once(payload: bytes, source: Source, autopilot: Autopilot) -> bool:
+    """ArduPilot's older way to be sent somewhere, as DroneKit's simple_goto has it."""
+    return payload.ljust(_CURRENT + 1, b"\0")[_CURRENT] in _FLOWN_AT_ONCE
+
+
 _SETPOINT = "PX4 flies by the latest setpoint, whoever sent it"
 _STICKS = "a program's sticks look like a pilot's, for whom the guard stands down"
 _COMMAND = "OFFBOARD is the guard's meanwhile, and a place that was named before the hit may be behind it"
@@ -76,6 +85,8 @@ KEPT_OUT: Mapping[int, tuple[Test, str]] = {
     dialect.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: (_always, _SETPOINT),
     dialect.MAVLINK_MSG_ID_MANUAL_CONTROL: (_on_board, _STICKS),
     dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: (_on_board, _STICKS),
+    dialect.MAVLINK_MSG_ID_MISSION_ITEM: (_is_flown_at_once, _COMMAND),
+    dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT: (_is_flown_at_once, _COMMAND),
     dialect.MAVLINK_MSG_ID_SET_MODE: (_mode_flies_setpoints, _COMMAND),
     dialect.MAVLINK_MSG_ID_COMMAND_LONG: (_long_moves, _COMMAND),
     dialect.MAVLINK_MSG_ID_COMMAND_INT: (_int_moves, _COMMAND),

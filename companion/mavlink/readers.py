@@ -88,6 +88,17 @@ def _imu(
     return messages.ImuSample(time_usec, force, rates)
 
 
+# What RAW_IMU counts in, SI: thousandths of standard gravity, and of a radian a second.
+_MILLI_G_M_S2, _MILLI_RAD_S = 9.80665e-3, 1e-3
+
+
+def _raw_imu(time_usec: int, xacc: int, yacc: int, zacc: int, xgyro: int, ygyro: int, zgyro: int) -> Sample | None:
+    """As ArduPilot has it: the same samples as in HIGHRES_IMU, rounded."""
+    force = (_MILLI_G_M_S2 * xacc, _MILLI_G_M_S2 * yacc, _MILLI_G_M_S2 * zacc)
+    rates = (_MILLI_RAD_S * xgyro, _MILLI_RAD_S * ygyro, _MILLI_RAD_S * zgyro)
+    return _imu(time_usec, *force, *rates, ACCELEROMETER_UPDATED)
+
+
 def _local_position(time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Sample:
     if not (hypot(x, y, z) <= messages.POSITION_M and hypot(vx, vy, vz) <= messages.VELOCITY_M_S):
         return _moves_too_far("LOCAL_POSITION_NED", x, y, z, vx, vy, vz)
@@ -278,6 +289,21 @@ def _cast_parameter(param_id: bytes | str, param_value: float, param_type: int) 
     return messages.Parameter(name, param_value if is_real else int(param_value))
 
 
+# A pulse of a remote control, microseconds: its middle and the way to either end.
+_MIDDLE_US, _WAY_US = 1500, 500
+# One that is not connected has none, or all bits.
+_NO_PULSES = (0, 0xFFFF)
+
+
+def _radio(chan1_raw: int, chan2_raw: int, chan3_raw: int, chan4_raw: int) -> Sample | None:
+    """The pilot's sticks as ArduPilot has them by default: roll, pitch, throttle, yaw. Forward is the short pulse."""
+    pulses = (chan1_raw, chan2_raw, chan3_raw, chan4_raw)
+    if any(pulse in _NO_PULSES for pulse in pulses):
+        return None
+    right, back, up, clockwise = (min(max((pulse - _MIDDLE_US) / _WAY_US, -1.0), 1.0) for pulse in pulses)
+    return messages.Sticks((-back, right, up, clockwise))
+
+
 def _autopilot_version(flight_sw_version: int) -> Sample:
     # major, minor, patch, type: one byte each, from the top
     version = flight_sw_version
@@ -336,6 +362,8 @@ ARDUPILOT_READERS = _readers(
         dialect.MAVLink_attitude_target_message: _unbounded_target,
         dialect.MAVLink_param_value_message: _cast_parameter,
         EkfStatusReport: _ekf_status,
+        dialect.MAVLink_rc_channels_message: _radio,
+        dialect.MAVLink_raw_imu_message: _raw_imu,
     }
 )
 

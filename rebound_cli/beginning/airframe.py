@@ -1,9 +1,11 @@
-"""`rebound airframe px4`: PX4's parameters for one of our airframes."""
+"""`rebound airframe`: an autopilot's parameters for one of our airframes."""
 
 from argparse import Namespace
 
+from companion.errors import ConfigurationError
 from rebound_cli.inputs import load_world
 from sim_vehicle.hil.parameters import as_airframe_file, as_environment, as_params_file
+from sim_vehicle.json.parameters import as_parameter_file
 
 _FORMATS = {"env": as_environment, "params": as_params_file, "airframe": as_airframe_file}
 
@@ -11,5 +13,10 @@ _FORMATS = {"env": as_environment, "params": as_params_file, "airframe": as_airf
 def run_airframe(options: Namespace) -> int:
     """Print them in the format asked for."""
     airframe = load_world(None, (), options.airframe, None).airframe
-    print(_FORMATS[options.format](airframe, options.position))
+    if options.target == "px4":
+        print(_FORMATS[options.format or "env"](airframe, options.position or "mocap"))
+    elif options.format is not None or options.position is not None:
+        raise ConfigurationError("--format and --position belong to px4: leave them out for ArduPilot.")
+    else:
+        print(as_parameter_file(airframe))
     return 0

@@ -1,13 +1,13 @@
-"""Companion and simulated vehicle in one process, joined by the same bytes, on virtual time."""
+"""Companion and simulated vehicle in lockstep, joined by the same bytes, on virtual time."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Protocol
 
 from companion.companion import Companion
 from companion.mission.model import Mission, longest_s
-from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import look_for_file
@@ -16,7 +16,6 @@ from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
 from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.vehicle import SimulatedVehicle
 
 # When virtual time begins: any fixed moment will do, so that the same seed gives the same bytes.
 EPOCH_US = 1_600_000_000_000_000
@@ -32,6 +31,18 @@ _LONGEST_WAIT_S = 60.0
 _LOOK_EVERY = 250
 
 
+class SteppedVehicle(Protocol):
+    """One interval a step: MAVLink in, MAVLink out."""
+
+    @property
+    def time_boot_us(self) -> int: ...
+
+    @property
+    def truth(self) -> TruthRecorder: ...
+
+    def step(self, received: bytes, /) -> Sequence[bytes]: ...
+
+
 def virtual_time_limit_s(mission: Mission) -> float:
     """Longest virtual time a mission may reasonably take; a flight beyond it hangs."""
     hits = mission.on_collision.max_hits * (mission.on_collision.hold_s + mission.companion.settled.timeout_s)
@@ -40,7 +51,7 @@ def virtual_time_limit_s(mission: Mission) -> float:
 
 def fly_mission_lockstep(
     mission: Mission,
-    world: SimulatedWorld,
+    vehicle: SteppedVehicle,
     recorder: FlightRecorder,
     interrupts: Interrupts,
     console: Console | None = None,
@@ -48,7 +59,6 @@ def fly_mission_lockstep(
 ) -> tuple[Flown, TruthRecorder]:
     """Fly a whole mission; it fails when it takes much longer than it should. `followed` notes what is detected."""
     companion = Companion(mission)
-    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     limit_s = virtual_time_limit_s(mission)
 
     def look(flight_time_s: float) -> None:
@@ -67,7 +77,7 @@ def fly_mission_lockstep(
 
 def run_lockstep(
     companion: Companion,
-    vehicle: SimulatedVehicle,
+    vehicle: SteppedVehicle,
     recorder: FlightRecorder,
     interrupts: Interrupts,
     limit_s: float,

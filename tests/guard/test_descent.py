@@ -2,8 +2,9 @@
 
 import pytest
 
+from companion.autopilot.px4.firmware import PX4
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
-from companion.guard.descent import STICK_DEADZONE, Descent
+from companion.guard.descent import Descent
 from companion.link.vehicle import ModeReport, Vehicle
 from companion.messages import LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
@@ -40,8 +41,8 @@ def throttle(deflection):
         (POSCTL, (down(None),), False),
         (AUTO_LOITER, (down(2.0), down(0.0)), False),
         # A throttle below its middle, where sticks ask for velocities
-        (POSCTL, (throttle(-1.5 * STICK_DEADZONE),), True),
-        (ALTCTL, (throttle(-0.9 * STICK_DEADZONE),), False),
+        (POSCTL, (throttle(-1.5 * PX4.defaults.stick_deadzone),), True),
+        (ALTCTL, (throttle(-0.9 * PX4.defaults.stick_deadzone),), False),
         (AUTO_LOITER, (throttle(-1.0),), False),
     ],
 )

@@ -2,6 +2,7 @@
 
 import pytest
 
+from companion.autopilot.px4.firmware import PX4
 from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.messages import Sticks
@@ -44,4 +45,4 @@ def test_a_hit_is_answered_where_the_guard_watches_and_never_takes_the_vehicle_b
     ],
 )
 def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
-    assert has_moved(Sticks(before), Sticks(now)) is counts
+    assert has_moved(Sticks(before), Sticks(now), PX4.defaults.stick_override) is counts

@@ -12,9 +12,9 @@ _FORCE_FLYING = 159
 _LOW, _HIGH = 0, 2
 
 
-def _changed_law(leans: bool | None) -> tuple[VehicleCommand, ...]:
+def _changed_law(leans: bool | None) -> VehicleCommand:
     """High while it is flown by attitude, low before and after."""
-    return (SetAuxFunction(_FORCE_FLYING, _HIGH if leans else _LOW),)
+    return SetAuxFunction(_FORCE_FLYING, _HIGH if leans else _LOW)
 
 
 ARDUPILOT = Autopilot(
@@ -27,7 +27,7 @@ ARDUPILOT = Autopilot(
     sticks=modes.LOITER,
     descents=frozenset({modes.LAND}),
     mode_names=modes.MODE_NAMES,
-    guarded_modes=(),
+    guarded_modes=modes.GUARDED,
     mode_name=modes.mode_name,
     pilot=modes.pilot,
     set_mode=modes.set_mode,
@@ -36,8 +36,11 @@ ARDUPILOT = Autopilot(
     least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
     # It has no CURRENT_MODE: how soon a pilot's mode is seen depends on this alone.
     streams=(SetMessageInterval(MessageId.HEARTBEAT, 50_000),),
+    lesser_imu=MessageId.RAW_IMU,
     estimator_message=MessageId.EKF_STATUS_REPORT,
+    sticks_message=MessageId.RC_CHANNELS,
     is_told_to_take_off=True,
+    wants_setpoints_first=False,
     changed_law=_changed_law,
     attitude_parameters=(setup.LOSS, setup.OPTIONS),
     attitude_held_s=setup.attitude_held_s,
@@ -48,7 +51,7 @@ ARDUPILOT = Autopilot(
     judge_vehicle=setup.judge_vehicle,
     judge_parameters=setup.judge_parameters,
     remedies=Remedies(
-        slow_streams="serial: SERIAL2_PROTOCOL 2, SERIAL2_BAUD 921; a board without HIGHRES_IMU cannot be flown",
+        slow_streams="serial: SERIAL2_PROTOCOL 2, SERIAL2_BAUD 921",
         full_link="the link is full: SERIAL2_BAUD 921",
         no_time="MAVLink 2 on the link (SERIAL2_PROTOCOL 2)",
         no_battery="set up the power module (BATT_MONITOR)",

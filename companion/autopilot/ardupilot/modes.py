@@ -34,6 +34,11 @@ _NAMES = {
     28: "TURTLE",
 }
 MODE_NAMES = frozenset(_NAMES.values())
+# Modes in which Copter itself holds a position or a height; of the others see those of PX4 (px4.modes).
+GUARDED = (
+    *("LOITER", "POSHOLD", "ALT_HOLD", "FLOWHOLD", "ZIGZAG", "GUIDED", "AUTO", "RTL", "SMART_RTL", "AUTO_RTL"),
+    *("BRAKE", "CIRCLE", "FOLLOW"),
+)
 _HAND = frozenset({"STABILIZE", "ACRO", "DRIFT", "SPORT", "FLIP", "SYSTEMID", "AUTOROTATE", "TURTLE"})
 _STICKS = frozenset({"ALT_HOLD", "LOITER", "POSHOLD", "FLOWHOLD", "ZIGZAG", "AUTOTUNE"})
 _SETPOINTS = frozenset({"GUIDED", "GUIDED_NOGPS"})

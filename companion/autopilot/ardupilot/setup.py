@@ -29,6 +29,13 @@ PULSE_PER_M_S_HZ = 2.86
 DEFAULT_FILTER_HZ = 20.0
 # From this on a hit of 0.1 m/s shows with its 5.7 m/s^2.
 LEAST_FILTER_HZ = 20.0
+# Copter's default, m/s^3: from level to 2.5 m/s^2 in half a second. A recovery by position begins no sooner.
+LEAST_JERK_M_S3 = 5.0
+# With 17 degrees a vehicle brakes by 3 m/s^2; the rest is for wind. Copter's default is 30.
+LEAST_LEAN_DEG, LEAN_DEG = 20.0, 30.0
+# Names that changed with 4.7, newer before older.
+JERKS, LEANS = ("PSC_JERK_NE", "PSC_JERK_XY"), ("ATC_ANGLE_MAX", "ANGLE_MAX")
+SKIPPED, CHECKED = "ARMING_SKIPCHK", "ARMING_CHECK"
 SERIALS, COMPANION_BAUD = range(1, 6), 921_600
 # SERIALn_PROTOCOL: MAVLink 1 and 2. SERIALn_BAUD has thousands, by ArduPilot's own rounding.
 MAVLINK_1, MAVLINK_2 = 1, 2
@@ -97,14 +104,44 @@ def _fence(name: str, enabled: float, setup: Setup) -> PreflightItem:
     return judged(name, found, (enabled != 0.0, DOUBTFUL, remedy), beyond=beyond)
 
 
+def _crash_check(name: str, enabled: float, setup: Setup) -> PreflightItem:
+    found = "a vehicle that lies on its side " + ("stops its motors" if enabled else "keeps its motors running")
+    return judged(name, found, (enabled == 0.0, DOUBTFUL, f"{name} = 1; a recovery holds it off"), mended=1)
+
+
+def _told(setup: Setup, names: tuple[str, ...]) -> tuple[str, float]:
+    """A parameter by whichever name the firmware has; NaN of one that was not told."""
+    return next(
+        ((name, float(setup.parameters[name])) for name in names if name in setup.parameters), (names[0], math.nan)
+    )
+
+
+def _renamed(setup: Setup) -> Iterator[PreflightItem]:
+    """Parameters with two names, of which a vehicle tells one."""
+    name, jerk_m_s3 = _told(setup, JERKS)
+    remedy = f"{name} = {LEAST_JERK_M_S3:g} or more"
+    late = not jerk_m_s3 >= LEAST_JERK_M_S3
+    yield judged(name, f"{jerk_m_s3:g} m/s^3: how soon a recovery by position leans", (late, DOUBTFUL, remedy))
+    name, lean = _told(setup, LEANS)
+    per_degree = 1.0 if name == LEANS[0] else 100.0
+    remedy = f"{name} = {LEAN_DEG * per_degree:g}"
+    flat = not lean >= LEAST_LEAN_DEG * per_degree
+    yield judged(name, f"Copter leans by {lean / per_degree:g} degrees at most", (flat, DOUBTFUL, remedy))
+    name, bits = _told(setup, (SKIPPED, CHECKED))
+    unchecked, all_checks = bits != 0.0 if name == SKIPPED else bits != 1.0, 0 if name == SKIPPED else 1
+    remedy = f"{name} = {all_checks}, and mend what the check finds"
+    yield judged(name, f"{bits:g}: checks before arming", (unchecked, DOUBTFUL, remedy), beyond=" are left out")
+
+
 # What decides whether a collision is survived.
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     LOSS: _timeout,
     OPTIONS: _options,
     FILTER: _filter,
     "FENCE_ENABLE": _fence,
+    "FS_CRASH_CHECK": _crash_check,
 }
-PARAMETERS = (*_SETTINGS, "FRAME_CLASS")
+PARAMETERS = (*_SETTINGS, "FRAME_CLASS", *JERKS, *LEANS, SKIPPED, CHECKED)
 
 
 def asked(line: SerialLine | None) -> tuple[str, ...]:
@@ -118,7 +155,8 @@ def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
-    return judged_settings(_SETTINGS, setup)
+    yield from judged_settings(_SETTINGS, setup)
+    yield from _renamed(setup)
 
 
 def sight(seen: Sight) -> PreflightItem:

@@ -8,13 +8,13 @@ from companion.messages import MessageId, RunChecks, VehicleCommand
 _IGNORE_ROLL_AND_PITCH_RATE = 0x03
 
 
-def _changed_law(leans: bool | None) -> tuple[VehicleCommand, ...]:
+def _changed_law(leans: bool | None) -> VehicleCommand | None:
     """Have PX4 change between its controllers of position and of attitude.
 
     Within OFFBOARD it does so with its status, twice a second (Commander.cpp, updateControlMode): until then both
     fly the vehicle, or neither does.
     """
-    return () if leans is None else (RunChecks(),)
+    return None if leans is None else RunChecks()
 
 
 PX4 = Autopilot(
@@ -33,8 +33,11 @@ PX4 = Autopilot(
     wire=Wire(casts_whole_numbers=False, attitude_mask=_IGNORE_ROLL_AND_PITCH_RATE),
     least_version=(0, 0, 0),
     streams=(),
+    lesser_imu=None,
     estimator_message=MessageId.ESTIMATOR_STATUS,
+    sticks_message=MessageId.MANUAL_CONTROL,
     is_told_to_take_off=False,
+    wants_setpoints_first=True,
     changed_law=_changed_law,
     attitude_parameters=(setup.LOSS,),
     attitude_held_s=lambda told: told[setup.LOSS],

@@ -18,6 +18,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
+from companion.mavlink.moves import would_move
 from companion.messages import (
     AttitudeSetpoint,
     AttitudeTarget,
@@ -87,8 +88,8 @@ def test_a_hit_is_found_and_flown_away_from_and_the_crash_check_is_in_force_afte
 
 
 def test_force_flying_is_high_only_while_it_is_flown_by_attitude():
-    assert ARDUPILOT.changed_law(True) == (SetAuxFunction(159, 2),)
-    assert ARDUPILOT.changed_law(False) == ARDUPILOT.changed_law(None) == (SetAuxFunction(159, 0),)
+    assert ARDUPILOT.changed_law(True) == SetAuxFunction(159, 2)
+    assert ARDUPILOT.changed_law(False) == ARDUPILOT.changed_law(None) == SetAuxFunction(159, 0)
 
 
 @pytest.mark.parametrize(
@@ -205,19 +206,88 @@ def test_arming_that_is_refused_ends_the_flight_in_one_sentence():
     assert report.outcome == "failed" and report.reason.startswith("not armed: arm: the vehicle answered FAILED")
 
 
-def test_a_guard_refuses_what_it_does_not_fly():
-    guard, vehicle, pending = Guard(GuardConfig()), FakeCopter(), b""
-    while not guard.finished:
+def guarded(vehicle, until, limit_s=30.0):
+    """The guard on a link with the vehicle, until its state or its end."""
+    guard, pending = Guard(GuardConfig()), b""
+    while not (guard.finished or until(guard)):
         result = guard.step(vehicle.step(pending), EPOCH_US + vehicle.time_us)
         pending = b"".join(result.sent_frames)
-        assert vehicle.time_us < 30_000_000
-    assert guard.outcome == "the vehicle's autopilot is ArduPilot: a guard flies PX4 alone"
-    assert "GUIDED" not in MODE_NAMES
+        assert vehicle.time_us < limit_s * 1e6
+    return guard
+
+
+def test_a_guard_meets_a_copter_and_hears_its_sticks_as_pulses():
+    vehicle = FakeCopter()
+    guard = guarded(vehicle, lambda guard: guard.status().state == "standing by")
+    assert not guard.finished
+    streams = {int(message.param1) for _, message in vehicle.commands if message.command == 511}
+    assert {65, 85} <= streams and 69 not in streams
+    assert {"LOITER", "AUTO", "POSHOLD", "GUIDED"} <= MODE_NAMES
+    assert not {"STABILIZE", "ACRO", "LAND"} & set(GuardConfig().modes)
+
+
+def test_a_guard_refuses_a_copter_that_is_too_old():
+    guard = guarded(FakeCopter(flight_version=4 << 24 | 2 << 16 | 3 << 8), lambda _: False)
+    assert guard.outcome == "ArduPilot 4.2.3 is too old: ArduPilot 4.3 is the oldest that flies"
+
+
+def test_what_a_dead_companion_left_high_is_set_low_when_the_next_one_begins():
+    vehicle = FakeCopter()
+    guarded(vehicle, lambda guard: guard.status().state == "standing by")
+    switched = [message.param2 for _, message in vehicle.commands if message.command == AUX_FUNCTION]
+    assert switched == [0.0]
+
+
+def test_a_switch_that_is_not_answered_is_set_again():
+    vehicle = FakeCopter(ack=lambda command, count: [] if command == AUX_FUNCTION and count < 3 else [0])
+    guarded(vehicle, lambda guard: guard.status().state == "standing by" and vehicle.time_us > 4_000_000)
+    switched = [message.confirmation for _, message in vehicle.commands if message.command == AUX_FUNCTION]
+    assert switched == [0, 1, 2]
+
+
+@pytest.mark.parametrize("current", [0, 2, 3])
+def test_a_place_that_dronekit_sends_is_kept_out_while_a_guard_recovers(current):
+    fields = (1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0)
+    item = mav.MAVLink_mission_item_message(*fields, 1.0, 2.0, 3.0)
+    assert would_move(bytes(item.pack(mav.MAVLink(None, 255, 0))), ARDUPILOT) is (current != 0)
+
+
+def test_a_radios_pulses_are_the_pilots_sticks():
+    pulses = (1600, 1300, 1000, 1500, *(0,) * 14)
+    message = mav.MAVLink_rc_channels_message(0, 8, *pulses, 255)
+    assert heard(message).deflections == pytest.approx((0.4, 0.2, -1.0, 0.0))
+    assert heard(mav.MAVLink_rc_channels_message(0, 0, *(0xFFFF,) * 18, 255)) is None
+
+
+def test_a_board_without_highres_imu_is_flown_by_its_raw_one():
+    def ack(command, count):
+        return [2] if command == 511 and count == 1 else [0]  # the first stream asked for is the inertial sensor's
+
+    f = flight(FakeCopter(ack=ack), items=[TAKEOFF, LANDING])
+    f.run_to("takeoff")
+    first, second = ((int(message.param1), message.param2) for _, message in commanded(f, 511)[:2])
+    assert (first, second) == ((105, first[1]), (27, first[1]))
+
+
+def test_a_raw_imu_has_milli_units_and_counts_until_the_finer_one_comes():
+    decoder = Decoder()
+    decoder.listen_to(1, 1, ARDUPILOT.wire)
+    raw = ardupilotmega.MAVLink_raw_imu_message(4000, 102, 0, -1000, 100, 0, -50, 0, 0, 0)
+    finer = ardupilotmega.MAVLink_highres_imu_message(8000, 1.0, 0.0, -9.8, *(0.0,) * 10, 7)
+    samples = [
+        sample
+        for message in (raw, finer, raw)
+        for _, sample in decoder.feed(bytes(message.pack(ardupilotmega.MAVLink(None, 1, 1))))
+    ]
+    assert samples[0].specific_force_frd_m_s2 == pytest.approx((1.0, 0.0, -9.80665), abs=1e-3)
+    assert samples[0].angular_velocity_frd_rad_s == pytest.approx((0.1, 0.0, -0.05))
+    assert samples[1].specific_force_frd_m_s2 == pytest.approx((1.0, 0.0, -9.8)) and samples[2] is None
 
 
 # --- preflight
 
 HEALTHY = {"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": 8, "INS_ACCEL_FILTER": 20, "FENCE_ENABLE": 0, "FRAME_CLASS": 1}
+HEALTHY |= {"FS_CRASH_CHECK": 1, "PSC_JERK_NE": 5, "ATC_ANGLE_MAX": 30, "ARMING_SKIPCHK": 0}
 UART = SerialLine(921_600)
 ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
 
@@ -240,6 +310,10 @@ def test_a_healthy_copter_has_nothing_to_mend():
         ({"GUID_OPTIONS": 4}, None, "GUID_OPTIONS", "GUID_OPTIONS = 12"),
         ({"INS_ACCEL_FILTER": 10}, None, "INS_ACCEL_FILTER", "INS_ACCEL_FILTER = 20"),
         ({"FENCE_ENABLE": 1}, None, "FENCE_ENABLE", "FENCE_ENABLE = 0"),
+        ({"FS_CRASH_CHECK": 0}, None, "FS_CRASH_CHECK", "FS_CRASH_CHECK = 1"),
+        ({"PSC_JERK_NE": 2}, None, "PSC_JERK_NE", "PSC_JERK_NE = 5"),
+        ({"ATC_ANGLE_MAX": 10}, None, "ATC_ANGLE_MAX", "ATC_ANGLE_MAX = 30"),
+        ({"ARMING_SKIPCHK": 8}, None, "ARMING_SKIPCHK", "ARMING_SKIPCHK = 0"),
         ({"FRAME_CLASS": 2}, None, "FRAME_CLASS", "Mission Planner"),
         ({"SERIAL2_BAUD": 57}, UART, "port", "SERIAL2_PROTOCOL = 2"),
         ({"SERIAL2_BAUD": 57}, SerialLine(57_600), "port", "SERIAL2_BAUD = 921"),
@@ -251,10 +325,20 @@ def test_what_is_not_as_it_should_be_has_its_remedy(changed, line, item, remedy)
     assert found[item].verdict is not Verdict.GOOD and remedy in found[item].remedy
 
 
+def test_older_firmware_has_other_names_and_hundredths_of_a_degree():
+    older = {"PSC_JERK_XY": 5, "ANGLE_MAX": 1000, "ARMING_CHECK": 0}
+    newer = {"PSC_JERK_NE", "ATC_ANGLE_MAX", "ARMING_SKIPCHK"}
+    found = judged({**{name: value for name, value in HEALTHY.items() if name not in newer}, **older})
+    assert found["PSC_JERK_XY"].verdict is Verdict.GOOD
+    assert "10 degrees" in found["ANGLE_MAX"].found and found["ANGLE_MAX"].remedy == "ANGLE_MAX = 3000"
+    assert found["ARMING_CHECK"].remedy.startswith("ARMING_CHECK = 1")
+
+
 def test_what_was_not_told_is_doubtful_and_what_is_asked_is_judged():
     found = judged({})
     assert {item.verdict for item in found.values()} == {Verdict.DOUBTFUL}
-    assert {*setup.asked(None)} == {*HEALTHY} and {*ON_SERIAL2} <= {*setup.asked(UART)}
+    older = {"PSC_JERK_XY", "ANGLE_MAX", "ARMING_CHECK"}
+    assert {*setup.asked(None)} == {*HEALTHY} | older and {*ON_SERIAL2} <= {*setup.asked(UART)}
 
 
 def test_what_happens_in_a_silence_is_told():

@@ -1,0 +1,1 @@
+"""Body for a real ArduPilot: Copter's SITL with the model JSON."""

@@ -1,0 +1,46 @@
+"""Body and world of the simulated vehicle, with its motors in the hands of ArduPilot."""
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.errors import AirframeError
+from sim_vehicle.hil.vehicle import sampled_every
+from sim_vehicle.json.messages import BodyState, Pulses
+from sim_vehicle.plant.plant import Plant
+from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.truth import TruthRecorder
+
+# ArduPilot reads its inertial sensors a thousand times a second.
+SAMPLE_INTERVAL_US = 1_000
+
+
+class JsonVehicle:
+    """One sample of the inertial sensor a step; time begins at 0, as ArduPilot's clock does."""
+
+    def __init__(self, airframe: Airframe, scene: Scene, seed: int) -> None:
+        """Raises SceneError where a wall passes through the start, AirframeError for motors in another order."""
+        check_start_is_free(scene, airframe)
+        if airframe.rotors:
+            raise AirframeError(f"{airframe.name} has rotors of its own: ArduPilot flies a quad-x of equal arms here.")
+        self._plant = Plant(sampled_every(airframe, SAMPLE_INTERVAL_US), scene, seed)
+        self._motors = airframe.rotor_count
+        self._body = self._plant.state.body
+        self.time_boot_us = 0
+
+    @property
+    def truth(self) -> TruthRecorder:
+        """What really happened."""
+        return self._plant.truth
+
+    def answer(self, pulses: Pulses) -> bytes:
+        """Advance one sample and tell of it."""
+        output = self._plant.drive(pulses.motor_fractions(self._motors))
+        self.time_boot_us = output.time_boot_us
+        north, east, down, v_north, v_east, v_down, w, x, y, z = self._body[:10].tolist()
+        state = BodyState(
+            time_us=output.time_boot_us,
+            angular_velocity_frd_rad_s=output.angular_velocity_frd_rad_s,
+            specific_force_frd_m_s2=output.specific_force_frd_m_s2,
+            position_ned_m=(north, east, down),
+            attitude_wxyz=(w, x, y, z),
+            velocity_ned_m_s=(v_north, v_east, v_down),
+        )
+        return state.line()

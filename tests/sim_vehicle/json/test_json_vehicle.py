@@ -1,0 +1,104 @@
+"""What ArduPilot's SITL sends and gets, and the vehicle that it flies; recorded packets are of Copter 4.8-dev."""
+
+import json
+import math
+import struct
+from itertools import pairwise
+
+import pytest
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.errors import AirframeError
+from sim_vehicle.json.messages import Pulses, pulses_from
+from sim_vehicle.json.parameters import ardupilot_parameters, as_parameter_file
+from sim_vehicle.json.vehicle import JsonVehicle
+from sim_vehicle.physics.layout import GRAVITY_M_S2
+from sim_vehicle.scene import Scene
+
+FOLDABLE = load_built_in("foldable")
+FULL, STOPPED = 2000, 1000
+
+
+def packet(count: int, *widths_us: int, magic: int = 18_458) -> bytes:
+    return struct.pack("<HHI16H", magic, 1000, count, *widths_us, *(0,) * (16 - len(widths_us)))
+
+
+def told(line: bytes) -> dict:
+    assert line.startswith(b"\n")
+    assert line.endswith(b"\n")
+    return json.loads(line)
+
+
+def test_pulses_become_shares_of_the_motors_thrust() -> None:
+    pulses = pulses_from(packet(7, STOPPED, 1250, FULL, 2100))
+    assert pulses is not None
+    assert pulses.count == 7
+    assert pulses.motor_fractions(4) == (0.0, 0.25, 1.0, 1.0)
+
+
+def test_outputs_that_do_not_run_yet_stand() -> None:
+    pulses = pulses_from(packet(0))
+    assert pulses is not None
+    assert pulses.motor_fractions(4) == (0.0,) * 4
+
+
+@pytest.mark.parametrize("stranger", [b"", packet(1)[:-1], packet(1, magic=1)])
+def test_packets_of_others_are_none(stranger: bytes) -> None:
+    assert pulses_from(stranger) is None
+
+
+def test_a_vehicle_that_stands_tells_of_gravity_and_of_each_millisecond() -> None:
+    vehicle = JsonVehicle(FOLDABLE, Scene(), 1)
+    states = [told(vehicle.answer(Pulses(count, (STOPPED,) * 4))) for count in range(200)]
+    # Whole microseconds, none of which is lost where they are cut.
+    steps = [round(1e6 * (b["timestamp"] - a["timestamp"]), 3) for a, b in pairwise(states)]
+    assert {int(step) for step in steps} == {1000}
+    forces = [state["imu"]["accel_body"][2] for state in states[-100:]]
+    assert sum(forces) / 100 == pytest.approx(-GRAVITY_M_S2, abs=0.3)
+    assert states[-1]["quaternion"] == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-3)
+
+
+def test_full_thrust_lifts_by_what_the_motors_have_over_the_weight() -> None:
+    vehicle = JsonVehicle(FOLDABLE, Scene(), 1)
+    states = [told(vehicle.answer(Pulses(count, (FULL,) * 4))) for count in range(201)]
+    lifts_m_s2 = GRAVITY_M_S2 * (1.0 / FOLDABLE.hover_fraction - 1.0)
+    # Once the motors are up, and before drag counts.
+    climbed_m_s = states[100]["velocity"][2] - states[200]["velocity"][2]
+    assert climbed_m_s == pytest.approx(0.1 * lifts_m_s2, rel=0.1)
+
+
+def test_keys_come_in_the_order_in_which_ardupilot_looks_for_their_letters() -> None:
+    line = JsonVehicle(FOLDABLE, Scene(), 1).answer(Pulses(1, (STOPPED,) * 4)).decode()
+    keys = ("timestamp", "imu", "gyro", "accel_body", "position", "quaternion", "velocity")
+    assert sorted(keys, key=line.index) == list(keys)
+    assert [line.count(key) for key in keys] == [1] * len(keys)
+
+
+def test_motors_in_another_order_are_refused() -> None:
+    with pytest.raises(AirframeError, match="quad-x"):
+        JsonVehicle(load_built_in("hexa"), Scene(), 1)
+
+
+def test_a_unit_of_roll_turns_as_fast_as_the_gains_assume() -> None:
+    """A roll command c moves each motor of a quad-x by c / 2 of its thrust."""
+    values = {parameter.name: parameter.value for parameter in ardupilot_parameters(FOLDABLE)}
+    vehicle, hover, part = JsonVehicle(FOLDABLE, Scene(), 1), 0.9, 0.02
+    rates = []
+    for count in range(500):
+        offset = part / 2 * (count >= 400)
+        shares = (hover - offset, hover + offset, hover + offset, hover - offset)
+        state = told(vehicle.answer(Pulses(count, tuple(round(1000 + 1000 * share) for share in shares))))
+        rates.append(state["imu"]["gyro"][0])
+    turned_rad_s = sum(rates[490:]) / 10 - sum(rates[470:480]) / 10
+    per_unit = turned_rad_s / 0.02 / part
+    loop_per_s = 2 * FOLDABLE.control.attitude_damping * FOLDABLE.control.attitude_frequency_rad_s
+    assert values["ATC_RAT_RLL_P"] * per_unit == pytest.approx(loop_per_s, rel=0.2)
+
+
+def test_the_file_has_a_name_and_a_number_a_line_and_reasons_between() -> None:
+    lines = [line for line in as_parameter_file(FOLDABLE).splitlines() if not line.startswith("#")]
+    values = {name: float(value) for name, value in (line.split() for line in lines)}
+    assert len(values) == len(lines)
+    assert all(map(math.isfinite, values.values()))
+    assert values["GUID_OPTIONS"] == 8
+    assert values["MOT_THST_HOVER"] == pytest.approx(FOLDABLE.hover_fraction, rel=1e-4)
