@@ -13,7 +13,7 @@ FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
 # Those that a derivation gives.
 DERIVED = {
     "reflex/velocity_jump.py": {3},  # axes; Student's t by degrees of freedom
-    "reflex/motion_estimator.py": {3},  # axes
+    "reflex/filter_bank.py": {3},  # axes
     "reflex/impact.py": {4},  # a beginning that is known by two windows: half of half a window
     "reflex/monitor.py": {3},  # shown decimals
     "reflex/health.py": {3, 3600},  # shown decimals; seconds an hour

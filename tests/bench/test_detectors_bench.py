@@ -42,7 +42,8 @@ def test_the_samples_of_a_recording_are_those_of_the_whole_vehicle(rate, monkeyp
     kinds = {type(sample) for sample in made}
     decoded = [sample for raw in client.packets for _, sample in decoder.feed(raw) if type(sample) in kinds]
     # Then they are, bit by bit and in this order, what the bench makes of the recording
-    assert len(made) > 6 * rate and len(kinds) == len(asked_hz)
+    # A receiver shows no hit: no detector hears it.
+    assert len(made) > 6 * rate and len(kinds) == len(asked_hz) - 1
     assert without_landed_state(decoded) == without_landed_state(made)
 
 
