@@ -49,5 +49,6 @@ def test_a_clipped_hit_that_the_vehicle_has_not_seen_whole_leads_neither_into_th
     """A real PX4 after such a hit (bench/notes/px4.md) says "into the wall", and is right a second later."""
     outcome, flight = flown(airframe, speed_m_s)
     assert (outcome, flight["again"], flight["returned"]) == ("completed", 0, 0)
-    assert flight["past_m"] < 0.05
+    # As far from its setpoint as a vehicle that has settled may be (SettledConfig.distance_m).
+    assert flight["past_m"] < 0.1
     assert flight["lost_m"] < 0.1
