@@ -75,8 +75,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self._sample_boot_us = 0
         self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
-        # What the vehicle is told of it, and whether it is still to be told, or to answer.
-        self._law, self._is_met, self._is_telling = CommandClient(), False, True
+        # What the vehicle is told of it, until it has answered; and whether it is known.
+        self._law, self._is_met = CommandClient(), False
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
 
@@ -108,7 +108,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
-        if self._is_telling:
+        if self._law.busy or not self._is_met:
             self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
         self._beat(now_us)
@@ -230,7 +230,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _tell_law(self, now_us: int) -> None:
         told = self.flight.vehicle.autopilot.changed_law(self._leans)
         self._law.cancel()
-        self._is_telling = told is not None
         if told is not None:
             self._law.begin(told)
             self._repeat_law((), now_us)
@@ -245,7 +244,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
             send, outcome = self._law.step(acks, False, now_us)
             if send is not None:
                 self.flight.outbox.append(send)
-            self._is_telling = outcome is None
             if outcome is not None and not outcome.succeeded:
                 self.flight.report(now_us, "command", outcome.text)
 

@@ -71,10 +71,10 @@ class MeasuredVelocity:
     attitude is wrong: v' = a + b. Changed only by its methods; local NED, SI, the vehicle's boot clock.
     """
 
+    time_boot_us: int
+    summed_m_s: Vector3  # the accelerometer's integral up to its time
     velocity_ned_m_s: Vector3
     variance_m2_s2: float  # of v on an axis
-    summed_m_s: Vector3  # the accelerometer's integral up to its time
-    time_boot_us: int | None = None
     taken_boot_us: int = -1  # when the newest of its velocities was measured
     unseen_m_s2: Vector3 = ZERO
     both_m2_s3: float = 0.0  # covariance of v and b
@@ -82,7 +82,7 @@ class MeasuredVelocity:
 
     def predict(self, time_boot_us: int, summed_m_s: Vector3) -> None:
         """Up to a time, with the accelerometer's integral until then."""
-        elapsed_s = 0.0 if self.time_boot_us is None else 1e-6 * (time_boot_us - self.time_boot_us)
+        elapsed_s = 1e-6 * (time_boot_us - self.time_boot_us)
         faster = plus(plus(summed_m_s, -1.0, self.summed_m_s), elapsed_s, self.unseen_m_s2)
         self.velocity_ned_m_s = plus(self.velocity_ned_m_s, 1.0, faster)
         self.variance_m2_s2 += elapsed_s * (

@@ -56,7 +56,6 @@ class MotionEstimator:
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
-    unseen_m_s2: Vector3 = ZERO  # acceleration that the accelerometer does not show, as a receiver does
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
@@ -65,7 +64,7 @@ class MotionEstimator:
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
     _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
     _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
-    _measured: MeasuredVelocity | None = None  # by a receiver
+    _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
     _has_agreed: bool = False  # by itself: no model is needed any more
     # Since when the reported velocity, without a model's error and as it is, is the measured one.
@@ -78,8 +77,8 @@ class MotionEstimator:
 
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
-        self._newest, self._agrees_since_boot_us, self.has_converged = None, (None, None), False
-        self._has_agreed = False
+        self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
+        self.has_converged = self._has_agreed = self._was_odd = False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
@@ -128,7 +127,7 @@ class MotionEstimator:
     @property
     def belief(self) -> Belief:
         """What the attitude law goes by."""
-        motion = self.motion
+        motion, unseen = self.motion, ZERO if self._measured is None else self._measured.unseen_m_s2
         return Belief(
             motion.position_ned_m,
             motion.velocity_ned_m_s,
@@ -137,23 +136,24 @@ class MotionEstimator:
             self.wind_m_s2,
             self.attitude_wxyz,
             self.yaw_rate_rad_s,
-            plus(self.level_m_s2, 1.0, self.unseen_m_s2),
+            plus(self.level_m_s2, 1.0, unseen),
         )
 
     def measure(self, doppler: Doppler) -> None:
         """Take a receiver's velocity: the horizontal one from then on, until the vehicle's estimate has converged."""
-        was, begun_us = self._measured, self.pushed_boot_us
-        newest_us = begun_us if was is None else max(begun_us, was.taken_boot_us)
+        was = self._measured
+        newest_us = self.pushed_boot_us if was is None else was.taken_boot_us
         if self.is_fully_measured or self.has_converged or doppler.taken_boot_us <= newest_us:
             return
-        known = was or MeasuredVelocity(self.motion.velocity_ned_m_s, self.spread_m_s**2, self._summed_m_s)
-        known.predict(self._time_boot_us, self._summed_m_s)
+        now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
+        known = was or MeasuredVelocity(now_us, self._summed_m_s, velocity, variance)
+        known.predict(now_us, self._summed_m_s)
         is_odd = known.deviation(doppler) > reflex.DOPPLER_GATE
         was_odd, self._was_odd = self._was_odd, is_odd
         if is_odd and not was_odd:
             return
         known.update(doppler)
-        self._measured, self.unseen_m_s2 = known, known.unseen_m_s2
+        self._measured = known
         self._believe(self.motion, self.spread_m_s)
 
     @property
@@ -214,30 +214,30 @@ class MotionEstimator:
         normal = self.contact.normal_ned
         bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
         estimate, spread_m_s, left_m_s = bank.estimate(left)
-        error_m_s = bank.mean_error(1, g)
+        is_known, error_m_s = left_m_s <= SAME_M_S, bank.mean_error(1, g)
         if self.is_measured_apart:
             self._believe(estimate, spread_m_s)
-            self._compare(velocity, error_m_s if left_m_s <= SAME_M_S else ZERO, sample.time_boot_us)
-        self.has_converged = self.has_converged or (left_m_s <= SAME_M_S and not self.is_measured_apart)
-        if self._has_agreed:
-            return
-        if self.has_converged:
+            self._compare(velocity, error_m_s if is_known else None, sample.time_boot_us)
+        elif self.has_converged or is_known:
+            self.has_converged = True
+        else:
+            self._believe(estimate, spread_m_s)
+        if self.has_converged and not self._has_agreed:
             self.position_error_m, self._hidden_error_m_s = bank.mean_error(0, way_s), error_m_s
-            return
-        self._believe(estimate, spread_m_s)
 
     def _agrees(self, velocity_m_s: Vector3, since_us: int | None, time_boot_us: int) -> int | None:
         """Since when a velocity has been the measured one; None: it is not."""
         off = plus(velocity_m_s, -1.0, self.motion.velocity_ned_m_s)
         return None if math.hypot(off[0], off[1]) > SAME_M_S else since_us or time_boot_us
 
-    def _compare(self, reported_m_s: Vector3, error_m_s: Vector3, time_boot_us: int) -> None:
+    def _compare(self, reported_m_s: Vector3, error_m_s: Vector3 | None, time_boot_us: int) -> None:
         """Converged: a model has known the reported velocity's error for a moment, or there has been none for a while.
 
-        A swing only passes through what was measured.
+        A swing only passes through what was measured. `error_m_s` is None while no model knows it.
         """
         by_model_us, by_itself_us = self._agrees_since_boot_us
-        by_model_us = self._agrees(plus(reported_m_s, -1.0, error_m_s), by_model_us, time_boot_us)
+        less_error = None if error_m_s is None else plus(reported_m_s, -1.0, error_m_s)
+        by_model_us = None if less_error is None else self._agrees(less_error, by_model_us, time_boot_us)
         by_itself_us = self._agrees(reported_m_s, by_itself_us, time_boot_us)
         self._agrees_since_boot_us = (by_model_us, by_itself_us)
         is_explained = by_model_us is not None and time_boot_us - by_model_us > SHOWN_US

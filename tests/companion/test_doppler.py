@@ -114,6 +114,24 @@ def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_
     assert abs(found.velocity_error_m_s[0]) < SAME_M_S
 
 
+def test_a_swing_that_passes_the_measured_velocity_before_any_model_knows_it_is_no_agreement():
+    air, found = clipped()
+    go_on(air, found, 0.3)
+    # When what is reported is right for longer than a model would need
+    air.reported_off_m_s = 0.0
+    go_on(air, found, 0.3)
+    # Then it is not right for good
+    assert found.is_measured_apart
+
+
+def test_what_was_measured_before_the_contacts_next_push_does_not_count():
+    air, found = clipped()
+    go_on(air, found, 0.5)
+    assert found.is_measured_apart
+    found.note_contact(is_fully_measured=False, pushed_boot_us=air.now_us)
+    assert not found.is_measured_apart
+
+
 def test_an_acceleration_that_the_accelerometer_does_not_show_is_found():
     # Given gyroscopes whose tilt is wrong by 3 degrees
     air, found = clipped()
