@@ -35,7 +35,7 @@ LEAST_JERK_M_S3 = 5.0
 LEAST_LEAN_DEG, LEAN_DEG = 20.0, 30.0
 # Names that changed with 4.7, newer before older.
 JERKS, LEANS = ("PSC_JERK_NE", "PSC_JERK_XY"), ("ATC_ANGLE_MAX", "ANGLE_MAX")
-SKIPPED, CHECKED = "ARMING_SKIPCHK", "ARMING_CHECK"
+CHECKS = ("ARMING_SKIPCHK", "ARMING_CHECK")
 SERIALS, COMPANION_BAUD = range(1, 6), 921_600
 # SERIALn_PROTOCOL: MAVLink 1 and 2. SERIALn_BAUD has thousands, by ArduPilot's own rounding.
 MAVLINK_1, MAVLINK_2 = 1, 2
@@ -109,28 +109,30 @@ def _crash_check(name: str, enabled: float, setup: Setup) -> PreflightItem:
     return judged(name, found, (enabled == 0.0, DOUBTFUL, f"{name} = 1; a recovery holds it off"), mended=1)
 
 
-def _told(setup: Setup, names: tuple[str, ...]) -> tuple[str, float]:
-    """A parameter by whichever name the firmware has; NaN of one that was not told."""
-    return next(
-        ((name, float(setup.parameters[name])) for name in names if name in setup.parameters), (names[0], math.nan)
+def _jerk(name: str, jerk_m_s3: float, setup: Setup) -> PreflightItem:
+    late = (jerk_m_s3 < LEAST_JERK_M_S3, DOUBTFUL, f"{name} = {LEAST_JERK_M_S3:g} or more")
+    return judged(name, f"{jerk_m_s3:g} m/s^3: how soon a recovery by position leans", late)
+
+
+def _lean(name: str, lean: float, setup: Setup) -> PreflightItem:
+    per_degree = 1.0 if name == LEANS[0] else 100.0
+    flat = (lean < LEAST_LEAN_DEG * per_degree, DOUBTFUL, f"{name} = {LEAN_DEG * per_degree:g}")
+    return judged(name, f"Copter leans by {lean / per_degree:g} degrees at most", flat)
+
+
+def _checks(name: str, bits: float, setup: Setup) -> PreflightItem:
+    all_checks = 0 if name == CHECKS[0] else 1
+    remedy = f"{name} = {all_checks}, and mend what the check finds"
+    return judged(
+        name, f"{bits:g}: checks before arming", (bits != all_checks, DOUBTFUL, remedy), beyond=" are left out"
     )
 
 
 def _renamed(setup: Setup) -> Iterator[PreflightItem]:
     """Parameters with two names, of which a vehicle tells one."""
-    name, jerk_m_s3 = _told(setup, JERKS)
-    remedy = f"{name} = {LEAST_JERK_M_S3:g} or more"
-    late = not jerk_m_s3 >= LEAST_JERK_M_S3
-    yield judged(name, f"{jerk_m_s3:g} m/s^3: how soon a recovery by position leans", (late, DOUBTFUL, remedy))
-    name, lean = _told(setup, LEANS)
-    per_degree = 1.0 if name == LEANS[0] else 100.0
-    remedy = f"{name} = {LEAN_DEG * per_degree:g}"
-    flat = not lean >= LEAST_LEAN_DEG * per_degree
-    yield judged(name, f"Copter leans by {lean / per_degree:g} degrees at most", (flat, DOUBTFUL, remedy))
-    name, bits = _told(setup, (SKIPPED, CHECKED))
-    unchecked, all_checks = bits != 0.0 if name == SKIPPED else bits != 1.0, 0 if name == SKIPPED else 1
-    remedy = f"{name} = {all_checks}, and mend what the check finds"
-    yield judged(name, f"{bits:g}: checks before arming", (unchecked, DOUBTFUL, remedy), beyond=" are left out")
+    for names, judge in ((JERKS, _jerk), (LEANS, _lean), (CHECKS, _checks)):
+        told = next((name for name in names if name in setup.parameters), names[0])
+        yield from judged_settings({told: judge}, setup)
 
 
 # What decides whether a collision is survived.
@@ -141,7 +143,7 @@ _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     "FENCE_ENABLE": _fence,
     "FS_CRASH_CHECK": _crash_check,
 }
-PARAMETERS = (*_SETTINGS, "FRAME_CLASS", *JERKS, *LEANS, SKIPPED, CHECKED)
+PARAMETERS = (*_SETTINGS, "FRAME_CLASS", *JERKS, *LEANS, *CHECKS)
 
 
 def asked(line: SerialLine | None) -> tuple[str, ...]:
