@@ -6,10 +6,15 @@ loop that hangs.
 
 import os
 import socket
+import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 
 # As often as a person reads a line, and as PX4 sends its heartbeat.
 STATUS_EVERY_US = 1_000_000
+# Before all that share a processor by turns, after the kernel's own threads for interrupts (50). The kernel leaves
+# others a twentieth of the time (sched_rt_runtime_us).
+PRIORITY = 10
 
 
 class ServiceManager:
@@ -27,7 +32,15 @@ class ServiceManager:
         self._fed_us: int | None = None
         self._looked_us: int | None = None  # at the status
         self._error: OSError | None = None
-        self._is_told = False
+        self._news = deque[str]()
+
+    def go_first(self) -> None:
+        """Have this process run before all other programs, where the system lets it: its threads, and those to come."""
+        try:
+            for thread in threading.enumerate():
+                os.sched_setscheduler(thread.native_id or 0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        except OSError as error:
+            self._news.append(f"a busy computer may delay setpoints: {error.strerror or error} (SCHED_FIFO)")
 
     def stepped(self, is_heard: bool, is_ending: bool, status: Callable[[], str], now_us: int) -> None:
         """After each step that decides: whether the vehicle is heard, and whether this is the beginning of the end."""
@@ -49,17 +62,16 @@ class ServiceManager:
             # systemd is busy: the next step tries again.
             return
         except OSError as error:
+            if self._error is None:
+                self._news.append(f"systemd is not told: {error.strerror or error}")
             self._error = error
             return
         self._told |= due
         self._fed_us = now_us if is_hungry else self._fed_us
 
     def news(self) -> str | None:
-        """Why systemd is not told, once."""
-        if self._error is None or self._is_told:
-            return None
-        self._is_told = True
-        return f"systemd is not told: {self._error.strerror or self._error}"
+        """Why systemd is not told, or gives no priority; once."""
+        return self._news.popleft() if self._news else None
 
 
 def _has_passed(since_us: int | None, interval_us: int, now_us: int) -> bool:

@@ -160,6 +160,8 @@ class Loop:
         vehicle over first, and then ends in FlightFaultError.
         """
         started_us = self.clock.now_us()
+        if self.manager is not None:
+            self.manager.go_first()
         with undisturbed() as allow_collecting:
             try:
                 while not (self.stepped.finished or is_over()):

@@ -1,9 +1,11 @@
 """What systemd is told, on a socket of the test's own and in virtual time."""
 
 import contextlib
+import errno
 import itertools
 import os
 import socket
+import threading
 import uuid
 
 import pytest
@@ -94,6 +96,28 @@ def test_what_systemd_could_not_take_is_told_at_the_next_step(systemd):
     # When it reads again
     manager.stepped(True, False, lambda: "", 1)
     assert heard(bound) == ["READY=1"]
+    assert manager.news() is None
+
+
+def test_the_process_goes_before_other_programs_or_says_why_not(systemd, monkeypatch):
+    _, address = systemd
+    manager, asked = ServiceManager(address, None), []
+    # Given a system that lets it
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *call: asked.append(call))
+    manager.go_first()
+    # Then every thread has a priority over all that share a processor by turns, and there is nothing to tell
+    assert {thread for thread, *_ in asked} == {thread.native_id for thread in threading.enumerate()}
+    assert all(policy == os.SCHED_FIFO and how.sched_priority > 0 for _, policy, how in asked)
+    assert manager.news() is None
+
+    # Given one that does not
+    def refuse(*_):
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    manager.go_first()
+    # Then that is told once
+    assert "Operation not permitted" in manager.news()
     assert manager.news() is None
 
 

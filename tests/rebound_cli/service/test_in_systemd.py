@@ -37,6 +37,8 @@ def test_installed_booted_hit_killed_hung_and_configured_wrongly(rebound_vehicle
         assert checked.returncode == 0, checked.stdout
         sandbox.boot()
         sandbox.wait_for(lambda: is_in(sandbox, "standing by"))
+        policy = sandbox.run("chrt", "--all-tasks", "--pid", sandbox.shown("MainPID")).stdout
+        assert policy.count("SCHED_FIFO") == policy.count("policy"), policy
         assert "MemoryDenyWriteExecute=yes" in sandbox.file("/etc/systemd/system/rebound.service").read_text()
         # When a pilot flies
         pilot = taken_off(rebound_vehicle)
