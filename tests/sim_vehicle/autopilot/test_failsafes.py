@@ -18,7 +18,6 @@ from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.autopilot.flying import hovering, set_mode, sticks
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target
 
-SECOND = 1_000_000
 UP = target(position=(0.0, 0.0, -5.0))
 FLYING = {"armed": True, "sticks_lost_at_arming": False}
 
