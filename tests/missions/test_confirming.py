@@ -62,15 +62,11 @@ def spoil(air: Flight, kind: str, change: Callable[[Any], None], seconds: float)
     air.vehicle.step = lambda received: [spoilt(frame) for frame in step(received)]
 
 
-def flight_of(*sets: str, **sim: Any) -> Flight:
-    keys = {"on_collision": {"then": "continue", "max_hits": 2}, "companion": {"streams": {"window_s": 0.5}}}
-    return simulated(ITEMS, *sets, **keys, sim=sim)
-
-
 @functools.cache
 def cruising(*sets: str) -> Flight:
     """Flown once, and looked at in children alone."""
-    air = flight_of(*sets)
+    keys = {"on_collision": {"then": "continue", "max_hits": 2}, "companion": {"streams": {"window_s": 0.5}}}
+    air = simulated(ITEMS, *sets, **keys)
     air.run_until(lambda: air.state == "mission" and (air.companion.status().position_ned_m or (0,))[0] > 2.5)
     return air
 
