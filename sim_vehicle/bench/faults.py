@@ -63,7 +63,7 @@ def opposite(fault: Fault, at_s: float) -> Fault | None:
 
 
 _HAPPEN_ONCE = ("clock_jump", "estimator_reset", "payload_drop")
-_HAVE_TO_END = ("gust", "battery_sag", "push", "hand_catch")
+_HAVE_TO_END = ("gust", "battery_sag", "push")
 
 
 def sensor_dropout(sensor: Literal["imu", "gps"] = "imu") -> FaultRequest:

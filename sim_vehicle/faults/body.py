@@ -1,4 +1,4 @@
-"""Faults of the vehicle's body: motors, supply, load, hands, and the inertial sensor and what shakes it."""
+"""Faults of the vehicle's body: motors, supply, load, pushes, and the inertial sensor and what shakes it."""
 
 import math
 
@@ -57,25 +57,6 @@ class Pushes(Group[spec.Push]):
             disturbance.pushes = 1
             disturbance.push_ned_n[:] = share * np.array(push.force_ned_n)
             disturbance.push_point_frd_m[:] = push.point_frd_m
-
-
-class Hands(Group[spec.HandCatch]):
-    """Hands that take hold of the vehicle where it is."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._held: spec.HandCatch | None = None
-
-    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
-        # Never two at a time.
-        held = next(iter(self.acting(time_s)), None)
-        if held is not None and held is not self._held:
-            disturbance.hold_point_ned_m[:] = state.body[0:3]
-            disturbance.hold_stiffness_n_m = held.stiffness_n_m
-            disturbance.hold_damping_n_s_m = held.damping_n_s_m
-            disturbance.hold_turn_damping_n_m_s = held.turn_damping_n_m_s
-        disturbance.holds = int(held is not None)
-        self._held = held
 
 
 class Shaking(Group[spec.Vibration]):

@@ -9,7 +9,7 @@ import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.faults import spec
-from sim_vehicle.faults.body import Hands, InertialSensor, Load, Motors, Pushes, Shaking
+from sim_vehicle.faults.body import InertialSensor, Load, Motors, Pushes, Shaking
 from sim_vehicle.faults.estimate import Estimate
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.faults.wind import Air
@@ -37,7 +37,6 @@ class Faults:
             ((spec.MotorFailure, spec.FreeFall, spec.BatterySag), self._motors),
             ((spec.PayloadDrop,), Load()),
             ((spec.Push,), Pushes()),
-            ((spec.HandCatch,), Hands()),
             ((spec.ImuBias, spec.ImuStuck), InertialSensor(raw)),
             ((spec.Vibration,), self._shaking),
             ((spec.EstimatorReset, spec.EstimatorAfterClipping, spec.AidingLoss), self._estimate),

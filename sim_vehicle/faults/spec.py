@@ -141,18 +141,6 @@ class Push(During):
     """To full force and back, as half a cosine."""
 
 
-class HandCatch(During):
-    """A hand takes hold where the vehicle is and keeps it there until it lets go."""
-
-    kind: Literal["hand_catch"]
-    stiffness_n_m: Positive = 200.0
-    """Of an arm that holds still: 100 to 400 N/m (Mussa-Ivaldi, Hogan and Bizzi, 1985)."""
-    damping_n_s_m: NotNegative = 30.0
-    """Near critical for a vehicle of 1 kg, as arms are."""
-    turn_damping_n_m_s: NotNegative = 0.1
-    """Torque against turning, per rad/s."""
-
-
 class ImuBias(Timed):
     """The inertial sensor's zero moves."""
 
@@ -271,7 +259,6 @@ Fault = Annotated[
     | PayloadDrop
     | Vibration
     | Push
-    | HandCatch
     | ImuBias
     | ImuStuck
     | ImuDropout
@@ -291,15 +278,11 @@ def check_motor(fault: Fault, rotors: int) -> None:
         raise FaultError(f"{fault.kind}: no motor {motor}; this vehicle's are 0 to {rotors - 1}.")
 
 
-# Only one of these can act at a time: the body has one place for it.
-_ALONE: dict[str, type[object]] = {"push": Push, "hand_catch": HandCatch}
-
-
 def overlapping(faults: tuple[Fault, ...]) -> str | None:
     """What is wrong with two faults that would act at once and cannot; None if nothing is."""
-    for name, kind in _ALONE.items():
-        windows = sorted(fault.window_s for fault in faults if isinstance(fault, kind))
-        for (_, end_s), (start_s, _) in pairwise(windows):
-            if start_s < end_s:
-                return f"two faults of kind {name} act at {start_s:g} s; let one end before the next begins"
+    # The body has one place for it.
+    windows = sorted(fault.window_s for fault in faults if isinstance(fault, Push))
+    for (_, end_s), (start_s, _) in pairwise(windows):
+        if start_s < end_s:
+            return f"two faults of kind push act at {start_s:g} s; let one end before the next begins"
     return None

@@ -16,6 +16,7 @@ from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
 from sim_vehicle.control.setpoint import AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.geography import Place
+from sim_vehicle.hil.messages import Air
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -103,28 +104,17 @@ def heartbeat(state: Telemetry) -> Message:
 
 
 def highres_imu(state: Telemetry) -> Message:
-    sample, air = state.sample, state.air
-    fields = INERTIAL_FIELDS
-    field_is_new, air_is_new = state.renewed
-    if field_is_new:
-        fields |= MAGNETIC_FIELDS
-    pressure_hpa = altitude_m = temperature_c = 0.0
-    if air is not None:
-        pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
-        if air_is_new:
-            fields |= AIR_FIELDS
-    return framing.HIGHRES_IMU, framing.HIGHRES_IMU.pack(
-        sample.time_boot_us,
-        *sample.specific_force_frd_m_s2,
-        *sample.angular_velocity_frd_rad_s,
-        *state.magnetic_field_frd_gauss,
-        pressure_hpa,
-        0.0,
-        altitude_m,
-        temperature_c,
-        fields,
-        0,
-    )
+    sample, (field_is_new, air_is_new) = state.sample, state.renewed
+    inertial = (*sample.specific_force_frd_m_s2, *sample.angular_velocity_frd_rad_s)
+    fields = INERTIAL_FIELDS | (MAGNETIC_FIELDS if field_is_new else 0)
+    fields |= AIR_FIELDS if air_is_new and state.air is not None else 0
+    slow = (*state.magnetic_field_frd_gauss, *air_fields(state.air))
+    return framing.HIGHRES_IMU, framing.HIGHRES_IMU.pack(sample.time_boot_us, *inertial, *slow, fields, 0)
+
+
+def air_fields(air: Air | None) -> tuple[float, float, float, float]:
+    """HIGHRES_IMU's and HIL_SENSOR's: pressure, no difference of pressures, its altitude, temperature."""
+    return (0.0,) * 4 if air is None else (air.pressure_hpa, 0.0, air.altitude_m, air.temperature_c)
 
 
 def local_position_ned(state: Telemetry) -> Message:

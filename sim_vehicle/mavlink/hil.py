@@ -20,6 +20,7 @@ from sim_vehicle.mavlink.encode import (
     MAGNETIC_FIELDS,
     Encoder,
     Message,
+    air_fields,
     diagonal_covariance,
     units_of,
 )
@@ -62,29 +63,11 @@ class HilDecoder:
 
 
 def _sensor(sample: HilSensor) -> Message:
-    fields = INERTIAL_FIELDS
-    mag_x = mag_y = mag_z = pressure_hpa = altitude_m = temperature_c = 0.0
-    if sample.magnetic_field_frd_gauss is not None:
-        fields |= MAGNETIC_FIELDS
-        mag_x, mag_y, mag_z = sample.magnetic_field_frd_gauss
-    if sample.air is not None:
-        fields |= AIR_FIELDS
-        air = sample.air
-        pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
-    return framing.HIL_SENSOR, framing.HIL_SENSOR.pack(
-        sample.time_us,
-        *sample.specific_force_frd_m_s2,
-        *sample.angular_velocity_frd_rad_s,
-        mag_x,
-        mag_y,
-        mag_z,
-        pressure_hpa,
-        0.0,
-        altitude_m,
-        temperature_c,
-        fields,
-        0,
-    )
+    inertial = (*sample.specific_force_frd_m_s2, *sample.angular_velocity_frd_rad_s)
+    field, air = sample.magnetic_field_frd_gauss, sample.air
+    fields = INERTIAL_FIELDS | (0 if field is None else MAGNETIC_FIELDS) | (0 if air is None else AIR_FIELDS)
+    slow = (*(field or (0.0, 0.0, 0.0)), *air_fields(air))
+    return framing.HIL_SENSOR, framing.HIL_SENSOR.pack(sample.time_us, *inertial, *slow, fields, 0)
 
 
 def _gps(fix: HilGps) -> Message:

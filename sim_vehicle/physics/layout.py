@@ -65,11 +65,6 @@ class Disturbance:
     pushes: int  # 1 while the push acts
     push_ned_n: Vector3
     push_point_frd_m: Vector3
-    holds: int  # 1 while a hand holds the vehicle
-    hold_point_ned_m: Vector3
-    hold_stiffness_n_m: float
-    hold_damping_n_s_m: float
-    hold_turn_damping_n_m_s: float
     shakes: int  # 1 where any of the next is not zero
     shake_m_s2: PerArm  # of each rotor, RMS on each raw axis at hover thrust
     shake_rad_s: PerArm

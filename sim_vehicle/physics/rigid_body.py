@@ -49,8 +49,6 @@ def derivative(
         moment[i] = scratch.thrusts_moment_frd[i]
     if disturbance.pushes == 1:
         add_push(rotation, disturbance, scratch)
-    if disturbance.holds == 1:
-        add_hold(body, disturbance, scratch)
     scratch.contact_ned[:] = 0.0
     if touches:
         contact_wrench(body, rotation, behind, near, contact, faces, scratch, normal_forces)
@@ -96,15 +94,6 @@ def add_push(rotation: Floats, disturbance: Disturbance, scratch: Scratch) -> No
     scratch.moment_frd[0] += point[1] * push[2] - point[2] * push[1]
     scratch.moment_frd[1] += point[2] * push[0] - point[0] * push[2]
     scratch.moment_frd[2] += point[0] * push[1] - point[1] * push[0]
-
-
-@njit
-def add_hold(body: Floats, disturbance: Disturbance, scratch: Scratch) -> None:
-    """Add the spring and damper of a hand that holds the body where it caught it, and brakes its turning."""
-    for i in range(3):
-        scratch.force_ned[i] -= disturbance.hold_stiffness_n_m * (body[i] - disturbance.hold_point_ned_m[i])
-        scratch.force_ned[i] -= disturbance.hold_damping_n_s_m * body[3 + i]
-        scratch.moment_frd[i] -= disturbance.hold_turn_damping_n_m_s * body[10 + i]
 
 
 @njit

@@ -1,36 +1,8 @@
 """Vigorous flight by hand: its sticks, that it is vigorous, and what its table counts."""
 
-import itertools
-import math
-
-import numpy as np
 import pytest
 
-from bench.fly.by_hand.hand_pilot import wishes
-from bench.fly.by_hand.watched import STICKS_S
-from bench.studies.hand import HandCase, agile, fly_by_hand, text_of
-from sim_vehicle.airframe import load_built_in
-
-
-def test_drawn_sticks_reach_every_stop_and_never_pass_one():
-    # Given two minutes of one seed
-    drawn = [wishes(np.random.default_rng(5)) for _ in range(2)]
-    first, second = (list(itertools.islice(one, round(120.0 / STICKS_S))) for one in drawn)
-    values = np.array([(one.roll, one.pitch, one.throttle, one.yaw) for one in first])
-    # Then each stick was at both stops, none beyond, and the same seed flies the same
-    assert np.all(values.max(axis=0) == 1.0) and np.all(values.min(axis=0) == -1.0)
-    assert first == second
-
-
-def test_no_vehicle_is_asked_for_more_tilt_than_carries_its_weight():
-    # Given the named airframe, which hovers at 78 % of its thrust
-    airframe = load_built_in("foldable")
-    for seed in range(20):
-        agile_one, parameters = agile(airframe, np.random.default_rng(seed))
-        # Then at the steepest tilt the vertical part of its thrust is still its weight
-        upright = math.cos(math.radians(parameters["MPC_MAN_TILT_MAX"]))
-        assert upright / airframe.hover_fraction > 1.0
-        assert agile_one.control.tilt_max_rad == pytest.approx(math.radians(parameters["MPC_MAN_TILT_MAX"]))
+from bench.studies.hand import HandCase, fly_by_hand, text_of
 
 
 def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():

@@ -1,9 +1,11 @@
-"""The detectors' bench: its short cut past the autopilot, its truth, its verdicts."""
+"""The detectors' bench: its short cut past the autopilot, its truth, its verdicts, its command."""
 
+import pandas as pd
 import pytest
 
 from bench.cases.hits import draw_case, vehicle_of_hit
 from bench.fly.wire import ASKED_HZ, VehicleRecording, fly_hit, heard, streams_asked_hz
+from bench.main import main
 from bench.studies.detectors import first_possible, samples_late, work_out_hit
 from companion.mavlink.decode import Decoder
 from companion.messages import ExtendedState
@@ -103,3 +105,14 @@ def test_the_default_detector_finds_a_hit_at_every_rate_with_no_alarm_before_it(
     assert len(rows) == len(ASKED_HZ)
     for row in rows:
         assert row["latency_ms"] is not None and row["false"] == 0
+
+
+@pytest.mark.slow
+def test_the_command_writes_tables_and_rows(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["detectors", "--hits", "4", "--jobs", "1", "--out", "page"]) == 0
+    text = (tmp_path / "page" / "detectors.md").read_text()
+    assert "`python -m bench detectors --hits 4 --jobs 1 --out page`" in text
+    assert "## Every detector on simulated hits" in text and "bars are met" in capsys.readouterr().out
+    table = pd.read_json(tmp_path / "page" / "detectors.jsonl", lines=True)
+    assert {*table["detector"]} >= {"fused", "threshold"} and {*table["rate"]} == {*ASKED_HZ}

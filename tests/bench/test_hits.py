@@ -1,18 +1,14 @@
 """Hits alone: judged as whole flights are, the same bits twice, and honest bounds."""
 
-import pandas as pd
 import pytest
 
 from bench.cases.hits import HitCase
-from bench.fly.campaign import Results
 from bench.fly.guarded import draw_flown
 from bench.rows.tables import at_most, at_most_of_groups
-from bench.studies.hits import hit_rows, lead, parts, work_out_flown
+from bench.studies.hits import work_out_flown
 from tests.bench.test_recoveries import flown as flown_whole
 
 pytestmark = pytest.mark.slow
-
-BY_CELL = "By airframe, rate and speed"
 
 
 def judged(case: HitCase) -> dict:
@@ -53,23 +49,3 @@ def test_the_bound_is_clopper_and_pearsons_and_hits_by_one_vehicle_count_as_fewe
     assert at_most_of_groups(together) == pytest.approx(at_most(25, 100), abs=3e-3)
     assert at_most_of_groups([(0, 50)] * 300) == at_most(0, 300)
     assert at_most_of_groups([]) == at_most_of_groups([(3, 3)]) == 1.0
-
-
-def test_a_page_counts_misses_by_cell_and_names_them():
-    # Given 64 flights: one hit was missed, and one vehicle went past its obstacle with a false alarm
-    cases = [draw_flown(seed, False) for seed in range(64)]
-    found = {"touched": True, "found": True, "false": 0, "again": 0, "seconds": 3.0, "processor_s": 0.1}
-    found |= {"closing_m_s": 1.5, "latency_ms": 8.0, "tilt_deg": 9.0, "lost_m": 0.0, "rest_s": 1.0}
-    results = [dict(found) for _ in cases]
-    results[2] |= {"latency_ms": None, "found": False, "rest_s": None}
-    results[3] = {"touched": False, "false": 1, "seconds": 3.0, "processor_s": 0.1}
-    flights = pd.DataFrame(Results([*zip(cases, results, strict=True)]).rows())
-    rows = hit_rows(flights)
-    page, case = parts(rows), cases[2]
-    # Then the cell says so, is named as one that shows nothing, and the hit can be looked for
-    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page[BY_CELL].splitlines()]
-    name = f"{case.airframe}, {case.imu_hz} Hz, [1.0, 2.0) m/s"
-    assert [name, "16", "16", "1", "6.250"] in [row[:5] for row in cells]
-    assert name in page[BY_CELL].partition("Not shown")[2]
-    assert "63 hits, 1 missed; 1 false alarms in 0.05 h" in lead(rows, flights)
-    assert page["Missed at 0.5 m/s and more"] == f"{case.seed}/{case.approach}\n"

@@ -49,19 +49,6 @@ def test_a_row_that_is_not_a_number_differs():
 # --- eq. 2 in closed form -----------------------------------------------------------------------------------------
 
 
-def test_the_closed_form_solves_eq_2():
-    response = single.SpringResponse(30.0, 500.0, 1.4)
-    step_s = 1e-5
-    for time_s in (0.001, 0.02, 0.05, 0.09):
-        (before, _), (now, rate), (after, _) = (response.at(time_s + shift) for shift in (-step_s, 0.0, step_s))
-        assert (after - before) / (2 * step_s) == pytest.approx(rate, rel=1e-4, abs=1e-6)
-        assert (after - 2 * now + before) / step_s**2 == pytest.approx(-30.0 * rate - 500.0 * now, rel=1e-3)
-    assert response.at(0.0) == pytest.approx((0.0, 1.4))
-    assert response.at(response.half_period_s)[0] == pytest.approx(0.0, abs=1e-9)
-    fold_m, rate_m_s = response.at(response.force_free_s)
-    assert 30.0 * rate_m_s + 500.0 * fold_m == pytest.approx(0.0, abs=1e-9)
-
-
 def test_parameter_identification_agrees_with_eq_2():
     assert verdicts(single.ARM, pd.DataFrame()) == {PASSED}
 

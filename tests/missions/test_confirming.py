@@ -11,7 +11,7 @@ from bench.fly.copies import in_a_copy
 from bench.fly.packets import changed, made, number_of
 from companion.mavlink.packet import message_id_of
 from tests.flying import Flight
-from tests.simulated import simulated, wall
+from tests.simulated import simulated
 
 pytestmark = pytest.mark.flight
 
@@ -62,15 +62,11 @@ def spoil(air: Flight, kind: str, change: Callable[[Any], None], seconds: float)
     air.vehicle.step = lambda received: [spoilt(frame) for frame in step(received)]
 
 
-def flight_of(*sets: str, **sim: Any) -> Flight:
-    keys = {"on_collision": {"then": "continue", "max_hits": 2}, "companion": {"streams": {"window_s": 0.5}}}
-    return simulated(ITEMS, *sets, **keys, sim=sim)
-
-
 @functools.cache
 def cruising(*sets: str) -> Flight:
     """Flown once, and looked at in children alone."""
-    air = flight_of(*sets)
+    keys = {"on_collision": {"then": "continue", "max_hits": 2}, "companion": {"streams": {"window_s": 0.5}}}
+    air = simulated(ITEMS, *sets, **keys)
     air.run_until(lambda: air.state == "mission" and (air.companion.status().position_ned_m or (0,))[0] > 2.5)
     return air
 
@@ -179,28 +175,3 @@ def test_an_imu_that_measures_nothing_for_a_second_makes_the_detector_blind_and_
         assert (air.report.collisions, air.report.unconfirmed) == ((), 0)
 
     fly_on(forge)
-
-
-def test_places_that_are_not_believed_for_half_a_second_are_no_lean_on_an_obstacle_of_half_a_second():
-    def move(message: Any) -> None:
-        message.x += 50.0
-
-    # Given a vehicle that speeds up, when its places jump by 50 m until no velocity speaks against them any more
-    air = flight_of()
-    air.run_until(lambda: air.state == "mission" and motion(air)[0] > 1.0)
-    for kind in ("LOCAL_POSITION_NED", "ODOMETRY"):
-        spoil(air, kind, move, seconds=1.0)
-    air.run_to_end(1.5)
-    # Then it is handed over for being out of its fence, and nothing was in its way
-    assert "outside the fence" in air.report.reason
-    assert (air.report.collisions, air.report.obstacles) == ((), ())
-
-
-@pytest.mark.parametrize("airframe", ["foldable", "rigid"])
-@pytest.mark.parametrize("hz", [250, 50])
-def test_a_hit_on_a_wall_is_confirmed(airframe, hz):
-    """By the velocity, where one sample alone shows the contact."""
-    air = flight_of(f"companion.streams.highres_imu_hz={hz}", walls=[wall(4.0)], airframe=airframe)
-    air.run_to("recovering")
-    air.run_for(1.0)
-    assert air.report.unconfirmed == 0 and len(air.report.collisions) >= 1

@@ -1,6 +1,5 @@
 """The missions that ship, as files."""
 
-import math
 import re
 
 import pytest
@@ -13,9 +12,6 @@ DOCUMENT = MISSIONS.parent / "docs" / "reference" / "mission.md"
 NAMES = tuple(sorted(path.stem for path in MISSIONS.glob("*.yaml")))
 # Nothing in them that a real vehicle could not find: they fly on one as they are.
 WITHOUT_OBSTACLES = ("orbit", "path", "square")
-
-# Of the foldable airframe: how far ahead of the centre a head-on wall is touched.
-CONTACT_REACH_M = 0.145 * math.cos(math.pi / 4) + 0.08
 
 
 def load(name):

@@ -11,12 +11,13 @@ from sim_vehicle.vehicle import SimulatedVehicle
 START_NED_M = (2.0, -3.0, -20.0)
 
 
+@pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (0.0, 3.0, 0.0)])
 @pytest.mark.parametrize("speed_m_s", [0.5, 5.0])
 @pytest.mark.parametrize(("kind", "seed"), [("foldable", None), ("rigid", 7)])
-def test_a_vehicle_that_begins_in_flight_goes_steadily_on(kind, seed, speed_m_s):
-    # Given a vehicle that begins on its way north-east
+def test_a_vehicle_that_begins_in_flight_goes_steadily_on(kind, seed, speed_m_s, wind):
+    # Given a vehicle that begins on its way north-east, perhaps in a wind from the west
     velocity = (speed_m_s * 0.6, speed_m_s * 0.8, 0.0)
-    vehicle = SimulatedVehicle(vehicle_of(kind, seed).airframe, Scene(), 3)
+    vehicle = SimulatedVehicle(vehicle_of(kind, seed).airframe, Scene(wind_ned_m_s=wind), 3)
     vehicle.begin_in_flight(START_NED_M, velocity)
     # When it flies for two seconds
     began_us = vehicle.time_boot_us

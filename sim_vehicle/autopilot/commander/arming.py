@@ -92,5 +92,5 @@ def preflight_problems(
     if positioning.is_without_gps and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
         found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
     if navigator.fence.breached:
-        found.append(StatusText(Severity.CRITICAL, navigator.fence.breach_text))
+        found.append(StatusText(Severity.CRITICAL, "Geofence: approaching or outside geofence"))
     return found

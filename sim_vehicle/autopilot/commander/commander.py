@@ -32,8 +32,6 @@ from sim_vehicle.parameters.store import Parameters
 PERIOD_US = 20_000
 # COM_RC_OVERRIDE: in which modes moved sticks take over.
 _OVERRIDES_AUTO, _OVERRIDES_OFFBOARD = 1, 2
-# Commander::arm: sticks above these refuse a stick mode, with climb control and without.
-_CENTRE_THROTTLE, _LOW_THROTTLE = 0.2, -0.8
 
 
 class SystemStatus(IntEnum):
@@ -80,10 +78,6 @@ class Commander:
     def arm(self, reason: Reason = Reason.COMMAND) -> Result:
         """Arm as a command asks."""
         was_armed = self.arming.armed
-        refusal = None if was_armed else self._stick_refusal()
-        if refusal is not None:
-            self._texts.say(Severity.CRITICAL, f"Arming denied: {refusal}")
-            return Result.TEMPORARILY_REJECTED
         result = self.arming.arm(self._now_us, self.checks_pass)
         if result is not Result.ACCEPTED:
             self._texts += self._problems
@@ -96,15 +90,6 @@ class Commander:
             self._navigator.enter(self.modes.flown)
             self._judge()
         return result
-
-    def _stick_refusal(self) -> str | None:
-        """What is wrong with the throttle in a mode that sticks fly."""
-        sticks, mode = self.sticks.sticks, self.modes.flown
-        if Need.STICKS not in NEEDS[mode] or sticks is None:
-            return None
-        if mode in _CLIMB_CONTROLLED:
-            return "throttle above center" if sticks.throttle > _CENTRE_THROTTLE else None
-        return "high throttle" if sticks.throttle > _LOW_THROTTLE else None
 
     def disarm(self, forced: bool) -> Result:
         """Disarm as a command asks."""
@@ -257,4 +242,3 @@ class Commander:
 
 
 _ENDS_BY_ITSELF = (Mode.MISSION, Mode.TAKEOFF)
-_CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL)

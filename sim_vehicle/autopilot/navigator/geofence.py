@@ -1,4 +1,4 @@
-"""The geofence: uploaded polygons and circles, and the greatest distance and height from home.
+"""The geofence: uploaded polygons and circles.
 
 Source: PX4's navigator/geofence.cpp and Navigator::geofence_breach_check. Heights of the uploaded shapes do not count.
 """
@@ -56,8 +56,6 @@ class Geofence:
         self._shapes: tuple[Shape, ...] = ()
         self._checked_us: int | None = None
         self.breached = False
-        self.breach_text = ""
-        """What PX4 says about it when somebody tries to arm."""
         self._texts = texts
 
     def load(self, items: Sequence[StoredItem], view: View) -> None:
@@ -80,23 +78,12 @@ class Geofence:
         if self._checked_us is not None and view.now_us - self._checked_us < CHECK_PERIOD_US:
             return
         self._checked_us = view.now_us
-        outside = self._breach(view.position_ned_m, view.home_ned_m)
-        self.breach_text = outside or self.breach_text
-        self.breached = outside is not None or (self.breached and holds_after_breach)
+        self.breached = not self.allows(view.position_ned_m) or (self.breached and holds_after_breach)
 
-    def allows(self, position_ned_m: Vector3, home_ned_m: Vector3) -> bool:
-        """Whether a place is inside everything: distance, height and shapes."""
-        return self._breach(position_ned_m, home_ned_m) is None
-
-    def _breach(self, position_ned_m: Vector3, home_ned_m: Vector3) -> str | None:
-        north, east, down = position_ned_m
-        most_away_m, most_high_m = self._parameters["GF_MAX_HOR_DIST"], self._parameters["GF_MAX_VER_DIST"]
-        if most_away_m > 0.0 and math.hypot(north - home_ned_m[0], east - home_ned_m[1]) >= most_away_m:
-            return "Geofence: exceeding maximum distance to Home"
-        if most_high_m > 0.0 and home_ned_m[2] - down >= most_high_m:
-            return "Geofence: exceeding maximum altitude above Home"
-        inside = all(shape.allows(north, east) for shape in self._shapes)
-        return None if inside else "Geofence: approaching or outside geofence"
+    def allows(self, position_ned_m: Vector3) -> bool:
+        """Whether a place is inside every shape."""
+        north, east, _ = position_ned_m
+        return all(shape.allows(north, east) for shape in self._shapes)
 
     @property
     def _acts(self) -> bool:

@@ -64,7 +64,6 @@ class MissionFlight:
             store.current = 0
         self._was_disarmed, self._was_flown = False, True
         self._announce(view)
-        self._replay_speed()
         self._plan_climb(view)
         self._set_item(view)
 
@@ -99,13 +98,6 @@ class MissionFlight:
         self.runs = False
         what = "refusing takeoff" if view.landed else "loitering"
         self._texts.say(Severity.CRITICAL, f"No valid mission available, {what}")
-
-    def _replay_speed(self) -> None:
-        """The last change of speed before the current item counts again."""
-        for item in reversed(self._store.mission.items[: self._store.current]):
-            if item.command == kinds.DO_CHANGE_SPEED:
-                self.commands.append(item)
-                return
 
     def _plan_climb(self, view: View) -> None:
         """From below the first place it climbs before it goes there."""
@@ -246,7 +238,7 @@ def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, vie
             return "Mission rejected: Takeoff altitude below home altitude!"
         if item.command == kinds.TAKEOFF and has_place:
             return "Mission rejected: takeoff not first waypoint item"
-        if not fence.allows(place, home):
+        if not fence.allows(place):
             return f"Geofence violation for waypoint {number}"
         has_place = True
     return None

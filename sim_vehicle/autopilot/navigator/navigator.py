@@ -71,7 +71,7 @@ class Navigator:
 
     def hold_at(self, target: NavigatorTarget) -> bool:
         """DO_REPOSITION, before the mode becomes LOITER; False where the fence forbids the place."""
-        if not self.fence.allows(target.position_ned_m, self.view.home_ned_m):
+        if not self.fence.allows(target.position_ned_m):
             return False
         self._reposition = target
         if self._mode is Mode.LOITER:

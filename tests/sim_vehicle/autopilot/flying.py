@@ -3,7 +3,7 @@
 import math
 
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE, NAV_TAKEOFF
-from sim_vehicle.autopilot.messages import Result, StickInput
+from sim_vehicle.autopilot.messages import PositionTarget, Result, StickInput
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
@@ -25,6 +25,22 @@ def hovering(height_m: float = 5.0, **parameters: float) -> Flight:
     flight.fly(3.0)
     flight.autopilot.texts.clear()
     return flight
+
+
+def in_offboard(setpoint: PositionTarget, **parameters: float) -> Flight:
+    """The same in OFFBOARD, that setpoint having just been sent."""
+    flight = hovering(5.0, **parameters)
+    flight.fly(0.2, setpoint)
+    assert set_mode(flight, Mode.OFFBOARD) is Result.ACCEPTED
+    flight.fly(0.5, setpoint)
+    flight.autopilot.setpoint(setpoint)
+    return flight
+
+
+def north_east(flight: Flight) -> tuple[float, float]:
+    """Where it is."""
+    north, east, _ = flight.state.position_ned_m
+    return north, east
 
 
 def set_mode(flight: Flight, mode: Mode) -> Result | None:

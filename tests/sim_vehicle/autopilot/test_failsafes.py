@@ -15,25 +15,15 @@ from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
-from tests.sim_vehicle.autopilot.flying import hovering, set_mode, sticks
+from tests.sim_vehicle.autopilot.flying import hovering, in_offboard, set_mode, sticks
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target
 
-SECOND = 1_000_000
 UP = target(position=(0.0, 0.0, -5.0))
 FLYING = {"armed": True, "sticks_lost_at_arming": False}
 
 
 def situation(**fields: object) -> FailsafeSituation:
     return FailsafeSituation(**{"intended": Mode.LOITER, **FLYING, **fields})  # type: ignore[arg-type]
-
-
-def in_offboard(**parameters: float) -> Flight:
-    flight = hovering(5.0, **parameters)
-    flight.fly(0.2, UP)
-    assert set_mode(flight, Mode.OFFBOARD) is Result.ACCEPTED
-    flight.fly(0.5, UP)
-    flight.autopilot.setpoint(UP)
-    return flight
 
 
 def with_ground_station(**parameters: float) -> Flight:
@@ -95,7 +85,7 @@ def test_of_two_failsafes_the_later_in_the_order_wins():
 
 @pytest.mark.parametrize("value", OFFBOARD_LOSS)
 def test_lost_setpoints_do_what_com_obl_rc_act_says(value):
-    flight = in_offboard(COM_OBL_RC_ACT=value)
+    flight = in_offboard(UP, COM_OBL_RC_ACT=value)
     action, _ = OFFBOARD_LOSS[value]
     assert until_it_acts(flight, 2.0) == pytest.approx(1.07, abs=0.05)
     assert flown(flight) is MODE_OF[action]
@@ -194,13 +184,15 @@ def lose_gps(flight: Flight) -> None:
     assert flight.ask(INJECT_FAILURE, 4, 1) is Result.ACCEPTED
 
 
-def test_without_gps_the_position_is_lost_after_a_while_and_the_vehicle_descends():
-    flight = hovering(5.0)
+@pytest.mark.parametrize(("intended", "asked"), [(Mode.LOITER, None), (Mode.OFFBOARD, UP)])
+def test_without_gps_the_position_is_lost_after_a_while_and_the_vehicle_descends(intended, asked):
+    """Nor do setpoints of a place fly without one."""
+    flight = hovering(5.0) if asked is None else in_offboard(UP, COM_OBL_RC_ACT=3)
     lose_gps(flight)
-    flight.fly(4.9)
-    assert flown(flight) is Mode.LOITER
-    flight.fly(0.2)
-    assert (flown(flight), flight.autopilot.modes.intended) == (Mode.DESCEND, Mode.LOITER)
+    flight.fly(4.9, asked)
+    assert flown(flight) is intended
+    flight.fly(0.2, asked)
+    assert (flown(flight), flight.autopilot.modes.intended) == (Mode.DESCEND, intended)
     flight.fly_until(lambda: not flight.autopilot.arming.armed, 15.0)
     assert not flight.autopilot.commander.checks_pass
 
@@ -222,10 +214,3 @@ def test_one_that_sees_the_ground_lands_without_gps_and_holds_again_with_it():
     assert flight.ask(INJECT_FAILURE, 4, 0) is Result.ACCEPTED
     flight.fly(0.1)
     assert flown(flight) is Mode.LOITER
-
-
-def test_setpoints_of_a_place_do_not_fly_without_one():
-    flight = in_offboard(COM_OBL_RC_ACT=3)
-    lose_gps(flight)
-    flight.fly(5.1, UP)
-    assert (flown(flight), flight.autopilot.modes.intended) == (Mode.DESCEND, Mode.OFFBOARD)

@@ -9,15 +9,11 @@ from sim_vehicle.autopilot.flight_commands import DO_ORBIT, DO_REPOSITION
 from sim_vehicle.autopilot.messages import FollowTarget, Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
-from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, place, set_mode
+from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, north_east, place, set_mode
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target
 
 NAN = math.nan
 SEA_LEVEL_HOME_M = ORIGIN.place.altitude_m
-
-
-def north_east(flight: Flight) -> tuple[float, float]:
-    return flight.state.position_ned_m[:2]
 
 
 def test_takeoff_goes_to_the_height_and_over_the_place_that_the_command_names():

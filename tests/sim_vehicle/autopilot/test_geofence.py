@@ -96,19 +96,6 @@ def test_a_breach_is_found_within_a_fifth_of_a_second_and_held_where_it_was_foun
     assert (flight.autopilot.modes.flown, flight.autopilot.commander.system_status) == (Mode.RETURN, 4)
 
 
-@pytest.mark.parametrize(
-    ("limits", "velocity"),
-    [({"GF_MAX_HOR_DIST": 10.0}, (3.0, 0.0, 0.0)), ({"GF_MAX_VER_DIST": 10.0}, (0.0, 0.0, -2.0))],
-)
-def test_distance_and_height_from_home_are_fences_too(limits, velocity):
-    flight = hovering(5.0, **limits)
-    moving = target(velocity=velocity)
-    flight.fly(0.2, moving)
-    set_mode(flight, Mode.OFFBOARD)
-    flight.fly(6.0, moving)
-    assert flight.autopilot.modes.flown is Mode.LOITER
-
-
 def test_a_fence_that_excludes_home_or_the_vehicle_is_left_out():
     flight = Flight()
     upload(flight, *circle(kinds.FENCE_CIRCLE_EXCLUSION, 0.0, 0.0, 5.0), kind=MissionType.FENCE)
@@ -134,11 +121,12 @@ def test_places_outside_the_fence_are_refused():
 
 
 def test_outside_its_fence_a_vehicle_is_not_armed():
-    flight = Flight(None, GF_MAX_VER_DIST=10.0)
-    flight.autopilot.navigator.set_home((0.0, 0.0, 20.0), 0.0)
+    flight = Flight()
+    upload(flight, *KEEP_IN, kind=MissionType.FENCE)
+    flight.state = flight.state._replace(position_ned_m=(30.0, 0.0, 0.0))
     flight.fly(0.5)
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
     assert flight.texts()[-2:] == [
-        "Geofence: exceeding maximum altitude above Home",
+        "Geofence: approaching or outside geofence",
         "Arming denied: Resolve system health failures first",
     ]

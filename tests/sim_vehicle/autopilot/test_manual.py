@@ -129,24 +129,3 @@ def test_after_arming_the_throttle_waits_for_the_motors_and_then_rises_slowly():
     for more_s, thrust in ((0.9, 0.0), (0.6, 0.25), (0.5, 0.5), (1.2, 1.0)):
         sticks(flight, more_s, throttle=1.0)
         assert flight.autopilot.applied.thrust_fraction == pytest.approx(thrust, abs=0.02)
-
-
-# --- arming ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("mode", "throttle", "why"),
-    [
-        (Mode.POSCTL, 0.5, "throttle above center"),
-        (Mode.POSCTL, 0.0, None),
-        (Mode.STABILIZED, 0.0, "high throttle"),
-        (Mode.STABILIZED, -1.0, None),
-    ],
-)
-def test_a_throttle_that_is_up_refuses_arming(mode, throttle, why):
-    flight = Flight()
-    set_mode(flight, mode)
-    sticks(flight, 0.3, throttle=throttle)
-    result = flight.ask(COMPONENT_ARM_DISARM, 1)
-    assert result is (Result.TEMPORARILY_REJECTED if why else Result.ACCEPTED)
-    assert flight.texts()[-1] == (f"Arming denied: {why}" if why else "Armed by external command")

@@ -12,7 +12,7 @@ from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, St
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
-from tests.sim_vehicle.autopilot.flying import action, hovering, item, set_mode, upload
+from tests.sim_vehicle.autopilot.flying import action, hovering, item, north_east, set_mode, upload
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
 TAKEOFF, NORTH, EAST = item(kinds.TAKEOFF), item(kinds.WAYPOINT, 20.0), item(kinds.WAYPOINT, 20.0, 20.0)
@@ -31,10 +31,6 @@ def begun(*items: StoredItem) -> Flight:
 
 def reached(flight: Flight, number: int) -> float:
     return flight.fly_until(lambda: flight.autopilot.missions.progress.reached >= number, 60.0)
-
-
-def north_east(flight: Flight) -> tuple[float, float]:
-    return flight.state.position_ned_m[:2]
 
 
 @pytest.mark.parametrize("steps", range(4))

@@ -9,11 +9,12 @@ from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.control.setpoint import FREE
+from tests.sim_vehicle.autopilot.flying import in_offboard
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, attitude_of_yaw, target
 
 NORTH = attitude_of_yaw(0.0)
 EAST = attitude_of_yaw(math.pi / 2)
-UP_THERE = target(position=(0.0, 0.0, -3.0))
+UP_THERE = target(position=(0.0, 0.0, -5.0))
 
 
 @pytest.mark.parametrize(
@@ -66,18 +67,6 @@ def test_a_setpoint_that_leaves_an_axis_open_means_stop(incomplete):
     assert flown.velocity_ned_m_s == (0.0, 0.0, 0.0)
 
 
-def hovering() -> Flight:
-    """In OFFBOARD at 3 m, a setpoint having just been sent."""
-    flight = Flight()
-    flight.fly(0.5, UP_THERE)
-    assert flight.ask(DO_SET_MODE, 1, 6) is Result.ACCEPTED
-    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
-    flight.fly(9.0, UP_THERE)
-    assert flight.height_m == pytest.approx(3.0, abs=0.05)
-    flight.autopilot.setpoint(UP_THERE)
-    return flight
-
-
 def test_without_setpoints_offboard_can_be_chosen_but_not_armed():
     flight = Flight()
     assert flight.ask(DO_SET_MODE, 1, 6) is Result.ACCEPTED
@@ -91,27 +80,27 @@ def test_without_setpoints_offboard_can_be_chosen_but_not_armed():
 
 
 def test_setpoints_that_come_back_put_it_into_offboard_again():
-    flight = hovering()
+    flight = in_offboard(UP_THERE)
     flight.fly_until(lambda: flight.autopilot.commander.failsafe.acts, 2.0)
     flight.fly(0.5)
     waited_s = flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.OFFBOARD, 0.5, UP_THERE)
     assert waited_s == pytest.approx(0.09, abs=0.01)
     flight.fly(3.0, UP_THERE)
-    assert flight.height_m == pytest.approx(3.0, abs=0.05)
+    assert flight.height_m == pytest.approx(5.0, abs=0.05)
     assert flight.autopilot.commander.system_status == 4
 
 
 def test_a_refused_frame_and_an_empty_mask_do_not_keep_it_alive():
-    for useless in (target((0, 0, -3.0), frame=9), target()):
-        flight = hovering()
+    for useless in (target((0, 0, -5.0), frame=9), target()):
+        flight = in_offboard(UP_THERE)
         flight.fly_until(lambda flight=flight: flight.autopilot.commander.failsafe.acts, 2.0, useless)
 
 
 def test_only_setpoints_received_in_offboard_are_flown():
     # Given setpoints streamed while another mode flies
-    flight = hovering()
+    flight = in_offboard(UP_THERE)
     flight.ask(DO_SET_MODE, 1, 4, 3)
-    flight.fly(2.0, target(position=(50.0, 0.0, -3.0)))
+    flight.fly(2.0, target(position=(50.0, 0.0, -5.0)))
     # When OFFBOARD is entered and no further setpoint comes
     flight.ask(DO_SET_MODE, 1, 6)
     flight.fly(0.9)

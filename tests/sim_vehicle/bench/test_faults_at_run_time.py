@@ -1,7 +1,6 @@
 """Every fault that can be injected while the vehicle flies: it acts from now on, for a while, and can be taken back."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -56,29 +55,6 @@ def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
     pilot.command(400, 1, 0)
     pilot.fly(0.1)
     assert pilot.received and pilot.vehicle.truth.is_armed
-
-
-@pytest.mark.parametrize(
-    ("request_", "shows"),
-    [
-        (
-            faults.packet_loss(1.0, messages=("ATTITUDE",), direction="to_companion"),
-            lambda pilot: not pilot.all("ATTITUDE"),
-        ),
-        (faults.delay(0.2), lambda pilot: pilot.vehicle.time_s - stamps(pilot)[-1] / 1e6 > 0.19),
-        (faults.reordering(0.3, by_s=0.05), lambda pilot: np.any(np.diff(stamps(pilot)) < 0)),
-        (faults.duplication(1.0), lambda pilot: len(stamps(pilot)) > 1.9 * len(set(stamps(pilot)))),
-        (faults.corruption(0.2), lambda pilot: len(pilot.all("BAD_DATA")) > 0.1 * len(pilot.received)),
-    ],
-)
-def test_every_fault_of_the_wire(request_: FaultRequest, shows: Callable[[Pilot], bool]) -> None:
-    pilot = standing()
-    pilot.fly(1.0)
-    assert pilot.all("HIGHRES_IMU") and not shows(pilot)
-    pilot.forget()
-    pilot.vehicle.inject(request_)
-    pilot.fly(1.0)
-    assert pilot.all("HIGHRES_IMU") and shows(pilot)
 
 
 def stamps(pilot: Pilot) -> np.ndarray:

@@ -35,16 +35,3 @@ def test_every_example_passes(pytester: pytest.Pytester, monkeypatch: pytest.Mon
         "-p", "sim_vehicle.shell.pytest_plugin", "-p", "no:cacheprovider", "--strict-markers"
     )
     result.assert_outcomes(passed=len(tests))
-
-
-def test_the_tables_name_every_fault_and_setting() -> None:
-    from dataclasses import fields
-
-    from sim_vehicle.bench import faults
-    from sim_vehicle.bench.bench import Setup
-
-    text = (ROOT / "docs/how-to/testing.md").read_text()
-    functions = [name for name, value in vars(faults).items() if getattr(value, "__module__", "") == faults.__name__]
-    offered = {name for name in functions if name.islower() and name != "opposite"}
-    assert all(f"`{name}(" in text or f"`{name}`" in text for name in offered)
-    assert all(f"`{field.name}`" in text for field in fields(Setup))

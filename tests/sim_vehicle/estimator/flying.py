@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.onboard import OnboardEstimator
@@ -24,18 +24,7 @@ WITH_CAMERAS = {"sensors": {"motion_capture": {"fitted": True}}}
 
 def filtered(base: str = "foldable", changes: dict[str, Any] | None = None) -> Airframe:
     """A built-in airframe with its filter on."""
-    data = load_built_in(base).model_dump()
-    _lay_over(data, {"estimate": {"kind": "ekf"}})
-    _lay_over(data, changes or {})
-    return Airframe.model_validate(data)
-
-
-def _lay_over(data: dict[str, Any], changes: dict[str, Any]) -> None:
-    for key, value in changes.items():
-        if isinstance(value, dict):
-            _lay_over(data[key], value)
-        else:
-            data[key] = value
+    return Airframe.model_validate(with_base({"based_on": base, "estimate": {"kind": "ekf"}, **(changes or {})}))
 
 
 class Flight:

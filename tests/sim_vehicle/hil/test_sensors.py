@@ -67,10 +67,6 @@ def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():
     assert sum(sensor.air is not None for sensor in sensors) == 50
 
 
-def rms(values: list[float]) -> float:
-    return math.sqrt(sum(value * value for value in values) / len(values))
-
-
 def test_a_lost_gps_is_silent():
     scene = Scene.model_validate({"faults": [{"kind": "aiding_loss", "sensor": "gps", "at_s": 0.5}]})
     vehicle = HilVehicle(FOLDABLE, scene, seed=1, sample_interval_us=4_000)

@@ -14,7 +14,6 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.vehicle_client import End
 
-IMU = 105
 KEY = bytes(range(32))
 
 

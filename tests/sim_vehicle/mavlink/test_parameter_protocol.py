@@ -1,5 +1,6 @@
 """The parameter protocol as PX4 speaks it."""
 
+import math
 import struct
 
 import pytest
@@ -90,6 +91,14 @@ def test_a_wrong_type_is_silently_ignored(name, kind):
     before = client.vehicle.parameters.stored(name)
     assert set_to(client, name, 2.0, kind) == []
     assert client.vehicle.parameters.stored(name) == before
+
+
+@pytest.mark.parametrize(("value", "counts"), [(100.0, 8.0), (-1.0, 0.5), (math.nan, 3.0), (math.inf, 8.0)])
+def test_what_is_out_of_range_is_stored_but_does_not_count(value, counts):
+    parameters = Parameters()
+    parameters.set("MPC_Z_VEL_MAX_UP", value)
+    assert str(parameters.stored("MPC_Z_VEL_MAX_UP")) == str(value)
+    assert parameters["MPC_Z_VEL_MAX_UP"] == counts
 
 
 def test_a_gain_changes_how_the_vehicle_flies():

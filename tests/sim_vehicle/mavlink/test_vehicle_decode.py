@@ -110,6 +110,3 @@ def test_a_packet_is_read_field_by_field_as_pymavlink_reads_it(number):
 def plain(message, name):
     value = getattr(message, name)
     return tuple(value) if isinstance(value, list) else value
-
-
-HEARTBEAT, TARGET = packet(MESSAGES[0]), packet(MESSAGES[-1])

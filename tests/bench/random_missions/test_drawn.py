@@ -1,4 +1,4 @@
-"""Drawn vehicles follow from their seed alone, are airframe files, and are ones that can be built and flown."""
+"""Drawn vehicles and missions follow from their seed alone, are files, and can be built and flown."""
 
 import math
 
@@ -8,6 +8,7 @@ import yaml
 from bench.cases.missions import MissionCase, airframe_of, random_mission
 from bench.cases.vehicles import AIRFRAMES, drawn_vehicle
 from companion.mission.config import CompanionConfig
+from companion.mission.model import Mission
 from sim_vehicle.airframe import Airframe, with_base
 
 SEEDS = range(1, 61)
@@ -52,3 +53,12 @@ def test_a_mission_with_a_drawn_vehicle_says_of_it_what_its_owner_can_measure():
     # The room and the mission are those of the named vehicle
     named = random_mission(MissionCase(9, "foldable")).data
     assert {**named, "companion": 0} == {**random_mission(case).data, "companion": 0}
+
+
+def test_a_mission_is_a_file_that_reads_back_the_same_and_another_seed_is_another_mission():
+    missions = [random_mission(MissionCase(seed, "foldable")) for seed in SEEDS]
+    assert random_mission(MissionCase(7, "foldable")) == missions[6]
+    assert len({yaml.safe_dump(mission.data) for mission in missions}) == len(SEEDS)
+    for mission in missions:
+        read = yaml.safe_load(yaml.safe_dump(mission.data))
+        assert read == mission.data and Mission.model_validate(read)
