@@ -115,3 +115,20 @@ def test_what_is_gone_says_so_in_a_sentence_and_flies_nothing(capsys, words):
     assert main(words.split()) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("bench: `") and " is no more: " in line and line.endswith(".")
+
+
+def test_an_airframe_of_ones_own_is_looked_over_as_for_a_flight_and_flown_alone(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    own = tmp_path / "own.yaml"
+    # Given one that would begin in the ground
+    own.write_text("based_on: rigid\ngeometry: {foot_depth_m: 0.04}\n")
+    assert main(["campaign", "--airframe", str(own), "--missions", "1"]) == 1
+    assert f"{own}:1: the hub, geometry.hub_solid_radius_m, reaches" in capsys.readouterr().err
+    # When it is mended
+    own.write_text("based_on: racer\nname: own\nmass_kg: 0.8\n")
+    words = ["--missions", "1", "--first-seed", SEED, "--jobs", "1", "--out", str(tmp_path / "page")]
+    assert main(["campaign", "--airframe", str(own), *words]) == 0
+    # Then it alone flew, and its rows are kept by what is in the file
+    (flight,) = (tmp_path / "page" / "campaign.jsonl").read_text().splitlines()
+    assert json.loads(flight)["airframe"] == str(own)
+    assert [path.name for path in (tmp_path / "runs").rglob("campaign-own-*.jsonl")]
