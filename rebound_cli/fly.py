@@ -99,7 +99,7 @@ def run_fly(options: Namespace) -> int:
                 flown = _fly(flight, connection, options)
             finally:
                 recorder.close()
-        return _finish(flight, flown, options.json)
+        return _finish(flight, flown, options)
 
 
 def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> Flown:
@@ -213,7 +213,7 @@ def _fly_stepped(flight: Flight, vehicle: "SteppedVehicle") -> Flown:
     return flown
 
 
-def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
+def _finish(flight: Flight, flown: Flown, options: Namespace) -> int:
     world = flight.world
     airframe, seed = (world.airframe.name, world.seed) if world else (None, None)
     settled_s = flight.mission.companion.settled.duration_s
@@ -229,22 +229,22 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
         if world is not None:
-            _draw(flight)
+            _draw(flight, options.has_picture)
         else:
             offer_page(flight.folder, console)
         console.print(f"\nEverything is in {flight.folder}/")
     finally:
-        if json_on_stdout:
+        if options.json:
             print(json.dumps(summary, indent=2))
     if flown.fault is not None:
         raise flown.fault
     return 0 if summary["outcome"] == "completed" else 1
 
 
-def _draw(flight: Flight) -> None:
+def _draw(flight: Flight, has_picture: bool) -> None:
     """Picture and page of the flight; Ctrl-C leaves them out."""
     try:
-        show_flight(flight.folder, flight.followed)
+        show_flight(flight.folder, flight.followed, has_picture)
     except KeyboardInterrupt:
         offer_page(flight.folder, flight.console)
     except ReboundError as error:

@@ -14,8 +14,10 @@ from rebound_cli.replay.recording import Followed
 from rebound_cli.results.run_folder import FIGURE_NAME, REPORT_NAME, TLOG_NAME
 
 
-def show_flight(folder: Path, followed: Followed | None = None) -> None:
-    """The picture is of simulated flights. One that was followed is not decided again. Raises ReboundError, OSError."""
+def show_flight(folder: Path, followed: Followed | None, has_picture: bool) -> None:
+    """A page, and of simulated flights a picture. One that was followed is not decided again. Raises ReboundError,
+    OSError.
+    """
     # A drone that only offers the page never loads what makes it.
     from rebound_cli.report.page import write_page
     from rebound_cli.report.shown_flight import followed_flight, recorded_flight
@@ -23,7 +25,7 @@ def show_flight(folder: Path, followed: Followed | None = None) -> None:
     # Where nothing was heard, that is what reading it says.
     is_followed = followed is not None and followed.started_at_us
     flight = followed_flight(folder, followed) if followed is not None and is_followed else recorded_flight(folder)
-    if flight.scene is not None:
+    if flight.scene is not None and has_picture:
         from rebound_cli.figure.flight import draw_flight
 
         draw_flight(flight, folder / FIGURE_NAME)
