@@ -1,4 +1,4 @@
-"""`bench pictures`: every picture of the manual, from one flight: its figure, its report, and its hit as that shows it."""
+"""`bench pictures`: the pictures of the manual, from one flight: its figure, its report, the hit as that shows it."""
 
 import io
 import shutil
