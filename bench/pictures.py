@@ -1,4 +1,4 @@
-"""`bench pictures`: the pictures of the manual, from one flight: its figure, its report, the hit as that shows it."""
+"""`bench pictures`: the pictures of the manual, from one flight: its report, and the hit as that shows it."""
 
 import io
 import shutil
@@ -11,7 +11,7 @@ from PIL import Image
 
 from companion.errors import ReboundError
 from rebound_cli.main import main as rebound
-from rebound_cli.results.run_folder import FIGURE_NAME, REPORT_NAME
+from rebound_cli.results.run_folder import REPORT_NAME
 
 MISSION = Path(__file__).parents[1] / "missions" / "wall.yaml"
 FOLDER = Path("docs") / "images"
@@ -62,7 +62,6 @@ def run_pictures(options: Namespace) -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "wall"
         rebound(["fly", str(MISSION), "--lockstep", "--json", "--out", str(folder)])
-        shutil.copyfile(folder / FIGURE_NAME, images / "wall.png")
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=browser_path(), args=ARGUMENTS)
             write_animation(browser, folder / REPORT_NAME, images / "hit.webp")

@@ -192,7 +192,6 @@ def add_fly(commands: Commands) -> None:
     _add_peer_and_key(fly)
     _add_wait(fly, "with --connect: ")
     _flag(fly, "--yes", "with --connect: fly the plan without asking")
-    fly.set_defaults(has_picture=True)
 
 
 def add_guard(commands: Commands) -> None:

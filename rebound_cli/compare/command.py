@@ -61,16 +61,13 @@ def _flown(console: Console, options: Namespace, cases: Sequence[Case], out: Pat
 
 
 def _fly(mission: Path, airframe: str | None, case: Case, out: Path) -> Row:
-    """One, as `rebound fly --lockstep` does it, without the picture, which takes a quarter of it; in a process of its
-    own.
-    """
+    """One, as `rebound fly --lockstep` does it; in a process of its own."""
     from rebound_cli.main import build_parser
 
     words = ["fly", str(mission), "--lockstep", "--seed", str(case.seed), "--out", str(out / case.folder)]
     words += [] if airframe is None else ["--airframe", airframe]
     words += [word for one in case.sets for word in ("--set", one)]
     options, said = build_parser().parse_args(words), io.StringIO()
-    options.has_picture = False
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         try:
             options.run(options)

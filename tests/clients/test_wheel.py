@@ -18,7 +18,7 @@ from tests.docs.test_examples import command_lines, consoles, differs
 WHEEL = Path(os.environ["WHEEL"])
 # Root may write everywhere; without its capabilities it is a user like any other.
 POWERLESS = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"] if os.geteuid() == 0 else []
-# A drone needs none of them; rich, which is installed, is for a terminal.
+# A drone needs none of them.
 NOT_IMPORTED = ("numba", "filterpy", "scipy", "matplotlib", "pandas", "tabulate", "mavsdk", "rich", "pytest")
 REBOUND = f"""
 import sys

@@ -98,7 +98,7 @@ def test_a_single_mission_again_is_the_same_flight_with_its_whole_folder(written
     summary = json.loads((tmp_path / "again" / "summary.json").read_text())
     assert summary["duration_s"] == result["seconds"] and summary["airframe"] == "rigid"
     assert summary["outcome"] == result["outcome"] and len(summary["collisions"]) > 0
-    assert (tmp_path / "again" / "flight.png").exists()
+    assert (tmp_path / "again" / "report.html").exists()
 
 
 def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsys, monkeypatch):
