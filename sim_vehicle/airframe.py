@@ -335,7 +335,7 @@ class Airframe(Part):
         level = self._turning(gains.attitude_frequency_rad_s), gains.velocity_p_per_s, gains.velocity_i_per_s2
         climb_p, climb_i = gains.climb_p_per_s or level[1], gains.climb_i_per_s2
         climb = [self.motors.time_constant_s, 1.0], climb_p, level[2] if climb_i is None else climb_i
-        for way, (lag, p_per_s, i_per_s2) in (("along the ground", level), ("up and down", climb)):
+        for way, (lag, p_per_s, i_per_s2) in (("sideways", level), ("in height", climb)):
             # a = (p + i / s) (k (x_d - x) - s x) - d s^2 x, through the lag and the estimate's delay
             asked = lag[-1] * np.polymul([p_per_s, i_per_s2], [1.0, gains.position_p_per_s])
             braked = np.polyadd([lag[-1] * gains.velocity_d, 0.0, 0.0, 0.0], asked)

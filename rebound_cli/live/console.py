@@ -27,7 +27,7 @@ _ANEW, _RED, _AS_BEFORE = "\r\x1b[K", "\x1b[1;31m", "\x1b[0m"
 
 
 class _Lines:
-    """Lines, on a terminal above the state now, which is written anew. On the writer's thread; may raise what it raises."""
+    """Lines, on a terminal above the state now, which is written anew; on the writer's thread, and may raise."""
 
     def __init__(self, stream: TextIO, is_terminal: bool) -> None:
         self._stream, self._is_terminal = stream, is_terminal
