@@ -50,6 +50,7 @@ class ShownFlight:
     summary: Mapping[str, Any] | None = None
     scene: Scene | None = None
     rotors_frd_m: Sequence[tuple[float, float]] = ()  # of a simulated vehicle with a list of them
+    stop_s: float | None = None  # contact time of a simulated vehicle's frame or of its arms' stop
     truth: FlightTruth | None = None
     patches: Sequence[Patch] = ()
     versions: Mapping[str, str] | None = None
@@ -160,13 +161,14 @@ def _kind(text: str) -> str:
 
 
 def _world(folder: Path) -> dict[str, Any]:
-    """Scene and rotors, where the vehicle was a simulated one."""
+    """Scene, rotors and stop, where the vehicle was a simulated one."""
     airframe = folder / run_folder.AIRFRAME_NAME
     if not airframe.exists():
         return {}
-    document, rotors = load_document(settings_file(folder)), load_document(airframe).data.get("rotors") or ()
+    document, flown = load_document(settings_file(folder)), load_document(airframe).data
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
-    return {"scene": scene, "rotors_frd_m": [tuple(rotor["place_frd_m"]) for rotor in rotors]}
+    places = [tuple(rotor["place_frd_m"]) for rotor in flown.get("rotors") or ()]
+    return {"scene": scene, "rotors_frd_m": places, "stop_s": flown["arms"]["stop"]["contact_time_s"]}
 
 
 def _patches(path: Path) -> Sequence[Patch]:
