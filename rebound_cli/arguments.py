@@ -43,7 +43,6 @@ count = number(int, 1, math.inf, "a count: give a whole number from 1 on")
 instance = number(int, 0, 9, "an instance: give a number from 0 to 9")
 speed = number(float, 0, 1000, "a speed: give a number from 0 to 1000, here or in PX4_SIM_SPEED_FACTOR")
 share = number(float, 0, 1, "a share: give a number from 0 to 1")
-mass_kg = number(float, math.ulp(0.0), 1000, "a mass: give kilograms, such as 1.1")
 
 
 def mission_file(text: str) -> Path:
@@ -368,9 +367,7 @@ def add_tune(commands: Commands) -> None:
     text = (
         "False alarms, the smallest hit that shows, settings with their margins; see docs/how-to/recorded-flights.md."
     )
-    tune = _command(
-        commands, "tune", "identification.tune:run_tune", "settings for a vehicle from its healthy flights", text
-    )
+    tune = _command(commands, "tune", "replay.tune:run_tune", "settings for a vehicle from its healthy flights", text)
     text = "flights without a collision: .ulg, .bin, .tlog or runs' folders"
     _option(tune, "logs", text, "LOG", type=Path, nargs="+")
     _option(tune, "--detector", "default: the companion's", "NAME")
@@ -378,23 +375,6 @@ def add_tune(commands: Commands) -> None:
     _option(tune, "--companion", "settings to begin with (default: the defaults)", "FILE")
     _option(tune, "--out", "write the settings, for rebound fly --companion FILE", "FILE")
     _gone(tune, "--json", "the settings are YAML, which a program reads as well")
-
-
-def add_identify(commands: Commands) -> None:
-    text = "Fits stiffness, damping and restitution to hits on a wall; see docs/how-to/airframes.md."
-    summary = "find an airframe's springs in recorded hits"
-    identify = _command(commands, "identify", "identification.command:run_identify", summary, text)
-    text = "logs or runs' folders as replay reads them: one hit each"
-    _option(identify, "data", text, "DATA", type=Path, nargs="+")
-    _option(identify, "--mass", "of the vehicle; known for simulated runs", "KG", type=mass_kg)
-    _gone(identify, "--axis", "it belonged to CSV files of motion capture; a log tells where the wall is")
-    _option(identify, "--out", "write an airframe file", "FILE")
-    _gone(identify, "--name", "the airframe has the file's name")
-    _gone(
-        identify,
-        "--based-on",
-        "all else is that of foldable, or of rigid where no spring is seen; change it in the file",
-    )
 
 
 def add_airframe(commands: Commands) -> None:
@@ -458,5 +438,5 @@ COMMANDS = (
         add_report,
         add_watch,
     ),
-    *(add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
+    *(add_replay, add_tune, add_airframe, add_key, add_completion, add_service),
 )

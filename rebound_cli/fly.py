@@ -16,7 +16,6 @@ from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
 from rebound_cli import inputs
 from rebound_cli.background import Background
-from rebound_cli.figure.showing import offer_page, show_flight, watched_page
 from rebound_cli.flights.kept import folder_with_room
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
@@ -24,6 +23,7 @@ from rebound_cli.live.realtime import AskPerson, Computer, ConfirmAtOnce, Flight
 from rebound_cli.live.signed_connection import open_signed, refused_packets
 from rebound_cli.live.status import StatusServer, served
 from rebound_cli.replay.recording import Followed
+from rebound_cli.report.showing import offer_page, show_flight, watched_page
 from rebound_cli.results import run_folder
 from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import FlightRecorder
@@ -229,7 +229,7 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
         if world is not None:
-            _draw(flight)
+            _show(flight)
         else:
             offer_page(flight.folder, console)
         console.print(f"\nEverything is in {flight.folder}/")
@@ -241,8 +241,8 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     return 0 if summary["outcome"] == "completed" else 1
 
 
-def _draw(flight: Flight) -> None:
-    """Picture and page of the flight; Ctrl-C leaves them out."""
+def _show(flight: Flight) -> None:
+    """The page of the flight; Ctrl-C leaves it out."""
     try:
         show_flight(flight.folder, flight.followed)
     except KeyboardInterrupt:

@@ -16,13 +16,13 @@ from companion.shell.connection import Connection, Selectable
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.documents import Document, apply_overrides, load_document, validated
-from rebound_cli.figure.showing import offer_page
 from rebound_cli.flights.kept import folder_with_room
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop, watched
 from rebound_cli.live.signed_connection import open_signed, refused_packets
 from rebound_cli.live.status import served
+from rebound_cli.report.showing import offer_page
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 

@@ -32,6 +32,7 @@ GONE = {
     )
 }
 GONE["doctor"] = "is gone: send what 'rebound logs export' and 'journalctl --unit=rebound' give"
+GONE["identify"] = "is gone: press an arm on a scale for its stiffness, as docs/how-to/airframes.md says"
 GONE["plan"] = "is gone: upload the plan to the vehicle by QGroundControl, and fly it under 'rebound guard'"
 
 

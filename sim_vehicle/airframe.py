@@ -27,6 +27,9 @@ LEAST_HOVER = 1.25 * THRUST_MIN
 # Above this share of the way from MPC_THR_MIN to hover's thrust PX4 takes no vehicle for landed
 # (MulticopterLandDetector.cpp).
 NO_THRUST_SHARE = 0.1
+# Damping ratio of the closed loops, at least: half of what the built-in airframes have. A swing leaves a quarter of
+# itself to the next one.
+LEAST_DAMPING = 0.2
 BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
 
 Fraction = Annotated[float, Field(gt=0, lt=1)]
@@ -58,7 +61,8 @@ class Geometry(Part):
     @property
     def reach_m(self) -> float:
         """The furthest any part is from the centre."""
-        return self.motor_radius_m + self.guard_radius_m
+        foot_m = math.hypot(self.foot_radius_m, self.foot_depth_m)
+        return max(self.motor_radius_m + self.guard_radius_m, foot_m, self.hub_solid_radius_m)
 
 
 class Rotor(Part):
@@ -303,6 +307,52 @@ class Airframe(Part):
         return self
 
     @model_validator(mode="after")
+    def _is_a_body(self) -> "Airframe":
+        x, y, z = self.inertia_kg_m2
+        # A flat body has as much about one axis as about the two others; files give three digits.
+        if 2.0 * max(x, y, z) > 1.01 * (x + y + z):
+            raise ValueError("inertia_kg_m2: one is more than the two others together, which no body has")
+        tip_kg, radius_m = self.arms.tip_mass_kg, self.geometry.motor_radius_m
+        squares_m2 = [math.hypot(*rotor.place_frd_m) ** 2 for rotor in self.rotors] or 4 * [radius_m**2]
+        if tip_kg * len(squares_m2) >= self.mass_kg or tip_kg * sum(squares_m2) >= z:
+            raise ValueError(
+                f"arms.tip_mass_kg: {len(squares_m2)} ends of {tip_kg:g} kg have more mass, or more moment of inertia "
+                "about z, than the whole vehicle; lower it"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _holds_its_place(self) -> "Airframe":
+        gains = self.control
+        for what, frequency_rad_s in (
+            ("roll and pitch", gains.attitude_frequency_rad_s),
+            ("yaw", gains.yaw_frequency_rad_s),
+        ):
+            if _damping(self._turning(frequency_rad_s)) < LEAST_DAMPING:
+                raise ValueError(
+                    f"control: the motors' lag lets {what} swing; lower its frequency_rad_s or motors.time_constant_s"
+                )
+        level = self._turning(gains.attitude_frequency_rad_s), gains.velocity_p_per_s, gains.velocity_i_per_s2
+        climb_p, climb_i = gains.climb_p_per_s or level[1], gains.climb_i_per_s2
+        climb = [self.motors.time_constant_s, 1.0], climb_p, level[2] if climb_i is None else climb_i
+        for way, (lag, p_per_s, i_per_s2) in (("sideways", level), ("in height", climb)):
+            # a = (p + i / s) (k (x_d - x) - s x) - d s^2 x, through the lag and the estimate's delay
+            asked = lag[-1] * np.polymul([p_per_s, i_per_s2], [1.0, gains.position_p_per_s])
+            braked = np.polyadd([lag[-1] * gains.velocity_d, 0.0, 0.0, 0.0], asked)
+            moved = np.polymul(np.polymul(lag, [self.estimate.delay_s, 1.0]), [1.0, 0.0, 0.0, 0.0])
+            if _damping(np.polyadd(moved, braked)) < LEAST_DAMPING:
+                raise ValueError(
+                    f"control: place, velocity and attitude swing each other up {way}; lower control.position_p_per_s, "
+                    "velocity_p_per_s or velocity_i_per_s2, or raise attitude_frequency_rad_s"
+                )
+        return self
+
+    def _turning(self, frequency_rad_s: float) -> list[float]:
+        """The characteristic polynomial of a loop of the attitude, through the motors' lag; its end is the gain."""
+        turned = 2.0 * self.control.attitude_damping * frequency_rad_s
+        return [self.motors.time_constant_s, 1.0, turned, frequency_rad_s**2]
+
+    @model_validator(mode="after")
     def _can_fly(self) -> "Airframe":
         if self.hover_fraction > 0.9:
             raise ValueError(
@@ -337,6 +387,11 @@ class Airframe(Part):
                     "it would begin in the ground; make it smaller or raise geometry.foot_depth_m"
                 )
         return self
+
+
+def _damping(polynomial: Any) -> float:
+    """Of the least damped of its roots."""
+    return float(min(-root.real / abs(root) for root in np.roots(np.trim_zeros(polynomial))))
 
 
 def built_in_airframes() -> tuple[str, ...]:

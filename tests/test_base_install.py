@@ -6,7 +6,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 # Everything that only an extra brings.
-# rich is for a terminal: there is none here.
 LEFT_OUT = (
     *("numba", "filterpy", "scipy", "matplotlib", "pandas", "tabulate"),
     *("mavsdk", "pyulog", "mcap", "pygeomag", "pytest", "rich"),

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from bench.cases.draw import DIGITS, Draw, towards
@@ -11,8 +12,9 @@ from bench.cases.rooms import MAX_HEIGHT_M, DrawnRoom, draw_room
 from bench.cases.vehicles import companion_settings, drawn_vehicle
 from companion.errors import ReboundError
 from companion.mission.model import Mission
+from rebound_cli.documents import load_document
 from rebound_cli.inputs import with_guards
-from sim_vehicle.airframe import Airframe, with_base
+from sim_vehicle.airframe import Airframe, built_in_airframes, with_base
 from sim_vehicle.errors import SceneError
 from sim_vehicle.scene import Scene, check_start_is_free
 
@@ -59,9 +61,12 @@ class RandomMission:
 
 
 def airframe_data(case: MissionCase) -> Part:
-    """The airframe file: a drawn one, or a built-in one with the integration interval of PX4 on a flight controller."""
+    """The airframe file: a drawn one, one's own, or a built-in one with PX4's integration interval on a flight
+    controller."""
     if case.is_drawn:
         return drawn_vehicle(case.seed, case.airframe)
+    if case.airframe not in built_in_airframes():
+        return load_document(Path(case.airframe)).data
     return {"based_on": case.airframe, "imu": {"integration_interval_us": INTEGRATION_INTERVAL_US}}
 
 

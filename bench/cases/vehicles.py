@@ -9,8 +9,8 @@ from typing import Any
 import yaml
 
 from bench.cases.draw import Draw
-from rebound_cli.inputs import guards_of
-from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from rebound_cli.inputs import guards_of, load_world
+from sim_vehicle.airframe import Airframe, with_base
 
 Part = dict[str, Any]
 # What a vehicle's seed is joined with, so that its room is drawn from other numbers.
@@ -141,12 +141,12 @@ class BenchVehicle:
 
 @lru_cache(maxsize=16)
 def vehicle_of(kind: str, seed: int | None = None) -> BenchVehicle:
-    """The named airframe, or of a seed the vehicle of its kind that is drawn from it.
+    """The airframe of that name or file, or of a seed the vehicle of its kind that is drawn from it.
 
     Reading an airframe's file takes longer than flying a hit with it.
     """
     if seed is None:
-        airframe = load_built_in(kind)
+        airframe = load_world(None, (), kind, None).airframe
         return BenchVehicle(airframe, {"estimate": {"guards": guards_of(airframe)}})
     data = drawn_vehicle(seed, kind)
     return BenchVehicle(Airframe.model_validate(with_base(data)), companion_settings(data))

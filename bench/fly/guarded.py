@@ -44,11 +44,11 @@ OVERTURNED_DEG = 90.0
 LOOK_EVERY = 5
 
 
-def draw_flown(seed: int, is_drawn: bool) -> HitCase:
-    """Airframes, rates and approaches in turn, speeds at random."""
+def draw_flown(seed: int, is_drawn: bool, airframe: str | None = None) -> HitCase:
+    """Airframes, but for one that is given, rates and approaches in turn, speeds at random."""
     speed_m_s = round(float(np.random.default_rng([seed, 0]).uniform(*SPEEDS_M_S)), 3)
     approach, imu_hz = APPROACHES[seed // 4 % len(APPROACHES)], IMU_HZ[seed // 2 % 2]
-    return HitCase(seed, AIRFRAMES[seed % 2], approach, speed_m_s, is_drawn, imu_hz)
+    return HitCase(seed, airframe or AIRFRAMES[seed % 2], approach, speed_m_s, is_drawn, imu_hz)
 
 
 def fly(hit: HitCase) -> tuple[SimulatedVehicle, Guard, int | None]:

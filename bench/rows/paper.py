@@ -31,6 +31,8 @@ ESTIMATE = {"kind": "ekf"}
 LOST_SHARE = 0.1
 # Of an arm that is on its way: an arm that rests on its hysteresis is there to the last bit.
 LEAST_FOLD_M = 1e-6
+# The paper's stress analysis (section II) of its frame: a factor of safety of 1.85 at 100 N.
+BREAKING_FORCE_N = 185.0
 # What is kept of a flight that is to be drawn, around its first contact.
 TRACK_BEFORE_S, TRACK_AFTER_S = 2.0, 8.0
 

@@ -14,8 +14,7 @@ from bench.fly.lockstep import NOTICED_M_S, fly
 from bench.rows.judge import failures, work_out_mission
 from bench.rows.recovered import UNANSWERED
 from bench.rows.tables import Bar, bars_text, share_bar, summary_text, table
-from bench.studies.study import Shown, run_study, seeds_of
-from companion.errors import ConfigurationError
+from bench.studies.study import Shown, own_airframe, run_study, seeds_of
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
 
@@ -35,11 +34,11 @@ UPRIGHT = 0.7
 def run_missions(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed to be flown."""
     is_drawn = options.vehicles == "drawn"
+    own = options.airframe if is_drawn and options.only and options.airframe in AIRFRAMES else own_airframe(options)
     if options.only is not None:
-        return run_only(MissionCase(options.only, options.airframe or "foldable", is_drawn), options.out)
-    if options.airframe is not None:
-        raise ConfigurationError("--airframe belongs to --only: a campaign flies every mission with both.")
-    cases = [MissionCase(seed, name, is_drawn) for seed in seeds_of(options, options.missions) for name in AIRFRAMES]
+        return run_only(MissionCase(options.only, own or AIRFRAMES[0], is_drawn), options.out)
+    names = AIRFRAMES if own is None else (own,)
+    cases = [MissionCase(seed, name, is_drawn) for seed in seeds_of(options, options.missions) for name in names]
     wanted = DRAWN_WANTED if is_drawn else MISSIONS_WANTED
     return run_study(options, "campaign", "Campaign", cases, work_out_mission, lambda results: shown(results, wanted))
 
@@ -124,12 +123,13 @@ def level(hits: pd.DataFrame) -> pd.DataFrame:
 
 def mission_bars(flights: pd.DataFrame, hits: pd.DataFrame, wanted: Mapping[str, float]) -> list[Bar]:
     bars: list[Bar] = []
-    for name in AIRFRAMES:
+    names = list(dict.fromkeys(flights["airframe"]))
+    for name in names:
         flown = flights[flights["airframe"] == name]
         bars.append(
-            share_bar(f"{name}: missions that end as they say, without a crash", flown["is_good"], wanted[name])
+            share_bar(f"{name}: missions that end as they say, without a crash", flown["is_good"], wanted.get(name))
         )
-    for name in AIRFRAMES:
+    for name in names:
         bars += _hits(name, hits[hits["airframe"] == name])
     return bars
 

@@ -15,7 +15,7 @@ from bench.fly.wire import FOUND_WITHIN_US
 from bench.rows.contacts import tilts_deg
 from bench.rows.recovered import CAME_BACK_M
 from bench.rows.tables import CONFIDENCE, at_most_an_hour, at_most_of_groups, per_cent, table, text_of
-from bench.studies.study import Shown, run_study, seeds_of
+from bench.studies.study import Shown, own_airframe, run_study, seeds_of
 from companion.errors import ConfigurationError
 from companion.reflex.collision import CollisionReport
 from rebound_cli.results.truth_match import LATE_SAMPLE_US, FlightTruth
@@ -34,7 +34,8 @@ TWO_CORES_S = 2 * 3600.0
 
 def run_hits(options: Namespace) -> int:
     """0 when it is written, whatever it says; 1 when a hit failed to be flown."""
-    cases = [draw_flown(seed, options.vehicles == "drawn") for seed in seeds_of(options, options.hits)]
+    airframe, is_drawn = own_airframe(options), options.vehicles == "drawn"
+    cases = [draw_flown(seed, is_drawn, airframe) for seed in seeds_of(options, options.hits)]
     return run_study(options, "hits", "Hits alone", cases, work_out_flown, shown)
 
 

@@ -1,5 +1,6 @@
 """What every study does: its cases are flown, and what their rows show becomes a page in a folder of `build/`."""
 
+import hashlib
 import os
 import subprocess
 from argparse import Namespace
@@ -12,7 +13,9 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from bench.fly.campaign import Json, Results, run_campaign
+from companion.errors import ConfigurationError
 from rebound_cli import __version__
+from rebound_cli.inputs import load_world
 from rebound_cli.results.run_folder import RunFolderError
 
 
@@ -38,11 +41,27 @@ def run_study(
 ) -> int:
     """Fly the cases and write the page of that name; 1 where a case failed to be flown."""
     page = page_path(options.out, name)
-    results = run_campaign(name, cases, work_out, options.jobs)
+    results = run_campaign(_record_name(options, name), cases, work_out, options.jobs)
     shown = show(results)
     write_page(page, title, options.typed, shown)
     print("\n".join(filter(None, (shown.said, *results.failures))))
     return 0 if shown.is_met and not results.failures else 1
+
+
+def own_airframe(options: Namespace) -> str | None:
+    """The one that was asked for by name or file, looked over as `rebound fly` does it. Raises ReboundError."""
+    if options.airframe is None:
+        return None
+    if options.vehicles == "drawn":
+        raise ConfigurationError("--airframe is the vehicle, and --vehicles drawn draws it: leave one of them out.")
+    load_world(None, (), options.airframe, None)
+    return str(options.airframe)
+
+
+def _record_name(options: Namespace, name: str) -> str:
+    """Rows of an airframe's file belong to what is in it, not to where it lies."""
+    own = Path(getattr(options, "airframe", None) or "")
+    return f"{name}-{own.stem}-{hashlib.sha256(own.read_bytes()).hexdigest()[:8]}" if own.is_file() else name
 
 
 def seeds_of(options: Namespace, count: int) -> range:

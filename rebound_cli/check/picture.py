@@ -12,8 +12,8 @@ from matplotlib.patches import Circle, Polygon
 
 from companion.fence import Fence
 from companion.mission.model import Mission
+from rebound_cli.check.ground import OBSTACLE, draw_obstacles, draw_patches, footprint
 from rebound_cli.check.legs import FlownLeg
-from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches, footprint
 from sim_vehicle.scene import Scene
 
 Floats = npt.NDArray[np.float64]

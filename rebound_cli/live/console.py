@@ -1,6 +1,7 @@
 """What a person sees of a flight: events as they happen, the state now, the end."""
 
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -10,7 +11,6 @@ from rebound_cli.background import Background, at_once
 
 if TYPE_CHECKING:
     from companion.report import Event, Status
-    from rebound_cli.live.terminal import Terminal
 
 # Ten times a second looks continuous; in a file or a pipe a line every few seconds is enough to see life.
 LIVE_INTERVAL_S = 0.1
@@ -22,11 +22,15 @@ STANDING_OUT = ("detection", "hit")
 Fields = Sequence[tuple[str, str]]
 
 
-class Plain:
-    """Lines, for a pipe or a file; called on the writer's thread, may raise what writing raises."""
+# Of a terminal: back to the line's beginning and clear it; bold red, and as before.
+_ANEW, _RED, _AS_BEFORE = "\r\x1b[K", "\x1b[1;31m", "\x1b[0m"
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+
+class _Lines:
+    """Lines, on a terminal above the state now, which is written anew; on the writer's thread, and may raise."""
+
+    def __init__(self, stream: TextIO, is_terminal: bool) -> None:
+        self._stream, self._is_terminal = stream, is_terminal
         # The state is no line of a service's journal: the service manager shows the present one.
         self._is_journal = "NOTIFY_SOCKET" in os.environ
 
@@ -34,19 +38,25 @@ class Plain:
         self.ask(f"{text}\n")
 
     def event(self, time_s: float, kind: str, text: str, stands_out: bool) -> None:
-        self.print(f"{time_s:9.3f} s  {kind:<10}  {text}")
+        line = f"{time_s:9.3f} s  {kind:<10}  {text}"
+        self.print(f"{_RED}{line}{_AS_BEFORE}" if stands_out and self._is_terminal else line)
 
     def state(self, fields: Fields) -> None:
         (_, time_text), *others = fields
-        if not self._is_journal:
-            self.print("  ".join([f"{time_text:>11}", *(f"{name} {text}" for name, text in others)]))
+        line = "  ".join([f"{time_text:>11}", *(f"{name} {text}" for name, text in others)])
+        if self._is_terminal:
+            # One that wraps could not be cleared.
+            self.ask(line[: shutil.get_terminal_size().columns - 1])
+        elif not self._is_journal:
+            self.print(line)
 
     def ask(self, question: str) -> None:
-        self._stream.write(question)
+        self._stream.write(f"{_ANEW}{question}" if self._is_terminal else question)
         self._stream.flush()
 
     def close(self) -> None:
-        self._stream.flush()
+        """Take the state away."""
+        self.ask("")
 
 
 class Console:
@@ -59,12 +69,7 @@ class Console:
         self.writer = writer
         self._do = at_once if writer is None else writer.give
         self.is_terminal = stream.isatty()
-        self._display: Plain | Terminal = Plain(stream)
-        if self.is_terminal:
-            # A companion that runs as a service has no terminal, and never loads what draws on one.
-            from rebound_cli.live import terminal
-
-            self._display = terminal.Terminal(stream)
+        self._display = _Lines(stream, self.is_terminal)
         self._live_due_s = 0.0
         self.live_is_held = False  # while a question waits for its answer
 

@@ -140,14 +140,14 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     columns["imu"]["ratio"] = (np.where(watches, loud, np.nan), RATIO)
     columns["path"] = _on_both_clocks(columns["path"], log.position_time_boot_us - first_us)
     if truth is not None:
-        true, boot_us = truth.series, truth.series["time_boot_us"]
+        true, boot_us, folds_m = truth.series, truth.series["time_boot_us"], truth.series["arm_fold_m"]
         columns["truth"] = (
             times(truth.at_us(boot_us), flight.started_at_us)
             | {"boot": ((boot_us - first_us) * 1e-6, TIME_S)}
             | vector(NED, true["position_ned_m"], PLACE_M)
             | vector(VELOCITY, true["velocity_ned_m_s"], SPEED_M_S)
             | vector(TURN, true["attitude_wxyz"], UNIT)
-            | vector(("fold1", "fold2", "fold3", "fold4"), true["arm_fold_m"], FOLD_M)
+            | vector([f"fold{arm}" for arm in range(1, 1 + folds_m.shape[1])], folds_m, FOLD_M)
         )
     return {name: _packed(table, loud if name == "imu" else None, near_s, most) for name, table in columns.items()}
 

@@ -72,7 +72,10 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
         late_ms = (finding.at_us - began_us) / 1e3
         hit = impact_text(touch.kind, touch.impact_velocity_ned_m_s)
         facts.append(("Simulator", f"{hit}, from {flight.seconds(began_us):.4f} s on, seen after {late_ms:.1f} ms"))
-        facts.append(("Simulator's normal", f"{bearing(touch.normal_ned)}; {touch.peak_force_n:.0f} N at most"))
+        facts.append(("Simulator's normal", bearing(touch.normal_ned)))
+        # The shorter the stop's contact, the larger.
+        stop = "" if flight.stop_s is None else f", by the airframe's arms.stop of {1e3 * flight.stop_s:g} ms"
+        facts.append(("Simulator's largest force", f"{touch.peak_force_n:.0f} N{stop}"))
     return Moment(
         kind=kind,
         title=f"{what.capitalize()} at {speed_text(finding)}" if kind == "hit" else f"Touched, no collision: {what}",

@@ -1,11 +1,15 @@
 """What stands in a flight's scene, moves in it and is remembered of it, by the flight's clock: for all who draw it."""
 
+import math
 from typing import Any
 
 from companion.memory.patch import Patch
 from companion.memory.surroundings import outline
 from rebound_cli.report.shown_flight import ShownFlight, patch_of
 from sim_vehicle.world import Motion, Obstacle, Pole
+
+# From ahead to the right, as PX4 counts the motors of a quad-x.
+QUAD_X = [math.radians(degrees) for degrees in (45.0, 225.0, -45.0, 135.0)]
 
 
 def rounded_s(flight: ShownFlight, at_us: float) -> float:
@@ -85,5 +89,7 @@ def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
 
 
 def vehicle(flight: ShownFlight) -> dict[str, Any]:
+    """`arms`: where each ends, ahead and to the right, in the order of PX4's motors."""
     guards = flight.config.estimate.guards
-    return {"centre": guards.centre_m, "radius": guards.radius_m, "height": guards.height_m}
+    arms = flight.rotors_frd_m or [(guards.centre_m * math.cos(way), guards.centre_m * math.sin(way)) for way in QUAD_X]
+    return {"arms": arms, "centre": guards.centre_m, "radius": guards.radius_m, "height": guards.height_m}

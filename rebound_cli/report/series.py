@@ -1,4 +1,4 @@
-"""The columns and charts of a flight: for its page, live or afterwards, and its picture. Each as fine as it is kept.
+"""The columns and charts of a flight: for its page, live or afterwards. Each as fine as it is kept.
 
 Finer than any of the sensors, so that two bytes hold most numbers.
 """

@@ -49,6 +49,8 @@ class ShownFlight:
     events: Sequence[Mapping[str, Any]]
     summary: Mapping[str, Any] | None = None
     scene: Scene | None = None
+    rotors_frd_m: Sequence[tuple[float, float]] = ()  # of a simulated vehicle with a list of them
+    stop_s: float | None = None  # contact time of a simulated vehicle's frame or of its arms' stop
     truth: FlightTruth | None = None
     patches: Sequence[Patch] = ()
     versions: Mapping[str, str] | None = None
@@ -133,7 +135,7 @@ def _in_folder(folder: Path, settings: Mission | GuardConfig, findings: Findings
         findings=findings,
         events=list(run_folder.read_records(folder / run_folder.EVENTS_NAME, event_lines)),
         summary=summary,
-        scene=_scene(folder),
+        **_world(folder),
         truth=read_truth(folder / run_folder.TRUTH_NAME),
         patches=_patches(folder / run_folder.OBSTACLES_NAME),
     )
@@ -158,13 +160,15 @@ def _kind(text: str) -> str:
     return "mode" if text.startswith("mode ") else text if text in ("armed", "disarmed", "landed", "took off") else ""
 
 
-def _scene(folder: Path) -> Scene | None:
-    """Where the vehicle was a simulated one."""
-    file = settings_file(folder)
-    if not (folder / run_folder.AIRFRAME_NAME).exists():
-        return None
-    document = load_document(file)
-    return validated(Scene, document, document.data.get("sim") or {}, ("sim",))
+def _world(folder: Path) -> dict[str, Any]:
+    """Scene, rotors and stop, where the vehicle was a simulated one."""
+    airframe = folder / run_folder.AIRFRAME_NAME
+    if not airframe.exists():
+        return {}
+    document, flown = load_document(settings_file(folder)), load_document(airframe).data
+    scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
+    places = [tuple(rotor["place_frd_m"]) for rotor in flown.get("rotors") or ()]
+    return {"scene": scene, "rotors_frd_m": places, "stop_s": flown["arms"]["stop"]["contact_time_s"]}
 
 
 def _patches(path: Path) -> Sequence[Patch]:

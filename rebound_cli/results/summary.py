@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 
-# The paper's stress analysis (section II) of its frame: a factor of safety of 1.85 at 100 N.
-BREAKING_FORCE_N = 185.0
-_PAPERS_FRAME = "foldable"
-
 # Sizes are written to a tenth of a millimetre, times to a microsecond: finer digits are noise.
 _DIGITS = 4
 _TIME_DIGITS = 6
@@ -124,7 +120,6 @@ def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", tr
         **_rounded(hit, "contact_duration_s", "max_fold_m", digits=_TIME_DIGITS),
         **_rounded(hit, "rebound_speed_m_s"),
         "peak_force_n": round(hit.peak_force_n, 2),
-        "factor_of_safety": round(BREAKING_FORCE_N / hit.peak_force_n, 3) if facts.airframe == _PAPERS_FRAME else None,
         "impulse_n_s": round(math.hypot(*hit.impulse_ned_n_s), _DIGITS),
         **_rounded(hit, "energy_before_j", "energy_after_j"),
         "overshoot_m": round(overshoot_m, _DIGITS),

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 from simulator import ROOT, simulator, wait_until
 
-from tests.docs.test_examples import command_lines, consoles, differs
+from tests.docs.test_examples import blocks, command_lines, consoles, differs
 
 WHEEL = Path(os.environ["WHEEL"])
 # Root may write everywhere; without its capabilities it is a user like any other.
 POWERLESS = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"] if os.geteuid() == 0 else []
-# A drone needs none of them; rich, which is installed, is for a terminal.
+# A drone needs none of them.
 NOT_IMPORTED = ("numba", "filterpy", "scipy", "matplotlib", "pandas", "tabulate", "mavsdk", "rich", "pytest")
 REBOUND = f"""
 import sys
@@ -127,10 +127,11 @@ def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path, home):
 
 
 def typed(page):
-    """What a page has somebody type after `rebound`, and what it then shows; `service` changes a system."""
+    """What a page has somebody type after `rebound`, and what it then shows; `service install` without a change."""
     shown = {shlex.join(shlex.split(command)): text for command, text in consoles(ROOT / page)}
     lines = (words for words in command_lines(ROOT / page) if words and Path(words[0]).name == "rebound")
-    return [(words[1:], shown.get(shlex.join(words))) for words in lines if words[1] != "service"]
+    told = [(words[1:], shown.get(shlex.join(words))) for words in lines]
+    return [([*words, "--dry-run"] if words[:2] == ["service", "install"] else words, text) for words, text in told]
 
 
 PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs/tutorials").glob("*.md"))]
@@ -138,13 +139,19 @@ PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "d
 
 @pytest.mark.parametrize("page", [page for page in PAGES if typed(page)])
 def test_what_a_page_has_somebody_type_works_without_a_checkout(page, tmp_path, home):
+    settings = [text for language, text in blocks(ROOT / page) if language == "yaml"]
+    (tmp_path / "guard.yaml").write_text("".join(settings[:1]))
     for words, shown in typed(page):
         process = start("sim", tmp_path, WHEEL / "sim/bin/rebound", *words, HOME=home, COLUMNS="120")
         if words[0] == "sim":
             assert process.stdout.readline().startswith("Simulated vehicle"), words
             process.send_signal(signal.SIGINT)
         code, stdout, stderr = finished(process, 600)
-        if any("/dev/tty" in word for word in words):
+        if words[0] == "service":
+            # What would be written, and that it is not there.
+            says = "# /etc/systemd/system/rebound.service" if words[1] == "install" else "rebound.service is not there"
+            assert code == (words[1] == "check") and says in stdout and not stderr, stdout + stderr
+        elif any("/dev/tty" in word for word in words):
             # Where there is no drone that is the one thing that is said
             assert code != 0 and "does not exist" in stderr and stderr.count("\n") == 1, stderr
         elif words == ["status"]:

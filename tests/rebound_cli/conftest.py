@@ -2,7 +2,6 @@
 
 import pytest
 
-from rebound_cli import fly
 from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL, run_here
 
@@ -23,9 +22,3 @@ def wall_folder(wall_flight):
 def wall(wall_folder):
     """All that its page shows."""
     return recorded_flight(wall_folder)
-
-
-@pytest.fixture
-def without_pictures(monkeypatch):
-    """For flights whose flight.png nobody looks at: drawing takes as long as flying."""
-    monkeypatch.setattr(fly, "_draw", lambda *_: None)

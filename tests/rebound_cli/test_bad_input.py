@@ -73,7 +73,6 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("fly", SQUARE, "--lockstep", "--watch"), ("--watch belongs to flights in real time",)),
         (("fly", SQUARE, "--lockstep", "--signing-key", "key"), ("--signing-key belongs to --connect",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
-        (("identify", "missing.tlog"), ("missing.tlog: No such file",)),
         (("check", WALL, "--set", "obstacles.file=none.json"), ("none.json: no such file",)),
     ],
     ids=lambda given: " ".join(map(str, given[:1])),
@@ -95,7 +94,6 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
         (("sim", "--speed", "fast"), "'fast' is not a speed"),
         (("sim", "--sensor-rate", "333"), "--sensor-rate"),
         (("sim", "--autopilot", "apm"), "--autopilot"),
-        (("identify", "hit.tlog", "--mass", "nan"), "'nan' is not a mass"),
     ],
 )
 def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.hil.parameters import as_airframe_file, px4_parameters
 from sim_vehicle.physics.layout import allocation, arms_of
@@ -16,8 +16,8 @@ from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.simulated import simulated
 
-# Vehicles, each flown in a thirtieth of a second.
-DRAWN = 40
+# The interval of all built-in airframes.
+DT_S = 0.004
 SIDES = ("cw", "cw", "ccw", "ccw")
 
 
@@ -78,35 +78,85 @@ def test_each_meets_a_wall_recovers_and_lands(name: str, kind: str) -> None:
     assert flight.event("recovered").text.startswith("recovered: settled") and flight.kinds()[-1] == "done"
 
 
-def test_whatever_is_not_refused_stands_and_hovers() -> None:
-    # Given a vehicle drawn from the whole range of rings, sizes, springs and masses
-    chance, flown = random.Random(1), 0
-    base = load_built_in("hexa").model_dump()
-    for seed in range(DRAWN):
-        radius_m, count = chance.uniform(0.1, 0.4), chance.choice((4, 6, 8))
-        rotors = [rotor | {"spring": chance.random() < 0.5} for rotor in ring(count, radius_m)]
-        geometry = base["geometry"] | {
-            "hub_radius_m": 0.3 * radius_m,
-            "arm_length_m": 0.7 * radius_m,
-            "guard_radius_m": chance.uniform(0.03, 0.15),
-            "foot_depth_m": chance.uniform(0.03, 0.15),
-        }
-        mass_kg = chance.uniform(0.5, 3.0)
-        inertia = [mass_kg * (share * radius_m) ** 2 for share in (0.55, 0.6, 0.75)]
-        drawn = {**base, "rotors": rotors, "geometry": geometry, "mass_kg": mass_kg, "inertia_kg_m2": inertia}
+def drawn_from_the_whole_schema(seed: int) -> dict[str, Any]:
+    """Any of the built-in airframes with every number up to three times more or less, and with any rotors."""
+    chance = random.Random(seed)
+
+    def varied(value: Any) -> Any:
+        match value:
+            case bool() | int() | str() | None:
+                return value
+            case float():
+                return value * math.exp(chance.uniform(-math.log(3.0), math.log(3.0)))
+            case dict():
+                return {key: varied(part) for key, part in value.items()}
+        return type(value)(map(varied, value))
+
+    drawn = load_built_in(chance.choice(built_in_airframes())).model_dump()
+    drawn |= {key: varied(drawn[key]) for key in drawn if key not in ("rotors", "sensors", "estimator")}
+    drawn["arms"]["stop"]["restitution"] = chance.uniform(0.05, 0.95)
+    drawn["surface"]["foot"]["restitution"] = chance.uniform(0.05, 0.95)
+    # What independent numbers hardly ever fit together in
+    geometry, control, (x, y, _) = drawn["geometry"], drawn["control"], drawn["inertia_kg_m2"]
+    drawn["inertia_kg_m2"] = x, y, (z := chance.uniform(max(x, y), 1.05 * (x + y)))
+    radius_m, count = geometry["hub_radius_m"] + geometry["arm_length_m"], chance.choice((4, 6, 8))
+    geometry["guard_radius_m"] = chance.uniform(0.2, 1.1) * radius_m * math.sin(math.pi / count)
+    most_kg = min(z / radius_m**2, drawn["mass_kg"]) / count
+    drawn["arms"]["tip_mass_kg"] = chance.uniform(0.1, 1.1) * most_kg
+    drawn["motors"]["max_thrust_n"] = drawn["mass_kg"] * 9.81 / count / chance.uniform(0.1, 1.0)
+    control["velocity_p_per_s"] = (p := chance.uniform(0.1, 0.6) * control["attitude_frequency_rad_s"])
+    control["velocity_i_per_s2"] = chance.uniform(0.0, 0.4) * p * p
+    control["position_p_per_s"] = chance.uniform(0.1, 0.5) * p
+    rotors = [rotor | {"spring": chance.random() < 0.5} for rotor in ring(count, radius_m)]
+    return drawn | {"rotors": rotors}
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.slow)])
+def test_whatever_is_not_refused_stands_and_hovers(count: int) -> None:
+    flown = 0
+    for seed in range(count):
         try:
-            airframe = Airframe.model_validate(drawn)
+            airframe = Airframe.model_validate(drawn_from_the_whole_schema(seed))
         except ValidationError:
             continue
         plant = Plant(airframe, Scene(), seed)
-        began_m = plant.state.body[:3].copy()
-        # When it stands for a second, and then is asked to hover for eight
-        for _ in range(250):
+        body = plant.state.body
+        began_m = body[:3].copy()
+        # When it stands for five seconds, then it is still and upright
+        for _ in range(round(5.0 / DT_S)):
             plant.step(None, armed=False)
-        assert math.dist(plant.state.body[:3], began_m) < 0.02
-        for _ in range(2000):
+            assert math.dist(body[:3], began_m) < 0.02, seed
+        assert body[7] ** 2 + body[8] ** 2 < 1e-4, seed
+        # When it is asked to hover, then it is there after ten seconds, for two
+        for step in range(round(12.0 / DT_S)):
             plant.step(TrajectorySetpoint(position_ned_m=(0.0, 0.0, -1.5), yaw_rad=0.0), armed=True)
-        # Then it is there
-        assert math.dist(plant.state.body[:3], (0.0, 0.0, -1.5)) < 0.3, drawn
+            assert step < 10.0 / DT_S or math.dist(body[:3], (0.0, 0.0, -1.5)) < 0.3, seed
         flown += 1
-    assert flown > DRAWN // 4
+    assert flown > count // 20
+
+
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        ({"inertia_kg_m2": (0.003, 0.003, 0.007)}, "which no body has"),
+        ({"arms": {"tip_mass_kg": 0.3}}, r"arms\.tip_mass_kg: 4 ends of 0\.3 kg have more mass"),
+        ({"control": {"attitude_frequency_rad_s": 60.0}}, "the motors' lag lets roll and pitch swing"),
+        ({"control": {"position_p_per_s": 4.0}}, "swing each other up sideways; lower control"),
+        ({"control": {"climb_p_per_s": 40.0}}, "swing each other up in height"),
+    ],
+)
+def test_what_no_body_is_and_no_control_holds_is_refused(part: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        Airframe.model_validate(with_base({"based_on": "foldable", **part}))
+
+
+def test_feet_that_reach_further_than_the_guards_stand_on_the_ground() -> None:
+    # Given feet below the reach of a small vehicle's guards
+    small = {"hub_radius_m": 0.02, "arm_length_m": 0.06, "guard_radius_m": 0.03, "foot_depth_m": 0.15}
+    airframe = Airframe.model_validate(
+        with_base({"based_on": "foldable", "geometry": small, "arms": {"tip_mass_kg": 0.02}})
+    )
+    plant = Plant(airframe, Scene(), 1)
+    for _ in range(250):
+        plant.step(None, armed=False)
+        assert plant.state.body[2] == pytest.approx(-0.15, abs=0.002)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import approach
-from bench.rows.paper import Floats, StudyFlight
+from bench.rows.paper import BREAKING_FORCE_N, Floats, StudyFlight
 from bench.rows.tables import table
 from bench.studies.paper.figures import (
     CONTACT,
@@ -20,7 +20,6 @@ from bench.studies.paper.figures import (
     new_figure,
 )
 from bench.studies.paper.study import Findings, Study, claim
-from rebound_cli.results.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.plant.plant import Plant

@@ -12,9 +12,8 @@ import pandas as pd
 import yaml
 from matplotlib.figure import Figure
 
-from bench.rows.paper import StudyFlight
+from bench.rows.paper import BREAKING_FORCE_N, StudyFlight
 from bench.rows.tables import table
-from rebound_cli.results.summary import BREAKING_FORCE_N
 
 Claim = dict[str, str]
 PASSED, FAILED = "agrees", "**differs**"

@@ -264,10 +264,13 @@ function addVelocity(parent, moment, shared) {
 
 function addFolds(parent, moment, shared) {
   if (!tables.truth) return;
-  const truth = near(tables.truth, moment, ["fold1", "fold2", "fold3", "fold4"]);
-  const labels = ["front right", "rear left", "front left", "rear right"];
-  const colours = ["--blue", "--purple", "--sky", "--orange"];
-  const series = labels.map((label, number) => ({ label, values: truth.columns[number].map((fold) => 1e3 * fold), colour: colours[number] }));
+  const truth = near(tables.truth, moment, FOLDS);
+  const colours = ["--blue", "--purple", "--sky", "--orange", "--green", "--red", "--stone", "--grey"];
+  const series = flight.vehicle.arms.map(([ahead, aside], number) => {
+    const along = Math.abs(ahead) < 0.01 ? "" : ahead > 0 ? "front " : "rear ";
+    const label = `${number + 1}, ${along}${aside > 0 ? "right" : "left"}`;
+    return { label, values: truth.columns[number].map((fold) => 1e3 * fold), colour: colours[number] };
+  });
   if (truth.x.length) addChart(parent, { ...shared, x: truth.x, title: "Fold of each arm, as the simulator knows", unit: "mm", series });
 }
 

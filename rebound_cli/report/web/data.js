@@ -12,7 +12,6 @@ const UNITS = {
   side: "m/s2", side_threshold: "m/s2", beyond: "m/s2", beyond_threshold: "m/s2",
   n: "m", e: "m", d: "m", vn: "m/s", ve: "m/s", vd: "m/s", qw: "", qx: "", qy: "", qz: "", roll: "deg", pitch: "deg", tilt: "deg", thrust: "", ratio: "",
   speed: "m/s", height: "m",
-  fold1: "m", fold2: "m", fold3: "m", fold4: "m",
 };
 
 function decoded(column) {
@@ -31,6 +30,8 @@ function tableOf(packed) {
 
 const tables = {};
 for (const name of Object.keys(flight.tables)) tables[name] = tableOf(flight.tables[name]);
+const FOLDS = flight.vehicle.arms.map((_, number) => `fold${number + 1}`);
+for (const name of FOLDS) UNITS[name] = "m";
 
 // The last row that is no later than the value; -1 before the first.
 function rowAt(sorted, value) {

@@ -1,8 +1,6 @@
 // The flight in three dimensions. Inside of `world` all is north, east, down in metres, as everywhere in the data.
 "use strict";
 
-// Four arms as PX4 counts the motors of a quad-x; body forward, right.
-const ARMS = [[1, 1], [-1, -1], [1, -1], [-1, 1]];
 const SHOWN_AFTER_HIT_S = 4;
 const NEAREST_M = 0.3;
 const FARTHEST_M = 500;
@@ -79,7 +77,7 @@ function fill(world) {
     restyle,
     show(time) {
       shows.forEach((one) => one(time));
-      const folds = at(tables.truth, ["fold1", "fold2", "fold3", "fold4"], time);
+      const folds = at(tables.truth, FOLDS, time);
       const place = vehicle(at(tables.path, ["n", "e", "d"], time), turnAt(tables.attitude, time), folds);
       if (ghost) ghost(at(tables.truth, ["n", "e", "d"], time), turnAt(tables.truth, time), folds);
       return place;
@@ -107,33 +105,33 @@ function addGround(world, make) {
   world.add(new THREE.LineSegments(grid, make.line("--line", 0.8)));
 }
 
-// A hub with a nose, and four arms with their guards; an arm that folds moves inward.
+// A hub with a nose, and arms with their guards; an arm that folds moves inward.
 function addVehicle(world, make, body, nose, opacity) {
-  const { centre, radius, height } = flight.vehicle;
+  const { arms, radius, height } = flight.vehicle;
   const whole = new THREE.Group();
   const hub = new THREE.Mesh(new THREE.BoxGeometry(0.1, 0.08, 0.04), make.surface(body, opacity));
   const front = new THREE.Mesh(new THREE.ConeGeometry(0.025, 0.06, 12).rotateZ(-Math.PI / 2), make.surface(nose, opacity));
   front.position.x = 0.08;
   whole.add(hub, front);
-  const guards = ARMS.map(([ahead, aside], number) => {
+  const guards = arms.map(([ahead, aside]) => {
     const arm = new THREE.Group();
     arm.rotation.z = Math.atan2(aside, ahead);
     const beam = new THREE.Mesh(new THREE.BoxGeometry(1, 0.018, 0.014).translate(0.5, 0, 0), make.surface(body, opacity));
     const guard = new THREE.Group();
-    const ring = new THREE.Mesh(new THREE.TorusGeometry(radius, Math.max(0.004, height / 5), 8, 36), make.surface(number % 2 ? body : nose, opacity));
+    const ring = new THREE.Mesh(new THREE.TorusGeometry(radius, Math.max(0.004, height / 5), 8, 36), make.surface(ahead > 0 ? nose : body, opacity));
     const disc = new THREE.Mesh(new THREE.CircleGeometry(0.85 * radius, 32), make.surface("--grey", 0.25 * opacity));
     guard.add(ring, disc);
     arm.add(beam, guard);
     whole.add(arm);
-    return { beam, guard };
+    return { beam, guard, length: Math.hypot(ahead, aside) };
   });
   world.add(whole);
   return (place, turn, folds) => {
     whole.visible = Boolean(turn || place);
     if (place && place.every(Number.isFinite)) whole.position.set(...place);
     if (turn) whole.quaternion.copy(turn);
-    guards.forEach(({ beam, guard }, number) => {
-      const reach = centre - (folds && Number.isFinite(folds[number]) ? folds[number] : 0);
+    guards.forEach(({ beam, guard, length }, number) => {
+      const reach = length - (folds && Number.isFinite(folds[number]) ? folds[number] : 0);
       beam.scale.x = reach;
       guard.position.x = reach;
     });

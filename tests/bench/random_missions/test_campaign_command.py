@@ -98,7 +98,7 @@ def test_a_single_mission_again_is_the_same_flight_with_its_whole_folder(written
     summary = json.loads((tmp_path / "again" / "summary.json").read_text())
     assert summary["duration_s"] == result["seconds"] and summary["airframe"] == "rigid"
     assert summary["outcome"] == result["outcome"] and len(summary["collisions"]) > 0
-    assert (tmp_path / "again" / "flight.png").exists()
+    assert (tmp_path / "again" / "report.html").exists()
 
 
 def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsys, monkeypatch):
@@ -115,3 +115,20 @@ def test_what_is_gone_says_so_in_a_sentence_and_flies_nothing(capsys, words):
     assert main(words.split()) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("bench: `") and " is no more: " in line and line.endswith(".")
+
+
+def test_an_airframe_of_ones_own_is_looked_over_as_for_a_flight_and_flown_alone(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    own = tmp_path / "own.yaml"
+    # Given one that would begin in the ground
+    own.write_text("based_on: rigid\ngeometry: {foot_depth_m: 0.04}\n")
+    assert main(["campaign", "--airframe", str(own), "--missions", "1"]) == 1
+    assert f"{own}:1: the hub, geometry.hub_solid_radius_m, reaches" in capsys.readouterr().err
+    # When it is mended
+    own.write_text("based_on: racer\nname: own\nmass_kg: 0.8\n")
+    words = ["--missions", "1", "--first-seed", SEED, "--jobs", "1", "--out", str(tmp_path / "page")]
+    assert main(["campaign", "--airframe", str(own), *words]) == 0
+    # Then it alone flew, and its rows are kept by what is in the file
+    (flight,) = (tmp_path / "page" / "campaign.jsonl").read_text().splitlines()
+    assert json.loads(flight)["airframe"] == str(own)
+    assert [path.name for path in (tmp_path / "runs").rglob("campaign-own-*.jsonl")]

@@ -10,11 +10,11 @@ import pytest
 import yaml
 from matplotlib.figure import Figure
 
+from rebound_cli.check.ground import draw_obstacles, footprint
 from rebound_cli.check.legs import flown_legs
 from rebound_cli.check.picture import ends
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.documents import parse_document
-from rebound_cli.figure.ground import draw_obstacles, footprint
 from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.scene import Scene
 from tests.rebound_cli.command import ROOT, WALL, run_here

@@ -14,7 +14,6 @@ HIT = {
         "detection_latency_ms": 2.61,
         "height_lost_m": 0.021,
         "peak_force_n": 342.4,
-        "factor_of_safety": 0.54,
         "stopped_off_m": 0.59,
     },
 }

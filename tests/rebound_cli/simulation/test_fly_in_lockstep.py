@@ -20,7 +20,6 @@ pytestmark = pytest.mark.flight
 FILES = {
     "airframe.yaml",
     "events.jsonl",
-    "flight.png",
     "report.html",
     "obstacles.json",
     "flight.tlog",
@@ -59,7 +58,7 @@ def test_one_command_flies_into_the_wall_recovers_and_lands(wall_flight):
     assert 0.35 < log.position_ned_m[:, 0].max() - target[0] < 0.7
 
 
-def test_a_run_folder_can_be_flown_again_to_the_byte(wall_flight, without_pictures, tmp_path):
+def test_a_run_folder_can_be_flown_again_to_the_byte(wall_flight, tmp_path):
     folder, _ = wall_flight
     # When the resolved mission of a flight is flown
     again = run_here("fly", folder / "resolved.yaml", "--lockstep", "--json", "--out", tmp_path / "again")
@@ -79,7 +78,7 @@ def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
     assert "not known" not in result.stdout and "broken" not in result.stdout
 
 
-def test_a_mission_is_flown_over_a_line_that_loses_every_seventh_packet(without_pictures, tmp_path):
+def test_a_mission_is_flown_over_a_line_that_loses_every_seventh_packet(tmp_path):
     lossy = ("--set", "sim.faults=[{kind: wire, at_s: 0, loss: 0.15}]")
     flown = run_here("fly", SQUARE, "--lockstep", *HOP, *lossy, "--json", "--out", tmp_path / "run")
     assert flown.returncode == 0, flown.stdout

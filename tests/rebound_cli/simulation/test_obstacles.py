@@ -9,7 +9,7 @@ from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.main import main
 from tests.rebound_cli.command import QUICK, WALL, assert_comes_again, events_of
 
-pytestmark = [pytest.mark.flight, pytest.mark.usefixtures("without_pictures")]
+pytestmark = pytest.mark.flight
 
 # Into the wall 4 m north, in a room that leaves a way round it; the second item asks for a place behind it.
 TO_WALL = "items=[{takeoff: {height_m: 1.5}}, {go_to: {position_ned_m: [6, 0, -1.5], speed_m_s: 2}}, {return: {}}]"

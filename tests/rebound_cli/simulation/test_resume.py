@@ -10,7 +10,7 @@ from rebound_cli.main import main
 from rebound_cli.results.run_folder import EVENTS_NAME
 from tests.rebound_cli.command import QUICK, SQUARE, assert_comes_again, events_of
 
-pytestmark = [pytest.mark.flight, pytest.mark.usefixtures("without_pictures")]
+pytestmark = pytest.mark.flight
 
 
 def fly(*arguments):

@@ -1,11 +1,11 @@
-"""What is drawn of missions, flights and hits: legends hide no data, and every word is inside the picture."""
+"""What is drawn of a mission: legends hide no data, and every word is inside the picture."""
 
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from tests.rebound_cli.command import WALL, run_here
+from tests.rebound_cli.command import run_here
 
 
 @pytest.fixture
@@ -35,11 +35,4 @@ def test_a_mission_before_it_is_flown(drawn, tmp_path):
     assert run_here("check", "patrol", "--out", tmp_path).returncode == 0
     (figure,) = drawn
     assert len(figure.axes) == 2
-    assert_legible(figure)
-
-
-@pytest.mark.parametrize("changes", [(), ("--set", "items=[{takeoff: {height_m: 1}}, {land: {}}]")])
-def test_a_flight_with_a_hit_and_one_without(drawn, tmp_path, changes):
-    assert run_here("fly", WALL, *changes, "--lockstep", "--json", "--out", tmp_path / "flight").returncode == 0
-    (figure,) = drawn
     assert_legible(figure)

@@ -7,10 +7,10 @@ import pytest
 import yaml
 
 from companion.messages import LocalPosition
-from rebound_cli.identification import tune as tuning
-from rebound_cli.identification.tune import RESERVE, advise, margins
 from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.main import main
+from rebound_cli.replay import tune as tuning
+from rebound_cli.replay.tune import RESERVE, advise, margins
 from rebound_cli.replay.watching import watch_log
 from tests.rebound_cli.command import WALL
 from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog

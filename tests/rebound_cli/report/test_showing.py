@@ -7,8 +7,8 @@ from urllib.request import urlopen
 
 import pytest
 
-from rebound_cli.figure import showing
 from rebound_cli.live.console import Console
+from rebound_cli.report import showing
 from tests.test_base_install import alone
 
 
