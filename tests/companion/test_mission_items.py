@@ -57,6 +57,15 @@ def test_an_orbit_keeps_its_distance_and_looks_at_the_centre():
     assert max(facing) < math.radians(5)
 
 
+def test_a_velocity_is_flown_for_its_time_and_ends_at_rest():
+    f = flown({"velocity": {"velocity_ned_m_s": [0, 1, 0], "duration_s": 3.0}})
+    assert item_times_s(f)[0] == pytest.approx(3.0, abs=0.03)
+    last = f.vehicle.setpoints[-1][1]
+    assert (last.x, last.y, last.z) == pytest.approx((0.0, 2.25, -1.5), abs=1e-3), (
+        "3 s less half of each ramp, 1 s and 0.5 s"
+    )
+
+
 def test_speed_and_acceleration_can_be_set_for_all_that_follows():
     go = [{"go_to": {"position_ned_m": [2.0 * k, 0, -1.5]}} for k in (1, 0, 1)]
     f = flown(go[0], {"set_speed": {"speed_m_s": 2.0, "acceleration_m_s2": 4.0}}, *go[1:])

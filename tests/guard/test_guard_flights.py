@@ -341,6 +341,17 @@ def test_a_guard_does_not_begin_at_the_end_of_a_slow_link():
     assert air.guard.outcome.startswith("the round trip to the vehicle takes 404 ms and at most 100 ms are allowed")
 
 
+def test_a_guard_tells_of_a_link_that_became_slow_and_watches_on():
+    air = Air(faults=[far(at_s=18)])
+    air.take_off()
+    assert air.time_s < 18.0 and air.told("round_trip") == []
+    air.run_until(lambda: air.told("round_trip") != [], 25.0)
+    air.run_for(3.0)
+    assert air.state is State.WATCHING
+    assert air.told("round_trip") == ["round trip 404 ms: hits are answered late"]
+    assert air.guard.round_trip().summary()["worst"] == pytest.approx(404.0)
+
+
 def test_a_guard_on_the_ground_does_not_go_in_while_the_link_is_slow():
     # Given a guard that stands by, and a link that became slow
     air = Air(faults=[far(between_s=[8, 26])])
