@@ -3,10 +3,13 @@
 import json
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from bench.pictures import FRAME_S, write_animation
 from rebound_cli.report import content as report_content
 from rebound_cli.report.page import page, write_page
 from tests.browser.opened_page import drawn_share, line_share, pixels
@@ -103,6 +106,19 @@ def test_it_plays_by_its_own_clock_and_ten_times_slower_round_a_hit(opened, file
         hit_s = blank.time_s
         blank.page.clock.run_for(1000)
         assert blank.time_s - hit_s == pytest.approx(0.1, abs=0.01)
+
+
+def test_the_manuals_animation_is_the_replay_from_before_the_hit_to_after_it(browser, file, tmp_path):
+    write_animation(browser, file, tmp_path / "hit.webp")
+    assert (tmp_path / "hit.webp").stat().st_size < 1_500_000
+    with Image.open(tmp_path / "hit.webp") as animation:
+        assert animation.info["loop"] == 0 and 2.0 < FRAME_S * animation.n_frames < 4.0
+        frames = []
+        for number in range(animation.n_frames):
+            animation.seek(number)
+            frames.append(np.asarray(animation.convert("RGB")).astype(int))
+    # Each shows something else than the one before
+    assert min(abs(after - before).max() for before, after in pairwise(frames)) > 30
 
 
 def test_what_was_heard_is_text_and_never_an_element_or_a_script(opened, flight, tmp_path):

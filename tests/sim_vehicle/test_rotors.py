@@ -127,10 +127,11 @@ def test_whatever_is_not_refused_stands_and_hovers(count: int) -> None:
             plant.step(None, armed=False)
             assert math.dist(body[:3], began_m) < 0.02, seed
         assert body[7] ** 2 + body[8] ** 2 < 1e-4, seed
-        # When it is asked to hover, then it is there after ten seconds, for two
-        for step in range(round(12.0 / DT_S)):
+        # When it is asked to hover, then it is there after some time constants of its loop, for two seconds
+        there_s = 5.0 + 5.0 / airframe.control.position_p_per_s
+        for step in range(round((there_s + 2.0) / DT_S)):
             plant.step(TrajectorySetpoint(position_ned_m=(0.0, 0.0, -1.5), yaw_rad=0.0), armed=True)
-            assert step < 10.0 / DT_S or math.dist(body[:3], (0.0, 0.0, -1.5)) < 0.3, seed
+            assert step * DT_S < there_s or math.dist(body[:3], (0.0, 0.0, -1.5)) < 0.3, seed
         flown += 1
     assert flown > count // 20
 
@@ -142,7 +143,7 @@ def test_whatever_is_not_refused_stands_and_hovers(count: int) -> None:
         ({"arms": {"tip_mass_kg": 0.3}}, r"arms\.tip_mass_kg: 4 ends of 0\.3 kg have more mass"),
         ({"control": {"attitude_frequency_rad_s": 60.0}}, "the motors' lag lets roll and pitch swing"),
         ({"control": {"position_p_per_s": 4.0}}, "swing each other up sideways; lower control"),
-        ({"control": {"climb_p_per_s": 40.0}}, "swing each other up in height"),
+        ({"control": {"climb_p_per_s": 80.0}}, "swing each other up in height"),
     ],
 )
 def test_what_no_body_is_and_no_control_holds_is_refused(part: dict[str, Any], words: str) -> None:
@@ -159,4 +160,4 @@ def test_feet_that_reach_further_than_the_guards_stand_on_the_ground() -> None:
     plant = Plant(airframe, Scene(), 1)
     for _ in range(250):
         plant.step(None, armed=False)
-        assert plant.state.body[2] == pytest.approx(-0.15, abs=0.002)
+        assert plant.state.body[2] == pytest.approx(-0.15, abs=0.003)

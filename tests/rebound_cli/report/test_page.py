@@ -139,6 +139,18 @@ def test_the_scene_holds_wall_path_truth_and_what_is_remembered(opened):
     assert 1.0 < ended_s - began_s < 5.0
 
 
+def test_the_vehicle_has_the_arms_that_it_flew_with(wall):
+    # Given the quad-x that it was, front right first
+    arms = np.array(content(wall)["vehicle"]["arms"])
+    assert np.allclose(arms, 0.1025 * np.array([[1, 1], [-1, -1], [1, -1], [-1, 1]]), atol=1e-4)
+    # and the same flight by six rotors
+    places = [(0.0, 0.2), (0.0, -0.2), (0.17, -0.1), (-0.17, 0.1), (0.17, 0.1), (-0.17, -0.1)]
+    folds_m = np.zeros((len(wall.truth.series["time_boot_us"]), 6))
+    truth = replace(wall.truth, series=wall.truth.series | {"arm_fold_m": folds_m})
+    data = content(replace(wall, rotors_frd_m=places, truth=truth))
+    assert data["vehicle"]["arms"] == places and "fold6" in data["tables"]["truth"]["columns"]
+
+
 def test_an_obstacle_that_moves_does_so_by_the_clock_of_the_page(wall):
     # Given a door that comes from 10 s of the vehicle's clock on; the flight's own began some milliseconds later
     door = {"point_ned_m": (3, 0, -1.5), "normal_ned": (-1, 0, 0)}
