@@ -85,6 +85,8 @@ class Autopilot:
     """Older ones are refused."""
     streams: tuple[SetMessageInterval, ...]
     """Asked for beside those that all autopilots have."""
+    filters_imu: bool
+    """Its inertial samples are filtered: none shows that the raw ones were clipped."""
     lesser_imu: MessageId | None
     """Of boards that do not have HIGHRES_IMU."""
     estimator_message: MessageId

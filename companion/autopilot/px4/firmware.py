@@ -33,6 +33,7 @@ PX4 = Autopilot(
     wire=Wire(casts_whole_numbers=False, attitude_mask=_IGNORE_ROLL_AND_PITCH_RATE),
     least_version=(0, 0, 0),
     streams=(),
+    filters_imu=False,
     lesser_imu=None,
     estimator_message=MessageId.ESTIMATOR_STATUS,
     sticks_message=MessageId.MANUAL_CONTROL,

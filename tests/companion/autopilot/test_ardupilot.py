@@ -38,7 +38,7 @@ from tests.companion.autopilot.fake_copter import (
     TAKE_OFF,
     FakeCopter,
 )
-from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, flight
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, FakeVehicle, flight
 
 POSTURES = {modes.GUIDED: Pilot.SETPOINTS, modes.LOITER: Pilot.STICKS, 0: Pilot.HAND, 3: Pilot.AUTOPILOT, 99: None}
 
@@ -82,6 +82,14 @@ def test_a_hit_is_found_and_flown_away_from_and_the_crash_check_is_in_force_afte
     assert f.run_to_end().outcome == "completed"
     assert len(f.report.collisions) >= 1
     assert commanded(f, AUX_FUNCTION)[-1][1].param2 == 0.0
+
+
+@pytest.mark.parametrize(("vehicle", "may_be_whole"), [(FakeVehicle, True), (FakeCopter, False)])
+def test_no_hit_that_is_seen_through_a_filter_counts_as_measured_whole(vehicle, may_be_whole):
+    f = flight(vehicle(wall_north_m=3.0), items=[TAKEOFF, INTO_WALL, LANDING])
+    f.run_until(lambda: f.events and f.events[-1].kind == "detection")
+    contact = f.companion.core.reflex.monitor.estimator.contact
+    assert contact.is_clipped is not may_be_whole
 
 
 # --- by attitude
