@@ -45,6 +45,7 @@ ARDUPILOT = Autopilot(
     changed_law=_changed_law,
     attitude_parameters=(setup.LOSS, setup.OPTIONS),
     attitude_held_s=setup.attitude_held_s,
+    stops_alone=False,
     loss_parameter=setup.LOSS,
     rate_parameter="SERIALn_BAUD",
     sight=setup.sight,

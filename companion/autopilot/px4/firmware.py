@@ -42,6 +42,7 @@ PX4 = Autopilot(
     changed_law=_changed_law,
     attitude_parameters=(setup.LOSS,),
     attitude_held_s=lambda told: told[setup.LOSS],
+    stops_alone=True,
     loss_parameter=setup.LOSS,
     rate_parameter="MAV_x_RATE",
     sight=setup.sight,
