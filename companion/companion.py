@@ -66,6 +66,16 @@ class Stepped(ABC, Generic[CoreT]):
         sent = self._encoder.all_packets(outputs.messages, lambda error: core.fault(error, now_us))
         return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
 
+    @property
+    def leaves_word(self) -> bool:
+        """Whether the vehicle has to be told something if this program dies while it flies by attitude."""
+        return self._core is not None and not self._core.flight.vehicle.autopilot.stops_alone
+
+    def last_word(self) -> bytes:
+        """What that is now; empty for nothing."""
+        word = None if self._core is None else self._core.last_word
+        return b"" if word is None else self._encoder.unsent(word)
+
     def next_deadline_us(self) -> int:
         """When `step(b"", now)` is due if nothing arrives before; in the past when it is due at once."""
         return 0 if self._core is None else self._core.next_deadline_us()

@@ -85,6 +85,8 @@ class Autopilot:
     """Older ones are refused."""
     streams: tuple[SetMessageInterval, ...]
     """Asked for beside those that all autopilots have."""
+    filters_imu: bool
+    """Its inertial samples are filtered: none shows that the raw ones were clipped."""
     lesser_imu: MessageId | None
     """Of boards that do not have HIGHRES_IMU."""
     estimator_message: MessageId
@@ -101,6 +103,8 @@ class Autopilot:
     """Read before it is flown by attitude."""
     attitude_held_s: Callable[[Mapping[str, int | float]], float]
     """From these: for so long an attitude is flown on; infinite where no attitude with a thrust can be asked for."""
+    stops_alone: bool
+    """It brakes by itself once an attitude is followed by nothing; else it levels out and drifts."""
     loss_parameter: str
     """For so many seconds the last setpoint is flown on."""
     rate_parameter: str

@@ -28,6 +28,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 if isinstance(identity, str):
                     return identity
                 vehicle.identity, vehicle.autopilot = identity, identity.autopilot
+                flight.reflex.monitor.estimator.hides_clipping = identity.autopilot.filters_imu
             if sample.system_id != vehicle.identity.system_id:
                 continue
             if identify(sample) != vehicle.identity:

@@ -86,6 +86,13 @@ class Encoder:
                 on_fault(error)
         return tuple(packets)
 
+    def unsent(self, outgoing: Outgoing) -> bytes:
+        """The packets, which do not count as long as they are not sent."""
+        seq = self._mavlink.seq
+        packets = b"".join(self.packets(outgoing))
+        self._mavlink.seq = seq
+        return packets
+
     def _messages(self, outgoing: Outgoing) -> list[Any]:
         """The same, as pymavlink has them before they are bytes."""
         return self._chunks(outgoing) if isinstance(outgoing, StatusText) else [self._message(outgoing)]

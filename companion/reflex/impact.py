@@ -101,6 +101,7 @@ class ImpactEstimator:
     strapdown: Strapdown = field(default_factory=Strapdown)
     validity: VelocityValidity = field(default_factory=VelocityValidity)
     doppler: Doppler = field(default_factory=Doppler)
+    hides_clipping: bool = False  # filtered samples do not show it
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
@@ -138,7 +139,8 @@ class ImpactEstimator:
             f, contact = self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
             free = (f[0] - contact[0], f[1] - contact[1], f[2] - contact[2])
             averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
-            self.contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2)
+            range_m_s2 = self.config.accelerometer_range_m_s2
+            self.contact = ContactForce(free, averaging_us, range_m_s2, is_clipped=self.hides_clipping)
             self.contact.add(self.imu, self.imu.time_boot_us - free_until_us, self.strapdown.valid_wxyz)
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
         self.validity.invalidate(sample_us, math.hypot(*velocity))

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
 from companion.shell.addresses import host_and_port, scheme_and_rest, serial_device
-from companion.shell.connection import LinkCounts, Selectable, bound_socket, resolve, send_datagram
+from companion.shell.connection import LinkCounts, Selectable, Way, bound_socket, resolve, send_datagram
 
 # A sender of heartbeats has missed nine.
 FORGOTTEN_US = 10_000_000
@@ -194,6 +194,9 @@ class SharedConnection:
         self._vehicle.send(frame)
         if self._between.sends(frame):
             self._to_clients([frame])
+
+    def way(self, frame: bytes) -> Way | None:
+        return self._vehicle.way(frame)
 
     def news(self) -> str | None:
         return self._vehicle.news() or self._between.news()

@@ -5,7 +5,7 @@ import select
 import socket
 import time
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from companion.errors import ConnectionSetupError
 from companion.shell.peer import Peer
@@ -15,6 +15,14 @@ MOST_DATAGRAMS = 300
 # More than the longest MAVLink packet (280 bytes) and more than one UDP datagram can hold.
 READ_SIZE = 65_536
 ANY_HOST = "0.0.0.0"
+
+
+class Way(NamedTuple):
+    """How a packet would go now; for another process."""
+
+    packet: bytes
+    descriptor: int
+    address: Any = None  # of a datagram
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +44,9 @@ class Connection(Protocol):
 
     def send(self, frame: bytes) -> None:
         """Send one packet; one datagram a packet on UDP. Dropped when nobody is there to take it."""
+
+    def way(self, frame: bytes) -> Way | None:
+        """Of a packet that is not sent; None: nobody is there to take it."""
 
     def news(self) -> str | None:
         """Something about the link that a person should know, once."""
@@ -82,9 +93,12 @@ class UdpConnection:
         return self._socket.fileno()
 
     def send(self, frame: bytes) -> None:
+        if (way := self.way(frame)) is not None:
+            send_datagram(self._socket, frame, way.address)
+
+    def way(self, frame: bytes) -> Way | None:
         remote = self._remote or self._peer.answered
-        if remote is not None:
-            send_datagram(self._socket, frame, remote)
+        return None if remote is None else Way(frame, self._socket.fileno(), remote)
 
     def news(self) -> str | None:
         return self._peer.news()

@@ -20,7 +20,7 @@ from typing import Protocol
 from companion.autopilot.known import ASSUMED
 from companion.errors import ConnectionSetupError
 from companion.mavlink.packet import packet_length
-from companion.shell.connection import READ_SIZE, LinkCounts, bound_socket, plain, readable
+from companion.shell.connection import READ_SIZE, LinkCounts, Way, bound_socket, plain, readable
 
 # A local server answers within milliseconds and a radio link within a second; longer means nobody is there.
 TCP_CONNECT_TIMEOUT_S = 5.0
@@ -172,6 +172,10 @@ class StreamConnection:
 
     def fileno(self) -> int | None:
         return None if self._stream is None else self._stream.fileno()
+
+    def way(self, frame: bytes) -> Way | None:
+        descriptor = self.fileno()
+        return None if descriptor is None else Way(frame, descriptor)
 
     def send(self, frame: bytes) -> None:
         """Send one packet; it is dropped while there is no stream."""

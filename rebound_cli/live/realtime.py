@@ -18,6 +18,7 @@ from companion.shell.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.live.console import Console, state_fields
+from rebound_cli.live.heir import Heir
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.status import StatusServer
 from rebound_cli.results.run_folder import FlightRecorder
@@ -151,6 +152,7 @@ class Loop:
     manager: ServiceManager | None = field(default_factory=service_manager)
     now_us: int | None = None  # of the last step
     is_interrupted: bool = False
+    heir: Heir | None = None  # of a program that leaves a word
     step: Callable[[bytes, int], StepResult] | None = None  # where somebody follows the steps of what is stepped
 
     def run(self, beside: Callable[[int, StepResult], None], is_over: Callable[[], bool] = lambda: False) -> None:
@@ -175,6 +177,9 @@ class Loop:
                 reason = f"fault around the flight, please report it: {type(error).__name__} in {place.name}: {error}"
                 self._hand_over(reason)
                 raise FlightFaultError(f"F{reason[1:]}; the vehicle was handed over, as far as it answered.") from error
+            finally:
+                if self.heir is not None:
+                    self.heir.close()
 
     def exchange(self) -> tuple[int, StepResult]:
         """Wait for bytes or the next deadline, take one step, send and record; when it was and what came of it."""
@@ -193,12 +198,20 @@ class Loop:
         try:
             for frame in result.sent_frames:
                 self.connection.send(frame)
+            self._leave_word()
         finally:
             self.recorder.record(now_us, result)
         if self.manager is not None:
             is_ending = self.is_interrupted or self.stepped.finished
             self.manager.stepped(self.stepped.armed is not None, is_ending, self._status_text, now_us)
         return result
+
+    def _leave_word(self) -> None:
+        """After all that this step sends: what has to be said if it is the last one."""
+        if self.heir is None and self.stepped.leaves_word:
+            self.heir = Heir()
+        if self.heir is not None:
+            self.heir.hear(self.stepped.last_word(), self.connection)
 
     def _status_text(self) -> str:
         _, *fields = state_fields(self.stepped.status(), 0.0, self.heard.text(self.now_us or 0))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import MOST_DATAGRAMS, Connection, LinkCounts, Selectable
+from companion.shell.connection import MOST_DATAGRAMS, Connection, LinkCounts, Selectable, Way
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 
@@ -39,6 +39,9 @@ class SignedConnection:
 
     def send(self, frame: bytes) -> None:
         self._connection.send(self.signing.signed(frame, self._clock.now_us()))
+
+    def way(self, frame: bytes) -> Way | None:
+        return self._connection.way(self.signing.signed(frame, self._clock.now_us()))
 
     def news(self) -> str | None:
         return self._connection.news() or self.signing.news() or self._writer.news()

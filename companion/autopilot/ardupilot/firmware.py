@@ -36,6 +36,7 @@ ARDUPILOT = Autopilot(
     least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
     # It has no CURRENT_MODE: how soon a pilot's mode is seen depends on this alone.
     streams=(SetMessageInterval(MessageId.HEARTBEAT, 50_000),),
+    filters_imu=True,  # INS_ACCEL_FILTER
     lesser_imu=MessageId.RAW_IMU,
     estimator_message=MessageId.EKF_STATUS_REPORT,
     sticks_message=MessageId.RC_CHANNELS,
@@ -44,6 +45,7 @@ ARDUPILOT = Autopilot(
     changed_law=_changed_law,
     attitude_parameters=(setup.LOSS, setup.OPTIONS),
     attitude_held_s=setup.attitude_held_s,
+    stops_alone=False,
     loss_parameter=setup.LOSS,
     rate_parameter="SERIALn_BAUD",
     sight=setup.sight,

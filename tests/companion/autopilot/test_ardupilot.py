@@ -14,6 +14,7 @@ from companion.autopilot.interface import Pilot
 from companion.autopilot.known import MODE_NAMES
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
+from companion.core import AWAY_M
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.decode import Decoder
@@ -24,6 +25,7 @@ from companion.messages import (
     AttitudeTarget,
     EstimatorStatus,
     Parameter,
+    PositionSetpoint,
     Refused,
     SendCommand,
     SetAuxFunction,
@@ -38,7 +40,7 @@ from tests.companion.autopilot.fake_copter import (
     TAKE_OFF,
     FakeCopter,
 )
-from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, flight
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, FakeVehicle, flight
 
 POSTURES = {modes.GUIDED: Pilot.SETPOINTS, modes.LOITER: Pilot.STICKS, 0: Pilot.HAND, 3: Pilot.AUTOPILOT, 99: None}
 
@@ -84,12 +86,52 @@ def test_a_hit_is_found_and_flown_away_from_and_the_crash_check_is_in_force_afte
     assert commanded(f, AUX_FUNCTION)[-1][1].param2 == 0.0
 
 
+@pytest.mark.parametrize(("vehicle", "may_be_whole"), [(FakeVehicle, True), (FakeCopter, False)])
+def test_no_hit_that_is_seen_through_a_filter_counts_as_measured_whole(vehicle, may_be_whole):
+    f = flight(vehicle(wall_north_m=3.0), items=[TAKEOFF, INTO_WALL, LANDING])
+    f.run_until(lambda: any(event.kind == "detection" for event in f.events))
+    contact = f.companion.core.reflex.monitor.estimator.contact
+    assert contact.is_clipped is not may_be_whole
+
+
 # --- by attitude
 
 
 def test_force_flying_is_high_only_while_it_is_flown_by_attitude():
     assert ARDUPILOT.changed_law(True) == SetAuxFunction(159, 2)
     assert ARDUPILOT.changed_law(False) == ARDUPILOT.changed_law(None) == SetAuxFunction(159, 0)
+
+
+def leaning(vehicle):
+    """A flight that recovers from a hit by attitude: the scripted vehicles tell nothing of their thrust."""
+    f = flight(vehicle, items=[TAKEOFF, INTO_WALL, LANDING])
+    f.run_to("mission")
+    thrust = f.companion.core.reflex.thrust
+    thrust.known_s, thrust.full_m_s2 = 1.0, 20.0
+    f.run_to("recovering")
+    f.run_for(0.1)
+    return f
+
+
+def test_the_last_word_of_a_companion_is_a_place_off_what_was_hit():
+    f = leaning(FakeCopter(wall_north_m=3.0))
+    assert f.companion.leaves_word
+    sent = mav.MAVLink(None).decode(bytearray(f.companion.last_word()))
+    assert sent.get_type() == "SET_POSITION_TARGET_LOCAL_NED" and sent.type_mask & 0x1FF == 0x1F8
+    assert f.vehicle.position[0] - sent.x == pytest.approx(AWAY_M, abs=0.3)
+
+
+def test_no_word_is_left_to_a_px4_or_before_a_hit():
+    f = leaning(FakeVehicle(wall_north_m=3.0))
+    assert not f.companion.leaves_word and f.companion.last_word() == b""
+    f = flight(FakeCopter(), items=[TAKEOFF, INTO_WALL, LANDING])
+    f.run_to("mission")
+    assert f.companion.leaves_word and f.companion.last_word() == b""
+
+
+def test_a_word_that_is_not_sent_counts_for_no_packet():
+    encoder, place = Encoder(), PositionSetpoint(0, (1.0, 2.0, -3.0), None)
+    assert encoder.unsent(place) == encoder.packets(place)[0]
 
 
 @pytest.mark.parametrize(
