@@ -99,6 +99,15 @@ def _pulse_widths(state: Telemetry) -> list[int]:
     return [round(PWM_LEAST_US + PWM_SPAN_US * fraction) for fraction in state.sample.motor_fractions]
 
 
+def manual_control(state: Telemetry) -> Message:
+    """The sticks that count, whoever's they are (streams/MANUAL_CONTROL.hpp)."""
+    sticks = state.autopilot.commander.sticks.sticks
+    if sticks is None:
+        return dialect.MAVLink_manual_control_message(state.system, 0, 0, 500, 0, 0)
+    pitch, roll, yaw = (round(1000 * value) for value in (sticks.pitch, sticks.roll, sticks.yaw))
+    return dialect.MAVLink_manual_control_message(state.system, pitch, roll, round(500 * (sticks.throttle + 1)), yaw, 0)
+
+
 def scaled_imu(state: Telemetry) -> Message:
     sample = state.sample
     force = [_int16(1e3 * value / _GRAVITY_M_S2) for value in sample.specific_force_frd_m_s2]

@@ -74,6 +74,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(147, Topic.BATTERY, condition.battery_status, Rates(0.5, 0.5, 0.5)),
     StreamKind(2, Topic.ALWAYS_NEW, condition.system_time, Rates(1, None, None)),
     StreamKind(4, Topic.ALWAYS_NEW, condition.ping, Rates(1, 0.1, 0.1)),
+    StreamKind(69, Topic.STICKS, condition.manual_control),
     StreamKind(29, Topic.AIR, condition.scaled_pressure, Rates(1, 1, 1)),
     StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
     StreamKind(375, Topic.SAMPLE, condition.actuator_output_status),

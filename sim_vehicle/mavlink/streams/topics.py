@@ -26,11 +26,12 @@ class Topic(IntEnum):
     ORIGIN = 10
     """New once: it does not move."""
     MAGNETIC_FIELD = 11
-    ORBIT = 12
+    STICKS = 12
+    ORBIT = 13
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.ORBIT)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.STICKS, Topic.ORBIT)
 
 
 class Topics:
@@ -47,6 +48,7 @@ class Topics:
         """What is another object, or another number, whenever it is renewed."""
         state, commander = self._state, self._state.autopilot.commander
         return (
+            (Topic.STICKS, commander.sticks.sticks),
             (Topic.AIR, state.air),
             (Topic.MAGNETIC_FIELD, state.magnetic_field_frd_gauss),
             (Topic.GPS, state.gps),
