@@ -14,9 +14,9 @@ from companion.autopilot.interface import Pilot
 from companion.autopilot.known import MODE_NAMES
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
+from companion.core import AWAY_M
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
-from companion.core import AWAY_M
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.moves import would_move
