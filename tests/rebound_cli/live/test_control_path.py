@@ -213,7 +213,7 @@ def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
 class Stepping:
     """What the loop steps, for its bytes."""
 
-    armed, finished = True, False
+    armed, finished, leaves_word = True, False, False
 
     def __init__(self, deadline_us):
         self.received, self.deadline_us, self.notes = [], deadline_us, []
