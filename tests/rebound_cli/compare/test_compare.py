@@ -6,7 +6,7 @@ import pytest
 
 from rebound_cli.arguments import speeds_m_s
 from rebound_cli.compare.cases import Case
-from rebound_cli.compare.rows import lines_of, row_of
+from rebound_cli.compare.rows import lines_of, notes, row_of
 from rebound_cli.main import main
 from tests.rebound_cli.command import assert_one_clear_sentence, run, run_here
 
@@ -47,6 +47,22 @@ def test_speeds_are_a_range_or_a_list(capsys):
 def hit(speed_m_s, rest_s):
     truth = {"impact_velocity_ned_m_s": (speed_m_s, 0.0, 0.0), "height_lost_m": 0.1, "stopped_off_m": 0.5}
     return {"settled_after_s": rest_s, "truth": truth}
+
+
+def test_a_speed_that_the_way_to_the_wall_was_too_short_for_is_told():
+    # Given hits at the 2 m/s that were asked for, and at 2.8 and 2.7 where 4 were
+    asked = ((2.0, 1.95), (4.0, 2.8), (4.0, 2.7))
+    summaries = [
+        {"outcome": "completed", "reason": "", "recontacts": 0, "collisions": [hit(speed_m_s, 1.0)]}
+        for _, speed_m_s in asked
+    ]
+    rows = [
+        row_of(Case("paper", speed_m_s, seed, ()), summary)
+        for seed, ((speed_m_s, _), summary) in enumerate(zip(asked, summaries, strict=True))
+    ]
+    # Then the second speed is told as what it was
+    assert notes(rows)[1:] == ["Not reached before the hit: 4 m/s, but 2.80. Begin further away from it."]
+    assert len(notes(rows[:1])) == 1
 
 
 def test_the_table_has_medians_of_what_is_known_and_the_worst():
