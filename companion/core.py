@@ -252,9 +252,10 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def last_word(self) -> Outgoing | None:
         """For a vehicle that would drift if this program died now: a place away from what it has hit."""
         flight, latest, target = self.flight, self.flight.vehicle.history.latest(), self.flight.target
-        if not self._leans or flight.vehicle.autopilot.stops_alone or latest is None or target is None:
+        if not self._leans or flight.vehicle.autopilot.stops_alone or latest is None:
             return None
-        assert target.lean is not None, "it leans"
+        if target is None or target.lean is None:
+            return None  # it goes by a position from the next setpoint on
         n, e, _ = plus(latest.position_ned_m, AWAY_M, target.lean.surfaces[0].normal_ned)
         place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
         kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)

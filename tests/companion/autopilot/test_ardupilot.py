@@ -129,6 +129,15 @@ def test_no_word_is_left_to_a_px4_or_before_a_hit():
     assert f.companion.leaves_word and f.companion.last_word() == b""
 
 
+def test_no_word_is_left_where_the_next_setpoint_is_a_place():
+    # Given a hit that is taken back while the mode is not known: no setpoint has followed yet
+    f = leaning(FakeCopter(wall_north_m=3.0))
+    shared = f.companion.core.flight
+    shared.target = shared.target.at_rest()
+    # Then nothing is said, and nothing fails
+    assert f.companion.last_word() == b""
+
+
 def test_a_word_that_is_not_sent_counts_for_no_packet():
     encoder, place = Encoder(), PositionSetpoint(0, (1.0, 2.0, -3.0), None)
     assert encoder.unsent(place) == encoder.packets(place)[0]

@@ -19,8 +19,6 @@ def systemd(tmp_path, monkeypatch):
         bound.setblocking(False)
         monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
         monkeypatch.setenv("WATCHDOG_USEC", "5000000")
-        # Whoever tests goes before nobody.
-        monkeypatch.setattr(os, "sched_setscheduler", lambda *_: None)
         yield bound
 
 
@@ -48,12 +46,16 @@ class Reader:
             companion.confirm_plan()
 
 
-def test_a_flight_tells_systemd_that_it_is_ready_alive_how_it_goes_and_when_it_ends(systemd, tmp_path):
+def test_a_flight_tells_systemd_that_it_is_ready_alive_how_it_goes_and_when_it_ends(systemd, tmp_path, monkeypatch):
+    # Given a system that gives it the priority that it asks for, but not whoever tests
+    asked = []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda _, policy, how: asked.append(policy))
     reader = Reader(systemd)
     companion, *_ = fly(tmp_path, confirm=reader.beside)
     reader.read()
     told = reader.told
     assert companion.report().outcome == "completed"
+    assert set(asked) == {os.SCHED_FIFO}
     lines = [line for _, line in told]
     # Ready once, at the vehicle's first heartbeat, long before it is armed; the end is told last, once
     ready_us = next(at_us for at_us, line in told if line == "READY=1")
