@@ -342,6 +342,7 @@ def add_compare(commands: Commands) -> None:
         compare, "--seeds", "flights of each, with seeds from 1 on (default: %(default)s)", "N", type=count, default=10
     )
     _add_set(compare, _SET_MISSION)
+    _option(compare, "--scheduler", "of Dask, whose workers fly (default: all cores of this machine)", "ADDRESS")
     _option(compare, "--out", "folder of all (default: runs/<time>-compare-<mission>)", "DIR")
 
 

@@ -7,7 +7,7 @@ from importlib import metadata
 
 DISTRIBUTION = "px4-rebound"
 EXTRAS = dict.fromkeys(("numba", "pygeomag", "matplotlib"), "sim")
-EXTRAS |= {"pyulog": "logs", "mcap": "logs", "mavsdk": "mavsdk", "pandas": "bench"}
+EXTRAS |= {"pyulog": "logs", "mcap": "logs", "mavsdk": "mavsdk", "pandas": "bench", "distributed": "cluster"}
 
 
 def needed_text(error: ModuleNotFoundError) -> str:

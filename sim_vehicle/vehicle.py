@@ -25,8 +25,9 @@ from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.layout import Constants, PlantState
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.plant.standing import check_start
 from sim_vehicle.quantities import Vector3
-from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
+from sim_vehicle.scene import Scene
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Obstacle, build_world, distance_m
 
@@ -61,8 +62,7 @@ class SimulatedVehicle:
 
         Raises SceneError where a wall passes through the start position, or the wind is too strong.
         """
-        check_start_is_free(scene, airframe)
-        check_wind_can_be_held(scene, airframe)
+        check_start(airframe, scene)
         self._airframe, self._scene, self._seed, self._keeps_path = airframe, scene, seed, keeps_path
         self._epoch_at_boot_us = epoch_at_boot_us
         self._links: list[Link] = []

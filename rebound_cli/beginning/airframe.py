@@ -4,6 +4,7 @@ from argparse import Namespace
 
 from companion.errors import ConfigurationError
 from rebound_cli.inputs import load_world
+from rebound_cli.simulation.compiling import stand_own
 from sim_vehicle.hil.parameters import as_airframe_file, as_environment, as_params_file
 from sim_vehicle.json.parameters import as_parameter_file
 
@@ -12,7 +13,9 @@ _FORMATS = {"env": as_environment, "params": as_params_file, "airframe": as_airf
 
 def run_airframe(options: Namespace) -> int:
     """Print them in the format asked for."""
-    airframe = load_world(None, (), options.airframe, None).airframe
+    world = load_world(None, (), options.airframe, None)
+    stand_own(world)
+    airframe = world.airframe
     if options.target == "px4":
         print(_FORMATS[options.format or "env"](airframe, options.position or "mocap"))
     elif options.format is not None or options.position is not None:

@@ -13,6 +13,7 @@ from rebound_cli.check.legs import FlownLeg, flown_legs
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.extras import needed_text
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
+from rebound_cli.simulation.compiling import stand_own
 from sim_vehicle.errors import SimulationError
 
 # A repeat's laps are shown whole up to so many rows; a longer list hides what matters.
@@ -40,6 +41,7 @@ def run_check(options: Namespace) -> int:
 def _check(path: Path, options: Namespace) -> None:
     document = load_mission_document(path, options.set)
     world = world_from(document)
+    stand_own(world)
     mission = mission_from(document, world)
     legs = flown_legs(mission, world)
     print(mission_text(mission, legs))

@@ -1,24 +1,25 @@
-"""`rebound compare`: the flights, on all cores, and what is written of them."""
+"""`rebound compare`: the flights, on all cores or a Dask scheduler's workers, and what is written of them."""
 
 import contextlib
 import io
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from datetime import UTC, datetime
 from pathlib import Path
 
-from companion.errors import ReboundError
+from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import inputs
 from rebound_cli.compare.cases import Case, cases_of
 from rebound_cli.compare.page import write_page
 from rebound_cli.compare.rows import Row, row_of, table, write_csv
 from rebound_cli.documents import refuse_existing
-from rebound_cli.live.console import Console, console_for
+from rebound_cli.live.console import console_for
 from rebound_cli.results.run_folder import RUNS_FOLDER, read_summary
 from rebound_cli.simulation.compiling import prepare_vehicle
 
@@ -28,12 +29,17 @@ def run_compare(options: Namespace) -> int:
     refuse_existing(options.out)
     cases, mission = cases_of(options), options.mission.stem
     out = options.out or RUNS_FOLDER / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-compare-{mission}"
-    out.mkdir(parents=True)
-    with console_for(False) as console:
+    with _workers(options.scheduler) as workers, console_for(False) as console:
+        out.mkdir(parents=True)
         console.print(f"{len(cases)} flights to {out}/")
         # Here once, not on every core.
         prepare_vehicle(console, inputs.load_world(options.mission, (), options.airframe, None))
-        rows = dict(_flown(console, options, cases, out))
+        rows = {}
+        with (out / "progress.txt").open("w", encoding="utf-8", buffering=1) as progress:
+            for case, row, line in _flown(workers, options, cases, out.absolute()):
+                rows[case] = row
+                console.print(line)
+                progress.write(f"{line}\n")
         in_order = [rows[case] for case in cases]
         write_csv(in_order, out / "compare.csv")
         write_page(out / "compare.html", f"{mission}, {options.airframe or 'its own airframe'}", in_order)
@@ -41,23 +47,46 @@ def run_compare(options: Namespace) -> int:
     return 0 if all(row.second_touches is not None for row in in_order) else 1
 
 
-def _flown(console: Console, options: Namespace, cases: Sequence[Case], out: Path) -> Iterator[tuple[Case, Row]]:
+def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Path) -> Iterator[tuple[Case, Row, str]]:
     """In the order in which they are over, each with a line of progress."""
-    began_s, spawn = time.monotonic(), multiprocessing.get_context("spawn")
-    # Ctrl-C ends a flight, not a process that waits for the next one.
-    with ProcessPoolExecutor(os.cpu_count(), spawn, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        given = {pool.submit(_fly, options.mission, options.airframe, case, out): case for case in cases}
-        try:
-            for number, done in enumerate(as_completed(given), start=1):
-                row, case = done.result(), given[done]
-                left_s = (time.monotonic() - began_s) / number * (len(cases) - number)
-                hit = row.reason if row.impact_speed_m_s is None else f"hit at {row.impact_speed_m_s:.2f} m/s"
-                rest = "" if row.at_rest_after_s is None else f", at rest after {row.at_rest_after_s:.1f} s"
-                console.print(f"{number:4} of {len(cases)}, {left_s:4.0f} s to go: {case.folder}, {hit}{rest}")
-                yield case, row
-        except KeyboardInterrupt:
-            pool.shutdown(cancel_futures=True)
-            raise
+    began_s, airframe = time.monotonic(), options.airframe
+    if airframe is not None and Path(airframe).is_file():
+        airframe = str(Path(airframe).absolute())
+    given = {workers.submit(_fly, options.mission.absolute(), airframe, case, out): case for case in cases}
+    try:
+        for number, done in enumerate(as_completed(given), start=1):
+            row, case = done.result(), given[done]
+            left_s = (time.monotonic() - began_s) / number * (len(cases) - number)
+            hit = row.reason if row.impact_speed_m_s is None else f"hit at {row.impact_speed_m_s:.2f} m/s"
+            rest = "" if row.at_rest_after_s is None else f", at rest after {row.at_rest_after_s:.1f} s"
+            yield case, row, f"{number:4} of {len(cases)}, {left_s:4.0f} s to go: {case.folder}, {hit}{rest}"
+    finally:
+        # After Ctrl-C: what waits is not flown.
+        for each in given:
+            each.cancel()
+
+
+@contextlib.contextmanager
+def _workers(scheduler: str | None) -> Iterator[Executor]:
+    """All cores, or a Dask scheduler's workers. Raises ConfigurationError where nobody answers at its address."""
+    if scheduler is None:
+        spawn = multiprocessing.get_context("spawn")
+        # Ctrl-C ends a flight, not a process that waits for the next one.
+        with ProcessPoolExecutor(os.cpu_count(), spawn, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+            yield pool
+        return
+    from distributed import Client
+
+    try:
+        client = Client(scheduler, timeout="3 s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error}).") from None
+    with client, client.get_executor() as pool:
+        yield pool
+
+
+# A worker of Dask has threads, and all share its standard output.
+_ONE_AT_A_TIME = threading.Lock()
 
 
 def _fly(mission: Path, airframe: str | None, case: Case, out: Path) -> Row:
@@ -68,7 +97,7 @@ def _fly(mission: Path, airframe: str | None, case: Case, out: Path) -> Row:
     words += [] if airframe is None else ["--airframe", airframe]
     words += [word for one in case.sets for word in ("--set", one)]
     options, said = build_parser().parse_args(words), io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+    with _ONE_AT_A_TIME, contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         try:
             options.run(options)
         except ReboundError as error:

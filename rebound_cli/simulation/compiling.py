@@ -1,9 +1,12 @@
 """Kernels are compiled before a flight waits for them, and somebody who waits is told why."""
 
+import contextlib
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rebound_cli.live.console import Console
+from rebound_cli.live.console import Console, console_for
+from sim_vehicle.airframe import built_in_airframes
 
 if TYPE_CHECKING:
     from rebound_cli.inputs import SimulatedWorld
@@ -26,3 +29,19 @@ def prepare_vehicle(console: Console, world: "SimulatedWorld") -> None:
     if NOT_KEPT is not None:
         console.print(f"{COMPILED} is not kept ({NOT_KEPT}): give NUMBA_CACHE_DIR a folder that can be written to.")
     SimulatedVehicle(world.airframe, world.scene, world.seed, keeps_path=False)
+
+
+def stand_own(world: "SimulatedWorld") -> None:
+    """An airframe of one's own stands on the ground before anything is said of it; those that ship do in the tests.
+
+    Raises AirframeError, SceneError. Without the extra [sim] nothing is simulated.
+    """
+    if world.scene.airframe in built_in_airframes():
+        return
+    # What is printed may be read by a program.
+    with (
+        contextlib.suppress(ModuleNotFoundError),
+        contextlib.redirect_stdout(sys.stderr),
+        console_for(False) as console,
+    ):
+        prepare_vehicle(console, world)

@@ -10,8 +10,9 @@ from sim_vehicle.hil import sensors
 from sim_vehicle.hil.messages import Air, HilSensor, HilState, ToPx4
 from sim_vehicle.hil.sensors import air_at
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.plant.standing import check_start
 from sim_vehicle.quantities import Quaternion, Vector3
-from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.scene import Scene
 from sim_vehicle.truth import TruthRecorder
 
 # What PX4 asks for when it connects.
@@ -41,7 +42,7 @@ class HilVehicle:
         self, airframe: Airframe, scene: Scene, seed: int, sample_interval_us: int = SAMPLE_INTERVAL_US
     ) -> None:
         """Raises SceneError where a wall passes through the start position."""
-        check_start_is_free(scene, airframe)
+        check_start(airframe, scene)
         self._plant = Plant(sampled_every(airframe, sample_interval_us), scene, seed)
         rng = random.Random(seed)
         self._magnetometer = sensors.Magnetometer(rng)

@@ -5,7 +5,8 @@ from sim_vehicle.errors import AirframeError
 from sim_vehicle.hil.vehicle import sampled_every
 from sim_vehicle.json.messages import BodyState, Pulses
 from sim_vehicle.plant.plant import Plant
-from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.plant.standing import check_start
+from sim_vehicle.scene import Scene
 from sim_vehicle.truth import TruthRecorder
 
 # ArduPilot reads its inertial sensors a thousand times a second.
@@ -17,7 +18,7 @@ class JsonVehicle:
 
     def __init__(self, airframe: Airframe, scene: Scene, seed: int) -> None:
         """Raises SceneError where a wall passes through the start, AirframeError for motors in another order."""
-        check_start_is_free(scene, airframe)
+        check_start(airframe, scene)
         if airframe.rotors:
             raise AirframeError(f"{airframe.name} has rotors of its own: ArduPilot flies a quad-x of equal arms here.")
         self._plant = Plant(sampled_every(airframe, SAMPLE_INTERVAL_US), scene, seed)

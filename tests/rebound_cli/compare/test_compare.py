@@ -3,6 +3,7 @@
 import csv
 
 import pytest
+from distributed import LocalCluster
 
 from rebound_cli.arguments import speeds_m_s
 from rebound_cli.compare.cases import Case
@@ -18,12 +19,35 @@ def test_two_laws_are_flown_told_of_and_kept(tmp_path):
     assert done.returncode == 0, done.stderr
     # Then there was progress, in a pipe as on a terminal
     assert "1 of 2," in done.stdout and "2 of 2,    0 s to go:" in done.stdout
+    assert (out / "progress.txt").read_text() in done.stdout
     with (out / "compare.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["law"] for row in rows] == ["paper", "adaptive"]
     for row in rows:
         assert float(row["impact_speed_m_s"]) == pytest.approx(1.5, rel=0.1)
         assert (out / row["report"]).exists() and f'xlink:href="{row["report"]}"' in (out / "compare.html").read_text()
+
+
+@pytest.mark.flight
+def test_a_dask_scheduler_s_workers_fly_as_this_machine_s_cores_do(tmp_path):
+    # Given a cluster of one worker with two threads
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster:
+        words = ("compare", "wall", "--seeds", "2", "--out", tmp_path / "there", "--scheduler")
+        done = run_here(*words, cluster.scheduler_address)
+    assert done.returncode == 0, done.stderr
+    # Then each flight is as this process flies it
+    assert run_here("fly", "wall", "--lockstep", "--seed", "2", "--out", tmp_path / "here").returncode == 0
+    assert flown(tmp_path / "there" / "as-written-seed-2") == flown(tmp_path / "here")
+
+
+def flown(run):
+    return (run / "flight.tlog").read_bytes()
+
+
+def test_a_scheduler_that_is_not_there_is_told_and_nothing_is_begun(tmp_path):
+    words = ("compare", "wall", "--scheduler", "tcp://127.0.0.1:1", "--out", tmp_path / "none")
+    assert_one_clear_sentence(run_here(*words), "no Dask scheduler answers there")
+    assert not (tmp_path / "none").exists()
 
 
 def test_what_cannot_be_compared_is_one_sentence_before_anything_is_flown(tmp_path):

@@ -77,7 +77,7 @@ def test_the_filter_finds_the_gyroscopes_bias(hover):
 
 
 def test_a_hit_on_the_arms_stop_clips_and_flow_brings_the_velocity_back():
-    hit = hit_wall(filtered(), 2.0, seed=1, after_ms=(48, 200, 1000))
+    hit = hit_wall(filtered(), 4.0, seed=1, after_ms=(48, 200, 1000))
     # Given a hit that the accelerometer could not follow
     assert hit.flight.output.clipping_counts[0] > 10
     assert hit.before < 0.1
