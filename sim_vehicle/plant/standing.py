@@ -36,6 +36,6 @@ def check_start(airframe: Airframe, scene: Scene) -> None:
     # Written so that what is not a number is refused, too.
     if not (moved_m <= _MOVED_M and tilt_rad <= _TILTED_RAD):
         raise AirframeError(
-            f"{airframe.name} moves by {moved_m:.2g} m and tilts by {math.degrees(tilt_rad):.2g} degrees within {_WATCHED_S:g} s, "
-            "disarmed; see what of its geometry or surface.foot differs from an airframe that stands"
+            f"{airframe.name} moves by {moved_m:.2g} m and tilts by {math.degrees(tilt_rad):.2g} degrees within "
+            f"{_WATCHED_S:g} s, disarmed; see what of its geometry or surface.foot differs from an airframe that stands"
         )

@@ -6,6 +6,7 @@ from pydantic import ValidationError
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, SceneError
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
+from sim_vehicle.vehicle import SimulatedVehicle
 
 
 @pytest.mark.parametrize(
@@ -49,6 +50,14 @@ def test_a_file_states_only_what_differs_from_its_base() -> None:
     assert own.arms.fold_max_m == 0.05
     assert own.arms.stiffness_per_s2 == 500
     assert own.mass_kg == 1.112
+
+
+def test_what_moves_before_anybody_arms_it_is_refused() -> None:
+    """Given feet so stiff that no step of the physics follows them, then no vehicle is made of it."""
+    data = load_built_in("rigid").model_dump()
+    data["surface"]["foot"]["contact_time_s"] = 1e-5
+    with pytest.raises(AirframeError, match=r"rigid moves by .* disarmed; see"):
+        SimulatedVehicle(Airframe.model_validate(data), Scene(), seed=1)
 
 
 @pytest.mark.parametrize(
