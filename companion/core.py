@@ -361,9 +361,9 @@ class FlightCore(Core[FlightContext, Machine]):
         return super().next_deadline_us() if self.stop_reason is None else self.now_us
 
 
-# From the vehicle to the place of the last word: an estimate that a hit has left wrong by 0.5 m/s for two seconds leads
-# astray by one, and the vehicle may still move by 1 m/s.
-AWAY_M = 2.0
+# From the vehicle to the place of the last word. By a tilt that a hit has left wrong by 8 degrees a vehicle at rest
+# drifts 2 m towards the obstacle before Copter turns it.
+AWAY_M = 4.0
 # A setpoint at the edge of the envelope may cross it fifty times a second.
 LEAST_BETWEEN_LIMITS_US = 1_000_000
 

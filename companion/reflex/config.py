@@ -91,6 +91,8 @@ SHORT = 2
 # (bench/notes/decisions.md): friction turns a force by 17 degrees. Walls are met at up to 60 degrees, and
 # less often head-on than a quarter, as in the draws.
 IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
+# That of an impulse whose clipping does not show: clipped on each axis it is up to 55 degrees off, along a diagonal.
+HIDDEN_RAD = 1.0
 # Standard deviation of a change of velocity, m/s: that of both velocities, and what a controller adds in 0.1 s.
 CHANGE_M_S = 0.3
 # A slower vehicle may have been struck from any side.

@@ -10,7 +10,7 @@ from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO
-from companion.reflex.config import CLIPPED_SHARE, SHORT, EstimateConfig
+from companion.reflex.config import CLIPPED_SHARE, HIDDEN_RAD, IMPULSE_RAD, SHORT, EstimateConfig
 from companion.reflex.correction import VelocityValidity
 from companion.reflex.detector import DetectorState, Evidence, Impact, Phase
 from companion.reflex.surface import Normal, normal_of
@@ -151,7 +151,7 @@ class ImpactEstimator:
             position_ned_m=place,
             velocity_ned_m_s=velocity,
             velocity_error_m_s=error_m_s,
-            normal=normal_of(force_ned, self.came_ned_m_s),
+            normal=self._normal(force_ned),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_fully_measured=False,
@@ -186,12 +186,15 @@ class ImpactEstimator:
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
-            normal=normal_of(contact.impulse_ned_m_s, self.came_ned_m_s),
+            normal=self._normal(contact.impulse_ned_m_s),
             peak_specific_force_m_s2=contact.peak_m_s2,
             impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
             is_fully_measured=contact.is_fully_measured,
             is_lower_bound=contact.has_gap or not contact.is_fully_measured,
         )
+
+    def _normal(self, impulse_ned: Vector3) -> Normal:
+        return normal_of(impulse_ned, self.came_ned_m_s, HIDDEN_RAD if self.hides_clipping else IMPULSE_RAD)
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
         """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.

@@ -46,6 +46,7 @@ class MotionEstimator:
     start: MotionState  # the expected motion after it
     config: EstimateConfig
     is_second: bool = False  # the error of an earlier hit was still being corrected
+    fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
     motion: MotionState = field(init=False)
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
@@ -215,6 +216,9 @@ class MotionEstimator:
         bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
         estimate, spread_m_s, left_m_s = bank.estimate(left)
         is_known, error_m_s = left_m_s <= SAME_M_S, bank.mean_error(1, g)
+        if not self.fits_models:
+            # By then a receiver's velocity has come, where there is one.
+            is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US
         if self.is_measured_apart:
             self._believe(estimate, spread_m_s)
             self._compare(velocity, error_m_s if is_known else None, sample.time_boot_us)
@@ -240,7 +244,7 @@ class MotionEstimator:
         by_model_us = None if less_error is None else self._agrees(less_error, by_model_us, time_boot_us)
         by_itself_us = self._agrees(reported_m_s, by_itself_us, time_boot_us)
         self._agrees_since_boot_us = (by_model_us, by_itself_us)
-        is_explained = by_model_us is not None and time_boot_us - by_model_us > SHOWN_US
+        is_explained = self.fits_models and by_model_us is not None and time_boot_us - by_model_us > SHOWN_US
         is_right = by_itself_us is not None and time_boot_us - by_itself_us > 1e6 * reflex.COMPARED_S
         self.has_converged, self._has_agreed = is_explained or is_right, is_right and not is_explained
 

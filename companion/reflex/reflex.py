@@ -147,6 +147,7 @@ class Reflex:
         if before is not None and is_second:
             # The vehicle's estimate is still wrong from the hit before.
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
+        fits_models = not self.monitor.estimator.hides_clipping
         contact = Contact(estimate.time_boot_us, place, velocity, normal.direction_ned, normal.error_rad)
         expected, first_us = contact.rebound(self.law_config.restitution), impact.sample_time_boot_us
         record = CollisionRecord(
@@ -156,7 +157,7 @@ class Reflex:
             contact=contact,
             contact_normal=normal,
             peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
-            estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second),
+            estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second, fits_models),
         )
         if before is None and self._is_attitude_heard:
             reported_wxyz = self.monitor.estimator.strapdown.attitude_wxyz

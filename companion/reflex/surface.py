@@ -41,9 +41,9 @@ class Normal:
         return Normal(unit((n, e, d)), (was + more) ** -0.5)
 
 
-def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3) -> Normal:
-    """The normal by the contact's impulse or force, and by the velocity before it."""
-    normal, (n, e, d) = Normal().with_direction(impulse_ned, IMPULSE_RAD), velocity_ned_m_s
+def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, impulse_rad: float = IMPULSE_RAD) -> Normal:
+    """The normal by the contact's impulse or force, good to `impulse_rad`, and by the velocity before it."""
+    normal, (n, e, d) = Normal().with_direction(impulse_ned, impulse_rad), velocity_ned_m_s
     back = unit((-n, -e, -d)) if math.hypot(n, e, d) > APPROACH_M_S else ZERO
     is_behind = sum(a * b for a, b in zip(normal.direction_ned, back, strict=True)) < FROM_BEHIND
     return normal if is_behind else normal.with_direction(back, APPROACH_RAD)

@@ -61,6 +61,9 @@ def _setpoints(airframe: Airframe) -> Iterable[Parameter]:
     tilt_deg = math.degrees(airframe.control.tilt_max_rad)
     yield Parameter("GUID_OPTIONS", 8, "an attitude's thrust is thrust")
     yield Parameter("GUID_TIMEOUT", 0.3, "s; a companion that dies leaves an attitude, safe to hold for so long")
+    yield Parameter(
+        "ATC_RATE_FF_ENAB", 0, "an attitude and its turn are flown as asked; shaped, each turn is braked first"
+    )
     yield Parameter("ATC_ANGLE_MAX", tilt_deg, "degrees; more would not carry the weight")
 
 

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from companion.reflex.config import HIDDEN_RAD
 from companion.reflex.surface import normal_of
 
 
@@ -32,3 +33,8 @@ def test_force_and_approach_show_the_normal_each_by_its_error(force, speed_m_s, 
 
 def test_two_directions_leave_less_error_than_either():
     assert math.degrees(normal_of(turned(30.0), (2.0, 0.0, 0.0)).error_rad) == pytest.approx(17.3, abs=0.2)
+
+
+def test_an_impulse_that_may_be_clipped_turns_the_normal_less():
+    n, e, _ = normal_of(turned(45.0), (2.0, 0.0, 0.0), HIDDEN_RAD).direction_ned
+    assert 5.0 < math.degrees(math.atan2(-e, -n)) < 15.0

@@ -26,8 +26,7 @@ CLASSES = {1: "quadrotor", 2: "hexarotor", 3: "octorotor", 4: "octorotor", 5: "h
 # A low-pass of second order makes a pulse of a jump of the velocity. It is so high for each m/s and Hz: 57 m/s^2
 # for each m/s at the default, 20 Hz.
 PULSE_PER_M_S_HZ = 2.86
-DEFAULT_FILTER_HZ = 20.0
-# From this on a hit of 0.1 m/s shows with its 5.7 m/s^2.
+# The default: a hit of 0.1 m/s shows with its 5.7 m/s^2.
 LEAST_FILTER_HZ = 20.0
 # Copter's default, m/s^3: from level to 2.5 m/s^2 in half a second. A recovery by position begins no sooner.
 LEAST_JERK_M_S3 = 5.0
@@ -97,6 +96,12 @@ def _filter(name: str, edge_hz: float, setup: Setup) -> PreflightItem:
     return judged(name, found, (0.0 < edge_hz < LEAST_FILTER_HZ, DOUBTFUL, remedy), mended=LEAST_FILTER_HZ)
 
 
+def _shaping(name: str, enabled: float, setup: Setup) -> PreflightItem:
+    """Shaped, no asked turn is flown: Copter brakes the one that a hit has left, with half of what lifts."""
+    found = "an attitude is " + ("shaped: its turn is braked, and height lost" if enabled else "flown as asked")
+    return judged(name, found, (enabled != 0.0, DOUBTFUL, f"{name} = 0"), mended=0)
+
+
 def _fence(name: str, enabled: float, setup: Setup) -> PreflightItem:
     found = "its own fence is " + ("on" if enabled else "off")
     remedy = f"{name} = 0, or a fence that holds all of the mission's and its margin"
@@ -140,6 +145,7 @@ _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     LOSS: _timeout,
     OPTIONS: _options,
     FILTER: _filter,
+    "ATC_RATE_FF_ENAB": _shaping,
     "FENCE_ENABLE": _fence,
     "FS_CRASH_CHECK": _crash_check,
 }
@@ -163,7 +169,7 @@ def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
 
 def sight(seen: Sight) -> PreflightItem:
     """A filtered pulse is 18 ms wide: no hit falls between two samples."""
-    edge_hz = float(seen.parameters.get(FILTER) or DEFAULT_FILTER_HZ)
+    edge_hz = float(seen.parameters.get(FILTER) or LEAST_FILTER_HZ)
     slowest_m_s = seen.threshold_m_s2 / (PULSE_PER_M_S_HZ * edge_hz)
     remedy = "a faster HIGHRES_IMU (see above): a pulse is 18 ms wide, and shows in two samples from 100 Hz on"
     found = f"from {slowest_m_s:.2f} m/s on through a filter of {edge_hz:g} Hz; {seen.false_alarms}"

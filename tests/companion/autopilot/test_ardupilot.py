@@ -338,7 +338,7 @@ def test_a_raw_imu_has_milli_units_and_counts_until_the_finer_one_comes():
 # --- preflight
 
 HEALTHY = {"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": 8, "INS_ACCEL_FILTER": 20, "FENCE_ENABLE": 0, "FRAME_CLASS": 1}
-HEALTHY |= {"FS_CRASH_CHECK": 1, "PSC_JERK_NE": 5, "ATC_ANGLE_MAX": 30, "ARMING_SKIPCHK": 0}
+HEALTHY |= {"FS_CRASH_CHECK": 1, "ATC_RATE_FF_ENAB": 0, "PSC_JERK_NE": 5, "ATC_ANGLE_MAX": 30, "ARMING_SKIPCHK": 0}
 UART = SerialLine(921_600)
 ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
 
@@ -362,6 +362,7 @@ def test_a_healthy_copter_has_nothing_to_mend():
         ({"INS_ACCEL_FILTER": 10}, None, "INS_ACCEL_FILTER", "INS_ACCEL_FILTER = 20"),
         ({"FENCE_ENABLE": 1}, None, "FENCE_ENABLE", "FENCE_ENABLE = 0"),
         ({"FS_CRASH_CHECK": 0}, None, "FS_CRASH_CHECK", "FS_CRASH_CHECK = 1"),
+        ({"ATC_RATE_FF_ENAB": 1}, None, "ATC_RATE_FF_ENAB", "ATC_RATE_FF_ENAB = 0"),
         ({"PSC_JERK_NE": 2}, None, "PSC_JERK_NE", "PSC_JERK_NE = 5"),
         ({"ATC_ANGLE_MAX": 10}, None, "ATC_ANGLE_MAX", "ATC_ANGLE_MAX = 30"),
         ({"ARMING_SKIPCHK": 8}, None, "ARMING_SKIPCHK", "ARMING_SKIPCHK = 0"),
