@@ -60,20 +60,6 @@ def test_what_moves_before_anybody_arms_it_is_refused() -> None:
         SimulatedVehicle(Airframe.model_validate(data), Scene(), seed=1)
 
 
-@pytest.mark.parametrize(
-    ("part", "words"),
-    [
-        ({"mass_kg": 1.5}, r"raise motors\.max_thrust_n"),
-        ({"motors": {"idle_fraction": 0.2}}, r"lower motors\.idle_fraction to 0\.18 or less"),
-        ({"geometry": {"foot_depth_m": 0.04}}, r"the hub, .* would begin in the ground"),
-        ({"geometry": {"guard_height_m": 0.17}}, r"the guards, .* would begin in the ground"),
-    ],
-)
-def test_an_airframe_that_cannot_stand_fly_or_land_is_refused(part: dict[str, object], words: str) -> None:
-    with pytest.raises(ValidationError, match=words):
-        Airframe.model_validate(with_base({"based_on": "foldable", **part}))
-
-
 @pytest.mark.parametrize(("wind_ned_m_s", "is_held"), [((0, 24, 0), True), ((18, 18, 0), False), ((0, 0, 20), False)])
 def test_a_wind_that_the_vehicle_cannot_lean_against_is_refused(wind_ned_m_s: list[float], is_held: bool) -> None:
     # foldable leans by 30 degrees: its weight of 10.9 N times tan 30 degrees is 6.3 N, by its drag 25 m/s

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.mavlink.decode import Decoder
 from tests.sim_vehicle.packets import KINDS, OBEYED, addressed_to, packet, random_payload
-from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, Client
+from tests.sim_vehicle.vehicle_client import Client
 
 
 def state(client: Client) -> tuple:
@@ -29,9 +29,7 @@ def state(client: Client) -> tuple:
 
 def flying() -> Client:
     client = Client(system=255, component=190)
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(9.0)
+    client.take_off(9.0)
     assert client.armed()
     return client
 

@@ -125,6 +125,12 @@ class Client(End):
                 each_50_ms()
             self.step()
 
+    def take_off(self, seconds: float) -> None:
+        """And so long in the air."""
+        self.command(TAKEOFF)
+        self.command(ARM_DISARM, 1)
+        self.run(seconds)
+
     def rate_hz(self, kind: str, seconds: float) -> float:
         """Received from now on."""
         self.forget()

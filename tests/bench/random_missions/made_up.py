@@ -104,6 +104,20 @@ def collision(at_s=10.004, setpoint=(1.5, 0.0, -2.08), settled_s=1.0):
     )
 
 
+def report(*collisions, outcome="completed", reason="landed and disarmed"):
+    return FlightReport(
+        outcome=outcome,
+        reason=reason,
+        autopilot="PX4",
+        stream_rates_hz={},
+        collisions=collisions,
+        origin_ned_m=(0.0, 0.0, -STANDING_M),
+        started_at_us=EPOCH_US,
+        ended_at_us=EPOCH_US + round(DONE_S * 1e6),
+        armed_at_us=EPOCH_US + round(ARMED_S * 1e6),
+    )
+
+
 def flight(
     events=None,
     series=None,
@@ -113,20 +127,10 @@ def flight(
     reason="landed and disarmed",
     **mission_changes,
 ):
-    report = FlightReport(
-        outcome=outcome,
-        reason=reason,
-        autopilot="PX4",
-        stream_rates_hz={},
-        collisions=tuple(collisions),
-        origin_ned_m=(0.0, 0.0, -STANDING_M),
-        started_at_us=EPOCH_US,
-        ended_at_us=EPOCH_US + round(DONE_S * 1e6),
-        armed_at_us=EPOCH_US + round(ARMED_S * 1e6),
-    )
+    told = report(*collisions, outcome=outcome, reason=reason)
     truth = FlightTruth(tuple(hits), series or plain_path(), EPOCH_US)
     events = tuple(plain_events() if events is None else events)
-    return JudgedFlight(mission(**mission_changes), report, events, truth, room(), load_built_in("foldable"))
+    return JudgedFlight(mission(**mission_changes), told, events, truth, room(), load_built_in("foldable"))
 
 
 def room(place=(2.2, 0.0, -2.0), normal=(-1.0, 0.0, 0.0)):

@@ -1,52 +1,27 @@
 """Detections beside contacts, by the definitions of docs/reference/summary.md."""
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from companion.reflex.collision import CollisionReport
-from companion.report import FlightReport
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
-from sim_vehicle.truth import Hit
+from tests.bench.random_missions import made_up
+from tests.bench.random_missions.made_up import EPOCH_US
 
-EPOCH_US = 1_600_000_000_000_000
 SETTLED_S = 0.5
 
 
 def hit(start_ms, end_ms=None):
-    return Hit(
-        obstacle="wall",
-        contact_at_boot_us=1e3 * start_ms,
-        ended_at_boot_us=1e3 * (end_ms if end_ms is not None else start_ms + 30),
-        contact_position_ned_m=(3.8, 0.0, -1.5),
-        impact_velocity_ned_m_s=(2.0, 0.0, 0.0),
-        normal_ned=(-1.0, 0.0, 0.0),
-        max_fold_m=0.02,
-        peak_force_n=60.0,
-        rebound_velocity_ned_m_s=(-0.3, 0.0, 0.1),
-        impulse_ned_n_s=(-2.6, 0.0, 0.1),
-        energy_before_j=2.2,
-        energy_after_j=0.06,
-    )
+    ended_us = 1e3 * (end_ms if end_ms is not None else start_ms + 30)
+    made = made_up.hit(1e-3 * start_ms, place=(3.8, 0.0, -1.5))
+    return replace(made, ended_at_boot_us=ended_us, rebound_velocity_ned_m_s=(-0.3, 0.0, 0.1))
 
 
-def collision(sample_ms, settled_after_s=2.0, latency_us=500):
-    return CollisionReport(
-        detected_at_us=EPOCH_US + 1000 * sample_ms + latency_us,
-        sample_time_boot_us=1000 * sample_ms,
-        detector="lateral",
-        position_ned_m=(3.8, 0.0, -1.5),
-        impact_velocity_ned_m_s=(1.95, 0.0, 0.0),
-        impact_speed_m_s=1.95,
-        normal_ned=(-1.0, 0.0, 0.0),
-        peak_specific_force_m_s2=55.0,
-        recovery_setpoint_ned_m=(2.8, 0.0, -1.5),
-        settled_after_s=settled_after_s,
-        overshoot_m=0.0,
-        rebound_speed_m_s=0.3,
-    )
+def collision(sample_ms, settled_after_s=2.0):
+    made = made_up.collision(1e-3 * sample_ms, (2.8, 0.0, -1.5), settled_after_s)
+    return replace(made, detected_at_us=made.detected_at_us + 500)
 
 
 def counts(collisions, hits):
@@ -88,20 +63,6 @@ def test_what_counts(collisions, hits, expected):
     assert counts(collisions, hits) == expected
 
 
-def report_of(*collisions):
-    return FlightReport(
-        outcome="completed",
-        reason="landed",
-        autopilot="PX4 1.15.0",
-        stream_rates_hz={"HIGHRES_IMU": 249.987},
-        collisions=collisions,
-        origin_ned_m=(0.0, 0.0, 0.0),
-        started_at_us=EPOCH_US + 1_000_000,
-        ended_at_us=EPOCH_US + 26_000_000,
-        armed_at_us=EPOCH_US + 5_000_000,
-    )
-
-
 def path_of(rows):
     times_s, north_m, down_m = np.array(rows, dtype=float).T
     position = np.column_stack([north_m, np.zeros(len(rows)), down_m])
@@ -116,26 +77,28 @@ def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
     path = path_of([(9.9, 3.7, -1.6), (10.0, 3.8, -1.5), (11.0, 3.0, -1.47), (12.0, 2.76, -1.5), (12.6, 2.0, -1.0)])
     truth = FlightTruth([hit(10_000)], path, EPOCH_US)
     # When it is summed up
-    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    summary = build_summary(Flown(made_up.report(collision(10_004)), 0.5, truth), FACTS)
     # Then what came after the recovery does not count, and times are seconds since the start
     entry = summary["collisions"][0]
     assert entry["truth"]["overshoot_m"] == pytest.approx(0.04)
     assert entry["truth"]["height_lost_m"] == pytest.approx(0.03)
-    assert entry["truth"]["contact_at_s"] == pytest.approx(9.0)
+    assert entry["truth"]["contact_at_s"] == pytest.approx(10.0)
     assert entry["truth"]["detection_latency_ms"] == pytest.approx(4.5)
     assert entry["truth"]["rebound_speed_m_s"] == pytest.approx(0.3)
-    assert entry["detected_at_s"] == pytest.approx(9.0045)
-    assert (summary["duration_s"], summary["realtime_factor"]) == (25.0, 50.0)
+    assert entry["detected_at_s"] == pytest.approx(10.0045)
+    assert (summary["duration_s"], summary["realtime_factor"]) == (17.0, 34.0)
     # and a simulator that stands still for half a second, 0.4 s after the contact, changes none of it
     truth = FlightTruth([hit(10_000)], path, EPOCH_US + 500_000, stalls=[(10_400_000, 500_000)])
-    assert build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS) == summary
+    assert build_summary(Flown(made_up.report(collision(10_004)), 0.5, truth), FACTS) == summary
 
 
 def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contact():
     # Given the same path, of a vehicle that believed itself 0.3 m further north than it was when it touched
     path = path_of([(10.0, 3.8, -1.5), (11.0, 3.0, -1.5), (12.0, 2.46, -1.5)])
-    drifted = dataclasses.replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
-    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, FlightTruth([drifted], path, EPOCH_US)), FACTS)
+    drifted = replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
+    summary = build_summary(
+        Flown(made_up.report(collision(10_004)), 0.5, FlightTruth([drifted], path, EPOCH_US)), FACTS
+    )
     # Then its setpoint of 2.8 m was at 2.5 m, 1.3 m off the wall, which faces south; and it went 4 cm past that
     found = summary["collisions"][0]["truth"]
     assert (found["overshoot_m"], found["stopped_off_m"]) == pytest.approx((0.04, 1.3))
@@ -146,7 +109,7 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
     path = path_of([(10.0, 3.8, -1.5), (10.9, 3.0, -1.48), (11.5, 2.5, -1.2), (12.0, 2.5, -1.2)])
     truth = FlightTruth([hit(10_000), hit(11_000)], path, EPOCH_US)
     # When it is summed up
-    summary = build_summary(Flown(report_of(collision(10_004, None), collision(11_004)), 0.5, truth), FACTS)
+    summary = build_summary(Flown(made_up.report(collision(10_004, None), collision(11_004)), 0.5, truth), FACTS)
     # Then the first hit has neither that overshoot nor that loss of height; the second has both
     first, second = (entry["truth"] for entry in summary["collisions"])
     assert (first["overshoot_m"], first["height_lost_m"]) == pytest.approx((0.0, 0.02))
@@ -154,11 +117,11 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
 
 
 def test_without_truth_nothing_is_counted_and_without_a_contact_zero():
-    summary = build_summary(Flown(report_of(collision(10_004)), 25.0, None), FlightFacts("wall", None, None, 0.5))
+    summary = build_summary(Flown(made_up.report(collision(10_004)), 25.0, None), FlightFacts("wall", None, None, 0.5))
     unknown = ("false_detections", "missed_contacts", "recontacts", "seed", "airframe")
     assert [summary[key] for key in unknown] == [None] * 5
     assert summary["collisions"][0]["truth"] is None
 
     truth = FlightTruth([], path_of([(10.0, 0.0, 0.0)]), EPOCH_US)
-    summary = build_summary(Flown(report_of(), 0.5, truth), FACTS)
+    summary = build_summary(Flown(made_up.report(), 0.5, truth), FACTS)
     assert [summary[key] for key in ("false_detections", "missed_contacts", "recontacts")] == [0, 0, 0]

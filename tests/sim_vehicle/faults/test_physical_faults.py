@@ -10,9 +10,8 @@ from pydantic import ValidationError
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.faults.wind import Dryden, strengths_and_lengths
 from sim_vehicle.plant.cruise import Cruise
-from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from tests.sim_vehicle.physics.throwing import quiet
+from tests.sim_vehicle.physics.throwing import quiet, released
 
 FOLDABLE = load_built_in("foldable")
 QUIET = quiet(FOLDABLE)
@@ -37,13 +36,8 @@ def velocity(cruise: Cruise) -> np.ndarray:
 def test_a_gust_pushes_by_the_drag_of_its_air() -> None:
     """Without control: m dv = c V (length - rise), as long as the vehicle is slow against the gust."""
     airframe = quiet(FOLDABLE, drag_n_s_m=0.05)
-    scene = Scene.model_validate(
-        {"faults": [{"kind": "gust", "between_s": [0.1, 0.5], "velocity_ned_m_s": [0, 6, 0], "rise_s": 0.1}]}
-    )
-    plant = Plant(airframe, scene, seed=1)
-    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
-    for _ in range(150):
-        plant.step(None, armed=False)
+    gust = {"kind": "gust", "between_s": [0.1, 0.5], "velocity_ned_m_s": [0, 6, 0], "rise_s": 0.1}
+    plant = released(airframe, 0.6, faults=[gust])
     assert plant.state.body[4] == pytest.approx(0.05 * 6 * 0.3 / airframe.mass_kg, rel=0.02)
     assert plant.disturbance.wind_ned_m_s == pytest.approx([0, 0, 0])
 
@@ -107,13 +101,8 @@ def test_a_payload_that_drops_lets_the_vehicle_jump_by_its_weight() -> None:
 
 
 def test_a_push_gives_its_impulse_and_no_moment_through_the_centre() -> None:
-    scene = Scene.model_validate(
-        {"faults": [{"kind": "push", "between_s": [0.1, 0.5], "force_ned_n": [2, 0, 0], "rise_s": 0.1}]}
-    )
-    plant = Plant(QUIET, scene, seed=1)
-    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
-    for _ in range(200):
-        plant.step(None, armed=False)
+    push = {"kind": "push", "between_s": [0.1, 0.5], "force_ned_n": [2, 0, 0], "rise_s": 0.1}
+    plant = released(QUIET, 0.8, faults=[push])
     assert plant.state.body[3] == pytest.approx(2 * 0.3 / QUIET.mass_kg, rel=0.01)
     assert np.abs(plant.state.body[10:13]).max() == 0.0
 

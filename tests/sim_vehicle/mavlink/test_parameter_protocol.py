@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.parameters.store import Parameters
-from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, Client
+from tests.sim_vehicle.vehicle_client import Client
 
 INT32, REAL32, UINT32 = 6, 9, 5
 
@@ -106,9 +106,7 @@ def test_a_gain_changes_how_the_vehicle_flies():
     def distance_after(gain: float) -> float:
         client = Client()
         set_to(client, "MPC_XY_P", gain, REAL32)
-        client.command(TAKEOFF)
-        client.command(ARM_DISARM, 1)
-        client.run(8.0)
+        client.take_off(8.0)
         client.run(0.2, lambda: client.setpoint(2.0, 0.0, -2.0))
         client.command(176, 1, 6)
         client.run(1.0, lambda: client.setpoint(2.0, 0.0, -2.0))

@@ -13,7 +13,7 @@ from sim_vehicle.mavlink.streams.topics import OPTIONAL, Topic
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
-from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, TAKEOFF, Client
+from tests.sim_vehicle.vehicle_client import REQUEST_MESSAGE, Client
 
 NAN = math.nan
 MISSION_CURRENT = 42
@@ -44,9 +44,7 @@ def test_each_links_set_is_sent_at_its_rates(kind):
 def hovering() -> Client:
     """A vehicle that has taken off and holds, with everything asked for that is not sent unasked."""
     client = Client()
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(14.0)
+    client.take_off(14.0)
     return client
 
 
@@ -116,9 +114,7 @@ def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_
     client.send(dialect.MAVLink_param_set_message(1, 1, b"SIM_BAT_DRAIN", 20.0, 9))
     client.run(3.0)
     at_rest = client.last("BATTERY_STATUS")
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(6.0)
+    client.take_off(6.0)
     flying = client.last("BATTERY_STATUS")
     # 20 s would empty it (SIM_BAT_DRAIN), but not below half (SIM_BAT_MIN_PCT)
     client.run(10.0)
@@ -145,9 +141,7 @@ def test_the_world_lies_where_the_parameters_say():
 @pytest.fixture(scope="module")
 def orbiting() -> Client:
     client = Client(system=255, component=190)
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(8.0)
+    client.take_off(8.0)
     client.command(34, -6.0, 2.0, 0, 0, NAN, NAN, NAN)
     client.run(20.0)
     return client
@@ -186,9 +180,7 @@ def test_a_vehicle_with_a_filter_says_how_sure_it_is_of_itself():
     client = Client(airframe=filtered())
     client.run(3.0)
     stands = client.last("ODOMETRY")
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(30.0)
+    client.take_off(30.0)
     flies, body = client.last("ODOMETRY"), client.vehicle.state.body
     # Then it is less and less sure of its place, and rightly so; of its speed and its tilt it stays as sure
     assert flies.pose_covariance[0] > 20 * stands.pose_covariance[0] > 0.0

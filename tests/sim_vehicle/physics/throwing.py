@@ -44,6 +44,20 @@ def quiet(airframe: Airframe, **changes: object) -> Airframe:
     return Airframe.model_validate(data)
 
 
+def let_go(plant: Plant, seconds: float) -> Plant:
+    """Motors off."""
+    for _ in range(round(seconds / (1e-6 * plant.interval_us))):
+        plant.step(None, armed=False)
+    return plant
+
+
+def released(airframe: Airframe, seconds: float, **scene: object) -> Plant:
+    """High up, at rest, and let go."""
+    plant = Plant(airframe, Scene.model_validate(scene), seed=1)
+    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
+    return let_go(plant, seconds)
+
+
 def throw(
     airframe: Airframe,
     speed_m_s: float,
@@ -75,9 +89,7 @@ def throw(
     body[0:3] = [(10 - distance) * north, (10 - distance) * east, -HEIGHT_M]
     body[3:6] = [speed_m_s * north, speed_m_s * east, 0.0]
     body[10:13] = rates_frd_rad_s
-    for _ in range(round(duration_s / (1e-6 * plant.interval_us))):
-        plant.step(None, armed=False)
-    return Thrown(plant)
+    return Thrown(let_go(plant, duration_s))
 
 
 def closed_form_of_eq_2(airframe: Airframe, speed_m_s: float) -> tuple[float, float, float]:
