@@ -10,6 +10,7 @@ from companion.errors import AddressError, ConnectionSetupError
 from companion.guard.between import Between
 from companion.shell.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
 from companion.shell.connection import bound_socket, udp_out
+from tests.ports import free_port
 
 HEARTBEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 LOOPBACK = "127.0.0.1"
@@ -17,12 +18,6 @@ LOOPBACK = "127.0.0.1"
 
 def packet(system: int = 255, message=HEARTBEAT) -> bytes:
     return message.pack(dialect.MAVLink(None, system, 1))
-
-
-def free_port(kind: socket.SocketKind) -> int:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind((LOOPBACK, 0))
-        return int(probe.getsockname()[1])
 
 
 class Bench:

@@ -4,7 +4,6 @@ import contextlib
 import io
 import json
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ from pymavlink import mavutil
 
 from rebound_cli.main import main
 from rebound_cli.replay.recording import read_recording, reproduce
+from tests.ports import free_port
 
 ROOT = Path(__file__).parents[2]
 WALL = ROOT / "missions" / "wall.yaml"
@@ -65,12 +65,6 @@ def run_here(*arguments):
             for number, handler in handlers:
                 signal.signal(number, handler)
     return subprocess.CompletedProcess(arguments, code, stdout.getvalue(), stderr.getvalue())
-
-
-def free_port(kind=socket.SOCK_DGRAM):
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @contextlib.contextmanager

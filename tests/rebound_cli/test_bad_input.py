@@ -13,14 +13,8 @@ from tests.rebound_cli.command import (
     SQUARE,
     WALL,
     assert_one_clear_sentence,
-    run,
     run_here,
 )
-
-
-def test_a_missing_mission_file():
-    result = run("fly", "missions/wal.yaml", "--lockstep")
-    assert_one_clear_sentence(result, "missions/wal.yaml: no such file", "did you mean missions/wall.yaml?")
 
 
 def test_a_port_in_use(tmp_path):
@@ -56,6 +50,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
     [
         (("fly", WALL, "--lockstep", "--airframe", "foldible"), ("foldible", "did you mean foldable?")),
         (("fly", WALL, "--lockstep", "--airframe", "racer.yaml"), ("racer.yaml: no such file; did you mean racer?",)),
+        (("fly", "missions/wal.yaml", "--lockstep"), ("no such file", "did you mean missions/wall.yaml?")),
         (("check", "wal.yaml"), ("wal.yaml: no such file; did you mean wall?",)),
         (("airframe", "px4", "--airframe", "none"), ("foldable", "rigid")),
         (("fly", "--sim", "no-such-mission.yaml"), ("no-such-mission.yaml",)),
@@ -135,14 +130,14 @@ def test_what_is_wrong_with_a_guard_is_no_reason_to_start_it_again(options, word
     assert result.returncode == exit_codes.CONFIGURATION
 
 
-@pytest.mark.parametrize("command", ["paper", "results", "detectors", "campaign", "recoveries"])
-def test_a_study_that_moved_names_its_new_place(command, capsys):
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        *((study, "is now 'python -m bench ") for study in ("paper", "results", "detectors", "campaign", "recoveries")),
+        ("plan", "fly it under 'rebound guard'"),
+    ],
+)
+def test_a_command_that_moved_or_is_gone_names_what_to_use(command, words, capsys):
     assert main([command, "--out", "docs"]) == 1
     complaint = capsys.readouterr().err
-    assert "is now 'python -m bench " in complaint and complaint.count("\n") == 1
-
-
-def test_a_plan_of_qgroundcontrol_is_flown_by_px4_under_the_guard(capsys):
-    assert main(["plan", "import", "survey.plan"]) == 1
-    complaint = capsys.readouterr().err
-    assert "'rebound plan' is gone" in complaint and "'rebound guard'" in complaint and complaint.count("\n") == 1
+    assert words in complaint and complaint.count("\n") == 1

@@ -15,11 +15,11 @@ from rebound_cli.guard import run_guard
 from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
+from tests.ports import free_port
 from tests.rebound_cli.command import (
     QUICK,
     assert_comes_again,
     events_of,
-    free_port,
     guarding,
     run,
     taken_off,

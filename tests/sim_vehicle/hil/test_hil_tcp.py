@@ -14,6 +14,7 @@ from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.hil_tcp import serve_px4
 from sim_vehicle.shell.truth_file import load_stalls, load_truth
+from tests.ports import free_port
 from tests.sim_vehicle.hil.px4_client import HOVER, TIMEOUT_S, Px4Client
 
 
@@ -27,16 +28,10 @@ def compiled_physics() -> None:
     new_vehicle().step(MOTORS_STOPPED)
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @contextmanager
 def served(speed: float = 0.0, truth_path: Path | None = None) -> Iterator[tuple[int, list[str]]]:
     """The server in a thread: its port, and what it says."""
-    port, said, stop, listening = free_port(), [], threading.Event(), threading.Event()
+    port, said, stop, listening = free_port(socket.SOCK_STREAM), [], threading.Event(), threading.Event()
 
     def tell(text: str) -> None:
         said.append(text)

@@ -15,6 +15,7 @@ from sim_vehicle.json.vehicle import JsonVehicle
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell import json_udp
 from sim_vehicle.shell.json_udp import ArduPilotVehicle
+from tests.ports import free_port
 
 
 @dataclass
@@ -38,12 +39,6 @@ class Sitl:
             return json.loads(self.states.recv(2048))
         except BlockingIOError:
             return None
-
-
-def free_port(kind: socket.SocketKind) -> int:
-    with socket.socket(type=kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture
