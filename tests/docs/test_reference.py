@@ -21,7 +21,8 @@ from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.autopilot.commander.failsafe_table import ROWS
 from sim_vehicle.autopilot.modes import TRANSITIONS
-from tests.rebound_cli.results.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
+from tests.bench.random_missions import made_up
+from tests.rebound_cli.results.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of
 
 # What is told under a kind that stands in no call.
 ELSEWHERE = {"late", "lost", "guard", *_KINDS.values()}
@@ -111,7 +112,7 @@ def test_the_simulated_vehicles_modes_and_failsafes_are_all_named():
 def test_every_key_of_the_summary_has_its_meaning():
     # Given a flight with one collision, of which the simulator knows the contact
     truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
-    found = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    found = build_summary(Flown(made_up.report(collision(10_004)), 0.5, truth), FACTS)
     # Then the page explains just the keys that there are
     (entry,) = found["collisions"]
     headings = {
