@@ -59,9 +59,10 @@ def test_the_wall_missions_come_home():
 def test_the_door_is_tried_three_times_each_slower():
     flown = fly("knock")
     speeds = [hit.impact_speed_m_s for hit in flown.report.collisions]
-    assert len(speeds) == 3 and speeds == sorted(speeds, reverse=True)
-    # half a metre of run-up: the vehicle overruns the speed of the item before it has settled to it
-    assert speeds[2] < 0.75 * speeds[0]
+    # 0.4 m of run-up are too short for the speed that is asked for; both tries have the same, and the first had 4 m
+    assert len(speeds) == 3 and max(speeds[1:]) < 0.75 * speeds[0]
+    tries = [text for text in flown.told("item") if text.startswith("item 2 of 5")]
+    assert "% of the speed" not in tries[0] and "at 70%" in tries[1] and "at 49%" in tries[2]
     assert flown.report.reason.endswith("not flown from item 2 on")
 
 
