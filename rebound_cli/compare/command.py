@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +22,7 @@ from rebound_cli.documents import refuse_existing
 from rebound_cli.live.console import console_for
 from rebound_cli.results.run_folder import RUNS_FOLDER, read_summary
 from rebound_cli.simulation.compiling import prepare_vehicle
+from sim_vehicle.airframe import built_in_airframes
 
 
 def run_compare(options: Namespace) -> int:
@@ -35,8 +36,12 @@ def run_compare(options: Namespace) -> int:
         # Here once, not on every core.
         prepare_vehicle(console, inputs.load_world(options.mission, (), options.airframe, None))
         rows = {}
-        with (out / "progress.txt").open("w", encoding="utf-8", buffering=1) as progress:
-            for case, row, line in _flown(workers, options, cases, out.absolute()):
+        with (
+            (out / "progress.txt").open("w", encoding="utf-8", buffering=1) as progress,
+            # Closed after Ctrl-C, too: what waits is not flown.
+            contextlib.closing(_flown(workers, options, cases, out.absolute())) as flown,
+        ):
+            for case, row, line in flown:
                 rows[case] = row
                 console.print(line)
                 progress.write(f"{line}\n")
@@ -47,10 +52,10 @@ def run_compare(options: Namespace) -> int:
     return 0 if all(row.second_touches is not None for row in in_order) else 1
 
 
-def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Path) -> Iterator[tuple[Case, Row, str]]:
+def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Path) -> Generator[tuple[Case, Row, str]]:
     """In the order in which they are over, each with a line of progress."""
     began_s, airframe = time.monotonic(), options.airframe
-    if airframe is not None and Path(airframe).is_file():
+    if airframe is not None and airframe not in built_in_airframes():
         airframe = str(Path(airframe).absolute())
     given = {workers.submit(_fly, options.mission.absolute(), airframe, case, out): case for case in cases}
     try:
@@ -61,7 +66,6 @@ def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Pa
             rest = "" if row.at_rest_after_s is None else f", at rest after {row.at_rest_after_s:.1f} s"
             yield case, row, f"{number:4} of {len(cases)}, {left_s:4.0f} s to go: {case.folder}, {hit}{rest}"
     finally:
-        # After Ctrl-C: what waits is not flown.
         for each in given:
             each.cancel()
 
@@ -90,7 +94,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 
 def _fly(mission: Path, airframe: str | None, case: Case, out: Path) -> Row:
-    """One, as `rebound fly --lockstep` does it; in a process of its own."""
+    """One, as `rebound fly --lockstep` does it; here, in a process of the pool, or in a thread of Dask's."""
     from rebound_cli.main import build_parser
 
     words = ["fly", str(mission), "--lockstep", "--seed", str(case.seed), "--out", str(out / case.folder)]

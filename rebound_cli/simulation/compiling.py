@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rebound_cli.extras import needed_text
 from rebound_cli.live.console import Console, console_for
 from sim_vehicle.airframe import built_in_airframes
 
@@ -38,10 +39,10 @@ def stand_own(world: "SimulatedWorld") -> None:
     """
     if world.scene.airframe in built_in_airframes():
         return
-    # What is printed may be read by a program.
-    with (
-        contextlib.suppress(ModuleNotFoundError),
-        contextlib.redirect_stdout(sys.stderr),
-        console_for(False) as console,
-    ):
-        prepare_vehicle(console, world)
+    try:
+        # What is printed may be read by a program.
+        with contextlib.redirect_stdout(sys.stderr), console_for(False) as console:
+            prepare_vehicle(console, world)
+    except ModuleNotFoundError as error:
+        # What no extra brings is an error of ours.
+        needed_text(error)

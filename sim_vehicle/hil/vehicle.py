@@ -41,7 +41,7 @@ class HilVehicle:
     def __init__(
         self, airframe: Airframe, scene: Scene, seed: int, sample_interval_us: int = SAMPLE_INTERVAL_US
     ) -> None:
-        """Raises SceneError where a wall passes through the start position."""
+        """Raises SceneError where the start is not free, AirframeError where the vehicle does not stand."""
         check_start(airframe, scene)
         self._plant = Plant(sampled_every(airframe, sample_interval_us), scene, seed)
         rng = random.Random(seed)

@@ -17,7 +17,7 @@ class JsonVehicle:
     """One sample of the inertial sensor a step; time begins at 0, as ArduPilot's clock does."""
 
     def __init__(self, airframe: Airframe, scene: Scene, seed: int) -> None:
-        """Raises SceneError where a wall passes through the start, AirframeError for motors in another order."""
+        """Raises SceneError where the start is not free, AirframeError where it does not stand or for other motors."""
         check_start(airframe, scene)
         if airframe.rotors:
             raise AirframeError(f"{airframe.name} has rotors of its own: ArduPilot flies a quad-x of equal arms here.")

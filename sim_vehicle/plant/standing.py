@@ -9,7 +9,7 @@ from sim_vehicle.errors import AirframeError
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 
-# What lies in the ground, or on feet too stiff to be simulated, is thrown within the first contact, some milliseconds.
+# What lies in the ground, or on feet too stiff to be simulated, leaps within the first contact, some milliseconds.
 _WATCHED_S = 0.2
 # Feet give a millimetre under the weight, and a vehicle that stands does not tilt.
 _MOVED_M, _TILTED_RAD = 0.01, math.radians(2.0)

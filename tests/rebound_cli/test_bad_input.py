@@ -42,6 +42,16 @@ def test_an_airframe_is_printed_whole_in_every_format(format_name):
     assert all(parameter.name in result.stdout for parameter in px4_parameters(load_built_in("rigid")))
 
 
+@pytest.mark.parametrize("words", [("check", WALL, "--set", "sim.airframe={}"), ("airframe", "px4", "--airframe", "{}")])
+def test_nothing_is_said_of_an_airframe_of_one_s_own_that_leaps_off_the_ground(tmp_path, words):
+    # Given feet far stiffer than an interval of the physics
+    own = tmp_path / "stiff.yaml"
+    own.write_text("based_on: rigid\nname: stiff\nsurface: {foot: {contact_time_s: 0.00001, restitution: 0.1}}\n")
+    result = run_here(*(str(word).format(own) for word in words))
+    assert_one_clear_sentence(result, "stiff moves by", "disarmed")
+    assert result.stdout == ""
+
+
 CONNECTED = ("fly", SQUARE, "--connect")
 
 

@@ -1,10 +1,14 @@
 """The `sim:` part of a mission file and airframe files: what is refused, and with which words."""
 
+from collections.abc import Callable
+
 import pytest
 from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, SceneError
+from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.json.vehicle import JsonVehicle
 from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -52,12 +56,13 @@ def test_a_file_states_only_what_differs_from_its_base() -> None:
     assert own.mass_kg == 1.112
 
 
-def test_what_moves_before_anybody_arms_it_is_refused() -> None:
+@pytest.mark.parametrize("vehicle", [SimulatedVehicle, HilVehicle, JsonVehicle])
+def test_what_moves_before_anybody_arms_it_is_refused(vehicle: Callable[[Airframe, Scene, int], object]) -> None:
     """Given feet so stiff that no step of the physics follows them, then no vehicle is made of it."""
     data = load_built_in("rigid").model_dump()
     data["surface"]["foot"]["contact_time_s"] = 1e-5
     with pytest.raises(AirframeError, match=r"rigid moves by .* disarmed; see"):
-        SimulatedVehicle(Airframe.model_validate(data), Scene(), seed=1)
+        vehicle(Airframe.model_validate(data), Scene(), 1)
 
 
 @pytest.mark.parametrize(("wind_ned_m_s", "is_held"), [((0, 24, 0), True), ((18, 18, 0), False), ((0, 0, 20), False)])

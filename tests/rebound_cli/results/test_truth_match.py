@@ -76,20 +76,21 @@ def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
     # Given a flight whose path passes the setpoint at 2.8 m north by 4 cm and sinks by 3 cm before it is recovered
     path = path_of([(9.9, 3.7, -1.6), (10.0, 3.8, -1.5), (11.0, 3.0, -1.47), (12.0, 2.76, -1.5), (12.6, 2.0, -1.0)])
     truth = FlightTruth([hit(10_000)], path, EPOCH_US)
-    # When it is summed up
-    summary = build_summary(Flown(made_up.report(collision(10_004)), 0.5, truth), FACTS)
+    # When it is summed up, of a companion that began a second later than the vehicle
+    report = replace(made_up.report(collision(10_004)), started_at_us=EPOCH_US + 1_000_000)
+    summary = build_summary(Flown(report, 0.5, truth), FACTS)
     # Then what came after the recovery does not count, and times are seconds since the start
     entry = summary["collisions"][0]
     assert entry["truth"]["overshoot_m"] == pytest.approx(0.04)
     assert entry["truth"]["height_lost_m"] == pytest.approx(0.03)
-    assert entry["truth"]["contact_at_s"] == pytest.approx(10.0)
+    assert entry["truth"]["contact_at_s"] == pytest.approx(9.0)
     assert entry["truth"]["detection_latency_ms"] == pytest.approx(4.5)
     assert entry["truth"]["rebound_speed_m_s"] == pytest.approx(0.3)
-    assert entry["detected_at_s"] == pytest.approx(10.0045)
-    assert (summary["duration_s"], summary["realtime_factor"]) == (17.0, 34.0)
+    assert entry["detected_at_s"] == pytest.approx(9.0045)
+    assert (summary["duration_s"], summary["realtime_factor"]) == (16.0, 32.0)
     # and a simulator that stands still for half a second, 0.4 s after the contact, changes none of it
     truth = FlightTruth([hit(10_000)], path, EPOCH_US + 500_000, stalls=[(10_400_000, 500_000)])
-    assert build_summary(Flown(made_up.report(collision(10_004)), 0.5, truth), FACTS) == summary
+    assert build_summary(Flown(report, 0.5, truth), FACTS) == summary
 
 
 def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contact():

@@ -19,7 +19,7 @@ from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.world import build_world
-from tests.sim_vehicle.physics.throwing import let_go, quiet, throw
+from tests.sim_vehicle.physics.throwing import motors_off, quiet, throw
 
 
 @pytest.mark.parametrize("name", ["foldable", "rigid"])
@@ -51,7 +51,7 @@ def test_arms_that_unfold_slow_a_spin_as_a_skaters_do() -> None:
     plant.state.fold_m[:4] = 0.03
     plant.step(None, armed=False)
     momentum, spin = plant.state.inertia[ZZ] * plant.state.body[12], plant.state.body[12]
-    let_go(plant, 0.4)
+    motors_off(plant, 0.4)
     assert plant.state.fold_m.max() == pytest.approx(airframe.arms.hysteresis_m)
     assert plant.state.body[12] < 0.85 * spin
     assert plant.state.inertia[ZZ] * plant.state.body[12] == pytest.approx(momentum, rel=1e-3)

@@ -8,7 +8,7 @@ import pytest
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from tests.sim_vehicle.physics.throwing import closed_form_of_eq_2, let_go, quiet, throw
+from tests.sim_vehicle.physics.throwing import closed_form_of_eq_2, motors_off, quiet, throw
 
 
 @pytest.mark.parametrize("speed_m_s", [0.5, 1.0, 1.4])
@@ -59,7 +59,7 @@ def test_a_leaning_hoop_touches_with_its_forward_edge(foldable: Airframe, lean_d
         plant.place((1.7, 0.0, -3.0), (2.0, 0.0, 0.0))
         half = math.radians(lean_deg) / 2
         plant.state.body[6:10] = [math.cos(half), 0.0, math.sin(half), 0.0]
-        assert let_go(plant, 0.16).truth.hits
+        assert motors_off(plant, 0.16).truth.hits
         return float(plant.state.body[11])
 
     smooth = quiet(foldable, surface__guard_friction=0.0)
@@ -98,7 +98,7 @@ def test_friction_along_the_wall_is_coulombs(friction: float) -> None:
     wall = {"point_ned_m": [2, 0, -2], "normal_ned": [-1, 0, 0]}
     plant = Plant(airframe, Scene.model_validate({"walls": [wall]}), seed=1)
     plant.state.body[0:6] = [1.5, 0.0, -2.0, 1.0, 2.0, 0.0]
-    (hit,) = let_go(plant, 0.5).truth.hits
+    (hit,) = motors_off(plant, 0.5).truth.hits
     across = hit.impact_velocity_ned_m_s[0] - hit.rebound_velocity_ned_m_s[0]
     along = hit.impact_velocity_ned_m_s[1] - hit.rebound_velocity_ned_m_s[1]
     fallen = hit.rebound_velocity_ned_m_s[2] - hit.impact_velocity_ned_m_s[2]

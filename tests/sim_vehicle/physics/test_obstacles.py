@@ -9,7 +9,7 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from tests.sim_vehicle.physics.throwing import let_go, quiet
+from tests.sim_vehicle.physics.throwing import motors_off, quiet
 
 HEIGHT_M = 8.0
 POLE = {"poles": [{"point_ned_m": [2, 0, 0], "radius_m": 0.1, "height_m": 30}]}
@@ -50,7 +50,7 @@ def thrown(
     rolled = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     plant.state.body[6:10] = quaternion_from_matrix((turn @ rolled).tolist())
     plant.state.body[10:13] = rates
-    return let_go(plant, duration_s)
+    return motors_off(plant, duration_s)
 
 
 @pytest.mark.parametrize("offset_m", [0.0, 0.03, 0.1, 0.2, -0.25])

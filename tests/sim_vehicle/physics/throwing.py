@@ -44,8 +44,8 @@ def quiet(airframe: Airframe, **changes: object) -> Airframe:
     return Airframe.model_validate(data)
 
 
-def let_go(plant: Plant, seconds: float) -> Plant:
-    """Motors off."""
+def motors_off(plant: Plant, seconds: float) -> Plant:
+    """The plant after so long without thrust."""
     for _ in range(round(seconds / (1e-6 * plant.interval_us))):
         plant.step(None, armed=False)
     return plant
@@ -55,7 +55,7 @@ def released(airframe: Airframe, seconds: float, **scene: object) -> Plant:
     """High up, at rest, and let go."""
     plant = Plant(airframe, Scene.model_validate(scene), seed=1)
     plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
-    return let_go(plant, seconds)
+    return motors_off(plant, seconds)
 
 
 def throw(
@@ -89,7 +89,7 @@ def throw(
     body[0:3] = [(10 - distance) * north, (10 - distance) * east, -HEIGHT_M]
     body[3:6] = [speed_m_s * north, speed_m_s * east, 0.0]
     body[10:13] = rates_frd_rad_s
-    return Thrown(let_go(plant, duration_s))
+    return Thrown(motors_off(plant, duration_s))
 
 
 def closed_form_of_eq_2(airframe: Airframe, speed_m_s: float) -> tuple[float, float, float]:
