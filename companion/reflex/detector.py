@@ -119,6 +119,27 @@ class Impact:
 
 
 @dataclass(slots=True)
+class Innovation:
+    """What free flight does not explain, in the newest test of one sign, and the limit from which it is a hit.
+
+    Of a force in m/s^2, of a velocity in m/s. EKF2 calls the square of `ratio` a test ratio.
+    """
+
+    value: float = 0.0
+    limit: float = math.inf
+
+    def test(self, value: float, limit: float) -> float:
+        """Take a new test; its ratio."""
+        self.value, self.limit = value, limit
+        return value / limit
+
+    @property
+    def ratio(self) -> float:
+        """A hit from 1 on."""
+        return self.value / self.limit
+
+
+@dataclass(slots=True)
 class DetectorState:
     """What every detector's state shows; a detector that remembers more extends it.
 

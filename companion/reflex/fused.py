@@ -36,7 +36,16 @@ from companion.reflex.config import (
     FusedConfig,
 )
 from companion.reflex.correction import VelocityValidity
-from companion.reflex.detector import ON_THE_GROUND, DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.reflex.detector import (
+    ON_THE_GROUND,
+    DetectorState,
+    Evidence,
+    Impact,
+    ImpactKind,
+    Innovation,
+    Phase,
+    Situation,
+)
 from companion.reflex.free_flight import ForceNoise, ThrustGain
 from companion.reflex.velocity_jump import VelocityJump
 
@@ -47,6 +56,10 @@ class FusedState(DetectorState):
     m/s^2.
     """
 
+    side: Innovation = field(default_factory=Innovation)
+    vertical: Innovation = field(default_factory=Innovation)
+    velocity: Innovation = field(default_factory=Innovation)
+    """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
     floor: ForceNoise = field(default_factory=ForceNoise)
     thrust: ThrustGain = field(default_factory=ThrustGain)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
@@ -147,12 +160,13 @@ class FusedDetector:
         s.last_sample_boot_us = now_us
         s.jump.imu(before_us, now_us, w)
         side, thresholds, is_of_two = s.side_force(config, f)
-        side /= thresholds
         if is_of_two:
             free_until_us = s.before_boot_us
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
-        threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else s.side_threshold_m_s2(config, w)
-        ratio = max(side / threshold, beyond / s.vertical_threshold_m_s2(config))
+        ratio = max(
+            s.side.test(side, thresholds * s.side_threshold_m_s2(config, w)),
+            s.vertical.test(beyond, s.vertical_threshold_m_s2(config)),
+        )
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -238,6 +252,7 @@ class FusedDetector:
     def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
         time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, situation.strapdown
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
+        s.velocity.test(0.0, math.inf)
         if hovers(v):
             s.hovered_boot_us = time_us
         if strapdown is None or not strapdown.has_new_fix:
@@ -254,7 +269,8 @@ class FusedDetector:
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
         caution = 1.0 if type(sample) is Odometry and validity.is_valid else 2.0
         size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
-        is_jump = size > least + validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
+        corrected_m_s = validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
+        is_jump = s.velocity.test(size, least + corrected_m_s) > 1.0
         if is_jump or validity.is_valid:
             jump.learn(limited(step, least))
         if s.phase is not Phase.ARMED or not is_jump:

@@ -7,7 +7,7 @@ Foxglove's scene has z up. Its topics are in two frames: `local` is ENU about th
 import heapq
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from operator import itemgetter
 from typing import IO, Any, TypeAlias
@@ -18,8 +18,9 @@ from mcap.writer import Writer
 from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPosition, Quaternion, Vector3
 from rebound_cli import __version__
 from rebound_cli.logs.log import Log
+from rebound_cli.replay.listening import Numbers
 from rebound_cli.replay.report import finding_data
-from rebound_cli.report.content import finite
+from rebound_cli.report.content import finite, heard_at_us
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.run_folder import HIT_KINDS
 
@@ -48,7 +49,8 @@ def write_mcap(flight: ShownFlight, log: Log, file: IO[bytes]) -> None:
     channels: dict[str, int] = {}
     # What is much comes as it is wanted: half an hour of it would not fit into a small computer's memory.
     told = sorted(_told(flight), key=itemgetter(0))
-    for at_us, topic, data in heapq.merge(_heard(log), _truth(flight, log), told, key=itemgetter(0)):
+    streams = (_heard(log), _truth(flight, log), *_test_ratios(flight), told)
+    for at_us, topic, data in heapq.merge(*streams, key=itemgetter(0)):
         if topic not in channels:
             name = f"foxglove.{_FOXGLOVE[topic]}" if topic in _FOXGLOVE else f"rebound.{topic[1:]}"
             schema = json.dumps(foxglove.get(name) or {"title": name, **_kind(data)}).encode()
@@ -106,6 +108,22 @@ def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
         at_us = float(times_us[row])
         pose = _pose(series["position_ned_m"][row].tolist(), series["attitude_wxyz"][row].tolist())
         yield at_us, "/truth", {"timestamp": _time(at_us), "frame_id": "local", "pose": pose}
+
+
+def _test_ratios(flight: ShownFlight) -> tuple[Iterator[Message], Iterator[Message]]:
+    """As EKF2 publishes its own: the square of an innovation over its limit."""
+    forces, jumps = flight.findings.listener.tested, flight.findings.listener.tested_velocity
+    of_forces = {"side": forces.side_ratio, "vertical": np.fmax(0.0, forces.beyond_ratio)}
+    return (
+        _squares(flight, "/test_ratio/force", forces.time_boot_us, of_forces),
+        _squares(flight, "/test_ratio/velocity", jumps.time_boot_us, {"jump": jumps.ratio}),
+    )
+
+
+def _squares(flight: ShownFlight, topic: str, boot_us: Numbers, ratios: Mapping[str, Numbers]) -> Iterator[Message]:
+    squares = np.square(np.asarray(list(ratios.values()))).T.tolist()
+    for at_us, row in zip(heard_at_us(flight, boot_us).tolist(), squares, strict=True):
+        yield at_us, topic, dict(zip(ratios, row, strict=True))
 
 
 def _told(flight: ShownFlight) -> Iterator[Message]:

@@ -1,6 +1,6 @@
-"""What the companion's own detector makes of every IMU sample: listened to while it is flown, or flown once more.
+"""What the companion's own detector makes of every sample: listened to while it is flown, or flown once more.
 
-Nothing is judged here: all numbers are the detector's state and the answers of its own functions.
+Nothing is judged or computed here: all numbers are the innovations that the detector publishes.
 """
 
 import math
@@ -12,8 +12,8 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.messages import ImuSample, MessageId, Sample
-from companion.reflex.detector import Detector, DetectorState, Impact, Phase, Situation
+from companion.messages import ImuSample, LocalPosition, MessageId, Odometry, Sample
+from companion.reflex.detector import Detector, DetectorState, Evidence, Impact, Phase, Situation
 from companion.reflex.fused import FusedState
 from companion.reflex.monitor import CollisionMonitor
 
@@ -26,8 +26,8 @@ _NUMBERS = {phase: float(number) for number, phase in enumerate(PHASES)}
 
 @dataclass(frozen=True, slots=True)
 class Tested:
-    """IMU samples just before their test, m/s^2. `beyond_thrust_m_s2`: f_z outside what propellers can do; negative
-    inside. NaN where the detector does not say.
+    """IMU samples, m/s^2, with the phase before their test. `beyond_thrust_m_s2`: f_z outside what propellers can do;
+    negative inside. NaN where the detector does not say.
     """
 
     time_boot_us: Numbers
@@ -38,28 +38,51 @@ class Tested:
     beyond_threshold_m_s2: Numbers
 
     @property
+    def side_ratio(self) -> Numbers:
+        return self.side_m_s2 / self.side_threshold_m_s2
+
+    @property
+    def beyond_ratio(self) -> Numbers:
+        return self.beyond_thrust_m_s2 / self.beyond_threshold_m_s2
+
+    @property
     def ratio(self) -> Numbers:
-        """The larger of both over its threshold: a sample shows a contact from 1 on. NaN where nothing is known."""
-        side, beyond = self.side_m_s2 / self.side_threshold_m_s2, self.beyond_thrust_m_s2 / self.beyond_threshold_m_s2
-        return np.fmax(side, beyond)
+        """The larger of both: a sample shows a contact from 1 on. NaN where nothing is known."""
+        return np.fmax(self.side_ratio, self.beyond_ratio)
+
+
+@dataclass(frozen=True, slots=True)
+class TestedVelocity:
+    """Velocity jumps, m/s, with the phase before their test."""
+
+    time_boot_us: Numbers
+    phase: Numbers  # its place in PHASES
+    jump_m_s: Numbers
+    jump_threshold_m_s: Numbers
+
+    @property
+    def ratio(self) -> Numbers:
+        """A velocity shows a contact from 1 on."""
+        return self.jump_m_s / self.jump_threshold_m_s
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What the detector went by when it fired: the sample, if it was one, and whether a hand was thinkable."""
+    """What the detector went by when it fired: the sample, or the velocity, and whether a hand was thinkable."""
 
-    tested: Tested | None
+    tested: Tested | TestedVelocity
     may_be_hand: bool
 
 
-_COLUMNS = len(fields(Tested))
+_COLUMNS, _VELOCITY_COLUMNS = len(fields(Tested)), len(fields(TestedVelocity))
 
 
 @dataclass(slots=True)
 class Listener:
-    """Grows with the recording, by six numbers a sample. `shown` by the boot time of the impact's sample."""
+    """Grows with the recording, by six numbers a sample and four a velocity. `shown`: by the boot time of an impact."""
 
     numbers: "array[float]" = field(default_factory=lambda: array("d"))
+    velocity_numbers: "array[float]" = field(default_factory=lambda: array("d"))
     shown: dict[int, Shown] = field(default_factory=dict)
 
     @property
@@ -67,13 +90,25 @@ class Listener:
         """All samples, in the order heard."""
         return Tested(*np.array(self.numbers).reshape(-1, _COLUMNS).T)
 
+    @property
+    def tested_velocity(self) -> TestedVelocity:
+        """All velocities that could be compared, in the order heard."""
+        return TestedVelocity(*np.array(self.velocity_numbers).reshape(-1, _VELOCITY_COLUMNS).T)
+
     def one_tested(self, row: int) -> Tested:
-        return Tested(*self.numbers[_COLUMNS * row : _COLUMNS * (row + 1)])
+        return Tested(*_row(self.numbers, row, _COLUMNS))
+
+    def one_velocity(self, row: int) -> TestedVelocity:
+        return TestedVelocity(*_row(self.velocity_numbers, row, _VELOCITY_COLUMNS))
 
     def listen(self, monitor: CollisionMonitor) -> None:
         """To this watch, from now on."""
-        listened_to = _ListenedTo(monitor.detector, getattr(monitor.config, monitor.config.detector), self)
-        monitor.detector = cast(Detector[Any], listened_to)
+        monitor.detector = cast(Detector[Any], _ListenedTo(monitor.detector, self))
+
+
+def _row(numbers: "array[float]", row: int, columns: int) -> "array[float]":
+    begin = columns * row % len(numbers)
+    return numbers[begin : begin + columns]
 
 
 class _ListenedTo:
@@ -81,8 +116,8 @@ class _ListenedTo:
 
     losses: Mapping[MessageId, str]
 
-    def __init__(self, detector: Detector[Any], config: Any, listener: Listener) -> None:
-        self._detector, self._config, self._listener = detector, config, listener
+    def __init__(self, detector: Detector[Any], listener: Listener) -> None:
+        self._detector, self._listener = detector, listener
         self.name, self.losses = detector.name, detector.losses
 
     def initial(self) -> DetectorState:
@@ -90,32 +125,27 @@ class _ListenedTo:
         return state
 
     def step(self, state: DetectorState, sample: Sample, situation: Situation) -> tuple[DetectorState, Impact | None]:
-        tested, is_soft = None, False
-        if isinstance(sample, ImuSample):
-            tested = _tested(state, sample, self._config)
-            self._listener.numbers.extend(tested)
-            is_soft = isinstance(state, FusedState) and state.may_be_hand(sample.time_boot_us)
+        phase = _NUMBERS[state.phase]
         state, impact = self._detector.step(state, sample, situation)
+        if isinstance(sample, ImuSample):
+            self._listener.numbers.extend((sample.time_boot_us, phase, *_forces(state)))
+        elif isinstance(sample, LocalPosition | Odometry) and isinstance(state, FusedState):
+            jump = state.velocity
+            if math.isfinite(jump.limit):
+                self._listener.velocity_numbers.extend((sample.time_boot_us, phase, jump.value, jump.limit))
         if impact is not None:
-            one = None if tested is None else Tested(*tested)
-            self._listener.shown[impact.sample_time_boot_us] = Shown(one, is_soft)
+            self._listener.shown[impact.sample_time_boot_us] = self._shown(state, impact)
         return state, impact
 
+    def _shown(self, state: DetectorState, impact: Impact) -> Shown:
+        if impact.evidence is Evidence.VELOCITY_JUMP:
+            return Shown(self._listener.one_velocity(-1), False)
+        is_soft = isinstance(state, FusedState) and state.may_be_hand(impact.sample_time_boot_us)
+        return Shown(self._listener.one_tested(-1), is_soft)
 
-def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float, ...]:
-    """Its row of numbers."""
-    now_us, phase = sample.time_boot_us, _NUMBERS[state.phase]
+
+def _forces(state: DetectorState) -> tuple[float, ...]:
+    """Innovations and limits of the newest sample."""
     if not isinstance(state, FusedState):
-        threshold_m_s2 = state.threshold_m_s2
-        return now_us, phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2
-    force = sample.specific_force_frd_m_s2
-    threshold_m_s2 = state.side_threshold_m_s2(config, sample.angular_velocity_frd_rad_s)
-    side_m_s2, thresholds, _ = state.side_force(config, force)
-    return (
-        now_us,
-        phase,
-        side_m_s2,
-        thresholds * threshold_m_s2,
-        max(force[2], -force[2] - state.thrust.most_m_s2),
-        state.vertical_threshold_m_s2(config),
-    )
+        return math.nan, state.threshold_m_s2, math.nan, state.threshold_m_s2
+    return state.side.value, state.side.limit, state.vertical.value, state.vertical.limit

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.reflex.detector import Phase
-from rebound_cli.replay.listening import PHASES
+from rebound_cli.replay.listening import PHASES, Numbers
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
 from rebound_cli.report.series import (
@@ -138,6 +138,10 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     columns["imu"] |= {name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()}
     watches = tested["phase"] >= PHASES.index(Phase.ARMED)
     columns["imu"]["ratio"] = (np.where(watches, loud, np.nan), RATIO)
+    jumps = flight.findings.listener.tested_velocity
+    columns["jump"] = times(heard_at_us(flight, jumps.time_boot_us), flight.started_at_us) | {
+        "ratio": (np.where(jumps.phase >= PHASES.index(Phase.ARMED), jumps.ratio, np.nan), RATIO)
+    }
     columns["path"] = _on_both_clocks(columns["path"], log.position_time_boot_us - first_us)
     if truth is not None:
         true, boot_us, folds_m = truth.series, truth.series["time_boot_us"], truth.series["arm_fold_m"]
@@ -171,6 +175,12 @@ def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
         "beyond_threshold": tested.beyond_threshold_m_s2,
     }
     return {name: np.append(column, np.nan)[rows] for name, column in columns.items()}
+
+
+def heard_at_us(flight: ShownFlight, boot_us: Numbers) -> Floats:
+    """When what has these times on the vehicle's clock was heard, by the IMU samples around it."""
+    boot_us = np.asarray(boot_us)
+    return np.interp(boot_us, flight.log.imu_time_boot_us, flight.log.imu_at_us) if len(boot_us) else boot_us
 
 
 def _packed(columns: Columns, loudness: Floats | None, near_s: Floats, most: int) -> dict[str, Any]:

@@ -4,7 +4,7 @@ Each with what was measured and, in words, why it was a hit or why it was none.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.messages import Vector3
-from companion.reflex.detector import Evidence, ImpactKind, Phase
+from companion.motion.config import SHOWN_US
+from companion.reflex.detector import ImpactKind, Phase
 from companion.reflex.surface import Normal
-from rebound_cli.replay.listening import PHASES, Shown, Tested
+from rebound_cli.replay.listening import PHASES, Shown, Tested, TestedVelocity
 from rebound_cli.replay.report import bearing, impact_facts, kind_text, speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
@@ -103,7 +104,7 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
     impact, situation = finding.first.impact, finding.situation
     shown = flight.findings.listener.shown.get(impact.sample_time_boot_us)
     if shown is not None:
-        yield from _signs(shown, impact.evidence)
+        yield from _signs(shown.tested)
     if situation.descent_commanded:
         height = "an unknown height" if situation.height_m is None else f"{situation.height_m:.2f} m"
         yield f"A landing: thinkable, the vehicle was told to go down, at {height}."
@@ -123,13 +124,12 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
         yield "The simulator: a false alarm, nothing was touched."
 
 
-def _signs(shown: Shown, evidence: Evidence) -> Iterator[str]:
-    tested = shown.tested
-    if tested is not None and not math.isnan(tested.side_m_s2):
+def _signs(tested: Tested | TestedVelocity) -> Iterator[str]:
+    if isinstance(tested, TestedVelocity):
+        yield _jump_text(tested)
+    elif not math.isnan(tested.side_m_s2):
         yield _side_text(tested)
         yield _thrust_text(tested)
-    if evidence is Evidence.VELOCITY_JUMP:
-        yield "Its velocity jumped by what the accelerometer did not show: the contact fell between the samples."
 
 
 def _side_text(tested: Tested) -> str:
@@ -144,6 +144,15 @@ def _thrust_text(tested: Tested) -> str:
         return "Push along the thrust: within what the propellers can do: says nothing."
     says = "speaks for a contact" if beyond >= needed else "says nothing"
     return f"Push along the thrust: {beyond:.1f} m/s² beyond the propellers, a hit from {needed:.1f} on: {says}."
+
+
+def _jump_text(tested: TestedVelocity) -> str:
+    jump, needed = tested.jump_m_s, tested.jump_threshold_m_s
+    says = "speaks for a contact" if jump >= needed else "says nothing"
+    return (
+        f"Velocity jump: {jump:.2f} m/s that no sample shows, a hit from {needed:.2f} on "
+        f"({jump / needed:.1f} times): {says}."
+    )
 
 
 def _hand_text(flight: ShownFlight, finding: Finding, shown: Shown) -> str:
@@ -203,21 +212,27 @@ def _why_missed(flight: ShownFlight, hit: "Hit") -> Iterator[str]:
         yield "It belonged to the contact before: one contact is told once."
     else:
         loudest = flight.findings.listener.one_tested(rows[_loudest(np.take(tested.ratio, rows))])
-        yield _side_text(loudest)
-        yield _thrust_text(loudest)
+        yield from _signs(loudest)
+    jumps = flight.findings.listener.tested_velocity
+    rows = np.flatnonzero(np.abs(jumps.time_boot_us - hit.contact_at_boot_us - 0.5 * SHOWN_US) <= 0.5 * SHOWN_US)
+    if len(rows):
+        yield _jump_text(flight.findings.listener.one_velocity(rows[_loudest(np.take(jumps.ratio, rows))]))
 
 
 def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Moment]:
-    """The sample that came nearest to being taken for a hit, and was not; none where nothing was watched."""
-    tested = flight.findings.listener.tested
-    watched = tested.phase == PHASES.index(Phase.ARMED)
-    for boot_us in others_boot_us:
-        watched &= np.abs(tested.time_boot_us - boot_us) >= _BESIDE_US
-    ratios = np.where(watched, tested.ratio, np.nan)
-    if np.all(np.isnan(ratios)):
+    """What came nearest to being taken for a hit, and was not; none where nothing was watched."""
+    listener = flight.findings.listener
+    candidates: tuple[tuple[Tested | TestedVelocity, Callable[[int], Tested | TestedVelocity]], ...]
+    candidates = ((listener.tested, listener.one_tested), (listener.tested_velocity, listener.one_velocity))
+    nearest: list[Tested | TestedVelocity] = []
+    for tested, one in candidates:
+        ratios = _watched(tested, others_boot_us)
+        if np.any(np.isfinite(ratios)):
+            nearest.append(one(_loudest(ratios)))
+    if not nearest:
         return []
-    loudest = flight.findings.listener.one_tested(_loudest(ratios))
-    row = int(np.argmax(flight.log.imu_time_boot_us == loudest.time_boot_us))
+    loudest = max(nearest, key=lambda one: float(one.ratio))
+    row = int(np.argmin(np.abs(flight.log.imu_time_boot_us - loudest.time_boot_us)))
     at_us = float(flight.log.imu_at_us[row])
     return [
         Moment(
@@ -227,12 +242,19 @@ def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Momen
             boot_us=float(loudest.time_boot_us),
             facts=[("At", f"{flight.seconds(at_us):.3f} s")],
             reasons=[
-                _side_text(loudest),
-                _thrust_text(loudest),
-                "Verdict: no hit. Outside of the contacts above no sample of the flight came nearer to one.",
+                *_signs(loudest),
+                "Verdict: no hit. Outside of the contacts above nothing in the flight came nearer to one.",
             ],
         )
     ]
+
+
+def _watched(tested: Tested | TestedVelocity, others_boot_us: Sequence[float]) -> Floats:
+    """The ratios, NaN where nobody watched and beside other moments."""
+    watched = tested.phase == PHASES.index(Phase.ARMED)
+    for boot_us in others_boot_us:
+        watched &= np.abs(tested.time_boot_us - boot_us) >= _BESIDE_US
+    return np.where(watched, tested.ratio, np.nan)
 
 
 def _loudest(ratios: Floats) -> int:

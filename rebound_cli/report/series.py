@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from companion.reflex.config import LONGEST_SLOW_STEP_US
 from rebound_cli.results.flight_log import FlightLog
 
 Floats = npt.NDArray[np.float64]
@@ -50,6 +51,8 @@ class Overview:
 
 # Setpoints come twice a second at least while somebody sends any; those by attitude with each IMU sample.
 _PLACE_HELD_S, _ATTITUDE_HELD_S = 1.0, 0.3
+# Velocities further apart than this are not compared.
+_JUMP_HELD_S = 1e-6 * LONGEST_SLOW_STEP_US
 OVERVIEWS = (
     Overview(
         "Speed and height",
@@ -95,7 +98,10 @@ OVERVIEWS = (
     Overview(
         "How near to a hit, while the detector was on",
         "thresholds",
-        (Line("imu", "ratio", "push over threshold", "blue"),),
+        (
+            Line("imu", "ratio", "push over threshold", "blue"),
+            Line("jump", "ratio", "velocity jump over threshold", "orange", held_s=_JUMP_HELD_S),
+        ),
         top=1.5,
         level=(1.0, "a hit from here on"),
     ),

@@ -42,7 +42,9 @@ def test_an_airframe_is_printed_whole_in_every_format(format_name):
     assert all(parameter.name in result.stdout for parameter in px4_parameters(load_built_in("rigid")))
 
 
-@pytest.mark.parametrize("words", [("check", WALL, "--set", "sim.airframe={}"), ("airframe", "px4", "--airframe", "{}")])
+@pytest.mark.parametrize(
+    "words", [("check", WALL, "--set", "sim.airframe={}"), ("airframe", "px4", "--airframe", "{}")]
+)
 def test_nothing_is_said_of_an_airframe_of_one_s_own_that_leaps_off_the_ground(tmp_path, words):
     # Given feet far stiffer than an interval of the physics
     own = tmp_path / "stiff.yaml"

@@ -1,7 +1,11 @@
 """What the report says of the detector is what the detector did, and listening to it changes nothing."""
 
+import random
 from dataclasses import replace
 
+import numpy as np
+
+from companion.messages import Attitude, LocalPosition
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Phase
 from rebound_cli.replay.listening import PHASES
@@ -23,7 +27,7 @@ def test_a_sample_beyond_its_threshold_is_a_hit_and_no_other_is(wall):
     beyond = tested.time_boot_us[(tested.phase == PHASES.index(Phase.ARMED)) & (tested.ratio >= 1.0)]
     # The wall and the touchdown
     assert set(beyond) == fired and len(fired) == 2
-    assert all(shown.tested is not None for shown in wall.findings.listener.shown.values())
+    assert wall.findings.listener.shown.keys() == fired
 
 
 def test_a_simulated_flight_has_its_page_without_being_flown_again(wall, wall_folder, tmp_path):
@@ -55,6 +59,24 @@ def test_a_healthy_flight_is_told_by_its_closest_call():
     shown = of_a_log(flight(hit_us=None))
     (moment,) = moments_of(shown)
     assert moment.kind == "closest" and content(shown)["sentence"].startswith("No hit; ")
+
+
+def test_a_hit_between_the_samples_is_told_by_the_velocity_that_shows_it():
+    # Given a vehicle that a contact between two samples has slowed from 1 to 0.4 m/s
+    log, level, chance, heard = flight(hit_us=None), (1.0, 0.0, 0.0, 0.0), random.Random(1), []
+    for one in log.heard:
+        if isinstance(one.sample, LocalPosition):
+            heard.append(replace(one, sample=Attitude(one.at_us, level)))
+            velocity = ((1.0 if one.at_us < HIT_US else 0.4) + chance.gauss(0.0, 0.01), 0.0, 0.0)
+            one = replace(one, sample=replace(one.sample, velocity_ned_m_s=velocity))
+        heard.append(one)
+    shown = of_a_log(replace(log, heard=tuple(heard)))
+    (moment,) = (moment for moment in moments_of(shown) if moment.kind == "hit")
+    (told,) = (reason for reason in moment.reasons if reason.startswith("Velocity jump: 0.6"))
+    assert told.endswith("speaks for a contact.") and not any("Push" in reason for reason in moment.reasons)
+    # and what it was compared with is the detector's own
+    jumps = shown.findings.listener.tested_velocity
+    assert np.count_nonzero(jumps.ratio > 1.0) == 1 and jumps.jump_threshold_m_s.min() >= 0.12
 
 
 def test_what_the_simulator_knows_and_nobody_saw_is_told_with_why(wall):
