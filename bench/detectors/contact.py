@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from companion.messages import (
@@ -17,7 +17,6 @@ from companion.messages import (
 )
 from companion.motion.strapdown import LEVEL
 from companion.reflex.detector import DetectorState, Impact, Phase, Situation
-from companion.reflex.free_flight import ThrustGain
 from companion.strict_model import Positive, StrictModel
 
 # A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
@@ -35,7 +34,6 @@ class BaselineState(DetectorState):
     """Adds what the vehicle said last of its attitude and its thrust; changed in place."""
 
     attitude_wxyz: Quaternion = LEVEL
-    thrust: ThrustGain = field(default_factory=ThrustGain)
 
 
 class Reading(NamedTuple):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
@@ -10,6 +10,7 @@ from companion.messages import LandedState, MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
 from companion.reflex.correction import VelocityValidity
+from companion.reflex.free_flight import ThrustGain
 
 
 class Phase(Enum):
@@ -144,7 +145,8 @@ class DetectorState:
     """What every detector's state shows; a detector that remembers more extends it.
 
     `threshold_m_s2` is what a sample must reach now. The two before it describe the present contact, or the
-    latest one: time of its last loud sample, and the largest contact force per unit mass in one sample so far.
+    latest one: time of its last loud sample, and the largest contact force per unit mass in one sample so far. `thrust`
+    is learnt in free air.
     """
 
     phase: Phase = Phase.OFF
@@ -153,6 +155,7 @@ class DetectorState:
     last_loud_boot_us: int = 0
     peak_specific_force_m_s2: float = 0.0
     threshold_m_s2: float = 0.0
+    thrust: ThrustGain = field(default_factory=ThrustGain)
 
     def describe(self) -> str:
         if self.phase is Phase.OFF:

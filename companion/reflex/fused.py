@@ -46,7 +46,7 @@ from companion.reflex.detector import (
     Phase,
     Situation,
 )
-from companion.reflex.free_flight import ForceNoise, ThrustGain
+from companion.reflex.free_flight import ForceNoise
 from companion.reflex.velocity_jump import VelocityJump
 
 
@@ -61,7 +61,6 @@ class FusedState(DetectorState):
     velocity: Innovation = field(default_factory=Innovation)
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
     floor: ForceNoise = field(default_factory=ForceNoise)
-    thrust: ThrustGain = field(default_factory=ThrustGain)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
     hovered_boot_us: int | None = None
@@ -211,7 +210,7 @@ class FusedDetector:
         elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
         s.floor.learn(f, elapsed_s)
         s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
-        if s.phase is Phase.ARMED:
+        if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
     def _loud(self, s: FusedState, situation: Situation, impact: Impact, has_jumped: bool) -> Impact | None:

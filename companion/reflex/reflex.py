@@ -11,7 +11,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 from companion.messages import AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample, Vector3
-from companion.motion.config import KEPT_US, LONGEST_GAP_US, SettledConfig
+from companion.motion.config import KEPT_US, SettledConfig
 from companion.motion.rotation import body_to_ned, tilt_rad
 from companion.motion.vector import plus
 from companion.reflex import config as numbers
@@ -20,7 +20,7 @@ from companion.reflex.collision import CollisionRecord, level
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.confirmation import hypothesis_of
 from companion.reflex.crash import CrashWatch
-from companion.reflex.detector import ImpactKind, Phase, Situation
+from companion.reflex.detector import ImpactKind, Situation
 from companion.reflex.free_flight import ThrustGain
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
@@ -59,8 +59,6 @@ class Reflex:
     hits: list[CollisionRecord] = field(default_factory=list)
     recovery: Recovery | None = None  # of the newest
     loss_s: float | None = None  # for so long the vehicle flies its last setpoint on; infinite: it takes no thrust
-    thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
-    thrust_boot_us: int = 0  # its newest sample
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     crash: CrashWatch = field(default_factory=CrashWatch)
 
@@ -79,7 +77,6 @@ class Reflex:
         has_touched_down = any(estimate.impact.is_ground for estimate in impacts)
         # A crash is told where no hit is looked for, too.
         found = [] if situation.off_reason else [estimate for estimate in impacts if estimate.impact.is_collision]
-        self._learn_thrust(samples, situation.has_climbed and not has_touched_down)
         held = None if found else self._held(samples, situation)
         if held is not None:
             found = [held]
@@ -98,16 +95,6 @@ class Reflex:
         down_m_s = estimate.velocity_ned_m_s[2]
         text = f"crash: {force_m_s2:.0f} m/s^2, sinking at {down_m_s:.1f} m/s, tilted by {tilt_deg:.0f} degrees"
         return Notice("crash", text, {"specific_force_m_s2": force_m_s2, "down_m_s": down_m_s, "tilt_deg": tilt_deg})
-
-    def _learn_thrust(self, samples: Sequence[Sample], is_up: bool) -> None:
-        """What thrust there is, from all flight in free air; before the detector is armed, too."""
-        for sample in samples:
-            if isinstance(sample, AttitudeTarget):
-                self.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-            elif isinstance(sample, ImuSample):
-                elapsed_us, self.thrust_boot_us = sample.time_boot_us - self.thrust_boot_us, sample.time_boot_us
-                if is_up and self.monitor.state.phase is not Phase.CONTACT and elapsed_us < LONGEST_GAP_US:
-                    self.thrust.learn(sample.time_boot_us, -sample.specific_force_frd_m_s2[2], 1e-6 * elapsed_us)
 
     def _held(self, samples: Sequence[Sample], situation: Situation) -> ImpactEstimate | None:
         """A sustained external force that no detector shows: only while the vehicle flies to a position."""
@@ -235,6 +222,11 @@ class Reflex:
     def in_one_recovery(self) -> list[CollisionRecord]:
         """The last hits, the newest first, without a recovery in between."""
         return list(takewhile(lambda record: not record.is_over, reversed(self.hits)))
+
+    @property
+    def thrust(self) -> ThrustGain:
+        """Of the vehicle, as the detector has learnt it in free air."""
+        return self.monitor.state.thrust
 
     @property
     def sample_boot_us(self) -> int:
