@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
-from companion.core import Core, FlightCore
+from companion.core import NOTHING, Core, FlightCore
 from companion.flight.obstacle_map import all_known
 from companion.flight.plan import plan_text
 from companion.flight.states import State
@@ -56,7 +56,8 @@ class Stepped(ABC, Generic[CoreT]):
         core = self._core
         frames = self._decoder.feed(received) if received else []
         samples = [sample for _, sample in frames if sample is not None]
-        outputs = core.advance(samples, now_us)
+        # Most of what a vehicle sends is for others, and shows nothing.
+        outputs = core.advance(samples, now_us) if samples or core.is_due(now_us) else NOTHING
         identity = core.flight.vehicle.identity
         if identity is not None and not self._is_addressed:
             # From now on the vehicle alone is listened to and spoken to.

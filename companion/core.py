@@ -295,6 +295,10 @@ class Core(ABC, Generic[FlightT, MachineT]):
         due_us = min(self._heartbeat_due_us, self.now_us + POLL_INTERVAL_US)
         return min(due_us, self._setpoint_due_us) if self._setpoint_due_us > self.now_us else due_us
 
+    def is_due(self, now_us: int) -> bool:
+        """Whether a step is due although no sample came."""
+        return now_us >= self.next_deadline_us() or bool(self.flight.events or self.flight.outbox)
+
     def status(self) -> Status:
         """The live line's content."""
         vehicle = self.flight.vehicle
