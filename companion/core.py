@@ -47,9 +47,9 @@ HEARTBEAT_INTERVAL_US = 1_000_000
 POLL_INTERVAL_US = 50_000
 
 # States between take-off and landing, in which the fence's floor counts.
-ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
+ON_THE_WAY = (State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
 # States in which hits are detected. Climb and descent belong to them; the height decides about the ground.
-DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
+DETECTING_STATES = (*ON_THE_WAY, State.TAKEOFF, State.LANDING)
 
 
 @dataclass(frozen=True, slots=True)
