@@ -139,10 +139,16 @@ class Core(ABC, Generic[FlightT, MachineT]):
             samples, refusal = self._hear(samples, now_us)
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
-            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
-            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
+            acks: list[CommandAck] = []
+            positions: list[LocalPosition] = []
+            for sample in samples:
+                if isinstance(sample, LocalPosition):
+                    positions.append(sample)
+                elif isinstance(sample, CommandAck):
+                    acks.append(sample)
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
-            self.reflex.follow(samples, flight.height_m, flight.vehicle.landed)
+            # The height counts where there is a new one.
+            self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
             note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)
@@ -170,14 +176,11 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     def situation(self) -> Situation:
         """The detector's situation. The setpoints of others are not known."""
-        situation = situation_of(self.flight, self._off_state, self._goes_down)
+        flight, goes_down, target = self.flight, self._goes_down, self.flight.target
         if not self.machine.holds:
-            return situation
-        target = self.flight.target
-        return situation._replace(
-            landed_state=landed(self.flight, self._goes_down),
-            setpoint_position_ned_m=None if target is None or target.lean is not None else target.position_ned_m,
-        )
+            return situation_of(flight, self._off_state, goes_down, flight.vehicle.landed)
+        place = None if target is None or target.lean is not None else target.position_ned_m
+        return situation_of(flight, self._off_state, goes_down, landed(flight, goes_down), place)
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
         """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
@@ -346,10 +349,10 @@ class FlightCore(Core[FlightContext, Machine]):
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in a local frame that does not jump when the estimator resets its position."""
-        before = self.resets.shift_ned_m
-        samples = [self.resets.follow(sample, self.flight.mission.limits.max_step_m) for sample in samples]
-        jump_m = math.dist(self.resets.shift_ned_m, before)
-        if jump_m > 0.0:
+        before, most_m = self.resets.shift_ned_m, self.flight.mission.limits.max_step_m
+        samples = [self.resets.follow(sample, most_m) for sample in samples]
+        if self.resets.shift_ned_m != before:
+            jump_m = math.dist(self.resets.shift_ned_m, before)
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
             self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
         return super()._hear(samples, now_us)
