@@ -68,6 +68,8 @@ class Stepped(ABC, Generic[CoreT]):
             self._is_addressed = True
             self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot.wire)
             self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot.wire)
+        if outputs is NOTHING:
+            return StepResult(tuple(frames), (), ())
         sent = self._encoder.all_packets(outputs.messages, lambda error: core.fault(error, now_us))
         return StepResult(tuple(frames), sent, outputs.events)
 

@@ -112,7 +112,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if self._law.busy or not self._is_met:
             self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
-        self._beat(now_us)
+        if now_us >= self._heartbeat_due_us:
+            self._beat(now_us)
         try:
             self._inform(now_us)
         except Exception as error:
@@ -137,8 +138,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         flight = self.flight
         try:
             samples, refusal = self._hear(samples, now_us)
-            note_height(flight)
-            impacts = () if flight.fault else self._notice(samples, now_us)
+            height_m = note_height(flight)
+            impacts = () if flight.fault else self._notice(samples, height_m, now_us)
             acks: list[CommandAck] = []
             positions: list[LocalPosition] = []
             for sample in samples:
@@ -154,13 +155,13 @@ class Core(ABC, Generic[FlightT, MachineT]):
             return self.machine.fail(error, now_us)
         return moved
 
+    @abstractmethod
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in the frame of this flight, and why the vehicle is refused."""
-        return samples, update_vehicle(self.flight, samples, now_us)
 
-    def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
+    def _notice(self, samples: Sequence[Sample], height_m: float | None, now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
-        flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
+        flight, reaction = self.flight, self.reflex.step(samples, self._situation(height_m), now_us)
         sees = self.reflex.monitor.no_data_reason is None
         if sees is not (flight.no_data_since_us is None):
             flight.no_data_since_us = None if sees else now_us
@@ -170,17 +171,20 @@ class Core(ABC, Generic[FlightT, MachineT]):
             flight.note_touchdown()
         return reaction.collisions
 
+    @abstractmethod
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         """Run the state machine; whether its state changed."""
-        return self.machine.step(inputs, now_us)
 
     def situation(self) -> Situation:
         """The detector's situation. The setpoints of others are not known."""
+        return self._situation(self.flight.height_m)
+
+    def _situation(self, height_m: float | None) -> Situation:
         flight, goes_down, target = self.flight, self._goes_down, self.flight.target
         if not self.machine.holds:
-            return situation_of(flight, self._off_state, goes_down, flight.vehicle.landed)
+            return situation_of(flight, height_m, self._off_state, goes_down, flight.vehicle.landed)
         place = None if target is None or target.lean is not None else target.position_ned_m
-        return situation_of(flight, self._off_state, goes_down, landed(flight, goes_down), place)
+        return situation_of(flight, height_m, self._off_state, goes_down, landed(flight, goes_down), place)
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
         """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
@@ -274,7 +278,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     def _beat(self, now_us: int) -> None:
         """Send the companion's HEARTBEAT until the end."""
-        if now_us >= self._heartbeat_due_us and not self.machine.finished:
+        if not self.machine.finished:
             self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
             self.flight.outbox.append(OnboardHeartbeat(self._is_active))
 
@@ -355,11 +359,11 @@ class FlightCore(Core[FlightContext, Machine]):
             jump_m = math.dist(self.resets.shift_ned_m, before)
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
             self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
-        return super()._hear(samples, now_us)
+        return samples, update_vehicle(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         self.stop_reason = None
-        moved = super()._act(samples, inputs, now_us)
+        moved = self.machine.step(inputs, now_us)
         if self.machine.finished and self.flight.ended_at_us is None:
             self.flight.ended_at_us = now_us
         return moved
