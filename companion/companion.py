@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
-from companion.core import Core, FlightCore
+from companion.core import NOTHING, Core, FlightCore
 from companion.flight.obstacle_map import all_known
 from companion.flight.plan import plan_text
 from companion.flight.states import State
@@ -13,7 +13,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.readers import READERS, Reader
 from companion.memory.patch import Patch
-from companion.messages import ComputerStatus
+from companion.messages import ComputerStatus, Sample
 from companion.mission.model import Mission
 from companion.report import Event, ExpectationReport, FlightReport, Status
 
@@ -54,17 +54,24 @@ class Stepped(ABC, Generic[CoreT]):
             self._core = self._begun(now_us)
             self._core.stop_reason = self._stop_reason
         core = self._core
-        frames = self._decoder.feed(received) if received else []
-        samples = [sample for _, sample in frames if sample is not None]
-        outputs = core.advance(samples, now_us)
+        frames: list[bytes] = []
+        samples: list[Sample] = []
+        for frame, sample in self._decoder.feed(received) if received else ():
+            frames.append(frame)
+            if sample is not None:
+                samples.append(sample)
+        # Most of what a vehicle sends is for others, and shows nothing.
+        outputs = core.advance(samples, now_us) if samples or core.is_due(now_us) else NOTHING
         identity = core.flight.vehicle.identity
         if identity is not None and not self._is_addressed:
             # From now on the vehicle alone is listened to and spoken to.
             self._is_addressed = True
             self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot.wire)
             self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot.wire)
+        if outputs is NOTHING:
+            return StepResult(tuple(frames), (), ())
         sent = self._encoder.all_packets(outputs.messages, lambda error: core.fault(error, now_us))
-        return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
+        return StepResult(tuple(frames), sent, outputs.events)
 
     @property
     def leaves_word(self) -> bool:

@@ -47,9 +47,9 @@ HEARTBEAT_INTERVAL_US = 1_000_000
 POLL_INTERVAL_US = 50_000
 
 # States between take-off and landing, in which the fence's floor counts.
-ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
+ON_THE_WAY = (State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
 # States in which hits are detected. Climb and descent belong to them; the height decides about the ground.
-DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
+DETECTING_STATES = (*ON_THE_WAY, State.TAKEOFF, State.LANDING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if self._law.busy or not self._is_met:
             self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
-        self._beat(now_us)
+        if now_us >= self._heartbeat_due_us:
+            self._beat(now_us)
         try:
             self._inform(now_us)
         except Exception as error:
@@ -137,24 +138,30 @@ class Core(ABC, Generic[FlightT, MachineT]):
         flight = self.flight
         try:
             samples, refusal = self._hear(samples, now_us)
-            note_height(flight)
-            impacts = () if flight.fault else self._notice(samples, now_us)
-            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
-            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
+            height_m = note_height(flight)
+            impacts = () if flight.fault else self._notice(samples, height_m, now_us)
+            acks: list[CommandAck] = []
+            positions: list[LocalPosition] = []
+            for sample in samples:
+                if isinstance(sample, LocalPosition):
+                    positions.append(sample)
+                elif isinstance(sample, CommandAck):
+                    acks.append(sample)
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
-            self.reflex.follow(samples, flight.height_m, flight.vehicle.landed)
+            # The height counts where there is a new one.
+            self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
             note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)
         return moved
 
+    @abstractmethod
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in the frame of this flight, and why the vehicle is refused."""
-        return samples, update_vehicle(self.flight, samples, now_us)
 
-    def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
+    def _notice(self, samples: Sequence[Sample], height_m: float | None, now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
-        flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
+        flight, reaction = self.flight, self.reflex.step(samples, self._situation(height_m), now_us)
         sees = self.reflex.monitor.no_data_reason is None
         if sees is not (flight.no_data_since_us is None):
             flight.no_data_since_us = None if sees else now_us
@@ -164,20 +171,20 @@ class Core(ABC, Generic[FlightT, MachineT]):
             flight.note_touchdown()
         return reaction.collisions
 
+    @abstractmethod
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         """Run the state machine; whether its state changed."""
-        return self.machine.step(inputs, now_us)
 
     def situation(self) -> Situation:
         """The detector's situation. The setpoints of others are not known."""
-        situation = situation_of(self.flight, self._off_state, self._goes_down)
+        return self._situation(self.flight.height_m)
+
+    def _situation(self, height_m: float | None) -> Situation:
+        flight, goes_down, target = self.flight, self._goes_down, self.flight.target
         if not self.machine.holds:
-            return situation
-        target = self.flight.target
-        return situation._replace(
-            landed_state=landed(self.flight, self._goes_down),
-            setpoint_position_ned_m=None if target is None or target.lean is not None else target.position_ned_m,
-        )
+            return situation_of(flight, height_m, self._off_state, goes_down, flight.vehicle.landed)
+        place = None if target is None or target.lean is not None else target.position_ned_m
+        return situation_of(flight, height_m, self._off_state, goes_down, landed(flight, goes_down), place)
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
         """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
@@ -271,7 +278,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     def _beat(self, now_us: int) -> None:
         """Send the companion's HEARTBEAT until the end."""
-        if now_us >= self._heartbeat_due_us and not self.machine.finished:
+        if not self.machine.finished:
             self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
             self.flight.outbox.append(OnboardHeartbeat(self._is_active))
 
@@ -294,6 +301,10 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """When the next step is due if nothing arrives."""
         due_us = min(self._heartbeat_due_us, self.now_us + POLL_INTERVAL_US)
         return min(due_us, self._setpoint_due_us) if self._setpoint_due_us > self.now_us else due_us
+
+    def is_due(self, now_us: int) -> bool:
+        """Whether a step is due although no sample came."""
+        return now_us >= self.next_deadline_us() or bool(self.flight.events or self.flight.outbox)
 
     def status(self) -> Status:
         """The live line's content."""
@@ -342,17 +353,17 @@ class FlightCore(Core[FlightContext, Machine]):
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in a local frame that does not jump when the estimator resets its position."""
-        before = self.resets.shift_ned_m
-        samples = [self.resets.follow(sample, self.flight.mission.limits.max_step_m) for sample in samples]
-        jump_m = math.dist(self.resets.shift_ned_m, before)
-        if jump_m > 0.0:
+        before, most_m = self.resets.shift_ned_m, self.flight.mission.limits.max_step_m
+        samples = [self.resets.follow(sample, most_m) for sample in samples]
+        if self.resets.shift_ned_m != before:
+            jump_m = math.dist(self.resets.shift_ned_m, before)
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
             self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
-        return super()._hear(samples, now_us)
+        return samples, update_vehicle(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         self.stop_reason = None
-        moved = super()._act(samples, inputs, now_us)
+        moved = self.machine.step(inputs, now_us)
         if self.machine.finished and self.flight.ended_at_us is None:
             self.flight.ended_at_us = now_us
         return moved

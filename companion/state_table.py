@@ -16,11 +16,15 @@ class StateTable(Generic[StateT, TriggerT]):
 
     def __init__(self, rows: Mapping[StateT, Mapping[TriggerT, StateT]]) -> None:
         self.rows = rows
-        self.final = frozenset(state for state, row in rows.items() if not row)
+        self.final = tuple(state for state, row in rows.items() if not row)
 
     def moves(self, state: StateT, trigger: TriggerT) -> bool:
         """Whether the trigger means anything in this state."""
         return trigger in self.rows[state]
+
+    def from_which(self, trigger: TriggerT) -> tuple[StateT, ...]:
+        """The states in which the trigger means something."""
+        return tuple(state for state, row in self.rows.items() if trigger in row)
 
     def next_state(self, state: StateT, trigger: TriggerT) -> StateT:
         return self.rows[state].get(trigger, state)

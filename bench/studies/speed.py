@@ -28,6 +28,7 @@ from bench.rows.tables import table
 from bench.studies.study import Shown, page_path, write_page
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
+from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connection import udp_out
 from rebound_cli.background import Background
@@ -117,7 +118,7 @@ AFTER = 125
 class Recorded:
     """What the vehicle said in each interval, and the interval whose packets show the hit."""
 
-    number: int
+    mission: Mission
     said: Sequence[bytes]
     hit: int
 
@@ -133,9 +134,8 @@ class Going(Clock):
         return super().now_us() + self._ahead_us
 
 
-def recorded(number: int) -> Recorded:
-    """The flight of that number up to its hit, and what the vehicle says after it to whoever does nothing."""
-    mission = mission_of(number)
+def recorded(mission: Mission) -> Recorded:
+    """The flight up to its first hit, and what the vehicle says after it to whoever does nothing."""
     scene = Scene.model_validate(mission.sim or {})
     companion = Companion(mission)
     companion.confirm_plan()
@@ -146,11 +146,11 @@ def recorded(number: int) -> Recorded:
         said.append(b"".join(frame for result in results for frame in result.received_frames))
         if any(event.kind == "detection" for result in results for event in result.events):
             after = [flight.step_alone() for _ in range(AFTER)]
-            return Recorded(number, [*said, *after], len(said) - 1)
+            return Recorded(mission, [*said, *after], len(said) - 1)
     raise AssertionError("the vehicle never met the wall")
 
 
-def _now_us(interval: int) -> int:
+def now_us_of(interval: int) -> int:
     return EPOCH_US + 4000 * (interval + 2)
 
 
@@ -178,13 +178,13 @@ def beside(run: Callable[..., None], *arguments: Any) -> Iterator[None]:
 
 def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
     """The child: the loop of real flights, log and all. It flies to there itself, in memory that is its own."""
-    companion, start = Companion(mission_of(flight.number)), flight.hit - LEAD
+    companion, start = Companion(flight.mission), flight.hit - LEAD
     companion.confirm_plan()
     for interval in range(start):
-        companion.step(flight.said[interval], _now_us(interval))
+        companion.step(flight.said[interval], now_us_of(interval))
     connection = udp_out("127.0.0.1", port)
     recorder = FlightRecorder(folder, Background("log"))
-    clock = Going(_now_us(start))
+    clock = Going(now_us_of(start))
     loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())
     with undisturbed():
         connection.send(b"\0")
@@ -238,7 +238,7 @@ def spread(taken: Sequence[float | None]) -> Json:
 
 def measured(hits: int) -> list[Json]:
     """Quiet and busy: how the milliseconds of so many hits are spread."""
-    flights, times = [recorded(number) for number in range(_FLIGHTS)], -(-hits // _FLIGHTS)
+    flights, times = [recorded(mission_of(number)) for number in range(_FLIGHTS)], -(-hits // _FLIGHTS)
 
     def spread_of_all(state: str) -> Json:
         return {"beside it": state, **spread([taken for flight in flights for taken in timed(flight, times)])}

@@ -88,8 +88,8 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition
     link = flight.mission.companion.link
     if flight.vehicle.identity is None:
         return None
-    silent_s = flight.silent_s(now_us)
     if state in ON_THE_GROUND:
+        silent_s = flight.silent_s(now_us)
         if silent_s > link.patience_s:
             return Transition(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
         flight.note_silence(now_us)

@@ -15,7 +15,7 @@ from companion.flight.ending import ON_THE_GROUND, HandOver, Released, early_end
 from companion.flight.obstacle_map import remember
 from companion.flight.progress import FlyHome, FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
-from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
+from companion.flight.states import FINAL_STATES, MAY_CRASH, TABLE, State, Trigger
 from companion.flight.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.mission.items import TakeoffItem
 
@@ -94,10 +94,13 @@ class Machine(StateMachine):
     def step(self, inputs: Inputs, now_us: int) -> bool:
         before = self.handler
         if self.state not in FINAL_STATES:
-            self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
-        if TABLE.moves(self.state, Trigger.CRASHED):
+            ended = early_end(self.flight, self.state, inputs, now_us)
+            if ended is not None:
+                self._take(ended, now_us)
+        if self.state in MAY_CRASH:
             how = crashed(self.flight, self.state is State.LANDING, now_us)
-            self._take(None if how is None else Transition(Trigger.CRASHED, how), now_us)
+            if how is not None:
+                self._take(Transition(Trigger.CRASHED, how), now_us)
         for estimate in inputs.impacts:
             if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
@@ -127,8 +130,8 @@ class Machine(StateMachine):
         if self.state not in FINAL_STATES or self.flight.outcome is None:
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
-    def _take(self, transition: Transition | None, now_us: int) -> None:
-        if transition is None or not TABLE.moves(self.state, transition.trigger):
+    def _take(self, transition: Transition, now_us: int) -> None:
+        if not TABLE.moves(self.state, transition.trigger):
             return
         previous, self.state = self.state, TABLE.next_state(self.state, transition.trigger)
         self.handler = self._begin(previous, transition, now_us)

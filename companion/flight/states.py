@@ -89,4 +89,4 @@ TABLE = StateTable[State, Trigger](
     }
 )
 
-FINAL_STATES = TABLE.final
+FINAL_STATES, MAY_CRASH = TABLE.final, TABLE.from_which(Trigger.CRASHED)

@@ -8,7 +8,7 @@ from companion.flight.context import FlightContext
 from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
-from companion.messages import MessageId, Sample
+from companion.messages import MessageId, Sample, Vector3
 from companion.reflex.config import HELD_S
 from companion.reflex.detector import NO_POSITION, Situation
 
@@ -16,10 +16,14 @@ from companion.reflex.detector import NO_POSITION, Situation
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
-    mode, armed, conflicts, was_known = vehicle.custom_mode, vehicle.armed, vehicle.conflicts, vehicle.is_mode_known
+    mode, armed, conflicts, was_known = vehicle.mode, vehicle.armed, vehicle.conflicts, vehicle.is_mode_known
     vehicle.note_silence(now_us)
-    own_modes = flight.own_modes
     for sample in samples:
+        if isinstance(sample, messages.ImuSample):
+            # The most frequent of all: nothing of it is kept here.
+            vehicle.last_received_us = now_us
+            streams.count(messages.ImuSample, now_us)
+            continue
         if isinstance(sample, messages.Heartbeat):
             if not is_autopilot(sample):
                 continue
@@ -46,20 +50,20 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, messages.TimeSyncAnswer):
             flight.round_trip.update(sample, now_us)
-        vehicle.update(sample, now_us, own_modes)
+        vehicle.update(sample, now_us, flight.own_modes)
         streams.count(type(sample), now_us)
     _advance_trajectory_time(flight, now_us)
     if vehicle.conflicts > conflicts:
         _report_conflict(flight, now_us)
-    if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
+    if vehicle.mode is not None and (mode is None or vehicle.mode.custom_mode != mode.custom_mode):
         flight.report(now_us, "mode", f"mode {vehicle.mode_name}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.report(now_us, "disarmed", "disarmed")
     if was_known and not vehicle.is_mode_known:
         # PX4 answers within milliseconds; its next report by itself may take half a second.
         flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
-    if vehicle.identity is not None:
-        _measure_round_trip(flight, now_us)
+    if vehicle.identity is not None and (asked := flight.round_trip.ask(now_us)) is not None:
+        _measure_round_trip(flight, asked, now_us)
     return None
 
 
@@ -75,13 +79,10 @@ def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
         flight.trajectory_us += now_us - before_us
 
 
-def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
+def _measure_round_trip(flight: FlightContext, asked: messages.TimeSyncAsk, now_us: int) -> None:
     """On the ground a long round trip is a reason not to begin; in the air it is reported. For how long the
     last setpoint is flown on is asked with it until it is answered.
     """
-    asked = flight.round_trip.ask(now_us)
-    if asked is None:
-        return
     flight.outbox.append(asked)
     if flight.reflex.loss_s is None:
         autopilot, told = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
@@ -110,13 +111,14 @@ def _report_conflict(flight: FlightContext, now_us: int) -> None:
         flight.report(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
 
 
-def note_height(flight: FlightContext) -> None:
-    """Note whether the vehicle has left the ground. A hit that pushes it down again does not undo that."""
+def note_height(flight: FlightContext) -> float | None:
+    """The height, noted whether the vehicle has left the ground. A hit that pushes it down again does not undo that."""
     height_m = flight.height_m
     if height_m is not None and height_m >= flight.mission.companion.min_detection_height_m:
         flight.has_climbed = True
     elif height_m is None or flight.vehicle.landed is messages.LandedState.ON_GROUND:
         flight.has_climbed = False
+    return height_m
 
 
 def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
@@ -128,17 +130,25 @@ def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
     return messages.LandedState.UNDEFINED if is_up else flight.vehicle.landed
 
 
-def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool) -> Situation:
-    """The detector's situation of a vehicle that somebody else flies."""
-    height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m
+def situation_of(
+    flight: FlightContext,
+    height_m: float | None,
+    off_state: str | None,
+    goes_down: bool,
+    landed_state: messages.LandedState,
+    setpoint_ned_m: Vector3 | None = None,
+) -> Situation:
+    """The detector's situation; `landed_state` is the reported one of a vehicle that somebody else flies."""
+    least_m = flight.mission.companion.min_detection_height_m
     # Lift-off, ground effect and skids shake and push.
     below = NO_POSITION if height_m is None else f"below {least_m:g} m"
     return Situation(
         off_reason=off_state or (None if flight.has_climbed else below),
         armed=flight.vehicle.armed,
-        landed_state=flight.vehicle.landed,
+        landed_state=landed_state,
         height_m=height_m,
         descent_commanded=goes_down,
+        setpoint_position_ned_m=setpoint_ned_m,
         flown_by_hand=flight.vehicle.pilot in (Pilot.STICKS, Pilot.HAND),
         has_climbed=flight.has_climbed,
         has_position=flight.has_position,

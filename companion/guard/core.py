@@ -64,7 +64,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         echoes = [sample for sample in samples if isinstance(sample, PositionTarget)]
         inputs = inputs._replace(echoes=echoes, sticks=sticks, is_enabled=self.is_enabled)
         self.is_enabled = False
-        moved = super()._act(samples, inputs, now_us)
+        moved = self.machine.step(inputs, now_us)
         if moved and self.machine.state is State.CONNECTING:
             guard.reflex.restart(now_us)
         return moved

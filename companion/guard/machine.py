@@ -14,7 +14,7 @@ from companion.guard.context import GuardContext, GuardStateHandler, GuardTransi
 from companion.guard.descent import THROTTLE
 from companion.guard.holding import GiveBack, GuardCrashed, Recovering, StandDown, TakeOver
 from companion.guard.onward import lead_into, stop
-from companion.guard.states import HOLDING, TABLE, State, Trigger
+from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
 from companion.guard.watching import GuardConnect, StandBy, Watching
 from companion.messages import Asked, Sticks
 from companion.motion.rotation import yaw_rad
@@ -69,7 +69,7 @@ class GuardMachine(StateMachine):
     def step(self, inputs: Inputs, now_us: int) -> bool:
         before = self.handler
         self._take(self._from_outside(inputs, now_us), now_us)
-        if TABLE.moves(self.state, Trigger.CRASHED):
+        if self.state in MAY_CRASH:
             meant = self.state not in HOLDING and self.flight.descent.is_meant(self.flight.vehicle, now_us)
             if crashed(self.flight, meant, now_us) is not None:
                 self._take(GuardTransition(Trigger.CRASHED), now_us)

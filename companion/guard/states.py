@@ -106,4 +106,5 @@ TABLE = StateTable[State, Trigger](
 )
 
 # While it is in one of these the vehicle flies, or is about to fly, by the guard's setpoints.
-HOLDING = frozenset({State.TAKING_OVER, State.RECOVERING, State.GIVING_BACK})
+HOLDING = (State.TAKING_OVER, State.RECOVERING, State.GIVING_BACK)
+MAY_CRASH = TABLE.from_which(Trigger.CRASHED)

@@ -82,6 +82,7 @@ class Vehicle:
     attitude_parameters: dict[str, int | float] = field(default_factory=dict)  # see interface.Autopilot
     armed: bool | None = None
     mode: ModeReport | None = None
+    pilot: Pilot | None = None  # who moves it, where the mode says so
     failsafe: bool = False
     landed: messages.LandedState = messages.LandedState.UNDEFINED
     attitude: messages.Attitude | None = None
@@ -116,8 +117,6 @@ class Vehicle:
         """Take one sample of the identified vehicle. Without `own_modes` every mode is accepted at once."""
         self.last_received_us = now_us
         match sample:
-            case messages.ImuSample():
-                pass  # the most frequent of all: first, and nothing of it is kept here
             case messages.LocalPosition():
                 if self.history.add(sample):
                     self.last_position_us = now_us
@@ -152,6 +151,7 @@ class Vehicle:
         if is_known or not own_modes or self.unconfirmed_mode is not None:
             self.conflicts += is_known and self.unconfirmed_mode is not None
             self.mode, self.unconfirmed_mode = report, None
+            self.pilot = self.autopilot.pilot(report.custom_mode)
         else:
             self.unconfirmed_mode = report
 
@@ -173,11 +173,6 @@ class Vehicle:
     @property
     def mode_name(self) -> str:
         return "" if self.mode is None else self.autopilot.mode_name(self.mode.custom_mode)
-
-    @property
-    def pilot(self) -> Pilot | None:
-        """Who moves it, where the mode says so."""
-        return None if self.mode is None else self.autopilot.pilot(self.mode.custom_mode)
 
     @property
     def descends(self) -> bool:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -41,7 +42,7 @@ class Trajectory(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Ramps:
     """A trapezoidal speed along a way of any shape: speed up, cruise, brake."""
 
@@ -50,17 +51,17 @@ class Ramps:
     speeding_up_m_s2: float
     braking_m_s2: float
 
-    @property
+    @cached_property
     def _ramps_s2_per_m(self) -> float:
         """Times a top speed squared, what both ramps together take of the way."""
         return 0.5 / self.speeding_up_m_s2 + 0.5 / self.braking_m_s2
 
-    @property
+    @cached_property
     def top_speed_m_s(self) -> float:
         """The cruise speed, or what a way too short for it allows."""
         return min(self.speed_m_s, math.sqrt(self.distance_m / self._ramps_s2_per_m))
 
-    @property
+    @cached_property
     def duration_s(self) -> float:
         top = self.top_speed_m_s
         return self.distance_m / top + top * self._ramps_s2_per_m if top > 0.0 else 0.0
@@ -76,7 +77,7 @@ class Ramps:
         return 0.5 * growth * ramp_s**2 + top * (elapsed_s - ramp_s), top, 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LineProfile:
     """A straight line, never faster than `speed`, never changing faster than `acceleration`.
 
@@ -89,18 +90,18 @@ class LineProfile:
     acceleration_m_s2: float
     speeding_up_m_s2: float = math.inf
 
-    @property
+    @cached_property
     def distance_m(self) -> float:
         return math.dist(self.start_m, self.target_m)
 
-    @property
+    @cached_property
     def _ramps(self) -> Ramps:
         growth, level_m = self.acceleration_m_s2, math.dist(self.start_m[:2], self.target_m[:2])
         if level_m > 0.0:
             growth = min(growth, self.speeding_up_m_s2 * self.distance_m / level_m)
         return Ramps(self.distance_m, self.speed_m_s, growth, self.acceleration_m_s2)
 
-    @property
+    @cached_property
     def duration_s(self) -> float:
         return self._ramps.duration_s
 
@@ -117,7 +118,7 @@ class LineProfile:
         return position, (n * rate, e * rate, d * rate), (n * change, e * change, d * change)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CircleProfile:
     """Round a centre at its height, from an angle (clockwise from north, seen from above) through `angle_rad`."""
 
@@ -129,11 +130,11 @@ class CircleProfile:
     acceleration_m_s2: float
     speeding_up_m_s2: float = math.inf
 
-    @property
+    @cached_property
     def distance_m(self) -> float:
         return abs(self.angle_rad) * self.radius_m
 
-    @property
+    @cached_property
     def _ramps(self) -> Ramps:
         # v^2 / R sideways within its share of the acceleration
         turning_m_s = math.sqrt(TURNING_SHARE * self.acceleration_m_s2 * self.radius_m)
@@ -141,7 +142,7 @@ class CircleProfile:
         growth = min(braking, self.speeding_up_m_s2)
         return Ramps(self.distance_m, min(self.speed_m_s, turning_m_s), growth, braking)
 
-    @property
+    @cached_property
     def duration_s(self) -> float:
         return self._ramps.duration_s
 
@@ -168,17 +169,17 @@ class CircleProfile:
         return (n + self.radius_m * math.cos(angle_rad), e + self.radius_m * math.sin(angle_rad), d)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Chain:
     """One trajectory after the other; each begins where the one before it ends."""
 
     parts: Sequence[Trajectory]
 
-    @property
+    @cached_property
     def distance_m(self) -> float:
         return sum(part.distance_m for part in self.parts)
 
-    @property
+    @cached_property
     def duration_s(self) -> float:
         return sum(part.duration_s for part in self.parts)
 

@@ -144,7 +144,7 @@ class FusedDetector:
             state.before_boot_us, state.before_frd_m_s2 = before_us, state.last_frd_m_s2
             state.last_frd_m_s2 = sample.specific_force_frd_m_s2
             return state, impact
-        if isinstance(sample, LocalPosition | Odometry):
+        if isinstance(sample, (LocalPosition, Odometry)):
             return state, self._velocity(state, sample, situation)
         if isinstance(sample, AttitudeTarget):
             state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)

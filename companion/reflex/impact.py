@@ -115,7 +115,7 @@ class ImpactEstimator:
             f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
             self.strapdown.imu(sample.time_boot_us, f, w)
             self.earlier_imu, self.imu = self.imu, sample
-        elif isinstance(sample, LocalPosition | Odometry):
+        elif isinstance(sample, (LocalPosition, Odometry)):
             if isinstance(sample, LocalPosition):
                 self.history.add(sample)
             self.strapdown.velocity(sample)

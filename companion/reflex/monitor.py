@@ -6,7 +6,7 @@ samples at the same times give the same impacts and notices.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import field_validator
 
@@ -98,8 +98,7 @@ class CollisionMonitor:
         return self.state.describe()
 
 
-@dataclass(frozen=True, slots=True)
-class MonitorResult:
+class MonitorResult(NamedTuple):
     """Result of one step: impacts at their first sample, final estimates of contacts that have ended, notices."""
 
     impacts: Sequence[ImpactEstimate]

@@ -71,12 +71,15 @@ class Reflex:
     def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
         """Take the samples received since the last step, in order; call it without any, too."""
         result = advance(self.monitor, samples, situation, now_us)
-        notices, impacts = list(result.notices), result.impacts
-        if not situation.is_wreck:
-            notices += [notice for estimate in impacts if (notice := self._contact_notice(estimate)) is not None]
-        has_touched_down = any(estimate.impact.is_ground for estimate in impacts)
-        # A crash is told where no hit is looked for, too.
-        found = [] if situation.off_reason else [estimate for estimate in impacts if estimate.impact.is_collision]
+        notices, has_touched_down = list(result.notices), False
+        found: list[ImpactEstimate] = []
+        for estimate in result.impacts:
+            notice = None if situation.is_wreck else self._contact_notice(estimate)
+            notices += [] if notice is None else [notice]
+            has_touched_down |= estimate.impact.is_ground
+            # A crash is told where no hit is looked for, too.
+            if estimate.impact.is_collision and not situation.off_reason:
+                found.append(estimate)
         held = None if found else self._held(samples, situation)
         if held is not None:
             found = [held]

@@ -68,7 +68,8 @@ class Circumstances:
     def situation(self) -> Situation:
         """Now."""
         guard = self._guard
-        return situation_of(guard, self._why_not(guard), guard.descent.is_meant(guard.vehicle, self._now_us))
+        goes_down = guard.descent.is_meant(guard.vehicle, self._now_us)
+        return situation_of(guard, guard.height_m, self._why_not(guard), goes_down, guard.vehicle.landed)
 
 
 @dataclass(slots=True)

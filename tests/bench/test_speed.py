@@ -2,16 +2,26 @@
 
 import cProfile
 import pstats
+import shutil
 from pathlib import Path
 
 import pytest
 
+from bench.fly.faulted import mission_of
+from bench.studies.instructions import counted
 from bench.studies.speed import fly, recorded, spread, timed
 
 ROOT = Path(__file__).parents[2]
 # A change that costs more is looked at: it is made cheaper, or the count here is renewed.
 MOST_MORE = 1.05
 HELD_TO = {"sim_vehicle": 116.82, "companion": 326.52, "rebound_cli": 6.14}
+HELD_RATIO = {
+    "a quiet IMU sample": 4.33,
+    "a position": 5.22,
+    "an attitude": 3.3,
+    "a hit's first sample": 22.5,
+    "a second of flight": 2.57,
+}
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +57,20 @@ def test_no_program_calls_5_per_cent_more_functions_an_interval(calls, package, 
 @pytest.mark.realtime
 def test_each_hit_is_answered_long_before_px4_would_miss_a_setpoint():
     # Given a flight that is played to the loop of real flights until its hit (COM_OF_LOSS_T is 1 s)
-    taken = list(timed(recorded(0), 3))
+    taken = list(timed(recorded(mission_of(0)), 3))
     assert all(seconds is not None and 0.0 < seconds < 0.5 for seconds in taken)
 
 
 def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies():
     found = spread([0.004, 0.006, None])
     assert (found["setpoints"], found["p50"], found["most"]) == (2, "6.00", "inf")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind counts instructions, and is not installed")
+def test_no_packet_takes_5_per_cent_more_instructions():
+    # Given what each took last, over pymavlink's parse of the same bytes
+    # When they are counted now, then none has become dearer unseen
+    found = {row[""]: row["ratio"] for row in counted()}
+    assert found.keys() == HELD_RATIO.keys()
+    assert {what: ratio for what, ratio in found.items() if ratio > MOST_MORE * HELD_RATIO[what]} == {}

@@ -31,7 +31,7 @@ def test_no_heartbeat_for_ten_seconds():
     [
         (FakeVehicle(autopilot=3), "ArduPilot"),
         (FakeVehicle(vehicle_type=1), "fixed-wing"),
-        (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 32"),
+        (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 31.5 Hz"),
         (FakeVehicle(no_imu=True), "HIGHRES_IMU arrives at 0.0 Hz"),
         (FakeVehicle(no_positions=True), "LOCAL_POSITION_NED"),
         (FakeVehicle(armed=True), "armed already"),

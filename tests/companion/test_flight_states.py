@@ -6,7 +6,7 @@ from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 from companion.guard import states as guard_states
 
 BEFORE_THE_FLIGHT = {State.CONNECT, State.READY}
-IN_THE_AIR = set(State) - FINAL_STATES - BEFORE_THE_FLIGHT - {State.CRASHED}
+IN_THE_AIR = set(State) - set(FINAL_STATES) - BEFORE_THE_FLIGHT - {State.CRASHED}
 
 
 @pytest.mark.parametrize("state", [state for state in State if state not in FINAL_STATES])
@@ -36,7 +36,7 @@ def test_before_and_after_a_flight_there_is_no_hit_to_answer(state):
 @pytest.mark.parametrize(
     ("table", "start", "ends"),
     [
-        (TABLE, State.CONNECT, FINAL_STATES),
+        (TABLE, State.CONNECT, set(FINAL_STATES)),
         (guard_states.TABLE, guard_states.State.CONNECTING, {guard_states.State.ENDED}),
     ],
     ids=["flight", "guard"],

@@ -22,7 +22,7 @@ def test_only_a_person_a_failsafe_a_disarm_or_a_crash_lets_go_of_a_recovery():
 
 
 def test_a_crash_is_told_wherever_hits_are_answered_and_ends_with_a_disarm_or_a_take_off():
-    assert {state for state in State if TABLE.moves(state, Trigger.CRASHED)} == HOLDING | {State.WATCHING}
+    assert {state for state in State if TABLE.moves(state, Trigger.CRASHED)} == {*HOLDING, State.WATCHING}
     ends = {trigger for trigger, state in TABLE.rows[State.CRASHED].items() if state is State.STANDING_BY}
     assert ends == {Trigger.DISARMED, Trigger.FLIES_AGAIN} and State.CRASHED not in HOLDING
 
