@@ -325,7 +325,7 @@ def add_check(commands: Commands) -> None:
     _option(check, "missions", text, "MISSION", type=mission_file, nargs="*")
     _flag(check, "--schema", "print the JSON schema of mission files, for editors, and nothing else")
     _add_set(check, _SET_MISSION)
-    _option(check, "--out", "folder of the pictures (default: runs/check)", "DIR", default=Path("runs/check"))
+    _option(check, "--out", "folder of the pages (default: runs/check)", "DIR", default=Path("runs/check"))
     _flag(check, "--no-picture", "draw nothing")
 
 
