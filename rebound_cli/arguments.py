@@ -256,7 +256,7 @@ def add_preflight(commands: Commands) -> None:
     _add_connect(preflight, required=True)
     _add_peer_and_key(preflight)
     _add_companion(preflight)
-    _option(preflight, "--card", "write the card of the first flight, to be printed", "FILE")
+    _gone(preflight, "--card", "`rebound init --example first-flight` writes the steps to the first hit")
     _flag(preflight, "--fix", "offer to set the parameters that would mend it")
     _gone(preflight, "--yes", "--fix asks before it sets a parameter")
     _add_json(preflight, "findings")
@@ -325,7 +325,7 @@ def add_check(commands: Commands) -> None:
     _option(check, "missions", text, "MISSION", type=mission_file, nargs="*")
     _flag(check, "--schema", "print the JSON schema of mission files, for editors, and nothing else")
     _add_set(check, _SET_MISSION)
-    _option(check, "--out", "folder of the pictures (default: runs/check)", "DIR", default=Path("runs/check"))
+    _option(check, "--out", "folder of the pages (default: runs/check)", "DIR", default=Path("runs/check"))
     _flag(check, "--no-picture", "draw nothing")
 
 

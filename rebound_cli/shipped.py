@@ -10,8 +10,8 @@ def shipped_missions() -> dict[str, Path]:
 
 
 def shipped_examples() -> dict[str, Path]:
-    """Programs, settings, layouts."""
-    return _files_of("rebound_examples", ".py", ".yaml", ".json", ".xml")
+    """Programs, settings, layouts, a checklist."""
+    return _files_of("rebound_examples", ".py", ".yaml", ".json", ".xml", ".txt")
 
 
 def _files_of(package: str, *kinds: str) -> dict[str, Path]:

@@ -7,7 +7,6 @@ from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Identity, StatusText
-from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.mode_numbers import NUMBERS
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.errors import FaultError, SceneError
@@ -33,8 +32,6 @@ from sim_vehicle.world import Obstacle, build_world, distance_m
 
 # A signature has one byte for the link.
 _LINK_NUMBERS = 256
-# PX4 answers, then waits 0.4 s before it resets itself; a flight controller then takes some seconds to be heard again.
-REBOOT_AFTER_US, BOOT_TAKES_US = 400_000, 2_000_000
 # A vehicle that begins in flight is on the way to where it would be after so long: further than any study of a hit.
 FAR_S = 60.0
 
@@ -63,26 +60,18 @@ class SimulatedVehicle:
         Raises SceneError where a wall passes through the start position, or the wind is too strong.
         """
         check_start(airframe, scene)
-        self._airframe, self._scene, self._seed, self._keeps_path = airframe, scene, seed, keeps_path
-        self._epoch_at_boot_us = epoch_at_boot_us
+        self._airframe, self._seed = airframe, seed
         self._links: list[Link] = []
         self._links_may_fail, self._faults = links_may_fail, list(scene.faults)
         self.texts: tuple[StatusText, ...] = ()
         self._links_so_far = 0
         self._companion_link: Link | None = None
         self.parameters = Parameters({**defaults_from(airframe), **(parameters or {})})
-        self._signing, self._missions = signing or Signing(), MissionStore()
         self._plant = Plant(with_parameters(airframe, self.parameters), scene, seed, keeps_path)
-        self._boot()
-
-    def _boot(self) -> None:
-        """Start the vehicle's software."""
-        airframe, parameters = self._airframe, self.parameters
-        # Its clock begins at zero; the body's goes on, and with it what is recorded of the flight.
-        booted_at_us = self._plant.booted_at_us = int(self._plant.state.time_us)
+        parameters = self.parameters
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
-        self._autopilot = Autopilot(airframe.hover_fraction, first, parameters, self._missions)
+        self._autopilot = Autopilot(airframe.hover_fraction, first, parameters)
         self._positioning = self._autopilot.commander.positioning
         self._positioning.sees_ground = self._plant.onboard is not None
         # Taken once: looking a record's field up costs microseconds.
@@ -98,29 +87,23 @@ class SimulatedVehicle:
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
             true_body=self._body,
             attitude_setpoint=self._plant.state.attitude_setpoint,
-            epoch_at_boot_us=self._epoch_at_boot_us + booted_at_us,
+            epoch_at_boot_us=epoch_at_boot_us,
             system=identity.system,
         )
         self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = int(self._plant.state.time_us)
-        """Since the vehicle was first switched on; its own clock begins anew with every reboot."""
         self._topics = Topics(self._telemetry)
-        self._signing.boot()
         self._board = Board(
             identity,
             self._autopilot,
             parameters,
             self._telemetry,
             self._topics,
-            self._signing,
+            signing or Signing(),
             self.interval_us,
-            booted_at_us,
         )
-        for link in self._links:
-            link.boot(self._board)
         self._tuned_at = 0
-        self._reboot_at_us: int | None = None
 
     def begin_in_flight(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Instead of on the ground: in HOLD, nose ahead, steadily on the way to a place far ahead."""
@@ -242,8 +225,6 @@ class SimulatedVehicle:
 
     def advance(self) -> None:
         """One interval: act on what the links have received, fly, leave what they are to send."""
-        if self._reboot_at_us is not None and self._is_rebooting(self._reboot_at_us):
-            return
         self._communicate()
         if self.parameters.changes != self._tuned_at:
             self._tuned_at = self.parameters.changes
@@ -251,7 +232,7 @@ class SimulatedVehicle:
         autopilot = self._autopilot
         sample = self._plant.step(autopilot.run_control(), autopilot.motors_run)
         autopilot.observe(sample)
-        self.time_boot_us = sample.time_boot_us + self._plant.booted_at_us
+        self.time_boot_us = sample.time_boot_us
         self._topics.count(new_position=self._publish(sample))
         texts = self.texts = tuple(autopilot.texts)
         autopilot.texts.clear()
@@ -270,27 +251,6 @@ class SimulatedVehicle:
                 for other in links:
                     if other is not link:
                         other.forward(foreign)
-        if self._autopilot.wants_reboot and self._reboot_at_us is None:
-            self._reboot_at_us = self.time_boot_us + REBOOT_AFTER_US
-
-    def _is_rebooting(self, reboot_at_us: int) -> bool:
-        """Whether nobody is there at the moment; the body goes on in any case, without motors."""
-        if self.time_boot_us < reboot_at_us:
-            return False
-        if self.time_boot_us < reboot_at_us + BOOT_TAKES_US:
-            self._plant.step(None, armed=False)
-            self.time_boot_us = int(self._plant.state.time_us)
-            for link in self._links:
-                link.discard()
-            return True
-        self.parameters.boot()
-        airframe = with_parameters(self._airframe, self.parameters)
-        if airframe.imu.integration_interval_us != self.interval_us:
-            plant = Plant(airframe, self._scene, self._seed, self._keeps_path)
-            plant.take_over(self._plant)
-            self._plant = plant
-        self._boot()
-        return True
 
     def _sense(self, telemetry: Telemetry) -> None:
         slow, faults, now_us = self._slow, self._plant.faults, telemetry.sample.time_boot_us

@@ -20,13 +20,17 @@ def alone(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", WITHOUT + code], cwd=ROOT, capture_output=True, text=True, timeout=120)
 
 
-def test_missions_are_checked_and_what_cannot_be_drawn_is_said(tmp_path):
+def test_missions_are_checked_and_drawn(tmp_path):
     code = f"from rebound_cli.main import main\nsys.exit(main(['check', 'wall', 'square', '--out', {str(tmp_path)!r}]))"
     done = alone(code, tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("not drawn: this needs matplotlib, of the extra [sim]: ") == 2
-    # And what is to be typed is the extra, package by package, for the Python that runs
-    assert f"[sim]: {sys.executable} -m pip install 'numba>=" in done.stdout and "'matplotlib>=" in done.stdout
+    assert done.stdout.count("drawn in") == 2
+
+
+def test_what_an_extra_brings_is_named_package_by_package_for_the_python_that_runs(tmp_path):
+    done = alone("from rebound_cli.main import main\nsys.exit(main(['sim']))", tmp_path)
+    assert done.returncode == 1
+    assert f"[sim]: {sys.executable} -m pip install 'numba>=" in done.stderr and "'matplotlib>=" in done.stderr
 
 
 def test_a_mission_is_flown_and_a_wall_recovered_from(tmp_path):

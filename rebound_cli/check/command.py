@@ -11,7 +11,6 @@ from companion.flight.plan import describe_item, describe_modifiers, mission_lin
 from companion.mission.model import Mission
 from rebound_cli.check.legs import FlownLeg, flown_legs
 from rebound_cli.check.schema import mission_schema
-from rebound_cli.extras import needed_text
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.simulation.compiling import stand_own
 from sim_vehicle.errors import SimulationError
@@ -47,19 +46,16 @@ def _check(path: Path, options: Namespace) -> None:
     print(mission_text(mission, legs))
     if options.no_picture:
         return
-    try:
-        # A drone has no matplotlib, and need not have.
-        from rebound_cli.check.picture import draw_mission
-    except ModuleNotFoundError as error:
-        print(f"\nnot drawn: {needed_text(error)}")
-        return
-    picture = options.out / f"{mission.name}.png"
+    # A drone that checks its mission before each flight loads no page.
+    from rebound_cli.check.page import write_mission_page
+
+    page = options.out / f"{mission.name}.html"
     try:
         options.out.mkdir(parents=True, exist_ok=True)
-        draw_mission(picture, mission, world.scene, legs)
+        write_mission_page(page, mission, world, legs)
     except OSError as error:
-        raise ConfigurationError(f"{picture} cannot be written: {error.strerror}.") from error
-    print(f"\ndrawn in {picture}")
+        raise ConfigurationError(f"{page} cannot be written: {error.strerror}.") from error
+    print(f"\ndrawn in {page}")
 
 
 def mission_text(mission: Mission, legs: Sequence[FlownLeg]) -> str:

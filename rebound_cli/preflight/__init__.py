@@ -1,1 +1,1 @@
-"""`rebound preflight`: the command and the card of the first flight."""
+"""`rebound preflight`."""

@@ -14,11 +14,9 @@ from companion.preflight import Preflight, findings
 from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
-from rebound_cli.documents import write_text
 from rebound_cli.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.signed_connection import open_signed
-from rebound_cli.preflight.card import card
 
 LONGEST_WAIT_S = 0.05
 # PX4 answers a parameter within 50 ms; after a second it has not taken it.
@@ -45,9 +43,6 @@ def run_preflight(options: Namespace) -> int:
             print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
         if options.fix:
             found = _fix(console, preflight, connection, clock, found)
-        if options.card is not None:
-            write_text(options.card, card(preflight.survey, found, options.connect))
-            console.print(f"\nThe card of the first flight is {options.card}.")
     finally:
         connection.close()
     return 1 if any(finding.verdict is Verdict.BAD for finding in found) else 0

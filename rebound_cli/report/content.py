@@ -48,6 +48,9 @@ _ROWS, _ROWS_PER_S = 7_000, 10.0
 # Around a moment all rows are kept: the microscope's 150 ms, and the slow motion's way there and back.
 AROUND_S = 1.0
 
+# What a page has not before the flight is over.
+UNFLOWN = {"hides": ["h-moments", "h-link"]}
+
 # The names of all quantities end in frame and unit: these are the places. In texts they are [north, east, down].
 _PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")
 _PLACES_IN_TEXT = re.compile(r"\[-?\d[\d.]*(?:, -?\d[\d.]*)+\]")
@@ -106,7 +109,7 @@ def live_content(flight: ShownFlight) -> dict[str, Any]:
         name: {"of": 0, "rows": 0, "columns": {column: {**empty, "kind": "i4"} for column in columns}}
         for name, columns in {**COLUMNS, "imu": ("t",)}.items()
     }
-    return content(flight) | {"live": True, "sentence": "Waiting for the flight.", "tables": tables}
+    return content(flight) | UNFLOWN | {"live": True, "sentence": "Waiting for the flight.", "tables": tables}
 
 
 def _told(flight: ShownFlight) -> Sequence[Mapping[str, Any]]:
@@ -143,7 +146,7 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
         "ratio": (np.where(jumps.phase >= PHASES.index(Phase.ARMED), jumps.ratio, np.nan), RATIO)
     }
     columns["path"] = _on_both_clocks(columns["path"], log.position_time_boot_us - first_us)
-    if truth is not None:
+    if truth is not None and truth.series:
         true, boot_us, folds_m = truth.series, truth.series["time_boot_us"], truth.series["arm_fold_m"]
         columns["truth"] = (
             times(truth.at_us(boot_us), flight.started_at_us)

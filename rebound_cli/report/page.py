@@ -48,15 +48,15 @@ _PAGE = """<!doctype html>
 
 def page(flight: ShownFlight, no_position: bool = False) -> str:
     """The whole file; the same bytes for the same flight."""
-    return _assembled(content(flight, no_position), SCRIPTS)
+    return assembled(content(flight, no_position), SCRIPTS)
 
 
 def live_page(flight: ShownFlight) -> str:
     """Of a flight that goes on: the page asks whoever serves it, and nobody else, for what comes."""
-    return _assembled(live_content(flight), (*SCRIPTS, LIVE_SCRIPT), "; connect-src 'self'")
+    return assembled(live_content(flight), (*SCRIPTS, LIVE_SCRIPT), "; connect-src 'self'")
 
 
-def _assembled(data: dict[str, Any], ours: Sequence[str], may: str = "") -> str:
+def assembled(data: dict[str, Any], ours: Sequence[str], may: str = "") -> str:
     data["libraries"] = libraries()
     scripts = [file_text(f"assets/{name}") for name in LIBRARIES] + [file_text(name) for name in ours]
     hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)

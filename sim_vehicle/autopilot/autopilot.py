@@ -49,12 +49,10 @@ class Autopilot:
         hover_thrust_fraction: float,
         first: Estimate,
         parameters: Parameters,
-        missions: MissionStore | None = None,
     ) -> None:
-        """``missions`` is handed in by whoever keeps them over a reboot."""
         self.parameters = parameters
         self.origin = origin_of(parameters)
-        self.missions = missions or MissionStore()
+        self.missions = MissionStore()
         self.detector = LandDetector(hover_thrust_fraction, parameters)
         view = View(
             first.time_boot_us,
@@ -69,8 +67,6 @@ class Autopilot:
         self.commander = Commander(parameters, self.navigator, self.detector, self.texts)
         self.modes, self.arming = self.commander.modes, self.commander.arming
         self.signal, self.battery = self.commander.signal, self.commander.battery
-        self.wants_reboot = False
-        """To be done by whoever switches the software on and off, once the answer is out."""
         self._offboard = OffboardControl(self.signal)
         self.applied: Setpoint | None = None
         self._manual = ManualFlight(parameters, hover_thrust_fraction)

@@ -140,14 +140,8 @@ def _return(command: Command, flight: CommandedVehicle) -> Result:
 
 
 def _reboot(command: Command, flight: CommandedVehicle) -> Result:
-    action = _cast(command.param1)
-    if action == 0:
-        return Result.ACCEPTED
-    # No board that this vehicle stands for can switch itself off or wait in its bootloader.
-    if action != 1 or flight.commander.arming.armed:
-        return Result.DENIED
-    flight.wants_reboot = True
-    return Result.ACCEPTED
+    """Whoever asks for nothing has it; a SITL neither reboots nor shuts down."""
+    return Result.ACCEPTED if _cast(command.param1) == 0 else Result.DENIED
 
 
 def _inject_failure(command: Command, flight: CommandedVehicle) -> Result:

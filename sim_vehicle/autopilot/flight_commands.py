@@ -38,7 +38,6 @@ class CommandedVehicle(Protocol):
     origin: Origin
     missions: MissionStore
     parameters: Parameters
-    wants_reboot: bool
 
     def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
         """Change the mode; ``says_so`` is the text for a change that was accepted."""

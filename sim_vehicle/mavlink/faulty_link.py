@@ -54,12 +54,8 @@ class FaultyLink(Link):
             if added is fault:
                 wire.remove(wire_fault)
         self._on_wire = [row for row in self._on_wire if row[0] is not fault]
-        now_s = self._world_us / 1e6
+        now_s = self.now_us / 1e6
         self._jumps = [jump for jump in self._jumps if jump is not fault or jump.window_s[0] < now_s]
-
-    @property
-    def _world_us(self) -> int:
-        return self.now_us + self._board.booted_at_us
 
     def push(self, data: bytes) -> None:
         """Bytes have been sent; they arrive when the wire lets them."""
@@ -68,16 +64,16 @@ class FaultyLink(Link):
     def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
         """Act on what has arrived."""
         frames, self._arriving = split(self._arriving), b""
-        super().push(b"".join(self._inbound.carry(frames, self._world_us)))
+        super().push(b"".join(self._inbound.carry(frames, self.now_us)))
         return super().receive(collects_foreign)
 
     def take(self) -> tuple[bytes, ...]:
         """The packets that arrive at the other end now, in order."""
         packets = super().take()
-        offset_us = round(1e6 * sum(jump.jump_s for jump in self._jumps if jump.window_s[0] <= self._world_us / 1e6))
+        offset_us = round(1e6 * sum(jump.jump_s for jump in self._jumps if jump.window_s[0] <= self.now_us / 1e6))
         if offset_us:
             packets = tuple(self._restamper.restamp(packet, offset_us) for packet in packets)
-        return self._outbound.carry(packets, self._world_us)
+        return self._outbound.carry(packets, self.now_us)
 
 
 def needs_faulty_link(faults: Sequence[Fault]) -> bool:

@@ -35,17 +35,12 @@ class Link:
     def __init__(self, kind: LinkKind, board: Board, number: int, seed: int) -> None:
         self.kind = kind
         self._number = number
-        self._seed = seed
         self._waiting = b""
-        self.boot(board)
-
-    def boot(self, board: Board) -> None:
-        """Begin as after switching on; nothing of the past is remembered."""
         self.now_us = board.telemetry.sample.time_boot_us
         self._board = board
         self._signing = board.signing.of_link()
         self._encoder = Encoder(board.identity)
-        self.streams = Streams(board.telemetry, board.topics, self._encoder, self.kind, self._seed)
+        self.streams = Streams(board.telemetry, board.topics, self._encoder, self.kind, seed)
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
         self._busy = tuple(service for service in self._services if isinstance(service, BusyService))
@@ -69,10 +64,6 @@ class Link:
     def take(self) -> tuple[bytes, ...]:
         """The packets to send, in order."""
         return self._encoder.take()
-
-    def discard(self) -> None:
-        """Nobody is there to read what has arrived."""
-        self._waiting = b""
 
     # --- what services need ------------------------------------------------------------------------------
 

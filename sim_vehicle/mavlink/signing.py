@@ -31,10 +31,6 @@ class Signing:
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
     _newest: int = 0
 
-    def boot(self) -> None:
-        """Before the links are; PX4 has no memory of what it has heard."""
-        self._streams.clear()
-
     def of_link(self) -> "Signing":
         """For a link that is started now. What all links have heard counts for each."""
         return Signing(self.key, self._streams)

@@ -1,4 +1,4 @@
-"""What each parameter is, and its value, which outlives the vehicle's reboots.
+"""What each parameter is, and its value.
 
 The table `px4.csv` has the facts of PX4's own parameter definitions. Defaults are the ones that a multicopter in PX4's
 simulation has (rc.mc_defaults, init.d-posix/rcS); the few that describe the vehicle itself are laid over them by
@@ -26,8 +26,6 @@ class Definition:
     default: float
     least: float | None
     most: float | None
-    needs_reboot: bool
-    """Whether a new value counts only after the next reboot."""
 
     def limited(self, value: float) -> float:
         """``value`` within the range that PX4 states for it; NaN and what has no end become the default."""
@@ -57,7 +55,6 @@ def _definition(row: dict[str, str]) -> Definition:
         default=number(row["default"]),
         least=number(row["min"]) if row["min"] else None,
         most=number(row["max"]) if row["max"] else None,
-        needs_reboot=row["needs_reboot"] == "yes",
     )
 
 
@@ -75,7 +72,7 @@ def time_outs_at(speed: float) -> dict[str, float]:
 class Parameters(dict[str, float]):
     """``parameters["MPC_XY_P"]`` is the value that counts now, in PX4's unit; whole numbers are of type int.
 
-    A dict, so that reading costs nothing; it is changed by `set` and `boot` alone. PX4 stores whatever number it is
+    A dict, so that reading costs nothing; it is changed by `set` alone. PX4 stores whatever number it is
     sent. So does this store (`stored`), but what counts is kept within the range that PX4 states: no code behind it
     was written for more.
     """
@@ -107,29 +104,19 @@ class Parameters(dict[str, float]):
         return self._stored[name]
 
     def set(self, name: str, value: float) -> None:
-        """Store ``value``; it counts at once, or after the next reboot where PX4 needs one."""
+        """Store ``value``; it counts at once."""
         row = self._definitions[name]
         stored = int(value) if row.is_whole else value
         if stored != self._stored[name]:
             self.sets += 1
             self._last_set[name] = self.sets
         self._stored[name] = stored
-        if not row.needs_reboot:
-            self._make_count(row)
+        # A default of the airframe may lie outside PX4's range, which is meant for PX4's own control.
+        counts = stored if stored == self.defaults[name] else row.limited(stored)
+        if counts != self[name]:
+            self[name] = counts
+            self.changes += 1
 
     def set_after(self, sets: int) -> list[str]:
         """The names whose stored value has changed since `sets` was that number."""
         return sorted(name for name, at in self._last_set.items() if at > sets)
-
-    def boot(self) -> None:
-        """Let the values count that were waiting for a reboot."""
-        for row in self._definitions.values():
-            self._make_count(row)
-
-    def _make_count(self, row: Definition) -> None:
-        # A default of the airframe may lie outside PX4's range, which is meant for PX4's own control.
-        stored = self._stored[row.name]
-        value = stored if stored == self.defaults[row.name] else row.limited(stored)
-        if value != self[row.name]:
-            self[row.name] = value
-            self.changes += 1

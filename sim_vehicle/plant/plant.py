@@ -78,8 +78,6 @@ class Plant:
         self._state_box = boxed(self.state)
         self._constants_box, self._disturbance_box = boxed(self._constants), boxed(self.disturbance)
         self._scratch_box = boxed(new_record(Scratch))
-        self.booted_at_us = 0
-        """Of the body's clock: where that of the samples begins."""
         self.truth = TruthRecorder(keeps_path, airframe.rotor_count)
         self.faults: Faults | None = None
         self._new_faults = partial(Faults, airframe=airframe, wind_ned_m_s=scene.wind_ned_m_s, seed=seed)
@@ -90,15 +88,6 @@ class Plant:
         """Change gains and limits of the inner loops, by their names in `Gains`."""
         for name, value in gains.items():
             self._constants_box[name] = value
-
-    def take_over(self, other: "Plant") -> None:
-        """Go on where ``other`` is, as the same body with other software or another inertial sensor."""
-        np.copyto(self._state_box, other._state_box)
-        self._around = other._around
-        self.truth, self.faults = other.truth, other.faults
-        np.copyto(self._disturbance_box, other._disturbance_box)
-        if self.onboard is not None and other.onboard is not None:
-            self.onboard.start(self.state.body, self.state.time_us)
 
     @property
     def constants(self) -> Constants:
@@ -223,7 +212,7 @@ class Plant:
         qw, qx, qy, qz, ax, ay, az, thrust, *motors = others
         resets = 0 if onboard is None else onboard.reset_counter
         return Estimate(
-            int(report[0]) - self.booted_at_us,
+            int(report[0]),
             (fx, fy, fz),
             (p, q, r),
             (int(clip_x), int(clip_y), int(clip_z)),

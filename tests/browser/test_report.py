@@ -13,6 +13,7 @@ from bench.pictures import FRAME_S, write_animation
 from rebound_cli.report import content as report_content
 from rebound_cli.report.page import page, write_page
 from tests.browser.opened_page import drawn_share, line_share, pixels
+from tests.rebound_cli.command import run_here
 from tests.rebound_cli.report.test_page import HOSTILE
 
 _OVERVIEWS = "overviews().map((one) => ({ title: one.title, columns: one.columns() }))"
@@ -148,6 +149,19 @@ def test_downloads_hold_all_rows_with_their_units(shown, flight):
     header, *rows = saved(shown, "wall-imu.csv").splitlines()
     assert header.startswith("t [s],boot [s],fx [m/s2]") and len(rows) == len(flight.log.imu_at_us)
     assert json.loads(saved(shown, "wall-summary.json")) == json.loads(json.dumps(flight.summary))
+
+
+def test_a_mission_that_is_checked_is_shown_before_it_is_flown(opened, tmp_path):
+    # Given one in a room, and one whose way is closed
+    assert run_here("check", "patrol", "blocked", "--out", tmp_path).returncode == 0
+    for name in ("patrol", "blocked"):
+        with opened((tmp_path / f"{name}.html").as_uri()) as shown:
+            assert drawn_share(shown.scene()) > 0.01 and shown.complaints == []
+            there = shown.text("#readout")
+            shown.page.locator("#scrubber").fill("8")
+            assert shown.text("#readout") != there and "north" in there
+            assert [title for title, chart in shown.charts() if line_share(chart) < LINE] == []
+            assert not shown.page.locator("#moment-title").is_visible()
 
 
 def test_without_position_nothing_shows_where_it_was(opened, flight, tmp_path):

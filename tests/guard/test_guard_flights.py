@@ -19,7 +19,6 @@ from tests.guard.flying import AttachedFlight
 from tests.guard.flying import GuardedFlight as Air
 
 CLEAR_M = 0.3
-REBOOT = 246
 
 
 def recovering(**changes) -> Air:
@@ -369,7 +368,7 @@ def test_a_guard_on_the_ground_does_not_go_in_while_the_link_is_slow():
     assert air.time_s > 26.0
 
 
-# --- a vehicle that is restarted by its own reboot, on the ground
+# --- a vehicle that is restarted on the ground
 
 
 @pytest.mark.slow
@@ -381,7 +380,7 @@ def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_
     monitor = air.guard.core.reflex.monitor
     monitor.state = replace(monitor.state, phase=Phase.CONTACT, last_loud_boot_us=10**12)
     # When the vehicle is restarted, and sends what it sends by default
-    air.command(REBOOT, 1)
+    air.restart_vehicle()
     air.run_to(State.CONNECTING, 8.0)
     assert air.told("link") == ["the vehicle was silent: its streams are asked for again"]
     # Then it is asked again, and its detector begins anew

@@ -46,7 +46,7 @@ def client() -> Client:
         (REQUEST_MESSAGE, (65,), [DENIED]),
         (241, (1,), [UNSUPPORTED]),
         (REBOOT, (0,), [ACCEPTED]),
-        (REBOOT, (2,), [DENIED]),
+        (REBOOT, (1,), [DENIED]),
         (401, (1,), [ACCEPTED]),
         (12345, (), [UNSUPPORTED]),
         (203, (), []),
@@ -81,58 +81,6 @@ def test_modes_in_which_nobody_can_arm(client, custom):
     assert results(client, ARM_DISARM, 1) == [TEMPORARILY_REJECTED]
     # Force changes nothing
     assert results(client, ARM_DISARM, 1, 21196) == [TEMPORARILY_REJECTED]
-
-
-def reboot(client: Client) -> None:
-    assert results(client, REBOOT, 1) == [ACCEPTED]
-    client.run(0.5)
-    client.forget()
-
-
-def test_a_reboot_is_silent_for_a_while_and_begins_anew(client):
-    client.command(SET_INTERVAL, 105, 4_000)
-    client.command(SET_MODE, 1, 1)
-    client.run(1.0)
-    reboot(client)
-    client.run(1.5)
-    assert client.received == []
-    client.run(2.0)
-    assert client.last("HEARTBEAT").custom_mode == 0x03040000
-    # Its clock began anew, the wall's did not
-    clock = client.last("SYSTEM_TIME")
-    assert 500 < client.all("ATTITUDE")[0].time_boot_ms + 500 < 1_000 < clock.time_boot_ms < 2_000
-    assert clock.time_unix_usec == pytest.approx(1e6 * client.time_s, abs=1e6)
-    assert 50 < len(client.all("HIGHRES_IMU")) < 100
-
-
-def test_no_reboot_while_armed(client):
-    results(client, ARM_DISARM, 1)
-    assert results(client, REBOOT, 1) == [DENIED]
-
-
-def test_parameters_outlive_a_reboot_and_some_count_only_then(client):
-    link = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
-    for name, whole in (("MAV_SYS_ID", 42), ("IMU_INTEG_RATE", 400)):
-        message = dialect.MAVLink_param_set_message(1, 1, name.encode(), 0.0, 6)
-        client.push(message._pack(link, message.crc_extra, _whole_set(name, whole)))
-    client.run(1.1)
-    assert client.last("HEARTBEAT").get_srcSystem() == 1
-    reboot(client)
-    client.run(4.0)
-    assert client.last("HEARTBEAT").get_srcSystem() == 42
-    assert client.vehicle.interval_us == 2_500
-    client.forget()
-    client.command(SET_INTERVAL, 105, 1_000, target=(42, 1))
-    begun_s = client.time_s
-    for _ in range(4_000):
-        client.step()
-    imu = client.all("HIGHRES_IMU")
-    assert len(imu) / (client.time_s - begun_s) == pytest.approx(395, abs=5)
-    assert imu[-1].zacc == pytest.approx(-9.8, abs=1.5)
-
-
-def _whole_set(name: str, whole: int) -> bytes:
-    return whole.to_bytes(4, "little", signed=True) + bytes([1, 1]) + name.encode().ljust(16, b"\0") + bytes([6])
 
 
 def test_set_mode_the_message_is_answered_once(client):

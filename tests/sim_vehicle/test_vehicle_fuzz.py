@@ -23,7 +23,6 @@ def state(client: Client) -> tuple:
         autopilot.arming.armed,
         parameters.sets,
         autopilot.navigator.view.home_ned_m,
-        autopilot.wants_reboot,
     )
 
 

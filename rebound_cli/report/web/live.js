@@ -4,7 +4,6 @@
 const ENDS = ["done", "aborted", "failed"];
 
 function goLive({ player, scene, scrubber, overview }) {
-  for (const part of ["h-moments", "h-link"]) document.querySelector(`[aria-labelledby="${part}"]`).hidden = true;
   byId("h-replay").textContent = "Live";
   const headline = byId("sentence");
   // Who looks back stays there, until the end of the scrubber is reached again.

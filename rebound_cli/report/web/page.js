@@ -107,6 +107,7 @@ function start() {
   byId("name").textContent = flight.name;
   byId("sentence").textContent = flight.sentence;
   byId("lines").append(...flight.lines.map((line) => element("li", line)));
+  for (const part of flight.hides || []) document.querySelector(`[aria-labelledby="${part}"]`).hidden = true;
   addRows(byId("link"), flight.link);
   addAbout();
 

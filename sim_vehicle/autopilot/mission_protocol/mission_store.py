@@ -1,4 +1,4 @@
-"""The uploaded mission, geofence and rally points: one store a vehicle, which outlives its reboots."""
+"""The uploaded mission, geofence and rally points: one store a vehicle."""
 
 from dataclasses import dataclass, field
 

@@ -28,8 +28,6 @@ class Board:
     signing: Signing
     interval_us: int
     """Of the inertial samples, and so of the vehicle's steps."""
-    booted_at_us: int = 0
-    """When its clock began, of the clock by which faults come and go."""
 
 
 class Channel(Protocol):

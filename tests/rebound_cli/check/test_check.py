@@ -4,20 +4,18 @@ import functools
 import json
 
 import jsonschema
-import matplotlib.image
 import numpy as np
 import pytest
 import yaml
-from matplotlib.figure import Figure
 
-from rebound_cli.check.ground import draw_obstacles, footprint
 from rebound_cli.check.legs import flown_legs
-from rebound_cli.check.picture import ends
+from rebound_cli.check.page import planned_flight
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.documents import parse_document
 from rebound_cli.inputs import mission_from, world_from
-from sim_vehicle.scene import Scene
+from rebound_cli.report.content import content
 from tests.rebound_cli.command import ROOT, WALL, run_here
+from tests.rebound_cli.report.opened import Opened
 
 SCHEMA = ROOT / "missions" / "schema.json"
 MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))
@@ -57,8 +55,6 @@ items:
     ]
     assert [flown.length_m for flown in legs] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
     assert legs[-1].ends_s is None, "nobody knows how long the wait is"
-    # and in the picture each place where a way ends has the item's number, once however often it is flown
-    assert ends([*legs, *legs]) == {(0.0, 0.0): ["1"], (4.0, 0.0): ["2"]}
 
 
 def test_what_stands_in_the_way_is_named_with_the_place():
@@ -108,29 +104,41 @@ sim:
     assert met[4][0] == pytest.approx(-10.5 - 0.2, abs=0.15)
 
 
-def test_a_moving_obstacle_is_drawn_where_it_begins_and_ends_with_its_way_between():
-    box = {"centre_ned_m": [-5, 0, -2], "size_m": [0.6, 1, 1]}
-    motion = {"velocity_ned_m_s": [1.5, 0.5, 0], "from_s": 12, "until_s": 14}
-    axis = Figure().subplots()
-    draw_obstacles(axis, Scene.model_validate({"boxes": [{**box, "motion": motion}]}), np.zeros(3), "obstacles", 0.7)
-    middles = [patch.get_xy()[:-1].mean(axis=0).tolist() for patch in axis.patches]
-    # east first: 2 s later it is 3 m north and 1 m east
-    assert np.ptp(middles, axis=0).tolist() == pytest.approx([1.0, 3.0])
-    assert [text.get_text() for text in axis.texts] == ["", "12 s", "14 s"]
-
-
-def test_obstacles_seen_from_above():
-    scene = Scene.model_validate(
-        {
-            "walls": [{"point_ned_m": [4, 0, -2], "normal_ned": [-1, 0, 0], "width_m": 4, "thickness_m": 0.2}],
-            "poles": [{"point_ned_m": [1, 2, 0], "radius_m": 0.5}],
-            "boxes": [{"centre_ned_m": [0, 0, -1], "size_m": [2, 1, 1], "yaw_deg": 90}],
-        }
+def test_a_page_shows_the_way_in_the_world_and_what_moves_in_it_from_arming_on():
+    # Given a start beside the world's origin, an obstacle that moves, and a patch that an earlier flight has found
+    document = parse_document(
+        """
+name: t
+items:
+  - takeoff: {height_m: 2}
+  - go_to: {position_ned_m: [4, 0, -2], speed_m_s: 2}
+  - wait_for: {file: go}
+  - land:
+obstacles: {known: [{touches_ned_m: [[3, 1, -1]], normal_ned: [0, -1, 0], found_at_us: 9000000000}]}
+sim:
+  start: {position_ned_m: [1, 2, 0]}
+  boxes:
+    - name: cart
+      centre_ned_m: [-5, 0, -2]
+      size_m: [0.6, 1, 1]
+      motion: {velocity_ned_m_s: [1.5, 0.5, 0], from_s: 12, until_s: 14}
+""",
+        "t.yaml",
     )
-    corners = [footprint(obstacle) for _, obstacle in scene.obstacles()]
-    spans = [np.ptp(outline, axis=0) for outline in corners]
-    assert np.allclose(spans[0], [0.2, 4.0]) and np.allclose(spans[1], [1.0, 1.0]) and np.allclose(spans[2], [1.0, 2.0])
-    assert np.allclose((corners[1].min(axis=0) + corners[1].max(axis=0)) / 2, [1.0, 2.0])
+    world = world_from(document)
+    mission = mission_from(document, world)
+    flight = planned_flight(mission, world, flown_legs(mission, world))
+    shown, log, stands_m = content(flight), flight.log, world.airframe.geometry.foot_depth_m
+    seconds = flight.seconds(log.position_at_us)
+    # up in 3 s, 3.5 s there, a wait that is drawn for 5 s, and down where it is
+    assert np.interp([0.0, 3.0, 6.5, 11.5], seconds, log.position_ned_m[:, 0]) == pytest.approx([1, 1, 5, 5], abs=1e-6)
+    assert np.interp([0.0, 3.0, 11.5], seconds, -log.position_ned_m[:, 2]) == pytest.approx(
+        [stands_m, 2 + stands_m, 2 + stands_m], abs=1e-6
+    )
+    assert log.position_ned_m[-1] == pytest.approx([5, 2, -stands_m]) and max(log.velocity_ned_m_s[:, 0]) > 1.9
+    (cart,), (known,) = shown["obstacles"], shown["surfaces"]
+    assert cart["motion"]["t"] == [12.0, 14.0] and cart["motion"]["offsets"][-1] == pytest.approx([3.0, 1.0, 0.0])
+    assert np.mean(known["corners"], axis=0)[1] == pytest.approx(3.0)
 
 
 def test_a_person_reads_what_would_be_flown(tmp_path):
@@ -138,11 +146,13 @@ def test_a_person_reads_what_would_be_flown(tmp_path):
     assert result.returncode == 0, result.stderr
     for words in ("go to [7.00, 0.00, -1.50]", "7.0 m", "meets 'north wall'", "in all 15.5 m in 21 s", "Fence"):
         assert words in result.stdout
-    picture = matplotlib.image.imread(tmp_path / "wall.png")
-    assert picture.shape[0] > 500 and picture.std() > 0.05
+    page = Opened((tmp_path / "wall.html").read_text())
+    assert [name for _, name in page.data["modes"]][1] == "2 go to [7.00, 0.00, -1.50] at 2 m/s, heading 0 deg"
+    assert [event["text"] for event in page.data["events"] if event["kind"] == "meets"] == ["north wall", "north wall"]
+    assert len(page.table("path")["t"]) > 100
 
 
-def test_neither_a_wrong_file_nor_a_picture_that_cannot_be_written_hides_another_mission(tmp_path):
+def test_neither_a_wrong_file_nor_a_page_that_cannot_be_written_hides_another_mission(tmp_path):
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text("name: wrong\nitems:\n  - takeoff: {height: 1}\n  - land:\n")
     result = run_here("check", wrong, WALL, "--no-picture", "--set", "on_interrupt=land")
@@ -150,7 +160,7 @@ def test_neither_a_wrong_file_nor_a_picture_that_cannot_be_written_hides_another
     assert f"{wrong}:3: items.0.takeoff.height: unknown key" in result.stderr and "Traceback" not in result.stderr
     assert "hand the vehicle to land" in result.stdout
     assert run_here("check").returncode == 1
-    # Given a file where the folder of the pictures is to be, both missions are told, and both pictures that nobody has
+    # Given a file where the folder of the pages is to be, both missions are told, and both pages that nobody has
     result = run_here("check", WALL, ROOT / "missions" / "square.yaml", "--out", wrong)
     assert result.returncode == 1 and "in all 15.5 m" in result.stdout and "square:" in result.stdout
     assert [line.endswith("cannot be written: File exists.") for line in result.stderr.splitlines()] == [True, True]

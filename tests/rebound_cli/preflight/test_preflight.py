@@ -8,7 +8,6 @@ import pytest
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.mission.config import CompanionConfig
 from companion.preflight import Preflight, findings
-from rebound_cli.preflight.card import card
 from rebound_cli.preflight.command import serial_line
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
@@ -76,15 +75,6 @@ def test_what_the_line_goes_through_is_read_where_linux_tells_it(tmp_path):
     assert serial_line("serial:///dev/ttyAMA0:921600", tmp_path) == SerialLine(921_600, None)
     assert serial_line("serial:///dev/ttyACM0:57600", tmp_path) == SerialLine(None, None)
     assert serial_line("udpin://0.0.0.0:14540", tmp_path) is None
-
-
-def test_the_card_of_the_first_flight_has_what_was_found_and_fits_a_page():
-    preflight, _ = surveyed()
-    lines = card(preflight.survey, findings(preflight.survey), "serial:///dev/ttyAMA0:921600").splitlines()
-    assert len(lines) < 66 and max(map(len, lines)) <= 100
-    text = "\n".join(lines)
-    assert "quadrotor, battery 100 %" in text and "Link serial:///dev/ttyAMA0:921600" in text
-    assert "[ ] look: COM_OBL_RC_ACT" in text and "PX4 acts 0.3 s later (COM_OF_LOSS_T): position" in text
 
 
 def test_a_remedy_that_is_taken_is_taken_by_the_vehicle():

@@ -100,25 +100,6 @@ def test_the_truth_is_neither_late_nor_noisy() -> None:
     assert path["time_boot_us"][-1] == round(1e6 * truth.time_boot_s)
 
 
-def test_what_was_changed_outlives_a_reboot_with_another_inertial_sensor() -> None:
-    pilot = Pilot(LockstepVehicle())
-    pilot.vehicle.place(Wall(point_ned_m=(0.6, 0, 0), normal_ned=(-1, 0, 0), name="gate"))
-    pilot.vehicle.inject(faults.sensor_dropout())
-    pilot.vehicle.advance(0.5)
-    from pymavlink.dialects.v20 import development as dialect
-
-    rate = np.array([200], np.int32).view(np.float32)[0]
-    pilot.send(dialect.MAVLink_param_set_message(1, 1, b"IMU_INTEG_RATE", float(rate), 6))
-    pilot.command(246, 1)
-    pilot.fly(4.0)
-    pilot.forget()
-    pilot.fly(1.0)
-    assert not pilot.all("HIGHRES_IMU") and pilot.all("ATTITUDE")
-    pilot.take_off()
-    pushed_north(pilot)
-    pilot.vehicle.advance_until(lambda truth: truth.hits, 4.0)
-
-
 def test_bad_setups_are_one_sentence() -> None:
     with pytest.raises(AirframeError, match="no airframe is called 'paper'"):
         LockstepVehicle(airframe="paper")
