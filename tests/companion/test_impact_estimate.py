@@ -113,3 +113,13 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():
     assert final.impulse_m_s == pytest.approx(1.5, abs=0.05)
     assert not final.is_lower_bound
     assert final.is_fully_measured
+
+
+@pytest.mark.parametrize(("hides_clipping", "least_deg", "most_deg"), [(False, 30.0, 40.0), (True, 5.0, 15.0)])
+def test_the_normal_is_less_by_a_force_whose_clipping_is_hidden(hides_clipping, least_deg, most_deg):
+    # Given a vehicle that flies north, and a first force that pushes it south-west
+    estimator = approaching()
+    estimator.hides_clipping = hides_clipping
+    n, e, _ = estimator.begin(Impact(CONTACT_US + 4_000, CONTACT_US, (-20.0, -20.0, 0.0))).normal.direction_ned
+    # Then the normal lies between the two, nearer to the surer one
+    assert least_deg < math.degrees(math.atan2(-e, -n)) < most_deg

@@ -7,7 +7,7 @@ import pytest
 
 from companion.flight.context import Inputs
 from companion.messages import Attitude, LocalPosition
-from companion.motion.config import SAME_M_S
+from companion.motion.config import CURRENT_US, SAME_M_S
 from companion.motion.strapdown import Strapdown
 from companion.reflex.config import TILT_PER_S, EstimateConfig
 from companion.reflex.laws import Contact
@@ -21,9 +21,9 @@ PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)
 WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 
-def reckoned(velocity=(2.0, 0.0, 0.0), normal=SOUTH, restitution=0.2, is_second=False, hit_us=HIT_US):
+def reckoned(velocity=(2.0, 0.0, 0.0), normal=SOUTH, restitution=0.2, is_second=False, hit_us=HIT_US, fits=True):
     contact = Contact(hit_us, AT, velocity, normal)
-    return MotionEstimator(contact, hit_us, contact.rebound(restitution), EstimateConfig(), is_second)
+    return MotionEstimator(contact, hit_us, contact.rebound(restitution), EstimateConfig(), is_second, fits)
 
 
 def said(north_m_s, since_us=60_000, position=AT):
@@ -43,12 +43,12 @@ def missing(since_s, late_s, rad_s, damping):
     return velocity, place
 
 
-def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1):
+def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1, fits=True):
     """Since the hit, s; true velocity; told velocity; reckoning: after each that a vehicle tells, noise included."""
     draw = random.Random(seed)
     after_m_s = -restitution * speed_m_s
     hidden_m_s = hides * (speed_m_s - after_m_s)
-    found = reckoned((speed_m_s, 0.0, 0.0), restitution=0.45)
+    found = reckoned((speed_m_s, 0.0, 0.0), restitution=0.45, fits=fits)
     strapdown, noise = Strapdown(), [0.0, 0.0]
     for tick in range(1, round(until_s / 0.004)):
         strapdown.time_boot_us = HIT_US + 4_000 * tick
@@ -92,6 +92,12 @@ def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into
     assert right_s < 0.5
     lost_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, until_s=2.0) if found.has_converged)
     assert lost_s > 0.9
+
+
+def test_an_autopilot_whose_estimate_follows_no_model_is_believed_once_its_receiver_could_have_spoken():
+    runs = (followed(PX4, 2.0, 0.5, hides=0.0, fits=fits) for fits in (True, False))
+    by_model_s, later_s = (next(since_s for since_s, _, _, found in run if found.has_converged) for run in runs)
+    assert by_model_s < 1e-6 * CURRENT_US < later_s
 
 
 @pytest.mark.parametrize("way", WAYS)

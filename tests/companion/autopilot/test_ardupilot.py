@@ -90,8 +90,10 @@ def test_a_hit_is_found_and_flown_away_from_and_the_crash_check_is_in_force_afte
 def test_no_hit_that_is_seen_through_a_filter_counts_as_measured_whole(vehicle, may_be_whole):
     f = flight(vehicle(wall_north_m=3.0), items=[TAKEOFF, INTO_WALL, LANDING])
     f.run_until(lambda: any(event.kind == "detection" for event in f.events))
-    contact = f.companion.core.reflex.monitor.estimator.contact
-    assert contact.is_clipped is not may_be_whole
+    reflex = f.companion.core.reflex
+    assert reflex.monitor.estimator.contact.is_clipped is not may_be_whole
+    # And no model of PX4's estimator says when the vehicle's own velocity is right again
+    assert reflex.hits[-1].estimator.fits_models is may_be_whole
 
 
 # --- by attitude

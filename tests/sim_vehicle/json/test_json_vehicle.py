@@ -7,6 +7,9 @@ from itertools import pairwise
 
 import pytest
 
+from companion.autopilot.ardupilot.setup import judge_parameters
+from companion.autopilot.setup import Setup, Verdict
+from companion.reflex.config import MOST_HELD_S
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import AirframeError
 from sim_vehicle.json.messages import Pulses, pulses_from
@@ -102,3 +105,12 @@ def test_the_file_has_a_name_and_a_number_a_line_and_reasons_between() -> None:
     assert all(map(math.isfinite, values.values()))
     assert values["GUID_OPTIONS"] == 8
     assert values["MOT_THST_HOVER"] == pytest.approx(FOLDABLE.hover_fraction, rel=1e-4)
+
+
+@pytest.mark.parametrize("airframe", ["foldable", "rigid", "racer"])
+def test_the_file_has_what_preflight_asks_for(airframe: str) -> None:
+    told = {parameter.name: parameter.value for parameter in ardupilot_parameters(load_built_in(airframe))}
+    setup = Setup(told, None, "quadrotor", 0.145, 0.08, 0.005, MOST_HELD_S)
+    found = {item.item: item.verdict for item in judge_parameters(setup) if item.item in told}
+    assert {"GUID_TIMEOUT", "GUID_OPTIONS", "ATC_RATE_FF_ENAB", "FENCE_ENABLE", "ATC_ANGLE_MAX"} <= set(found)
+    assert set(found.values()) == {Verdict.GOOD}
