@@ -78,10 +78,10 @@ class Stepped(ABC, Generic[CoreT]):
         """Whether the vehicle has to be told something if this program dies while it flies by attitude."""
         return self._core is not None and not self._core.flight.vehicle.autopilot.stops_alone
 
-    def last_word(self) -> bytes:
-        """What that is now; empty for nothing."""
-        word = None if self._core is None else self._core.last_word
-        return b"" if word is None else self._encoder.unsent(word)
+    def last_words(self) -> list[tuple[float, bytes]]:
+        """What that is now, each so many seconds later."""
+        words = () if self._core is None else self._core.last_words
+        return [(later_s, self._encoder.unsent(word)) for later_s, word in words]
 
     def next_deadline_us(self) -> int:
         """When `step(b"", now)` is due if nothing arrives before; in the past when it is due at once."""

@@ -35,7 +35,7 @@ from companion.mission.model import Mission
 from companion.motion.resets import Resets
 from companion.motion.vector import ZERO, plus
 from companion.reflex.collision import CollisionReport
-from companion.reflex.config import HELD_S, NOTICED_S
+from companion.reflex.config import HELD_S, LEAD_S, NOTICED_S
 from companion.reflex.detector import Situation
 from companion.reflex.impact import ImpactEstimate
 from companion.reflex.reflex import start_reflex
@@ -256,17 +256,27 @@ class Core(ABC, Generic[FlightT, MachineT]):
                 self.flight.report(now_us, "command", outcome.text)
 
     @property
-    def last_word(self) -> Outgoing | None:
-        """For a vehicle that would drift if this program died now: a place away from what it has hit."""
+    def last_words(self) -> tuple[tuple[float, Outgoing], ...]:
+        """For a vehicle that would drift if this program died now, each so many seconds later: an attitude that leans
+        away from what it has hit, and a place away from it.
+
+        Copter begins the way to a place with the velocity that it believes, and with its attitude as what a level
+        flight takes. So the place waits until the first is right, and the lean makes the second right.
+        """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest(), self.flight.target
         if not self._leans or flight.vehicle.autopilot.stops_alone or latest is None:
-            return None
+            return ()
         if target is None or target.lean is None:
-            return None  # it goes by a position from the next setpoint on
-        n, e, _ = plus(latest.position_ned_m, AWAY_M, target.lean.surfaces[0].normal_ned)
+            return ()  # it goes by a position from the next setpoint on
+        normal, now_us = target.lean.surfaces[0].normal_ned, self.now_us - self.started_at_us
+        n, e, _ = plus(latest.position_ned_m, AWAY_M, normal)
         place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
         kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
-        return self.resets.sent(PositionSetpoint(self.now_us - self.started_at_us, kept.position_ned_m, None))
+        since_s = 1e-6 * (self.reflex.sample_boot_us - self.reflex.hits[-1].sample_time_boot_us)
+        later_s = max(0.0, MISLED_S - since_s)
+        lean = target.lean.setpoint(now_us, plus(ZERO, AWAY_M_S2, (normal[0], normal[1], 0.0)))
+        words = ((later_s, lean), (later_s + LEAD_S, PositionSetpoint(now_us, kept.position_ned_m, None)))
+        return tuple((at_s, self.resets.sent(word)) for at_s, word in words)
 
     @property
     def finished(self) -> bool:
@@ -375,6 +385,10 @@ class FlightCore(Core[FlightContext, Machine]):
 # From the vehicle to the place of the last word. By a tilt that a hit has left wrong by 8 degrees a vehicle at rest
 # drifts 2 m towards the obstacle before Copter turns it.
 AWAY_M = 4.0
+# Copter's velocity is wrong by up to 7 m/s after a clipped hit, and by less than 1 m/s from so long after it on.
+MISLED_S = 0.8
+# What its tilt is wrong by then, 9 degrees, moves a vehicle by that is level by its own attitude.
+AWAY_M_S2 = 1.5
 # A setpoint at the edge of the envelope may cross it fifty times a second.
 LEAST_BETWEEN_LIMITS_US = 1_000_000
 

@@ -48,6 +48,8 @@ class Strapdown:
     """
     level_acceleration_m_s2: Vector3 = ZERO
     """Horizontal acceleration, NED, of a vehicle that is level by its reported attitude; zero while that is valid."""
+    sinks_m_s2: float = 0.0
+    """By how much less than by its reported attitude a thrust of 1 g lifts; zero while that is valid."""
     fixes: deque[VelocityFix] = field(default_factory=deque)
     """Velocities without a restart of the integral or a reset of the estimator between them, the newest last."""
     has_new_fix: bool = False
@@ -62,9 +64,11 @@ class Strapdown:
             attitude_wxyz = turned(attitude_wxyz, self.rates_frd_rad_s, 1e-6 * behind_us)
         n, e, d = body_to_ned(self.valid_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
         if not most_wrong_rad or -d < math.cos(most_wrong_rad):
-            self.valid_wxyz, self.level_acceleration_m_s2 = attitude_wxyz, ZERO
+            self.valid_wxyz, self.level_acceleration_m_s2, self.sinks_m_s2 = attitude_wxyz, ZERO, 0.0
         else:
             self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
+            told, valid = (body_to_ned(each, (0.0, 0.0, 1.0))[2] for each in (attitude_wxyz, self.valid_wxyz))
+            self.sinks_m_s2 = GRAVITY_M_S2 * (told - valid)
 
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> None:
         """Integrate one sample (body FRD); a gap restarts the integral."""

@@ -56,6 +56,7 @@ class MotionEstimator:
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
+    _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
     _bank: FilterBank | None = None  # from the first report on
@@ -107,7 +108,7 @@ class MotionEstimator:
         self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
         if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
             # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
-            self.level_m_s2 = strapdown.level_acceleration_m_s2
+            self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
         self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
         if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
@@ -199,6 +200,9 @@ class MotionEstimator:
         bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
         # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
         level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
+        if not self.fits_models:
+            # By a wrong tilt a vehicle that leans reports a climb that there is none of. PX4 was flown without this.
+            level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
         bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
         self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
         g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))

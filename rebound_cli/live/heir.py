@@ -1,7 +1,7 @@
-"""A process beside the companion that says its last word when the companion is no more.
+"""A process beside the companion that says its last words when the companion is no more.
 
-It has nothing but that word: the packet, and a duplicate of the descriptor that it would have gone by. The channel
-between the two closes when the companion ends, however it ends.
+It has nothing but these words, each with its time, and a duplicate of the descriptor that they would have gone by. The
+channel between the two closes when the companion ends, however it ends.
 """
 
 import json
@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -31,33 +32,30 @@ class Heir:
         command = [sys.executable, "-I", "-S", __file__, str(its.fileno())]
         self._process = subprocess.Popen(command, pass_fds=[its.fileno()], start_new_session=True)
         its.close()
-        self._has_word = False
+        self._has_words = False
 
-    def hear(self, word: bytes, connection: "Connection") -> None:
-        """The newest word, empty for none. Nobody is waited for, and nothing is raised."""
-        way = connection.way(word) if word else None
-        if way is None and not self._has_word:
+    def hear(self, words: Sequence[tuple[float, bytes]], connection: "Connection") -> None:
+        """The newest words, each so many seconds after the end. Nobody is waited for, and nothing is raised."""
+        ways = [(later_s, way) for later_s, word in words if (way := connection.way(word)) is not None]
+        if not ways and not self._has_words:
             return
-        self._has_word = way is not None
+        self._has_words = bool(ways)
+        said = json.dumps([[later_s, way.packet.hex(), way.address] for later_s, way in ways]).encode()
         with suppress(OSError):
-            if way is None:
-                self._channel.send(b"null")
-            else:
-                said = json.dumps([way.packet.hex(), way.address]).encode()
-                socket.send_fds(self._channel, [said], [way.descriptor])
+            socket.send_fds(self._channel, [said], [way.descriptor for _, way in ways[:1]])
 
     def close(self) -> None:
         """The companion ends by itself: there is no word."""
         self._channel.setblocking(True)
         with suppress(OSError):
-            self._channel.send(b"null")
+            self._channel.send(b"[]")
         self._channel.close()
         self._process.wait()
 
 
 def serve(channel: socket.socket) -> None:
-    """Hear words until the companion has ended, and say the last one."""
-    word: list[Any] | None = None  # a packet and where it goes
+    """Hear words until the companion has ended, and say the last ones."""
+    words: list[tuple[float, str, Any]] = []
     descriptor = -1
     while True:
         said, descriptors, _, _ = socket.recv_fds(channel, _MOST_BYTES, 1)
@@ -65,15 +63,21 @@ def serve(channel: socket.socket) -> None:
             break
         if descriptor >= 0:
             os.close(descriptor)
-        word, descriptor = json.loads(said), descriptors[0] if descriptors else -1
-    packet, address = word or ("", None)
-    for _ in range(TIMES if packet else 0):
-        with suppress(OSError):
-            if address is None:
-                os.write(descriptor, bytes.fromhex(packet))
-            else:
-                socket.socket(fileno=os.dup(descriptor)).sendto(bytes.fromhex(packet), tuple(address))
-        time.sleep(APART_S)
+        words, descriptor = json.loads(said), descriptors[0] if descriptors else -1
+    ended_s = time.monotonic()
+    for later_s, packet, address in words:
+        time.sleep(max(0.0, ended_s + later_s - time.monotonic()))
+        for _ in range(TIMES):
+            _say(bytes.fromhex(packet), descriptor, address)
+            time.sleep(APART_S)
+
+
+def _say(packet: bytes, descriptor: int, address: Any) -> None:
+    with suppress(OSError):
+        if address is None:
+            os.write(descriptor, packet)
+        else:
+            socket.socket(fileno=os.dup(descriptor)).sendto(packet, tuple(address))
 
 
 if __name__ == "__main__":

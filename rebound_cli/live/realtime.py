@@ -211,7 +211,7 @@ class Loop:
         if self.heir is None and self.stepped.leaves_word:
             self.heir = Heir()
         if self.heir is not None:
-            self.heir.hear(self.stepped.last_word(), self.connection)
+            self.heir.hear(self.stepped.last_words(), self.connection)
 
     def _status_text(self) -> str:
         _, *fields = state_fields(self.stepped.status(), 0.0, self.heard.text(self.now_us or 0))

@@ -50,6 +50,7 @@ def _gains(airframe: Airframe) -> Iterable[Parameter]:
     yaw_rate_per_s = 2 * control.attitude_damping * control.yaw_frequency_rad_s
     yaw_p = yaw_rate_per_s * jz / (thrust_n * motors.moment_per_thrust_m)
     yield Parameter("ATC_RAT_YAW_P", yaw_p, f"rate loop of {yaw_rate_per_s:.0f} 1/s")
+    yield Parameter("ATC_RAT_YAW_PDMX", 0.3, "to brake a turn, the most that leaves enough to lift with")
     yield Parameter("ATC_RAT_YAW_I", yaw_p / 10, "a tenth, as ArduPilot has it")
     yield Parameter("ATC_ANG_YAW_P", control.yaw_frequency_rad_s / (2 * control.attitude_damping), "1/s")
     hover = airframe.hover_fraction

@@ -125,6 +125,36 @@ def test_a_velocity_that_a_wrong_tilt_makes_across_the_hit_is_no_motion(way):
             assert not found.has_converged or abs(right.velocity_ned_m_s[1]) < 0.15
 
 
+def test_a_climb_that_a_wrong_tilt_makes_of_a_lean_is_no_motion_of_a_copter():
+    # Given a vehicle that flies level to the south after a hit, and by its wrong tilt takes itself for climbing
+    found, strapdown = reckoned((3.0, 0.0, 0.0), restitution=0.8, fits=False), Strapdown()
+    strapdown.sinks_m_s2, climbs_m_s, climbed_m = 0.5, 0.0, 0.0
+    for tick in range(1, 250):
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+        climbs_m_s += 0.004 * (0.5 - PX4[1] ** 2 * climbed_m)
+        climbed_m += 0.004 * (climbs_m_s - 2.0 * PX4[2] * PX4[1] * climbed_m)
+        if tick % 5 == 0:
+            lacks_m_s, lacks_m = missing(0.004 * tick, *PX4)
+            place = (AT[0] - 2.4 * 0.004 * tick + 5.4 * lacks_m, AT[1], AT[2] - climbed_m)
+            found.update(LocalPosition(strapdown.time_boot_us, place, (-2.4 + 5.4 * lacks_m_s, 0.0, -climbs_m_s)))
+    assert climbs_m_s > 0.05
+    # Then it is known to fly level
+    assert abs(found.motion.velocity_ned_m_s[2]) < 0.02
+
+
+@pytest.mark.parametrize(("told_deg", "flown_deg"), [(0.0, 10.0), (10.0, 20.0), (20.0, 10.0)])
+def test_a_tilt_that_is_told_too_small_lifts_less_than_it_tells(told_deg, flown_deg):
+    told, flown = (math.radians(each) for each in (told_deg, flown_deg))
+    strapdown = Strapdown()
+    strapdown.valid_wxyz = (math.cos(0.5 * flown), 0.0, math.sin(0.5 * flown), 0.0)
+    strapdown.attitude(0, (math.cos(0.5 * told), 0.0, math.sin(0.5 * told), 0.0), math.radians(15.0))
+    assert strapdown.sinks_m_s2 == pytest.approx(9.80665 * (math.cos(told) - math.cos(flown)))
+    # And nothing is left of it once the attitude is valid
+    strapdown.attitude(0, strapdown.valid_wxyz)
+    assert strapdown.sinks_m_s2 == 0.0
+
+
 def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_again():
     found, strapdown = reckoned(), Strapdown()
     for at_us, level_m_s2 in ((4_400_000, 0.9), (5_000_000, 0.0)):

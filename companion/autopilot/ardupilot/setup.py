@@ -32,6 +32,9 @@ LEAST_FILTER_HZ = 20.0
 LEAST_JERK_M_S3 = 5.0
 # With 17 degrees a vehicle brakes by 3 m/s^2; the rest is for wind. Copter's default is 30.
 LEAST_LEAN_DEG, LEAN_DEG = 20.0, 30.0
+# From 4.5 on. Copter's mixer takes from the lift what its loop of the yaw rate asks for: half of a command for each
+# motor. So much leaves a vehicle that a hit has turned as much lift as PX4's mixer does.
+YAW, MOST_YAW = "ATC_RAT_YAW_PDMX", 0.3
 # Names that changed with 4.7, newer before older.
 JERKS, LEANS = ("PSC_JERK_NE", "PSC_JERK_XY"), ("ATC_ANGLE_MAX", "ANGLE_MAX")
 CHECKS = ("ARMING_SKIPCHK", "ARMING_CHECK")
@@ -102,6 +105,11 @@ def _shaping(name: str, enabled: float, setup: Setup) -> PreflightItem:
     return judged(name, found, (enabled != 0.0, DOUBTFUL, f"{name} = 0"), mended=0)
 
 
+def _yaw(name: str, most: float, setup: Setup) -> PreflightItem:
+    found = f"{most:g}: most of what brakes a turn" if most > 0.0 else "off: to brake a turn takes half of the lift"
+    return judged(name, found, (not 0.0 < most <= MOST_YAW, DOUBTFUL, f"{name} = {MOST_YAW:g}"), mended=MOST_YAW)
+
+
 def _fence(name: str, enabled: float, setup: Setup) -> PreflightItem:
     found = "its own fence is " + ("on" if enabled else "off")
     remedy = f"{name} = 0, or a fence that holds all of the mission's and its margin"
@@ -149,7 +157,7 @@ _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     "FENCE_ENABLE": _fence,
     "FS_CRASH_CHECK": _crash_check,
 }
-PARAMETERS = (*_SETTINGS, "FRAME_CLASS", *JERKS, *LEANS, *CHECKS)
+PARAMETERS = (*_SETTINGS, YAW, "FRAME_CLASS", *JERKS, *LEANS, *CHECKS)
 
 
 def asked(line: SerialLine | None) -> tuple[str, ...]:
@@ -165,6 +173,8 @@ def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
     yield from judged_settings(_SETTINGS, setup)
     yield from _renamed(setup)
+    if YAW in setup.parameters:
+        yield from judged_settings({YAW: _yaw}, setup)
 
 
 def sight(seen: Sight) -> PreflightItem:

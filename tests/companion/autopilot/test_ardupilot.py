@@ -14,7 +14,6 @@ from companion.autopilot.interface import Pilot
 from companion.autopilot.known import MODE_NAMES
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
-from companion.core import AWAY_M
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.decode import Decoder
@@ -115,20 +114,34 @@ def leaning(vehicle):
     return f
 
 
-def test_the_last_word_of_a_companion_is_a_place_off_what_was_hit():
+def test_the_last_words_of_a_companion_are_a_lean_and_a_place_off_what_was_hit():
     f = leaning(FakeCopter(wall_north_m=3.0))
     assert f.companion.leaves_word
-    sent = mav.MAVLink(None).decode(bytearray(f.companion.last_word()))
+    (lean_s, lean), (place_s, place) = f.companion.last_words()
+    # Copter's velocity is wrong for 0.8 s, of which 0.1 s have passed, and leaning takes 0.15 s
+    assert (lean_s, place_s) == pytest.approx((0.7, 0.85), abs=0.03)
+    sent = mav.MAVLink(None).decode(bytearray(lean))
+    assert sent.get_type() == "SET_ATTITUDE_TARGET"
+    w, x, y, z = sent.q
+    assert math.degrees(math.asin(2.0 * (w * y - z * x))) == pytest.approx(8.7, abs=1.0)  # 1.5 m/s^2 to the south
+    sent = mav.MAVLink(None).decode(bytearray(place))
     assert sent.get_type() == "SET_POSITION_TARGET_LOCAL_NED" and sent.type_mask & 0x1FF == 0x1F8
-    assert f.vehicle.position[0] - sent.x == pytest.approx(AWAY_M, abs=0.3)
+    # Its wrong tilt moves it by 2 m before it turns
+    assert f.vehicle.position[0] - sent.x == pytest.approx(4.0, abs=0.3)
+
+
+def test_later_in_a_recovery_the_last_words_do_not_wait():
+    f = leaning(FakeCopter(wall_north_m=3.0))
+    f.companion.core.reflex.hits[-1].sample_time_boot_us -= 1_000_000
+    assert [later_s for later_s, _ in f.companion.last_words()] == pytest.approx([0.0, 0.15])
 
 
 def test_no_word_is_left_to_a_px4_or_before_a_hit():
     f = leaning(FakeVehicle(wall_north_m=3.0))
-    assert not f.companion.leaves_word and f.companion.last_word() == b""
+    assert not f.companion.leaves_word and f.companion.last_words() == []
     f = flight(FakeCopter(), items=[TAKEOFF, INTO_WALL, LANDING])
     f.run_to("mission")
-    assert f.companion.leaves_word and f.companion.last_word() == b""
+    assert f.companion.leaves_word and f.companion.last_words() == []
 
 
 def test_no_word_is_left_where_the_next_setpoint_is_a_place():
@@ -137,7 +150,7 @@ def test_no_word_is_left_where_the_next_setpoint_is_a_place():
     shared = f.companion.core.flight
     shared.target = shared.target.at_rest()
     # Then nothing is said, and nothing fails
-    assert f.companion.last_word() == b""
+    assert f.companion.last_words() == []
 
 
 def test_a_word_that_is_not_sent_counts_for_no_packet():
@@ -340,7 +353,14 @@ def test_a_raw_imu_has_milli_units_and_counts_until_the_finer_one_comes():
 # --- preflight
 
 HEALTHY = {"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": 8, "INS_ACCEL_FILTER": 20, "FENCE_ENABLE": 0, "FRAME_CLASS": 1}
-HEALTHY |= {"FS_CRASH_CHECK": 1, "ATC_RATE_FF_ENAB": 0, "PSC_JERK_NE": 5, "ATC_ANGLE_MAX": 30, "ARMING_SKIPCHK": 0}
+HEALTHY |= {
+    "FS_CRASH_CHECK": 1,
+    "ATC_RATE_FF_ENAB": 0,
+    "ATC_RAT_YAW_PDMX": 0.3,
+    "PSC_JERK_NE": 5,
+    "ATC_ANGLE_MAX": 30,
+    "ARMING_SKIPCHK": 0,
+}
 UART = SerialLine(921_600)
 ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
 
@@ -365,6 +385,8 @@ def test_a_healthy_copter_has_nothing_to_mend():
         ({"FENCE_ENABLE": 1}, None, "FENCE_ENABLE", "FENCE_ENABLE = 0"),
         ({"FS_CRASH_CHECK": 0}, None, "FS_CRASH_CHECK", "FS_CRASH_CHECK = 1"),
         ({"ATC_RATE_FF_ENAB": 1}, None, "ATC_RATE_FF_ENAB", "ATC_RATE_FF_ENAB = 0"),
+        ({"ATC_RAT_YAW_PDMX": 0.0}, None, "ATC_RAT_YAW_PDMX", "ATC_RAT_YAW_PDMX = 0.3"),
+        ({"ATC_RAT_YAW_PDMX": 0.5}, None, "ATC_RAT_YAW_PDMX", "ATC_RAT_YAW_PDMX = 0.3"),
         ({"PSC_JERK_NE": 2}, None, "PSC_JERK_NE", "PSC_JERK_NE = 5"),
         ({"ATC_ANGLE_MAX": 10}, None, "ATC_ANGLE_MAX", "ATC_ANGLE_MAX = 30"),
         ({"ARMING_SKIPCHK": 8}, None, "ARMING_SKIPCHK", "ARMING_SKIPCHK = 0"),

@@ -19,8 +19,8 @@ heir, link = Heir(), open_connection(sys.argv[1])
 until = time.monotonic() + 5.0
 while link.way(b"x") is None and time.monotonic() < until:
     link.receive(0.05)
-for word in eval(sys.argv[2]):
-    heir.hear(word, link)
+for words in eval(sys.argv[2]):
+    heir.hear(words, link)
 print("ready", flush=True)
 if sys.stdin.readline():
     heir.close()
@@ -54,7 +54,7 @@ def heard(end, wait_s):
 
 def test_a_companion_that_is_killed_says_its_last_word(vehicle):
     address, end = vehicle
-    companion = begun(address, [b"an earlier one", WORD])
+    companion = begun(address, [[(0.0, b"an earlier one")], [(0.0, WORD)]])
     end, _ = end(), companion.stdout.readline()
     began_s = time.monotonic()
     os.kill(companion.pid, signal.SIGKILL)
@@ -63,7 +63,22 @@ def test_a_companion_that_is_killed_says_its_last_word(vehicle):
     companion.communicate()
 
 
-@pytest.mark.parametrize(("words", "is_killed"), [([WORD], False), ([WORD, b""], True), ([], True)])
+def test_of_several_words_each_is_said_at_its_time(vehicle):
+    address, end = vehicle
+    companion = begun(address, [[(0.3, WORD), (0.6, b"\xfdanother")]])
+    end, _ = end(), companion.stdout.readline()
+    began_s = time.monotonic()
+    os.kill(companion.pid, signal.SIGKILL)
+    assert heard(end, 2.0).startswith(WORD)
+    assert 0.3 <= time.monotonic() - began_s < 0.6
+    said = b""
+    while not said.endswith(b"another"):
+        said = heard(end, 2.0)
+    assert 0.6 <= time.monotonic() - began_s < 1.0
+    companion.communicate()
+
+
+@pytest.mark.parametrize(("words", "is_killed"), [([[(0.0, WORD)]], False), ([[(0.0, WORD)], []], True), ([], True)])
 def test_one_that_ends_by_itself_or_has_none_says_nothing(vehicle, words, is_killed):
     address, end = vehicle
     companion = begun(address, words)

@@ -112,5 +112,6 @@ def test_the_file_has_what_preflight_asks_for(airframe: str) -> None:
     told = {parameter.name: parameter.value for parameter in ardupilot_parameters(load_built_in(airframe))}
     setup = Setup(told, None, "quadrotor", 0.145, 0.08, 0.005, MOST_HELD_S)
     found = {item.item: item.verdict for item in judge_parameters(setup) if item.item in told}
-    assert {"GUID_TIMEOUT", "GUID_OPTIONS", "ATC_RATE_FF_ENAB", "FENCE_ENABLE", "ATC_ANGLE_MAX"} <= set(found)
+    wanted = {"GUID_TIMEOUT", "GUID_OPTIONS", "ATC_RATE_FF_ENAB", "ATC_RAT_YAW_PDMX", "FENCE_ENABLE", "ATC_ANGLE_MAX"}
+    assert wanted <= set(found)
     assert set(found.values()) == {Verdict.GOOD}
