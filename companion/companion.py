@@ -76,7 +76,7 @@ class Stepped(ABC, Generic[CoreT]):
     @property
     def leaves_word(self) -> bool:
         """Whether the vehicle has to be told something if this program dies while it flies by attitude."""
-        return self._core is not None and not self._core.flight.vehicle.autopilot.stops_alone
+        return self._core is not None and self._core.flight.vehicle.autopilot.last_words is not None
 
     def last_words(self) -> list[tuple[float, bytes]]:
         """What that is now, each so many seconds later."""

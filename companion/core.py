@@ -138,8 +138,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         flight = self.flight
         try:
             samples, refusal = self._hear(samples, now_us)
-            height_m = note_height(flight)
-            impacts = () if flight.fault else self._notice(samples, height_m, now_us)
+            note_height(flight)
+            impacts = () if flight.fault else self._notice(samples, now_us)
             acks: list[CommandAck] = []
             positions: list[LocalPosition] = []
             for sample in samples:
@@ -159,9 +159,9 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in the frame of this flight, and why the vehicle is refused."""
 
-    def _notice(self, samples: Sequence[Sample], height_m: float | None, now_us: int) -> Sequence[ImpactEstimate]:
+    def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
-        flight, reaction = self.flight, self.reflex.step(samples, self._situation(height_m), now_us)
+        flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
         sees = self.reflex.monitor.no_data_reason is None
         if sees is not (flight.no_data_since_us is None):
             flight.no_data_since_us = None if sees else now_us
@@ -177,14 +177,11 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     def situation(self) -> Situation:
         """The detector's situation. The setpoints of others are not known."""
-        return self._situation(self.flight.height_m)
-
-    def _situation(self, height_m: float | None) -> Situation:
         flight, goes_down, target = self.flight, self._goes_down, self.flight.target
         if not self.machine.holds:
-            return situation_of(flight, height_m, self._off_state, goes_down, flight.vehicle.landed)
+            return situation_of(flight, self._off_state, goes_down, flight.vehicle.landed)
         place = None if target is None or target.lean is not None else target.position_ned_m
-        return situation_of(flight, height_m, self._off_state, goes_down, landed(flight, goes_down), place)
+        return situation_of(flight, self._off_state, goes_down, landed(flight, goes_down), place)
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
         """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
@@ -257,26 +254,27 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     @property
     def last_words(self) -> tuple[tuple[float, Outgoing], ...]:
-        """For a vehicle that would drift if this program died now, each so many seconds later: an attitude that leans
-        away from what it has hit, and a place away from it.
+        """For a vehicle that would drift if this program died now, each so many seconds later: an attitude that tilts
+        it off what it has hit, and a place off it.
 
-        Copter begins the way to a place with the velocity that it believes, and with its attitude as what a level
-        flight takes. So the place waits until the first is right, and the lean makes the second right.
+        It begins the way to a place with the velocity that it believes, and with its attitude as what a level flight
+        takes. So the place waits until the first is right, and the tilt makes the second right.
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest(), self.flight.target
-        if not self._leans or flight.vehicle.autopilot.stops_alone or latest is None:
+        words, recovery = flight.vehicle.autopilot.last_words, self.reflex.recovery
+        if not self._leans or words is None or latest is None or recovery is None:
             return ()
         if target is None or target.lean is None:
             return ()  # it goes by a position from the next setpoint on
         normal, now_us = target.lean.surfaces[0].normal_ned, self.now_us - self.started_at_us
-        n, e, _ = plus(latest.position_ned_m, AWAY_M, normal)
+        n, e, _ = plus(latest.position_ned_m, words.away_m, normal)
         place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
         kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
-        since_s = 1e-6 * (self.reflex.sample_boot_us - self.reflex.hits[-1].sample_time_boot_us)
-        later_s = max(0.0, MISLED_S - since_s)
-        lean = target.lean.setpoint(now_us, plus(ZERO, AWAY_M_S2, (normal[0], normal[1], 0.0)))
-        words = ((later_s, lean), (later_s + LEAD_S, PositionSetpoint(now_us, kept.position_ned_m, None)))
-        return tuple((at_s, self.resets.sent(word)) for at_s, word in words)
+        since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.sample_time_boot_us)
+        later_s = max(0.0, words.misled_s - since_s)
+        tilt = target.lean.setpoint(now_us, plus(ZERO, words.away_m_s2, (normal[0], normal[1], 0.0)))
+        said = ((later_s, tilt), (later_s + LEAD_S, PositionSetpoint(now_us, kept.position_ned_m, None)))
+        return tuple((at_s, self.resets.sent(word)) for at_s, word in said)
 
     @property
     def finished(self) -> bool:
@@ -382,13 +380,6 @@ class FlightCore(Core[FlightContext, Machine]):
         return super().next_deadline_us() if self.stop_reason is None else self.now_us
 
 
-# From the vehicle to the place of the last word. By a tilt that a hit has left wrong by 8 degrees a vehicle at rest
-# drifts 2 m towards the obstacle before Copter turns it.
-AWAY_M = 4.0
-# Copter's velocity is wrong by up to 7 m/s after a clipped hit, and by less than 1 m/s from so long after it on.
-MISLED_S = 0.8
-# What its tilt is wrong by then, 9 degrees, moves a vehicle by that is level by its own attitude.
-AWAY_M_S2 = 1.5
 # A setpoint at the edge of the envelope may cross it fifty times a second.
 LEAST_BETWEEN_LIMITS_US = 1_000_000
 

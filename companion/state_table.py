@@ -16,6 +16,7 @@ class StateTable(Generic[StateT, TriggerT]):
 
     def __init__(self, rows: Mapping[StateT, Mapping[TriggerT, StateT]]) -> None:
         self.rows = rows
+        # Few, and looked for in each step: in a tuple by identity, in a set by the hash of an Enum, which is slow.
         self.final = tuple(state for state, row in rows.items() if not row)
 
     def moves(self, state: StateT, trigger: TriggerT) -> bool:

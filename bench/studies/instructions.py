@@ -78,7 +78,8 @@ def _counts(recording: bytes, groups: int) -> list[tuple[int, int]]:
     if shutil.which("valgrind") is None:
         raise ReboundError("valgrind counts the instructions, and is not installed: apt-get install valgrind.")
     with tempfile.TemporaryDirectory() as name:
-        (folder := Path(name), place := Path(name) / "recording")[1].write_bytes(recording)
+        folder, place = Path(name), Path(name) / "recording"
+        place.write_bytes(recording)
         counter = ["valgrind", "--quiet", "--tool=callgrind", "--dump-before=getppid"]
         program = [sys.executable, "-m", "bench.fly.counted", str(place)]
         environment = os.environ | {"PYTHONHASHSEED": "0", "PYTHONPATH": str(ROOT)}

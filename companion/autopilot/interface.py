@@ -58,6 +58,16 @@ class Wire:
 
 
 @dataclass(frozen=True, slots=True)
+class LastWords:
+    """What a vehicle is told that a companion has died off an obstacle: to tilt off it, then a place off it."""
+
+    misled_s: float
+    """After a hit its own velocity is too wrong for so long to begin the way to a place with."""
+    away_m_s2: float
+    away_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Autopilot:
     """Tables and functions of one autopilot; nothing else of the companion names its modes and parameters."""
 
@@ -103,8 +113,8 @@ class Autopilot:
     """Read before it is flown by attitude."""
     attitude_held_s: Callable[[Mapping[str, int | float]], float]
     """From these: for so long an attitude is flown on; infinite where no attitude with a thrust can be asked for."""
-    stops_alone: bool
-    """It brakes by itself once an attitude is followed by nothing; else it levels out and drifts."""
+    last_words: LastWords | None
+    """None where it brakes by itself once an attitude is followed by nothing; else it levels out and drifts."""
     loss_parameter: str
     """For so many seconds the last setpoint is flown on."""
     rate_parameter: str

@@ -111,14 +111,13 @@ def _report_conflict(flight: FlightContext, now_us: int) -> None:
         flight.report(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
 
 
-def note_height(flight: FlightContext) -> float | None:
-    """The height, noted whether the vehicle has left the ground. A hit that pushes it down again does not undo that."""
+def note_height(flight: FlightContext) -> None:
+    """Note whether the vehicle has left the ground. A hit that pushes it down again does not undo that."""
     height_m = flight.height_m
     if height_m is not None and height_m >= flight.mission.companion.min_detection_height_m:
         flight.has_climbed = True
     elif height_m is None or flight.vehicle.landed is messages.LandedState.ON_GROUND:
         flight.has_climbed = False
-    return height_m
 
 
 def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
@@ -132,14 +131,13 @@ def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
 
 def situation_of(
     flight: FlightContext,
-    height_m: float | None,
     off_state: str | None,
     goes_down: bool,
     landed_state: messages.LandedState,
     setpoint_ned_m: Vector3 | None = None,
 ) -> Situation:
     """The detector's situation; `landed_state` is the reported one of a vehicle that somebody else flies."""
-    least_m = flight.mission.companion.min_detection_height_m
+    height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m
     # Lift-off, ground effect and skids shake and push.
     below = NO_POSITION if height_m is None else f"below {least_m:g} m"
     return Situation(

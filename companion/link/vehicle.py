@@ -82,7 +82,6 @@ class Vehicle:
     attitude_parameters: dict[str, int | float] = field(default_factory=dict)  # see interface.Autopilot
     armed: bool | None = None
     mode: ModeReport | None = None
-    pilot: Pilot | None = None  # who moves it, where the mode says so
     failsafe: bool = False
     landed: messages.LandedState = messages.LandedState.UNDEFINED
     attitude: messages.Attitude | None = None
@@ -151,7 +150,6 @@ class Vehicle:
         if is_known or not own_modes or self.unconfirmed_mode is not None:
             self.conflicts += is_known and self.unconfirmed_mode is not None
             self.mode, self.unconfirmed_mode = report, None
-            self.pilot = self.autopilot.pilot(report.custom_mode)
         else:
             self.unconfirmed_mode = report
 
@@ -173,6 +171,11 @@ class Vehicle:
     @property
     def mode_name(self) -> str:
         return "" if self.mode is None else self.autopilot.mode_name(self.mode.custom_mode)
+
+    @property
+    def pilot(self) -> Pilot | None:
+        """Who moves it, where the mode says so."""
+        return None if self.mode is None else self.autopilot.pilot(self.mode.custom_mode)
 
     @property
     def descends(self) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import tilt_rad
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, plus
 from companion.reflex.config import (
     CARRIED_SHARE,
     LIES_US,
@@ -80,5 +80,4 @@ class CrashWatch:
 
 
 def _mean(mean: Vector3, sample: Vector3) -> Vector3:
-    (x, y, z), (a, b, c) = mean, sample
-    return (x + LYING_SHARE * (a - x), y + LYING_SHARE * (b - y), z + LYING_SHARE * (c - z))
+    return plus(mean, LYING_SHARE, plus(sample, -1.0, mean))

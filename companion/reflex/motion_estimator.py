@@ -201,7 +201,7 @@ class MotionEstimator:
         # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
         level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
         if not self.fits_models:
-            # By a wrong tilt a vehicle that leans reports a climb that there is none of. PX4 was flown without this.
+            # By a wrong tilt a vehicle that leans reports a climb that there is none of. No flight of PX4 has shown it.
             level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
         bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
         self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s

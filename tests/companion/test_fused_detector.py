@@ -240,3 +240,11 @@ def test_one_contact_is_one_impact_and_a_shaking_that_stays_is_learnt():
     assert len(loud.fly(8_000_000)) == 1
     assert loud.state.phase is Phase.ARMED
     assert loud.state.threshold_m_s2 > 20.0
+
+
+def test_what_thrust_there_is_is_learnt_before_the_detector_trusts_its_noise():
+    # Given half a second in free air, which is enough to recover by (THRUST_LEARNT_S)
+    flown = Flight()
+    flown.fly(until_us=700_000)
+    assert flown.state.phase is Phase.QUIET and flown.state.thrust.known_s > 0.5
+    assert flown.state.thrust.full_m_s2 == pytest.approx(GRAVITY / HOVER_FRACTION, rel=0.02)

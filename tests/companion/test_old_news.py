@@ -152,3 +152,14 @@ def test_a_pilot_who_changes_the_mode_while_offboard_is_asked_for_on_the_ground_
     f.vehicle.pilot_takes(POSCTL)
     f.run_to_end(0.5)
     assert modes_asked(f) == 1
+
+
+def test_what_is_reported_between_two_steps_is_told_with_the_next_although_nothing_is_heard():
+    f = flying_in("mission")
+    core = f.companion.core
+    core.flight.report(f.now_us, "implausible", "seen by somebody else")
+    assert f.now_us < f.companion.next_deadline_us()
+    (event,) = f.companion.step(b"", f.now_us).events
+    assert event.text == "seen by somebody else"
+    # and without anything to tell nothing is stepped
+    assert f.companion.step(b"", f.now_us).events == ()

@@ -5,8 +5,8 @@ import pytest
 from companion.autopilot.px4.firmware import PX4
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
 from companion.guard.descent import Descent
-from companion.link.vehicle import Vehicle
-from companion.messages import CurrentMode, LandedState, PositionTarget, Sticks
+from companion.link.vehicle import ModeReport, Vehicle
+from companion.messages import LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
 
 SECOND = 1_000_000
@@ -16,9 +16,7 @@ ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
     descent = Descent()
     descent.update(samples, 0)
-    vehicle = Vehicle(landed=landed)
-    vehicle.update(CurrentMode(mode, None), now_us)
-    return descent.is_meant(vehicle, now_us)
+    return descent.is_meant(Vehicle(mode=ModeReport(mode, None, False), landed=landed), now_us)
 
 
 def down(speed_m_s):
