@@ -9,7 +9,7 @@ from bench.detectors.contact import Baseline, BaselineState, Reading
 from companion.messages import ImuSample, LocalPosition, MessageId, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.vector import ZERO, along, plus
+from companion.motion.vector import ZERO, along, minus, plus, towards
 from companion.reflex.detector import Impact, Phase, Situation
 
 # Drag changes within a second; the model's error in seconds. So does the lag behind a setpoint, with the speed.
@@ -82,8 +82,8 @@ class MomentumDetector(Baseline):
         lift = s.thrust.expected_m_s2(now_us, -GRAVITY_M_S2)
         known = plus(body_to_ned(s.attitude_wxyz, (0.0, 0.0, lift)), GRAVITY_M_S2, (0.0, 0.0, 1.0))
         s.integral_m_s = plus(s.integral_m_s, dt_s, plus(known, 1.0, s.residual_m_s2))
-        s.residual_m_s2 = plus(ZERO, GAIN_PER_S, plus(velocity, -1.0, s.integral_m_s))
-        push = plus(s.residual_m_s2, -1.0, s.mean_m_s2)
+        s.residual_m_s2 = plus(ZERO, GAIN_PER_S, minus(velocity, s.integral_m_s))
+        push = minus(s.residual_m_s2, s.mean_m_s2)
         size = _size(push)
         is_loud = size >= s.threshold_m_s2
         if not is_loud:
@@ -156,11 +156,11 @@ class HybridDetector(Baseline):
         external = (f_x, f_y, f_z - s.thrust.expected_m_s2(sample.time_boot_us, f_z))
         s.force_m_s2 = _followed(s.force_m_s2, external, FORCE_GAIN_PER_S * dt_s)
         s.wind_m_s2 = _followed(s.wind_m_s2, external, WIND_GAIN_PER_S * dt_s)
-        return plus(s.force_m_s2, -1.0, s.wind_m_s2)
+        return minus(s.force_m_s2, s.wind_m_s2)
 
     def _torque(self, s: HybridState, rates: Vector3, dt_s: float) -> float:
         """The residual r' = K_t (w' - r); its size, rad/s^2."""
-        x, y, z = plus(rates, -1.0, s.rates_rad_s or rates)
+        x, y, z = minus(rates, s.rates_rad_s or rates)
         s.rates_rad_s = rates
         s.turning_rad_s2 = _followed(s.turning_rad_s2, (x / dt_s, y / dt_s, z / dt_s), TORQUE_GAIN_PER_S * dt_s)
         return _size(s.turning_rad_s2)
@@ -168,7 +168,7 @@ class HybridDetector(Baseline):
 
 def _followed(old: Vector3, new: Vector3, gain: float) -> Vector3:
     """One step of a first-order low-pass: exact in time, so that no rate makes it unstable."""
-    return plus(old, 1.0 - math.exp(-gain), plus(new, -1.0, old))
+    return towards(old, new, 1.0 - math.exp(-gain))
 
 
 # --- `tracking`
@@ -214,7 +214,7 @@ class TrackingDetector(Baseline):
             state.phase, state.off_reason = Phase.OFF, "no setpoint"
             return None
         last, state.setpoint_ned_m = state.setpoint_ned_m, asked
-        behind = plus(sample.position_ned_m, -1.0, asked)
+        behind = minus(sample.position_ned_m, asked)
         error_m = _size(behind)
         before_us, state.position_boot_us = state.position_boot_us, now_us
         if last is None or math.dist(last, asked) > JUMP_M:

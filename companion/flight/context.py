@@ -25,6 +25,7 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
+from companion.motion.vector import ZERO, minus, plus
 from companion.reflex.attitude_law import Lean
 from companion.reflex.collision import CollisionRecord
 from companion.reflex.impact import ImpactEstimate
@@ -282,13 +283,11 @@ class FlightContext:
     def local_ned_m(self, mission_ned_m: Vector3) -> Vector3:
         """From mission coordinates (relative to the arming position) to the vehicle's local NED."""
         assert self.origin_ned_m is not None, "mission coordinates have a meaning only after arming"
-        o, p = self.origin_ned_m, mission_ned_m
-        return (o[0] + p[0], o[1] + p[1], o[2] + p[2])
+        return plus(self.origin_ned_m, 1.0, mission_ned_m)
 
     def mission_ned_m(self, local_ned_m: Vector3) -> Vector3:
         """From the vehicle's local NED to mission coordinates; the same before the origin is known."""
-        o, p = self.origin_ned_m or (0.0, 0.0, 0.0), local_ned_m
-        return (p[0] - o[0], p[1] - o[1], p[2] - o[2])
+        return minus(local_ned_m, self.origin_ned_m or ZERO)
 
 
 class StateHandler(Protocol):

@@ -7,7 +7,7 @@ from companion.flight.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import SetArmed
 from companion.motion.rotation import tilt_rad
-from companion.motion.vector import along, plus
+from companion.motion.vector import along, minus
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
@@ -51,7 +51,7 @@ def _is_pressed(flight: FlightContext, now_us: int) -> bool:
         return False
     # Not where the vehicle reports to be: a hit may have put that off by more than a metre.
     newest, place = recovery[0], recovery[0].estimator.motion.position_ned_m
-    off_m = along(plus(place, -1.0, newest.contact.position_ned_m), newest.normal.direction_ned)
+    off_m = along(minus(place, newest.contact.position_ned_m), newest.normal.direction_ned)
     return off_m < settled.distance_m
 
 

@@ -17,7 +17,7 @@ from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
-from companion.motion.vector import ZERO, along, plus
+from companion.motion.vector import ZERO, along, minus, plus, towards
 from companion.reflex.attitude_law import brakable_m_s, held_off
 from companion.reflex.config import BEHIND_M, BRAKES_M_S2, HELD_S, NOTICED_S
 from companion.reflex.surface import Surface, projected
@@ -43,7 +43,7 @@ class KnownSurface:
     def _faces(self, patch: Patch, place_ned_m: Vector3) -> bool:
         """Whether the patch lies behind that place, or where it is too near, behind the place that is not."""
         short_m = max(0.0, self.surface.distance_m - self.surface.off_m(place_ned_m))
-        n, e, d = plus(plus(place_ned_m, short_m, self.surface.normal_ned), -1.0, self.origin_ned_m)
+        n, e, d = minus(plus(place_ned_m, short_m, self.surface.normal_ned), self.origin_ned_m)
         return patch.faces((n, e, d), self.reach_m)
 
 
@@ -223,7 +223,7 @@ def _ahead(around: Surroundings, fence: Fence, start: Vector3, end: Vector3) -> 
     top_m, floor_m = _heights(origin, fence, around.has_floor)
     surfaces.append(Surface((0.0, 0.0, top_m), (0.0, 0.0, 1.0), 0.0))
     surfaces.append(Surface((0.0, 0.0, floor_m), (0.0, 0.0, -1.0), 0.0))
-    north_m, east_m, _ = plus(end, -1.0, origin)
+    north_m, east_m, _ = minus(end, origin)
     inside_n, inside_e = fence.nearest_inside(north_m, east_m)
     beyond_m = math.dist((inside_n, inside_e), (north_m, east_m))
     if beyond_m > _ROUNDING_M and fence.contains(start[0] - origin[0], start[1] - origin[1]):
@@ -238,8 +238,7 @@ def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3
     if distance_m <= most_m:
         return place, False
     scale = most_m / distance_m
-    n, e, d = (s + scale * (p - s) for p, s in zip(place, start, strict=True))
-    return (n, e, d), True
+    return towards(start, place, scale), True
 
 
 def _within_fence(place: Vector3, origin: Vector3, fence: Fence, has_floor: bool) -> Vector3:

@@ -10,7 +10,7 @@ from companion.memory.patch import Patch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
-from companion.motion.vector import plus
+from companion.motion.vector import minus, plus
 from companion.reflex.collision import CollisionRecord
 from companion.reflex.laws import Contact
 from companion.reflex.surface import Normal, Surface
@@ -65,7 +65,7 @@ def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, se
     For a contact outside the fence it is the nearest position inside.
     """
     (start_n, start_e, _), (end_n, end_e, end_d) = (
-        plus(place, -1.0, origin_ned_m) for place in (contact_ned_m, setpoint_ned_m)
+        minus(place, origin_ned_m) for place in (contact_ned_m, setpoint_ned_m)
     )
     n, e = fence.nearest_inside(end_n, end_e)
     if fence.contains(start_n, start_e):

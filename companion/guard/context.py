@@ -10,6 +10,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.descent import Descent
 from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks, Vector3
+from companion.motion.vector import minus
 
 # Setpoints are lost when there is none for so long.
 LONGEST_BETWEEN_S = ASSUMED.defaults.loss_us * 1e-6
@@ -55,7 +56,7 @@ class GuardContext(FlightContext):
             return
         since_s = (now_us - before_us) * 1e-6
         if asked.velocity_ned_m_s is None and 0.0 < since_s < LONGEST_BETWEEN_S:
-            north, east, down = ((p - b) / since_s for p, b in zip(asked.place_ned_m, before.place_ned_m, strict=True))
+            north, east, down = (part / since_s for part in minus(asked.place_ned_m, before.place_ned_m))
             self.asked = Asked(asked.place_ned_m, (north, east, down))
 
     def note_unconfirmed(self) -> None:

@@ -11,7 +11,7 @@ from companion.memory.patch import LEAST_SPEED_M_S
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Asked, Vector3
 from companion.motion.rotation import yaw_rad
-from companion.motion.vector import ZERO, along
+from companion.motion.vector import ZERO, along, plus
 
 # PX4 brakes by this where it is set up as docs/how-to/guard.md has it. With PX4's default it needs less room
 # (reflex.config.BRAKES_M_S2).
@@ -66,14 +66,13 @@ def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> boo
     latest = guard.vehicle.history.latest()
     if latest is None or (asked.place_ned_m is None and asked.velocity_ned_m_s is None):
         return None
-    velocity = asked.velocity_ned_m_s or (0.0, 0.0, 0.0)
+    velocity = asked.velocity_ned_m_s or ZERO
     ahead_s = math.hypot(*velocity) / (2.0 * BRAKES_M_S2) + GOES_ON_S
     here = guard.mission_ned_m(latest.position_ned_m)
     place = here if asked.place_ned_m is None else guard.mission_ned_m(asked.place_ned_m)
-    north, east, down = (p + v * ahead_s for p, v in zip(place, velocity, strict=True))
     mission = guard.mission
     known = ObstacleMap(all_known(guard), mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
-    goal = (north, east, down)
+    goal = plus(place, ahead_s, velocity)
     # A surface may be longer than it is known to be: who is in front of it stays there.
     leads_behind = any(
         patch.off_m(here) > 0.0
@@ -89,5 +88,4 @@ def stop(guard: GuardContext) -> Target | None:
     if latest is None:
         return None
     brakes_s = math.hypot(*latest.velocity_ned_m_s) / (2.0 * BRAKES_M_S2)
-    north, east, down = (p + v * brakes_s for p, v in zip(latest.position_ned_m, latest.velocity_ned_m_s, strict=True))
-    return Target((north, east, down), guard.yaw_rad)
+    return Target(plus(latest.position_ned_m, brakes_s, latest.velocity_ned_m_s), guard.yaw_rad)

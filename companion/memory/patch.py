@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex.config import FROM_BEHIND, STEEP
 from companion.reflex.surface import Normal, away_from
 
@@ -55,7 +55,7 @@ class Patch:
 
     def off_m(self, place_ned_m: Vector3) -> float:
         """How far a place is in front of the surface's plane."""
-        return sum(n * (p - c) for n, p, c in zip(self.normal_ned, place_ned_m, self.centre_ned_m, strict=True))
+        return along(minus(place_ned_m, self.centre_ned_m), self.normal_ned)
 
     def beside_m(self, place_ned_m: Vector3) -> float:
         """Of a wall: how far a place is beside all touches."""
@@ -140,14 +140,14 @@ def touch_of(
     is_behind = _agreement(normal.direction_ned, against) < FROM_BEHIND
     if normal.direction_ned == ZERO:
         return None
-    n, e, d = (c - reach_m * x for c, x in zip(centre_ned_m, normal.direction_ned, strict=True))
+    surface_ned_m = plus(centre_ned_m, -reach_m, normal.direction_ned)
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
-    return Patch(((n, e, d),), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
+    return Patch((surface_ned_m,), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
 
 
 def _agreement(a: Vector3, b: Vector3) -> float:
     """The cosine between unit vectors; 0 where one is zero."""
-    return max(-1.0, min(1.0, sum(x * y for x, y in zip(a, b, strict=True))))
+    return max(-1.0, min(1.0, along(a, b)))
 
 
 # Error of a touch's place: the position drifts by some centimetres between two hits, and the touching part of the guard

@@ -13,6 +13,7 @@ from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig
 from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
+from companion.motion.vector import minus
 
 # Least acceleration against a strong wind: 4 m/s after ten seconds.
 LEAST_SPEEDING_UP_M_S2 = 0.4
@@ -86,7 +87,7 @@ def first_leg(item: items.Motion, start_m: Vector3) -> Vector3:
             first = item.points_ned_m[0]
         case items.OrbitItem():
             first = item.centre_ned_m
-    return (first[0] - start_m[0], first[1] - start_m[1], first[2] - start_m[2])
+    return minus(first, start_m)
 
 
 def trajectory_of(item: items.Motion, start_m: Vector3, speeds: SpeedLimits) -> Trajectory:

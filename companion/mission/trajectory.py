@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.messages import Vector3
+from companion.motion.vector import minus, plus, towards
 
 REST: Vector3 = (0.0, 0.0, 0.0)
 
@@ -112,10 +113,8 @@ class LineProfile:
             return self.target_m, REST, REST
         way, rate, change = ramps.at(max(0.0, elapsed_s), remaining_s)
         distance = ramps.distance_m
-        s = self.start_m
-        n, e, d = ((t - f) / distance for f, t in zip(s, self.target_m, strict=True))
-        position = (s[0] + n * way, s[1] + e * way, s[2] + d * way)
-        return position, (n * rate, e * rate, d * rate), (n * change, e * change, d * change)
+        n, e, d = (part / distance for part in minus(self.target_m, self.start_m))
+        return plus(self.start_m, way, (n, e, d)), (n * rate, e * rate, d * rate), (n * change, e * change, d * change)
 
 
 @dataclass(frozen=True)
@@ -239,9 +238,9 @@ class CurveProfile:
         part = place - index
         before, after = self._table[index], self._table[index + 1]
         return (
-            _between(before[0], after[0], part),
-            _between(before[1], after[1], part),
-            _between(before[2], after[2], part),
+            towards(before[0], after[0], part),
+            towards(before[1], after[1], part),
+            towards(before[2], after[2], part),
         )
 
     def _plan(self, points: Floats, speed_m_s: float, acceleration_m_s2: float, speeding_up_m_s2: float) -> None:
@@ -340,7 +339,3 @@ def _distinct(points_m: Sequence[Vector3]) -> list[Vector3]:
 
 def _tuples(rows: Floats) -> list[Vector3]:
     return [(float(n), float(e), float(d)) for n, e, d in rows]
-
-
-def _between(a: Vector3, b: Vector3, part: float) -> Vector3:
-    return (a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]))

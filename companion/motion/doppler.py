@@ -21,7 +21,7 @@ from companion.motion.config import (
 )
 from companion.motion.delay import RECEIVER, Delay
 from companion.motion.strapdown import Strapdown
-from companion.motion.vector import ZERO, plus
+from companion.motion.vector import ZERO, minus, plus, towards
 
 
 @dataclass(slots=True)
@@ -83,7 +83,7 @@ class MeasuredVelocity:
     def predict(self, time_boot_us: int, summed_m_s: Vector3) -> None:
         """Up to a time, with the accelerometer's integral until then."""
         elapsed_s = 1e-6 * (time_boot_us - self.time_boot_us)
-        faster = plus(plus(summed_m_s, -1.0, self.summed_m_s), elapsed_s, self.unseen_m_s2)
+        faster = plus(minus(summed_m_s, self.summed_m_s), elapsed_s, self.unseen_m_s2)
         self.velocity_ned_m_s = plus(self.velocity_ned_m_s, 1.0, faster)
         self.variance_m2_s2 += elapsed_s * (
             2.0 * self.both_m2_s3 + elapsed_s * self.unseen_variance_m2_s4 + DRIFT_M2_S3
@@ -92,7 +92,7 @@ class MeasuredVelocity:
         self.time_boot_us, self.summed_m_s = time_boot_us, summed_m_s
 
     def _innovation(self, doppler: Doppler) -> Vector3:
-        off = plus(doppler.velocity_ned_m_s, -1.0, self.velocity_ned_m_s)
+        off = minus(doppler.velocity_ned_m_s, self.velocity_ned_m_s)
         return (off[0], off[1], 0.0)
 
     def deviation(self, doppler: Doppler) -> float:
@@ -123,7 +123,7 @@ def _faster_by(strapdown: Strapdown, since_s: float) -> Vector3 | None:
     for fix in reversed(strapdown.fixes):
         if fix.time_boot_us <= at_us:
             share = (at_us - fix.time_boot_us) / max(later_us - fix.time_boot_us, 1)
-            then_m_s = plus(fix.sum_ned_m_s, share, plus(later_m_s, -1.0, fix.sum_ned_m_s))
+            then_m_s = towards(fix.sum_ned_m_s, later_m_s, share)
             return (sum_m_s[0] - then_m_s[0], sum_m_s[1] - then_m_s[1], 0.0)
         later_us, later_m_s = fix.time_boot_us, fix.sum_ned_m_s
     return None

@@ -20,7 +20,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.motion.config import CURRENT_US, STAMP_RESOLUTION_US
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, minus, plus
 
 
 @dataclass(slots=True)
@@ -45,12 +45,10 @@ class Resets:
             if self._jumps(sample):
                 return Refused("LOCAL_POSITION_NED", "the place jumps, and no reset is counted")
             self._place = sample
-        n, e, d = self.shift_ned_m
         if self.shift_ned_m == ZERO:
             return sample
         if isinstance(sample, LocalPosition | Odometry | PositionTarget) and sample.position_ned_m is not None:
-            x, y, z = sample.position_ned_m
-            return replace(sample, position_ned_m=(x - n, y - e, z - d))
+            return replace(sample, position_ned_m=minus(sample.position_ned_m, self.shift_ned_m))
         return sample
 
     def _jumps(self, sample: LocalPosition) -> bool:
@@ -78,16 +76,11 @@ class Resets:
 
     def _after(self, before: Odometry, first: Odometry, most_m: float) -> Vector3:
         over_s = (first.time_boot_us - before.time_boot_us) * 1e-6
-        came = zip(first.position_ned_m, before.position_ned_m, before.velocity_ned_m_s, strict=True)
-        jump = [p - q - over_s * v for p, q, v in came]
-        if sum(part * part for part in jump) > most_m * most_m:
-            return self.shift_ned_m
-        n, e, d = (s + j for s, j in zip(self.shift_ned_m, jump, strict=True))
-        return (n, e, d)
+        jump = plus(minus(first.position_ned_m, before.position_ned_m), -over_s, before.velocity_ned_m_s)
+        return self.shift_ned_m if math.hypot(*jump) > most_m else plus(self.shift_ned_m, 1.0, jump)
 
     def sent(self, setpoint: PositionSetpoint | AttitudeSetpoint) -> PositionSetpoint | AttitudeSetpoint:
         """A setpoint moved from the companion's local NED, without resets, into the vehicle's."""
         if self.shift_ned_m == ZERO or isinstance(setpoint, AttitudeSetpoint):
             return setpoint
-        x, y, z = (p + s for p, s in zip(setpoint.position_ned_m, self.shift_ned_m, strict=True))
-        return replace(setpoint, position_ned_m=(x, y, z))
+        return replace(setpoint, position_ned_m=plus(setpoint.position_ned_m, 1.0, self.shift_ned_m))

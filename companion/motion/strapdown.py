@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from companion.messages import LocalPosition, Odometry, Quaternion, Vector3
 from companion.motion.config import CURRENT_US, GRAVITY_M_S2, KEPT_US, LONGEST_GAP_US
 from companion.motion.rotation import body_to_ned, ned_to_body, turned
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, minus, plus
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
@@ -26,8 +26,7 @@ class VelocityFix:
     @property
     def less_sum_m_s(self) -> Vector3:
         """Velocity minus integral: constant while the two agree."""
-        v, u = self.velocity_ned_m_s, self.sum_ned_m_s
-        return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
+        return minus(self.velocity_ned_m_s, self.sum_ned_m_s)
 
 
 @dataclass(slots=True)
@@ -100,8 +99,7 @@ class Strapdown:
             return
         if not -LONGEST_GAP_US < ahead_us < LONGEST_GAP_US:
             return
-        (n, e, d), (a, b, c), ahead_s = self.sum_ned_m_s, self.acceleration_ned_m_s2, ahead_us * 1e-6
-        in_sum = (n + ahead_s * a, e + ahead_s * b, d + ahead_s * c)
+        in_sum = plus(self.sum_ned_m_s, ahead_us * 1e-6, self.acceleration_ned_m_s2)
         self.has_new_fix, fixes = True, self.fixes
         fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, in_sum))
         while fixes[0].time_boot_us < time_us - KEPT_US:

@@ -28,6 +28,17 @@ def plus(vector: Vector3, factor: float, direction: Vector3) -> Vector3:
     )
 
 
+def minus(vector: Vector3, other: Vector3) -> Vector3:
+    """vector - other."""
+    return (vector[0] - other[0], vector[1] - other[1], vector[2] - other[2])
+
+
+def towards(vector: Vector3, other: Vector3, share: float) -> Vector3:
+    """vector + share * (other - vector): a share of the way; of a low-pass filter the next value."""
+    x, y, z = vector
+    return (x + share * (other[0] - x), y + share * (other[1] - y), z + share * (other[2] - z))
+
+
 def limited(vector: Vector3, most: float) -> Vector3:
     """The vector, no longer than that."""
     size = math.hypot(*vector)

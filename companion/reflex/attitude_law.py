@@ -19,7 +19,7 @@ from companion.messages import AttitudeSetpoint, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import LEVEL
-from companion.motion.vector import ZERO, along, limited, plus
+from companion.motion.vector import ZERO, along, limited, minus, plus
 from companion.reflex import config as reflex
 from companion.reflex.surface import Surface, projected
 
@@ -68,8 +68,8 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
         # What it pushes with is no wind to lean against.
         external = plus(external, -max(0.0, along(external, normal)), normal)
     off = projected(ZERO, [side for side in sides if side[1] > 0.0])
-    short, moves = plus(off, -1.0, velocity), plus(belief.tilt_m_s2, 1.0, external)
-    n, e, _ = plus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), -1.0, moves)
+    short, moves = minus(off, velocity), plus(belief.tilt_m_s2, 1.0, external)
+    n, e, _ = minus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), moves)
     climbs = reflex.HEIGHT_PER_S2 * (down_m - place[2]) - reflex.CLIMB_PER_S * v_d
     return (n, e, min(max(climbs, -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2))
 
@@ -115,7 +115,7 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     by_axis = along(force, up)
     thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
     thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
-    asked = plus((n, e, -lifts_m_s2), -1.0, belief.level_m_s2)
+    asked = minus((n, e, -lifts_m_s2), belief.level_m_s2)
     return tilted(asked, lean.yaw_rad), thrust
 
 

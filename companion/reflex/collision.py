@@ -8,7 +8,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import VelocityFix
-from companion.motion.vector import ZERO, plus, split, unit
+from companion.motion.vector import ZERO, minus, split, unit
 from companion.reflex.config import DECIDED_US, FADED_US
 from companion.reflex.confirmation import Hypothesis
 from companion.reflex.detector import DetectorState, Phase
@@ -115,8 +115,8 @@ class CollisionRecord:
     def follow_recovery(self, sample: LocalPosition) -> None:
         """Update overshoot and rebound speed while the vehicle recovers."""
         normal = self.normal.direction_ned
-        away = unit(plus(self.setpoint_ned_m, -1.0, self.contact.position_ned_m))
-        past_m = split(plus(sample.position_ned_m, -1.0, self.setpoint_ned_m), normal if away == ZERO else away)[0]
+        away = unit(minus(self.setpoint_ned_m, self.contact.position_ned_m))
+        past_m = split(minus(sample.position_ned_m, self.setpoint_ned_m), normal if away == ZERO else away)[0]
         self.overshoot_m = max(self.overshoot_m, past_m)
         if self.is_rebound(sample.time_boot_us):
             self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, split(sample.velocity_ned_m_s, normal)[0])

@@ -14,7 +14,7 @@ from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2, SAME_M_S
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import VelocityFix
-from companion.motion.vector import ZERO, plus, split
+from companion.motion.vector import ZERO, minus, plus, split
 from companion.reflex.config import DECIDED_US, STRUCK_M_S, SURE
 from companion.reflex.detector import Evidence
 from companion.reflex.impact import ImpactEstimate
@@ -62,7 +62,7 @@ class Hypothesis:
             in_sum_m_s = self.force_m_s2 * 0.5e-6 * (self.later_boot_us - self.earlier.time_boot_us)
             sure = SURE * math.sqrt(1.0 / len(was) + 1.0 / len(came))
         # The median: one of them may be forged. A jump that no sample showed fades from the sum: one velocity shows it.
-        change = plus(plus(_median(came), -1.0, _median(was)), in_sum_m_s, self.away)
+        change = plus(minus(_median(came), _median(was)), in_sum_m_s, self.away)
         shown = max if self.earlier is None else median
         shown_m_s, was_m_s = shown(self._along(came)), median(self._along(was))
         least_m_s = 0.5 * max(self.change_m_s, SAME_M_S)
@@ -89,7 +89,7 @@ class Hypothesis:
         if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
             return None
         over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
-        return split(plus(places[-1].position_ned_m, -1.0, places[0].position_ned_m), self.away)[0] / over_s
+        return split(minus(places[-1].position_ned_m, places[0].position_ned_m), self.away)[0] / over_s
 
 
 def _median(vectors: Sequence[Vector3]) -> Vector3:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import tilt_rad
-from companion.motion.vector import ZERO, plus
+from companion.motion.vector import ZERO, towards
 from companion.reflex.config import (
     CARRIED_SHARE,
     LIES_US,
@@ -62,8 +62,8 @@ class CrashWatch:
         for sample in samples:
             match sample:
                 case ImuSample():
-                    self.force_frd_m_s2 = _mean(self.force_frd_m_s2, sample.specific_force_frd_m_s2)
-                    self.rates_frd_rad_s = _mean(self.rates_frd_rad_s, sample.angular_velocity_frd_rad_s)
+                    self.force_frd_m_s2 = towards(self.force_frd_m_s2, sample.specific_force_frd_m_s2, LYING_SHARE)
+                    self.rates_frd_rad_s = towards(self.rates_frd_rad_s, sample.angular_velocity_frd_rad_s, LYING_SHARE)
                 case Attitude():
                     self.tipped.update(tilt_rad(sample.attitude_wxyz) > TIPPED_RAD, sample.time_boot_us)
                 case LocalPosition():
@@ -77,7 +77,3 @@ class CrashWatch:
         turns = math.hypot(*self.rates_frd_rad_s) > STILL_RAD_S
         lies = self.is_carried or landed is LandedState.ON_GROUND
         self.lying.update(is_still and lies and not turns, sample.time_boot_us)
-
-
-def _mean(mean: Vector3, sample: Vector3) -> Vector3:
-    return plus(mean, LYING_SHARE, plus(sample, -1.0, mean))

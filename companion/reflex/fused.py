@@ -23,7 +23,7 @@ from typing import ClassVar
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
-from companion.motion.vector import ZERO, limited
+from companion.motion.vector import ZERO, limited, minus
 from companion.reflex.classify import classified, hovers
 from companion.reflex.config import (
     CLEAR,
@@ -280,7 +280,7 @@ class FusedDetector:
         over_s = max(now_us - free_until_us, 1) * 1e-6
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(strapdown.valid_wxyz, push)
-        s.velocity_ned_m_s = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
+        s.velocity_ned_m_s = minus(v, step)
         impact = Impact(
             now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
         )

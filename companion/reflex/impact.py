@@ -9,7 +9,7 @@ from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import Strapdown
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex.config import CLIPPED_SHARE, HIDDEN_RAD, IMPULSE_RAD, SHORT, EstimateConfig
 from companion.reflex.correction import VelocityValidity
 from companion.reflex.detector import DetectorState, Evidence, Impact, Phase
@@ -37,14 +37,14 @@ class ContactForce:
 
         The first one comes so long after the latest time without contact.
         """
-        f, free, (n, e, d) = sample.specific_force_frd_m_s2, self.free_frd_m_s2, self.impulse_ned_m_s
-        force = x, y, z = body_to_ned(attitude_wxyz, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
+        f = sample.specific_force_frd_m_s2
+        force = body_to_ned(attitude_wxyz, minus(f, self.free_frd_m_s2))
         # Of the time before the first sample only its own window is known.
         elapsed_s = 1e-6 * (elapsed_us if self.forces_ned_m_s2 else min(elapsed_us, self.averaging_us))
         is_contiguous = elapsed_us < 2 * self.averaging_us  # less than one window is missing
         self.has_gap |= not is_contiguous
         self.is_clipped |= max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
-        self.impulse_ned_m_s = (n + elapsed_s * x, e + elapsed_s * y, d + elapsed_s * z)
+        self.impulse_ned_m_s = plus(self.impulse_ned_m_s, elapsed_s, force)
         self.forces_ned_m_s2.append(force)
         if len(self.forces_ned_m_s2) == 2 and is_contiguous:
             # The contact began within the first window: its mean is that share of the second window's.
@@ -59,9 +59,9 @@ class ContactForce:
     @property
     def is_fully_measured(self) -> bool:
         """Whether the force so far was measured without clipping, as far as the samples show."""
-        x, y, z = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
-        least = 0.5 * (x * x + y * y + z * z)
-        lasting = sum(a * x + b * y + c * z >= least for a, b, c in self.forces_ned_m_s2)
+        largest = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
+        least = 0.5 * along(largest, largest)
+        lasting = sum(along(force, largest) >= least for force in self.forces_ned_m_s2)
         return not self.is_clipped and lasting > SHORT
 
 
@@ -136,8 +136,7 @@ class ImpactEstimator:
         self.contact = None
         # A velocity that alone shows a contact has no force of its own.
         if self.imu is not None and impact.evidence is Evidence.FORCE:
-            f, contact = self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
-            free = (f[0] - contact[0], f[1] - contact[1], f[2] - contact[2])
+            free = minus(self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
             averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
             range_m_s2 = self.config.accelerometer_range_m_s2
             self.contact = ContactForce(free, averaging_us, range_m_s2, is_clipped=self.hides_clipping)
@@ -204,7 +203,6 @@ class ImpactEstimator:
         latest = self.history.before(contact_us - STAMP_RESOLUTION_US)
         if latest is None:
             return ZERO, ZERO, math.inf
-        (n, e, d), (u, v, w) = latest.position_ned_m, latest.velocity_ned_m_s
         ahead_s = 1e-6 * (contact_us - latest.time_boot_us)
-        place = (n + ahead_s * u, e + ahead_s * v, d + ahead_s * w)
+        place = plus(latest.position_ned_m, ahead_s, latest.velocity_ned_m_s)
         return place, latest.velocity_ned_m_s, self.config.velocity_noise_m_s

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.vector import ZERO, along, plus, split
+from companion.motion.vector import ZERO, along, minus, plus, split
 from companion.reflex.config import WAY_S, RecoveryConfig
 
 
@@ -76,7 +76,7 @@ def _normal(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Ve
 
 def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
     normal, ways_m = contact.normal_ned, plus(ZERO, WAY_S, motion.velocity_ned_m_s)
-    off_m = along(plus(motion.position_ned_m, -1.0, contact.position_ned_m), normal)
+    off_m = along(minus(motion.position_ned_m, contact.position_ned_m), normal)
     off_way_m, along_way = split(ways_m, normal)
     if normal[2] == 0.0:
         along_way = (along_way[0], along_way[1], 0.0)

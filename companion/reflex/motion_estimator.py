@@ -28,7 +28,7 @@ from companion.motion.config import (
 from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import LEVEL, Strapdown
-from companion.motion.vector import ZERO, along, limited, plus, split
+from companion.motion.vector import ZERO, along, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
@@ -101,7 +101,7 @@ class MotionEstimator:
         pushed = strapdown.acceleration_ned_m_s2
         pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else pushed
         was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
-        mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
+        mean = towards(was.acceleration_ned_m_s2, pushed, weight)
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
@@ -114,7 +114,7 @@ class MotionEstimator:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
             n, e, _ = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
             share = elapsed_s / (reflex.SMOOTHING_S + elapsed_s)
-            self.external_m_s2 = plus(self.external_m_s2, share, plus((n, e, 0.0), -1.0, self.external_m_s2))
+            self.external_m_s2 = towards(self.external_m_s2, (n, e, 0.0), share)
 
     @property
     def _bias_m_s2(self) -> Vector3:
@@ -124,7 +124,7 @@ class MotionEstimator:
     @property
     def wind_m_s2(self) -> Vector3:
         """External force per mass across the thrust, horizontal: wind and drag."""
-        return plus(self.external_m_s2, -1.0, self._bias_m_s2)
+        return minus(self.external_m_s2, self._bias_m_s2)
 
     @property
     def belief(self) -> Belief:
@@ -196,14 +196,14 @@ class MotionEstimator:
             return
         config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - self._at_boot_us), 1e-6 * (now_us - at_us)
         # Clipping hides between none and all of the change of velocity.
-        half = plus(ZERO, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
+        half = plus(ZERO, 0.5, minus(self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s))
         bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
         # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
-        level_m_s2 = plus(self.level_m_s2, -1.0, self._bias_m_s2)
+        level_m_s2 = minus(self.level_m_s2, self._bias_m_s2)
         if not self.fits_models:
             # By a wrong tilt a vehicle that leans reports a climb that there is none of. No flight of PX4 has shown it.
             level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
-        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s), level_m_s2)
+        bank.predict(elapsed_s, minus(self._summed_m_s, self._moved_m_s), level_m_s2)
         self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
         g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
         # The report as of now.
@@ -235,7 +235,7 @@ class MotionEstimator:
 
     def _agrees(self, velocity_m_s: Vector3, since_us: int | None, time_boot_us: int) -> int | None:
         """Since when a velocity has been the measured one; None: it is not."""
-        off = plus(velocity_m_s, -1.0, self.motion.velocity_ned_m_s)
+        off = minus(velocity_m_s, self.motion.velocity_ned_m_s)
         return None if math.hypot(off[0], off[1]) > SAME_M_S else since_us or time_boot_us
 
     def _compare(self, reported_m_s: Vector3, error_m_s: Vector3 | None, time_boot_us: int) -> None:
@@ -244,7 +244,7 @@ class MotionEstimator:
         A swing only passes through what was measured. `error_m_s` is None while no model knows it.
         """
         by_model_us, by_itself_us = self._agrees_since_boot_us
-        less_error = None if error_m_s is None else plus(reported_m_s, -1.0, error_m_s)
+        less_error = None if error_m_s is None else minus(reported_m_s, error_m_s)
         by_model_us = None if less_error is None else self._agrees(less_error, by_model_us, time_boot_us)
         by_itself_us = self._agrees(reported_m_s, by_itself_us, time_boot_us)
         self._agrees_since_boot_us = (by_model_us, by_itself_us)
@@ -261,8 +261,8 @@ class MotionEstimator:
             share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
             if 0.0 < elapsed_s < reflex.COMPARED_S:
                 self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
-        place = plus(was.position_ned_m, share, plus(measured.position_ned_m, -1.0, was.position_ned_m))
-        velocity = plus(was.velocity_ned_m_s, share, plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
+        place = towards(was.position_ned_m, measured.position_ned_m, share)
+        velocity = towards(was.velocity_ned_m_s, measured.velocity_ned_m_s, share)
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = 0.0
 
@@ -273,8 +273,8 @@ class MotionEstimator:
 
     def corrected(self, sample: LocalPosition) -> LocalPosition:
         """The report without its known errors."""
-        place = plus(sample.position_ned_m, -1.0, self.position_error_m)
-        velocity = plus(sample.velocity_ned_m_s, -1.0, self.velocity_error_m_s)
+        place = minus(sample.position_ned_m, self.position_error_m)
+        velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
         return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
 
 
@@ -285,7 +285,7 @@ def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition
     """
     half_s = 0.5 * elapsed_s
     led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
-    further_m = plus(led, -1.0, measured.position_ned_m)
+    further_m = minus(led, measured.position_ned_m)
     return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
 
 

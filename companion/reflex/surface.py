@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.vector import ZERO, along, plus, unit
+from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex.config import (
     APPROACH_M_S,
     APPROACH_RAD,
@@ -45,15 +45,15 @@ def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, impulse_rad: floa
     """The normal by the contact's impulse or force, good to `impulse_rad`, and by the velocity before it."""
     normal, (n, e, d) = Normal().with_direction(impulse_ned, impulse_rad), velocity_ned_m_s
     back = unit((-n, -e, -d)) if math.hypot(n, e, d) > APPROACH_M_S else ZERO
-    is_behind = sum(a * b for a, b in zip(normal.direction_ned, back, strict=True)) < FROM_BEHIND
+    is_behind = along(normal.direction_ned, back) < FROM_BEHIND
     return normal if is_behind else normal.with_direction(back, APPROACH_RAD)
 
 
 def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Normal:
     """The normal with the change of the velocity by the whole contact."""
-    n, e, d = (after - before for before, after in zip(before_ned_m_s, after_ned_m_s, strict=True))
-    size_m_s = math.hypot(n, e, d)
-    return normal.with_direction((n, e, d), math.hypot(CHANGE_RAD, CHANGE_M_S / max(size_m_s, 1e-6)))
+    change_m_s = minus(after_ned_m_s, before_ned_m_s)
+    size_m_s = math.hypot(*change_m_s)
+    return normal.with_direction(change_m_s, math.hypot(CHANGE_RAD, CHANGE_M_S / max(size_m_s, 1e-6)))
 
 
 def away_from(normal_ned: Vector3) -> Vector3:
@@ -77,8 +77,7 @@ class Surface:
 
     def off_m(self, place_ned_m: Vector3) -> float:
         """Distance of a position from touching, m; negative behind the surface."""
-        (n, e, d), (a, b, c), (x, y, z) = place_ned_m, self.normal_ned, self.point_ned_m
-        return (n - x) * a + (e - y) * b + (d - z) * c
+        return along(minus(place_ned_m, self.point_ned_m), self.normal_ned)
 
 
 def projected(vector: Vector3, sides: Sequence[tuple[Vector3, float]]) -> Vector3:

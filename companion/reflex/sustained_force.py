@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.vector import ZERO, plus, split, unit
+from companion.motion.vector import ZERO, minus, plus, split, towards, unit
 from companion.reflex.config import (
     FOLLOWED_S,
     FREE_M_S,
@@ -65,7 +65,7 @@ class SustainedForceMonitor:
         What is in the way, as an impact of a vehicle that hardly moves: its force is what it takes of the acceleration.
         """
         is_first, now_us, elapsed_s = self.time_us == 0, sample.time_boot_us, self._smooth(sample, attitude_wxyz)
-        short = ZERO if goal_ned_m is None else plus(goal_ned_m, -1.0, sample.position_ned_m)
+        short = ZERO if goal_ned_m is None else minus(goal_ned_m, sample.position_ned_m)
         is_there = math.hypot(*short) < PLACE_SPREAD_M
         if goal_ned_m is None:
             self.gain.known_s = 0.0
@@ -73,7 +73,7 @@ class SustainedForceMonitor:
             self.gain.learn(now_us, self.measured_m_s2, elapsed_s)
         if is_first:
             self.wind_m_s2 = self.missing_m_s2
-        grown = plus(self.missing_m_s2, -1.0, self.wind_m_s2)
+        grown = minus(self.missing_m_s2, self.wind_m_s2)
         towards = unit(grown)
         force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
         along_m_s, across = split(self.velocity_m_s, towards)
@@ -114,9 +114,9 @@ class SustainedForceMonitor:
             self.velocity_m_s, self.thrust_ned_m_s2, self.time_us = velocity, thrust, now_us
         elapsed_s, self.time_us, self.imu_count = (now_us - self.time_us) * 1e-6, now_us, 0
         weight = elapsed_s / (SMOOTHING_S + elapsed_s)
-        self.velocity_m_s = plus(self.velocity_m_s, weight, plus(velocity, -1.0, self.velocity_m_s))
-        self.thrust_ned_m_s2 = plus(self.thrust_ned_m_s2, weight, plus(thrust, -1.0, self.thrust_ned_m_s2))
-        changes = plus(velocity, -1.0, self.velocity_m_s)
+        self.velocity_m_s = towards(self.velocity_m_s, velocity, weight)
+        self.thrust_ned_m_s2 = towards(self.thrust_ned_m_s2, thrust, weight)
+        changes = minus(velocity, self.velocity_m_s)
         self.missing_m_s2 = plus(self.thrust_ned_m_s2, -1.0 / SMOOTHING_S, changes)
         return elapsed_s
 

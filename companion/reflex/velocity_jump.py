@@ -14,7 +14,7 @@ from companion.messages import Vector3
 from companion.motion.config import LONGEST_GAP_US, YAW_SHARE
 from companion.motion.delay import Delay
 from companion.motion.strapdown import VelocityFix
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex.config import (
     COMPARED,
     LAG_S,
@@ -57,7 +57,7 @@ class VelocityJump:
             self.unseen_share = max(0.0, 1.0 - self.averaging_us / elapsed_us)
             step = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
             if step > math.hypot(*self.rate_step_frd_rad_s) or time_us - self.rate_step_until_us > LONGEST_SLOW_STEP_US:
-                self.rate_step_frd_rad_s = _less(rates_frd_rad_s, self.rates_frd_rad_s)
+                self.rate_step_frd_rad_s = minus(rates_frd_rad_s, self.rates_frd_rad_s)
                 self.rate_step_over_us, self.rate_step_until_us = elapsed_us, time_us
         self.rates_frd_rad_s = rates_frd_rad_s
 
@@ -77,10 +77,10 @@ class VelocityJump:
         step = _newest_less_mean(fix.less_sum_m_s for fix in recent[1:])
         # Mean accelerations between velocities, without vibration.
         pairs = zip(pairwise(recent), apart_us, strict=True)
-        change = _newest_less_mean(_less(b.sum_ned_m_s, a.sum_ned_m_s, 1e-6 * us) for (a, b), us in pairs)
+        change = _newest_less_mean(_rate(b.sum_ned_m_s, a.sum_ned_m_s, 1e-6 * us) for (a, b), us in pairs)
         self.newest = (step, change)
         late_s = self.delay.delay_s(self.variance_m2_s2)
-        return (step[0] + late_s * change[0], step[1] + late_s * change[1], step[2] + late_s * change[2])
+        return plus(step, late_s, change)
 
     def compared(self, fixes: Sequence[VelocityFix]) -> Sequence[VelocityFix]:
         """The velocities that make the newest step, the newest last."""
@@ -93,7 +93,7 @@ class VelocityJump:
         `free_flight`).
         """
         self.delay.learn(*self.newest)
-        square = (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) / 3.0
+        square = along(step, step) / 3.0
         self.known = min(self.known + 1, MEMORY)
         change = square - self.variance_m2_s2
         self.variance_m2_s2 += change / (min(self.known, RISE) if change > 0.0 else self.known)
@@ -122,7 +122,7 @@ class VelocityJump:
         return 0.5 * least_m_s if is_turned else least_m_s
 
 
-def _less(a: Vector3, b: Vector3, seconds: float = 1.0) -> Vector3:
+def _rate(a: Vector3, b: Vector3, seconds: float) -> Vector3:
     return ((a[0] - b[0]) / seconds, (a[1] - b[1]) / seconds, (a[2] - b[2]) / seconds)
 
 

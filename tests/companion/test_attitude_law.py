@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
-from companion.motion.vector import ZERO, along, plus
+from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex.attitude_law import Belief, Lean, attitude_and_thrust, held_off, tilted, wanted
 from companion.reflex.config import LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S
 from companion.reflex.surface import Surface
@@ -38,7 +38,7 @@ def flown(velocity, surfaces, wind_m_s2=ZERO, full_m_s2=FULL_M_S2, believed_full
         belief = Belief(place, velocity, 0.0, tilt, wind_m_s2, tilted(up, 0.0))
         asked = lean(belief, surfaces, full_m_s2=believed_full_m_s2)
         attitude, thrust = attitude_and_thrust(wanted(belief, surfaces, HERE[2]), asked)
-        pulls = plus(plus(ZERO, 144.0, plus(up_of(attitude), -1.0, up)), -24.0, turns)
+        pulls = plus(plus(ZERO, 144.0, minus(up_of(attitude), up)), -24.0, turns)
         turns = plus(turns, tick_s, pulls)
         up = plus(up, tick_s, turns)
         force = plus(plus(wind_m_s2, thrust * full_m_s2, up), GRAVITY_M_S2, (0.0, 0.0, 1.0))

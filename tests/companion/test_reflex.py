@@ -9,7 +9,7 @@ from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import LEVEL
-from companion.motion.vector import ZERO, limited, plus
+from companion.motion.vector import ZERO, limited, minus, plus
 from companion.reflex.attitude_law import held_off, tilted
 from companion.reflex.config import BRAKES_M_S2, MOST_HELD_S, NOTICED_S, RecoveryConfig
 from companion.reflex.detector import Situation
@@ -56,9 +56,7 @@ class Air:
             self.touched_us = self.now_us
         if self.touched_us is not None and self.now_us < self.touched_us + 1e6 * CONTACT_S:
             force = plus(force, (1.0 + RESTITUTION) * 2.0 / CONTACT_S, (-1.0, 0.0, 0.0))
-        pulls = plus(
-            plus(ZERO, 144.0, plus(body_to_ned(self.asked, (0.0, 0.0, -1.0)), -1.0, self.up)), -24.0, self.turns
-        )
+        pulls = plus(plus(ZERO, 144.0, minus(body_to_ned(self.asked, (0.0, 0.0, -1.0)), self.up)), -24.0, self.turns)
         self.turns = plus(self.turns, 1e-6 * TICK_US, pulls)
         self.up = plus(self.up, 1e-6 * TICK_US, self.turns)
         self.velocity = plus(self.velocity, 1e-6 * TICK_US, plus(force, GRAVITY_M_S2, DOWN))
