@@ -43,6 +43,9 @@ LATEST_S = 0.1
 DRIFT_M2_S3 = 0.03
 # Standard deviation of the acceleration that a tilt makes which is wrong by the gyroscopes, too: 3 degrees.
 LEVEL_SPREAD_M_S2 = 0.5
+# How fast that acceleration spreads, (m/s^2)^2 in a second: after a clipped hit PX4 takes 0.01 rad/s of a turn for the
+# gyroscopes' bias, and takes it off HIGHRES_IMU.
+LEVEL_DRIFT_M2_S5 = (0.01 * GRAVITY_M_S2) ** 2
 
 # --- a receiver's velocity
 # Delay of a satellite receiver's velocity: PX4's default EKF2_GPS_DELAY; the receivers that ArduPilot knows have 0.1 to
@@ -53,6 +56,8 @@ RECEIVER_REPEATS = 10.0
 # Standard deviation of its noise before it is learnt: PX4's EKF2_GPS_V_NOISE. Not below twice the 0.05 m/s of u-blox's
 # data sheets.
 DOPPLER_M_S, FINEST_DOPPLER_M_S = 0.3, 0.1
+# A velocity further off, in standard deviations, is beyond belief: PX4's EKF2_GPS_V_GATE.
+DOPPLER_GATE = 5.0
 # Standard deviations of the delay by which a velocity is taken for older, so that none from before a hit counts.
 CERTAIN = 2.0
 # Memory of the noise in velocities: 10 to 20 s at the usual rates.

@@ -13,15 +13,17 @@ from dataclasses import dataclass, field
 from companion.messages import GpsVelocity, Vector3
 from companion.motion.config import (
     CERTAIN,
+    DOPPLER_GATE,
     DOPPLER_M_S,
     DOPPLER_MEMORY,
     DRIFT_M2_S3,
     FINEST_DOPPLER_M_S,
+    LEVEL_DRIFT_M2_S5,
     LEVEL_SPREAD_M_S2,
 )
 from companion.motion.delay import RECEIVER, Delay
 from companion.motion.strapdown import Strapdown
-from companion.motion.vector import ZERO, minus, plus, towards
+from companion.motion.vector import ZERO, limited, minus, plus, towards
 
 
 @dataclass(slots=True)
@@ -30,6 +32,7 @@ class Doppler:
 
     taken_boot_us: int = -1  # the newest velocity was measured later than this
     velocity_ned_m_s: Vector3 = ZERO  # as of the newest IMU sample; horizontal
+    late_s: float = 0.0  # carried on by so much
     variance_m2_s2: float = DOPPLER_M_S**2
     known: int = 1
     delay: Delay = field(default_factory=lambda: Delay(RECEIVER))
@@ -38,7 +41,7 @@ class Doppler:
         """Take one velocity; `is_free`: the vehicle's own is right. What cannot be carried on to now is left out."""
         if is_free:
             self._learn(sample, strapdown)
-        late_s = self.delay.delay_s(self.variance_m2_s2)
+        late_s = self.late_s = self.delay.delay_s(self.variance_m2_s2)
         faster = _faster_by(strapdown, late_s)
         if faster is None:
             return
@@ -54,8 +57,11 @@ class Doppler:
         (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, strapdown.sum_ned_m_s)
         behind: Vector3 = (n - own[0], e - own[1], 0.0)
         change = plus(ZERO, 1.0 / RECEIVER.expected_s, faster)
-        self.delay.learn(behind, change)
-        noise = plus(behind, self.delay.delay_s(self.variance_m2_s2), change)
+        most_m_s = DOPPLER_GATE * math.sqrt(self.variance_m2_s2)
+        # A receiver may show a hit before any sample does: neither its noise nor its delay.
+        if math.hypot(*plus(behind, self.delay.delay_s(self.variance_m2_s2), change)) < most_m_s:
+            self.delay.learn(behind, change)
+        noise = limited(plus(behind, self.delay.delay_s(self.variance_m2_s2), change), most_m_s)
         self.known = min(self.known + 1, DOPPLER_MEMORY)
         self.variance_m2_s2 += (0.5 * math.hypot(*noise) ** 2 - self.variance_m2_s2) / self.known
 
@@ -68,7 +74,8 @@ class Doppler:
 @dataclass(slots=True)
 class MeasuredVelocity:
     """Kalman filter of the horizontal velocity v and of the acceleration b that the accelerometer does not show, as its
-    attitude is wrong: v' = a + b. Changed only by its methods; local NED, SI, the vehicle's boot clock.
+    attitude is wrong: v' = a + b. A velocity that was carried on by the accelerometer over its delay d is v - d b.
+    Changed only by its methods; local NED, SI, the vehicle's boot clock.
     """
 
     time_boot_us: int
@@ -89,26 +96,30 @@ class MeasuredVelocity:
             2.0 * self.both_m2_s3 + elapsed_s * self.unseen_variance_m2_s4 + DRIFT_M2_S3
         )
         self.both_m2_s3 += elapsed_s * self.unseen_variance_m2_s4
+        self.unseen_variance_m2_s4 += LEVEL_DRIFT_M2_S5 * elapsed_s
         self.time_boot_us, self.summed_m_s = time_boot_us, summed_m_s
 
-    def _innovation(self, doppler: Doppler) -> Vector3:
-        off = minus(doppler.velocity_ned_m_s, self.velocity_ned_m_s)
-        return (off[0], off[1], 0.0)
+    def _measures(self, doppler: Doppler) -> tuple[Vector3, float, float, float]:
+        """Innovation of a receiver's velocity, its variance, and its covariances with v and b."""
+        late_s = doppler.late_s
+        n, e, _ = plus(minus(doppler.velocity_ned_m_s, self.velocity_ned_m_s), late_s, self.unseen_m_s2)
+        with_v = self.variance_m2_s2 - late_s * self.both_m2_s3
+        with_b = self.both_m2_s3 - late_s * self.unseen_variance_m2_s4
+        return (n, e, 0.0), with_v - late_s * with_b + doppler.trusted_variance_m2_s2, with_v, with_b
 
     def deviation(self, doppler: Doppler) -> float:
         """How far a receiver's velocity is from this one, in standard deviations of the difference."""
-        size = self.variance_m2_s2 + doppler.trusted_variance_m2_s2
-        return math.hypot(*self._innovation(doppler)) / math.sqrt(size)
+        innovation, size, _, _ = self._measures(doppler)
+        return math.hypot(*innovation) / math.sqrt(size)
 
     def update(self, doppler: Doppler) -> None:
         """Take a receiver's velocity."""
-        innovation, size = self._innovation(doppler), self.variance_m2_s2 + doppler.trusted_variance_m2_s2
-        gain, gain_b = self.variance_m2_s2 / size, self.both_m2_s3 / size
-        self.velocity_ned_m_s = plus(self.velocity_ned_m_s, gain, innovation)
-        self.unseen_m_s2 = plus(self.unseen_m_s2, gain_b, innovation)
-        self.unseen_variance_m2_s4 -= gain_b * self.both_m2_s3
-        self.both_m2_s3 -= gain * self.both_m2_s3
-        self.variance_m2_s2 -= gain * self.variance_m2_s2
+        innovation, size, with_v, with_b = self._measures(doppler)
+        self.velocity_ned_m_s = plus(self.velocity_ned_m_s, with_v / size, innovation)
+        self.unseen_m_s2 = plus(self.unseen_m_s2, with_b / size, innovation)
+        self.variance_m2_s2 -= with_v * with_v / size
+        self.both_m2_s3 -= with_v * with_b / size
+        self.unseen_variance_m2_s4 -= with_b * with_b / size
         self.taken_boot_us = doppler.taken_boot_us
 
     @property

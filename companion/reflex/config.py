@@ -224,8 +224,6 @@ CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 TILT_PER_S = 0.5
 # Error of this model on those hits, RMS over 3 s, as a share of the clipped velocity.
 MODEL_ERROR = 0.03
-# A receiver's velocity further off, in standard deviations, is beyond belief: PX4's EKF2_GPS_V_GATE.
-DOPPLER_GATE = 5.0
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
 COMPARED_S = 0.5

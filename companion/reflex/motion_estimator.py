@@ -18,6 +18,7 @@ from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import (
     CURRENT_US,
     DELAY_S,
+    DOPPLER_GATE,
     GRAVITY_M_S2,
     LATEST_S,
     LONGEST_GAP_US,
@@ -150,7 +151,7 @@ class MotionEstimator:
         now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
         known = was or MeasuredVelocity(now_us, self._summed_m_s, velocity, variance)
         known.predict(now_us, self._summed_m_s)
-        is_odd = known.deviation(doppler) > reflex.DOPPLER_GATE
+        is_odd = known.deviation(doppler) > DOPPLER_GATE
         was_odd, self._was_odd = self._was_odd, is_odd
         if is_odd and not was_odd:
             return

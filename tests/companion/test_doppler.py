@@ -27,10 +27,10 @@ class Air:
         self.late, self.noise_m_s = round(late_s / 0.004), noise_m_s
         self.now_us, self.velocities, self.reported_off_m_s = began_us, [0.0], 0.0
 
-    def step(self, acceleration_m_s2=0.0, is_free=True, receives=True):
+    def step(self, acceleration_m_s2=0.0, is_free=True, receives=True, turns_rad_s=0.0):
         self.now_us += 4_000
         self.velocities.append(self.velocities[-1] + 0.004 * acceleration_m_s2)
-        self.strapdown.imu(self.now_us, (acceleration_m_s2, 0.0, -G), (0.0, 0.0, 0.0))
+        self.strapdown.imu(self.now_us, (acceleration_m_s2, 0.0, -G), (0.0, turns_rad_s, 0.0))
         tick, sample = len(self.velocities), None
         if tick % 5 == 0:
             velocity = (self.velocities[-1] + self.reported_off_m_s, 0.0, 0.0)
@@ -62,6 +62,29 @@ def test_a_steady_flight_teaches_no_delay_and_the_receivers_noise():
         air.step()
     assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(RECEIVER.expected_s, abs=0.02)
     assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.4, rel=0.25)
+
+
+def test_a_hit_that_the_receiver_shows_before_any_sample_is_neither_its_noise_nor_its_delay():
+    air = Air(0.012, noise_m_s=0.05)
+    for tick in range(7_500):
+        air.step(2.0 * math.sin(2.0e-3 * tick))
+    known, variance_m2_s2 = air.doppler.delay.delay_s(air.doppler.variance_m2_s2), air.doppler.variance_m2_s2
+    air.velocities = [velocity - 7.0 for velocity in air.velocities]
+    air.reported_off_m_s = 7.0
+    for _ in range(25):
+        air.step()
+    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(known, abs=0.002)
+    assert air.doppler.variance_m2_s2 < 1.3 * variance_m2_s2
+
+
+def test_a_receiver_that_gets_worse_is_known_for_worse():
+    air = Air(0.012, noise_m_s=0.05)
+    for _ in range(3_000):
+        air.step()
+    air.noise_m_s = 0.8
+    for _ in range(7_500):
+        air.step()
+    assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.8, rel=0.4)
 
 
 def test_nothing_is_learnt_while_the_vehicles_own_velocity_is_not_valid():
@@ -141,6 +164,17 @@ def test_an_acceleration_that_the_accelerometer_does_not_show_is_found():
     # Then the belief does not lag behind, and the law is told what to lean against
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.15)
     assert found.belief.level_m_s2[0] == pytest.approx(0.5, abs=0.15)
+
+
+def test_gyroscopes_that_drift_mislead_the_belief_by_no_more_than_the_receivers_noise():
+    # Given what a real PX4 makes of a clipped hit: 0.009 rad/s of the rates are its gyroscopes' bias
+    air, found = clipped(rebound_m_s=0.0)
+    go_on(air, found, 0.5, turns_rad_s=0.009)
+    for _ in range(75):
+        go_on(air, found, 0.1, turns_rad_s=0.009)
+        # Then a vehicle at rest is known to be at rest, for as long as its own estimate is wrong
+        assert found.is_measured_apart
+        assert abs(found.motion.velocity_ned_m_s[0]) < 0.12
 
 
 def test_one_velocity_beyond_belief_does_not_count_and_two_do():
