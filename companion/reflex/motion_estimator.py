@@ -56,7 +56,7 @@ class MotionEstimator:
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
-    level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, NED
+    level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, by gyroscopes, NED
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
@@ -69,8 +69,8 @@ class MotionEstimator:
     _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
-    _has_agreed: bool = False  # by itself: no model is needed any more
-    # Since when the reported velocity, without a model's error and as it is, is the measured one.
+    _has_agreed: bool = False  # with the measured one, by itself
+    # Since when the reported velocity, less its mean error and as it is, is the measured one.
     _agrees_since_boot_us: tuple[int | None, int | None] = (None, None)
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
@@ -130,7 +130,7 @@ class MotionEstimator:
     @property
     def belief(self) -> Belief:
         """What the attitude law goes by."""
-        motion, unseen = self.motion, ZERO if self._measured is None else self._measured.unseen_m_s2
+        motion = self.motion
         return Belief(
             motion.position_ned_m,
             motion.velocity_ned_m_s,
@@ -139,14 +139,20 @@ class MotionEstimator:
             self.wind_m_s2,
             self.attitude_wxyz,
             self.yaw_rate_rad_s,
-            plus(self.level_m_s2, 1.0, unseen),
+            self.tilted_m_s2,
         )
 
+    @property
+    def tilted_m_s2(self) -> Vector3:
+        """Acceleration of a vehicle that is level by its own attitude, by gyroscopes and receiver, NED."""
+        return self.level_m_s2 if self._measured is None else plus(self.level_m_s2, 1.0, self._measured.unseen_m_s2)
+
     def measure(self, doppler: Doppler) -> None:
-        """Take a receiver's velocity: the horizontal one from then on, until the vehicle's estimate has converged."""
+        """Take a receiver's velocity: the horizontal one from then on, until the vehicle's own agrees with it."""
         was = self._measured
         newest_us = self.pushed_boot_us if was is None else was.taken_boot_us
-        if self.is_fully_measured or self.has_converged or doppler.taken_boot_us <= newest_us:
+        is_right = self.is_fully_measured or self._has_agreed or (self.has_converged and was is None)
+        if is_right or doppler.taken_boot_us <= newest_us:
             return
         now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
         known = was or MeasuredVelocity(now_us, self._summed_m_s, velocity, variance)
@@ -161,8 +167,9 @@ class MotionEstimator:
 
     @property
     def is_measured_apart(self) -> bool:
-        """Whether a receiver shows the velocity, and the vehicle's own has not converged."""
-        if self._measured is None or self.is_fully_measured or self.has_converged:
+        """Whether a receiver shows the velocity, and the vehicle's own is another, which it puts right by itself."""
+        is_right = self.is_fully_measured or self._has_agreed
+        if self._measured is None or is_right or self._time_boot_us - self.hit_boot_us > reflex.FADED_US:
             return False
         return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
 
@@ -186,7 +193,7 @@ class MotionEstimator:
             self.has_converged = True
         elif not self._has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
             self._filter(sample, at_us)
-        if self.has_converged:
+        if self.has_converged and not self.is_measured_apart:
             self._correct(sample)
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
@@ -226,32 +233,35 @@ class MotionEstimator:
             is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US
         if self.is_measured_apart:
             self._believe(estimate, spread_m_s)
-            self._compare(velocity, error_m_s if is_known else None, sample.time_boot_us)
+            self._compare(velocity, error_m_s[2], elapsed_s, is_known, sample.time_boot_us)
         elif self.has_converged or is_known:
             self.has_converged = True
         else:
             self._believe(estimate, spread_m_s)
         if self.has_converged and not self._has_agreed:
-            self.position_error_m, self._hidden_error_m_s = bank.mean_error(0, way_s), error_m_s
+            self.position_error_m = bank.mean_error(0, way_s)
+            if self._measured is None:
+                self._hidden_error_m_s = error_m_s
 
-    def _agrees(self, velocity_m_s: Vector3, since_us: int | None, time_boot_us: int) -> int | None:
-        """Since when a velocity has been the measured one; None: it is not."""
-        off = minus(velocity_m_s, self.motion.velocity_ned_m_s)
-        return None if math.hypot(off[0], off[1]) > SAME_M_S else since_us or time_boot_us
+    def _compare(
+        self, reported_m_s: Vector3, climb_error_m_s: float, elapsed_s: float, is_known: bool, time_boot_us: int
+    ) -> None:
+        """Take the reported velocity's error by the measured one. It is known once it hardly changes any more, and by all
+        models nothing swings (`is_known`): a swing only passes through what was measured.
 
-    def _compare(self, reported_m_s: Vector3, error_m_s: Vector3 | None, time_boot_us: int) -> None:
-        """Converged: a model has known the reported velocity's error for a moment, or there has been none for a while.
-
-        A swing only passes through what was measured. `error_m_s` is None while no model knows it.
+        The reported velocity is right, and the receiver needed no more, once the two have agreed for a while.
         """
-        by_model_us, by_itself_us = self._agrees_since_boot_us
-        less_error = None if error_m_s is None else minus(reported_m_s, error_m_s)
-        by_model_us = None if less_error is None else self._agrees(less_error, by_model_us, time_boot_us)
-        by_itself_us = self._agrees(reported_m_s, by_itself_us, time_boot_us)
-        self._agrees_since_boot_us = (by_model_us, by_itself_us)
-        is_explained = self.fits_models and by_model_us is not None and time_boot_us - by_model_us > SHOWN_US
-        is_right = by_itself_us is not None and time_boot_us - by_itself_us > 1e6 * reflex.COMPARED_S
-        self.has_converged, self._has_agreed = is_explained or is_right, is_right and not is_explained
+        off = minus(reported_m_s, self.motion.velocity_ned_m_s)
+        share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
+        n, e, _ = error = towards(self._hidden_error_m_s, off, share)
+        steady_us, same_us = self._agrees_since_boot_us
+        steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)
+        same_us = _since(_differs_m_s(off, ZERO) <= SAME_M_S, same_us, time_boot_us)
+        self._agrees_since_boot_us = (steady_us, same_us)
+        is_steady = self.fits_models and steady_us is not None and time_boot_us - steady_us > SHOWN_US
+        self._has_agreed = same_us is not None and time_boot_us - same_us > 1e6 * reflex.COMPARED_S
+        self.has_converged = self.has_converged or is_steady or self._has_agreed
+        self._hidden_error_m_s = ZERO if self._has_agreed else (n, e, climb_error_m_s)
 
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter."""
@@ -277,6 +287,16 @@ class MotionEstimator:
         place = minus(sample.position_ned_m, self.position_error_m)
         velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
         return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
+
+
+def _since(is_so: bool, since_us: int | None, time_boot_us: int) -> int | None:
+    """Since when it is so; None: it is not."""
+    return (since_us or time_boot_us) if is_so else None
+
+
+def _differs_m_s(velocity_m_s: Vector3, other_m_s: Vector3) -> float:
+    """Horizontally."""
+    return math.dist(velocity_m_s[:2], other_m_s[:2])
 
 
 def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:

@@ -196,7 +196,7 @@ class Reflex:
         if left_us <= 0:
             return None
         estimator, share = record.estimator, min(1.0, left_us / (numbers.FADED_US - numbers.FADES_FROM_US))
-        pushed = plus(estimator.wind_m_s2, 1.0, estimator.level_m_s2)
+        pushed = plus(estimator.wind_m_s2, 1.0, estimator.tilted_m_s2)
         return LeftWrong(share, estimator.position_error_m, estimator.velocity_error_m_s, pushed)
 
     # --- by which law
