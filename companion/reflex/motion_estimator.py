@@ -246,13 +246,13 @@ class MotionEstimator:
     def _compare(
         self, reported_m_s: Vector3, climb_error_m_s: float, elapsed_s: float, is_known: bool, time_boot_us: int
     ) -> None:
-        """Take the reported velocity's error by the measured one. It is known once it hardly changes any more, and by all
-        models nothing swings (`is_known`): a swing only passes through what was measured.
+        """Take the reported velocity's error by the measured one.
 
-        The reported velocity is right, and the receiver needed no more, once the two have agreed for a while.
+        It is known once it hardly changes, and by all models nothing swings (`is_known`): a swing only passes through
+        what was measured. Once the two have agreed for a while the receiver is needed no more.
         """
         off = minus(reported_m_s, self.motion.velocity_ned_m_s)
-        share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
+        share = elapsed_s / (reflex.COMPARED_S + elapsed_s) if self._hidden_error_m_s != ZERO else 1.0
         n, e, _ = error = towards(self._hidden_error_m_s, off, share)
         steady_us, same_us = self._agrees_since_boot_us
         steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)

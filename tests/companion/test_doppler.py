@@ -137,6 +137,40 @@ def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_
     assert abs(found.velocity_error_m_s[0]) < SAME_M_S
 
 
+def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
+    # Given an estimate that stays wrong, as PX4's by satellites does for ten seconds
+    air, found = clipped(rebound_m_s=0.0)
+    go_on(air, found, 0.5)
+    air.reported_off_m_s = -0.8
+    go_on(air, found, 3.5)
+    assert found.has_converged
+    assert found.is_measured_apart
+    # When it puts itself right slowly
+    for _ in range(40):
+        air.reported_off_m_s += 0.01
+        go_on(air, found, 0.1)
+        # Then what is taken off it is its error
+        assert found.velocity_error_m_s[0] == pytest.approx(air.reported_off_m_s, abs=0.12)
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.0, abs=0.1)
+
+
+def test_an_error_that_changes_is_not_known():
+    air, found = clipped(rebound_m_s=0.0)
+    for _ in range(50):
+        air.reported_off_m_s -= 0.1
+        go_on(air, found, 0.1)
+    assert found.is_measured_apart
+    assert not found.has_converged
+
+
+def test_after_twelve_seconds_the_vehicle_has_put_itself_right():
+    air, found = clipped(off_m_s=6.0, rebound_m_s=0.0)
+    go_on(air, found, 11.9)
+    assert found.is_measured_apart
+    go_on(air, found, 0.2)
+    assert not found.is_measured_apart
+
+
 def test_a_swing_that_passes_the_measured_velocity_before_any_model_knows_it_is_no_agreement():
     air, found = clipped()
     go_on(air, found, 0.3)
