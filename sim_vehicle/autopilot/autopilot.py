@@ -16,7 +16,6 @@ from sim_vehicle.autopilot.messages import (
     PositionTarget,
     Result,
     Severity,
-    StickInput,
     Texts,
 )
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
@@ -87,15 +86,13 @@ class Autopilot:
         self._commands.append(command)
 
     def receive(self, message: FlightInput) -> None:
-        """Take a setpoint, sticks or a target to follow."""
+        """Take a setpoint or sticks."""
         if isinstance(message, PositionTarget):
             self.setpoint(message)
         elif isinstance(message, AttitudeTarget):
             self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
-        elif isinstance(message, StickInput):
-            self.commander.sticks.heard(message, self._now_us)
         else:
-            self.navigator.follow(message)
+            self.commander.sticks.heard(message, self._now_us)
 
     def setpoint(self, target: PositionTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""

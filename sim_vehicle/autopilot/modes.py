@@ -23,9 +23,6 @@ class Mode(IntEnum):
     STABILIZED = 15
     TAKEOFF = 17
     LAND = 18
-    FOLLOW_TARGET = 19
-    PRECISION_LAND = 20
-    ORBIT = 21
 
 
 class Need(StrEnum):
@@ -51,9 +48,6 @@ NEEDS: dict[Mode, frozenset[Need]] = {
     Mode.RETURN: _PLACE | {Need.HOME},
     Mode.TAKEOFF: frozenset({Need.LOCAL_POSITION}),
     Mode.LAND: frozenset({Need.LOCAL_POSITION}),
-    Mode.PRECISION_LAND: frozenset({Need.LOCAL_POSITION}),
-    Mode.FOLLOW_TARGET: frozenset({Need.LOCAL_POSITION}),
-    Mode.ORBIT: frozenset({Need.LOCAL_POSITION}),
     Mode.OFFBOARD: frozenset({Need.SETPOINTS}),
     Mode.DESCEND: frozenset(),
     Mode.TERMINATION: frozenset(),
@@ -65,9 +59,6 @@ NOT_ARMABLE = frozenset(
         Mode.LAND,
         Mode.RETURN,
         Mode.DESCEND,
-        Mode.FOLLOW_TARGET,
-        Mode.PRECISION_LAND,
-        Mode.ORBIT,
         Mode.TERMINATION,
     }
 )
@@ -131,9 +122,6 @@ TRANSITIONS: tuple[Transition, ...] = (
     _request(Mode.RETURN),
     _request(Mode.TAKEOFF),
     _request(Mode.LAND, ModeCondition.ALWAYS),
-    _request(Mode.PRECISION_LAND),
-    _request(Mode.FOLLOW_TARGET),
-    _request(Mode.ORBIT),
     _request(Mode.OFFBOARD),
     _request(Mode.TERMINATION, ModeCondition.ALWAYS),
     Transition((Mode.TAKEOFF,), ModeEvent.TAKEOFF_REACHED, ModeCondition.ARMED, Mode.LOITER),

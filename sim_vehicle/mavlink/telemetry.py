@@ -51,8 +51,6 @@ class Telemetry:
     attitude_variance_rad2: float
     flow: FlowSample | None = None
     range: RangeSample | None = None
-    true_body: Floats | None = None
-    """The plant's own state (13,), for the truth channel alone."""
     attitude_setpoint: Floats | None = None
     """The attitude control's R_d (3, 3), body to NED."""
     gps: HilGps | None = None

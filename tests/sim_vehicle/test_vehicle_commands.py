@@ -35,7 +35,7 @@ def client() -> Client:
         (520, (1,), [ACCEPTED]),
         (410, (), [ACCEPTED]),
         (528, (1,), [ACCEPTED]),
-        (SET_INTERVAL, (26, 100_000), [ACCEPTED]),
+        (SET_INTERVAL, (30, 100_000), [ACCEPTED]),
         *((SET_INTERVAL, (unknown, 100_000), [FAILED]) for unknown in (0, 27, 9999, -1)),
         # Another link's interval, or an answer to somebody else, cannot be asked for
         (SET_INTERVAL, (105, 4_000, 1), [FAILED]),

@@ -68,7 +68,6 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(24, Topic.GPS, navigation.gps_raw_int, Rates(UNLIMITED, 5, 5)),
     StreamKind(87, Topic.POSITION, navigation.position_target_global_int, Rates(10, 1, 1)),
     StreamKind(230, Topic.POSITION, navigation.estimator_status, Rates(1, 0.5, 0.5)),
-    StreamKind(360, Topic.ORBIT, navigation.orbit_execution_status, Rates(5, 2, 2)),
     StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin, Rates(1, 1, 1)),
     StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position, Rates(0.5, 0.5, 0.5)),
     StreamKind(147, Topic.BATTERY, condition.battery_status, Rates(0.5, 0.5, 0.5)),
@@ -76,11 +75,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(4, Topic.ALWAYS_NEW, condition.ping, Rates(1, 0.1, 0.1)),
     StreamKind(69, Topic.STICKS, condition.manual_control),
     StreamKind(29, Topic.AIR, condition.scaled_pressure, Rates(1, 1, 1)),
-    StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
-    StreamKind(375, Topic.SAMPLE, condition.actuator_output_status),
     StreamKind(264, Topic.ALWAYS_NEW, condition.flight_information),
-    # The truth, as PX4's simulation has it too: for whoever studies a flight, on request alone.
-    StreamKind(115, Topic.TRUTH, aiding.hil_state_quaternion),
 )
 
 
