@@ -45,7 +45,8 @@ class HilVehicle:
         self._magnetometer = sensors.Magnetometer(rng)
         self._rng, self._origin = rng, Origin()
         self._gps = sensors.Gps(airframe, rng, self._origin)
-        self._cameras = sensors.Cameras(rng)
+        self._cameras = sensors.Cameras(airframe.sensors.motion_capture, rng)
+        self._cameras_period_us = round(1e6 / airframe.sensors.motion_capture.rate_hz)
         self.interval_us = self._plant.interval_us
         self._downward = DownwardSensors(airframe.sensors, self.interval_us, random.Random(~seed))
         # Taken once: looking a record's field up costs microseconds.
@@ -69,8 +70,8 @@ class HilVehicle:
         faults = self._plant.faults
         if self._is_due(sensors.GPS_PERIOD_US) and not (faults is not None and faults.gps_is_lost(now_us / 1e6)):
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
-        if self._is_due(sensors.MOTION_CAPTURE_PERIOD_US):
-            messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
+        if self._is_due(self._cameras_period_us):
+            messages.append(self._cameras.sample(now_us, self._body))
         messages += self._downward.observe(now_us, self._body, self._plant.seen_faces)
         is_magnetometer_due = self._is_due(sensors.MAGNETOMETER_PERIOD_US)
         messages.append(
