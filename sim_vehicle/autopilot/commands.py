@@ -17,7 +17,6 @@ from sim_vehicle.autopilot.modes import Mode
 
 NAV_RETURN_TO_LAUNCH = 20
 NAV_LAND = 21
-NAV_TAKEOFF = flight_commands.NAV_TAKEOFF
 DO_SET_MODE = 176
 COMPONENT_ARM_DISARM = 400
 SET_MESSAGE_INTERVAL = 511
@@ -37,7 +36,6 @@ DO_SET_ACTUATOR = 187
 REGIONS_OF_INTEREST = (80, 195, 196, 197, 201)
 PREFLIGHT_REBOOT_SHUTDOWN = 246
 RUN_PREARM_CHECKS = 401
-INJECT_FAILURE = 420
 LOGGING_START, LOGGING_STOP = 2510, 2511
 
 # Left by the commander to modules that this vehicle does not have: cameras, gimbals, grippers, the logger, tunes.
@@ -47,10 +45,6 @@ UNANSWERED = frozenset(
     | {LOGGING_START, LOGGING_STOP}
 )
 
-
-# FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.
-_GPS = 4
-_WELL, _OFF = 0, 1
 
 NO_ID = -1
 """No message has it: stands for a parameter that is not a number."""
@@ -119,14 +113,14 @@ def _set_mode(command: Command, flight: CommandedVehicle) -> Result:
     if mode is not None:
         return flight.request_mode(mode)
     kind = "base" if not base & CUSTOM_FLAG else "auto" if main == AUTO_MAIN_MODE else "main"
-    flight.say(Severity.CRITICAL, f"Unsupported {kind} mode")
+    flight.texts.say(Severity.CRITICAL, f"Unsupported {kind} mode")
     return Result.TEMPORARILY_REJECTED
 
 
 def _arm_disarm(command: Command, flight: CommandedVehicle) -> Result | None:
     action, forced = _whole(command.param1), _whole(command.param2) == FORCE
     if action not in (0, 1):
-        flight.say(Severity.CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:.3f}")
+        flight.texts.say(Severity.CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:.3f}")
         return None
     return flight.commander.arm() if action == 1 else flight.commander.disarm(forced)
 
@@ -144,17 +138,6 @@ def _reboot(command: Command, flight: CommandedVehicle) -> Result:
     return Result.ACCEPTED if _cast(command.param1) == 0 else Result.DENIED
 
 
-def _inject_failure(command: Command, flight: CommandedVehicle) -> Result:
-    """No fix any more; or well again."""
-    unit, kind = _cast(command.param1), _cast(command.param2)
-    if unit != _GPS or kind not in (_WELL, _OFF):
-        return Result.UNSUPPORTED
-    if not flight.parameters["SYS_FAILURE_EN"]:
-        return Result.DENIED
-    flight.commander.positioning.gps_is_off = kind == _OFF
-    return Result.ACCEPTED
-
-
 def _accept(command: Command, flight: CommandedVehicle) -> Result:
     return Result.ACCEPTED
 
@@ -170,7 +153,6 @@ _HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     NAV_LAND: _land,
     NAV_RETURN_TO_LAUNCH: _return,
     PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
-    INJECT_FAILURE: _inject_failure,
     **dict.fromkeys((DO_SET_ACTUATOR, RUN_PREARM_CHECKS, *REGIONS_OF_INTEREST), _accept),
     **dict.fromkeys(UNANSWERED, _leave_unanswered),
 }

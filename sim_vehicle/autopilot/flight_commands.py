@@ -10,13 +10,12 @@ from typing import Protocol
 from sim_vehicle.autopilot.commander.arming import Reason
 from sim_vehicle.autopilot.commander.commander import Commander
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
-from sim_vehicle.autopilot.messages import Command, Result, Severity
+from sim_vehicle.autopilot.messages import Command, Result, Severity, Texts
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin, Place
-from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
 
 NAV_TAKEOFF = 22
@@ -36,13 +35,10 @@ class CommandedVehicle(Protocol):
     navigator: Navigator
     origin: Origin
     missions: MissionStore
-    parameters: Parameters
+    texts: Texts
 
     def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
         """Change the mode; ``says_so`` is the text for a change that was accepted."""
-
-    def say(self, severity: Severity, text: str) -> None:
-        """Tell the ground stations."""
 
 
 def from_mission(given: StoredItem) -> Command:
@@ -61,8 +57,8 @@ def _take_off(command: Command, flight: CommandedVehicle) -> Result:
 def _reposition(command: Command, flight: CommandedVehicle) -> Result:
     if int(_given(command.param2) or 0) != _SWITCH_MODE:
         return Result.UNSUPPORTED
-    if flight.commander.arming.armed and not flight.navigator.hold_at(_repositioned(command, flight)):
-        flight.say(Severity.CRITICAL, "Reposition is outside geofence")
+    if flight.commander.arming.armed:
+        flight.navigator.hold_at(_repositioned(command, flight))
     return flight.request_mode(Mode.LOITER)
 
 
@@ -89,9 +85,9 @@ def _change_speed(command: Command, flight: CommandedVehicle) -> Result:
 def _start_mission(command: Command, flight: CommandedVehicle) -> Result:
     missions, first = flight.missions, _given(command.param1)
     if not missions.progress.valid:
-        flight.say(Severity.CRITICAL, "Mission start denied! No valid mission")
+        flight.texts.say(Severity.CRITICAL, "Mission start denied! No valid mission")
         return Result.DENIED
-    if first is None or not -1 <= first < len(missions.mission.items):
+    if first is None or not -1 <= first < len(missions.mission):
         return Result.DENIED
     if first >= 0:
         missions.choose(int(first))

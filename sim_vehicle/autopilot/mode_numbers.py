@@ -33,7 +33,6 @@ def custom_mode(main: int, sub: int = 0) -> int:
 
 
 NUMBERS: dict[Mode, ModeNumbers] = {
-    Mode.MANUAL: ModeNumbers(custom_mode(1), _STICKS, 0, "Manual"),
     Mode.ALTCTL: ModeNumbers(custom_mode(2), _STICKS, 4, "Altitude"),
     Mode.POSCTL: ModeNumbers(custom_mode(3), _STICKS, 1, "Position"),
     Mode.TAKEOFF: ModeNumbers(custom_mode(4, 2), _AUTO, 8, "Takeoff"),

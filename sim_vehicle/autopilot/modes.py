@@ -11,7 +11,6 @@ from functools import cache
 class Mode(IntEnum):
     """The modes of a multicopter by PX4's NAVIGATION_STATE numbers."""
 
-    MANUAL = 0
     ALTCTL = 1
     POSCTL = 2
     MISSION = 3
@@ -39,7 +38,6 @@ class Need(StrEnum):
 # mode_requirements.cpp; attitude and rates, which every mode needs, are always there.
 _PLACE = frozenset({Need.LOCAL_POSITION, Need.GLOBAL_POSITION})
 NEEDS: dict[Mode, frozenset[Need]] = {
-    Mode.MANUAL: frozenset({Need.STICKS}),
     Mode.ALTCTL: frozenset({Need.STICKS}),
     Mode.POSCTL: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
     Mode.STABILIZED: frozenset({Need.STICKS}),
@@ -113,7 +111,6 @@ _FLOWN_WITHOUT_STICKS = tuple(mode for mode in Mode if Need.STICKS not in NEEDS[
 # leads out of TERMINATION: `ModeState` holds it. What a failsafe flies instead of the mode that is meant is
 # decided in `failsafe` and never changes what is meant, but for a pilot who takes over.
 TRANSITIONS: tuple[Transition, ...] = (
-    _request(Mode.MANUAL),
     _request(Mode.ALTCTL),
     _request(Mode.POSCTL),
     _request(Mode.STABILIZED),

@@ -10,7 +10,7 @@ from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_IN
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 NAN = math.nan
 PREARM_CHECK = 0x10000000
-REBOOT, INJECT_FAILURE = 246, 420
+REBOOT = 246
 
 
 def results(client: Client, number: int, *params: float, target: tuple[int, int] = (1, 1)) -> list[int]:
@@ -55,8 +55,6 @@ def client() -> Client:
         (ARM_DISARM, (0,), [ACCEPTED]),
         (SET_MODE, (1, 4, 3), [ACCEPTED, ACCEPTED]),
         (SET_MODE, (1, 9), [ACCEPTED, TEMPORARILY_REJECTED]),
-        (INJECT_FAILURE, (4, 1, 0), [ACCEPTED]),
-        (INJECT_FAILURE, (0, 1, 0), [UNSUPPORTED]),
     ],
 )
 def test_answers_on_the_ground(client, number, params, answers):
@@ -71,7 +69,7 @@ def test_only_what_is_addressed_to_us_is_answered(client, target, ours):
     assert bool(results(client, SET_MODE, 1, 4, 3, target=target)) is ours
 
 
-@pytest.mark.parametrize("custom", [(1, 1), (1, 4, 4), (1, 4, 6), (1, 4, 5), (1, 3)])
+@pytest.mark.parametrize("custom", [(1, 4, 4), (1, 4, 6), (1, 4, 5), (1, 3)])
 def test_modes_in_which_nobody_can_arm(client, custom):
     client.run(0.3)
     assert client.last("SYS_STATUS").onboard_control_sensors_health & PREARM_CHECK
@@ -89,18 +87,3 @@ def test_set_mode_the_message_is_answered_once(client):
     assert client.results(SET_MODE) == [ACCEPTED]
     client.run(1.0)
     assert client.last("HEARTBEAT").custom_mode == 0x06040000
-
-
-def test_a_lost_gps_shows_and_comes_back(client):
-    results(client, INJECT_FAILURE, 4, 1, 0)
-    client.run(1.0)
-    assert client.last("GPS_RAW_INT").fix_type == 0
-    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x20
-    results(client, INJECT_FAILURE, 4, 0, 0)
-    client.run(1.0)
-    assert client.last("GPS_RAW_INT").fix_type == 3
-
-
-def test_failures_are_refused_where_they_are_switched_off(client):
-    client.send(dialect.MAVLink_param_set_message(1, 1, b"SYS_FAILURE_EN", 0.0, 6))
-    assert results(client, INJECT_FAILURE, 4, 1, 0) == [DENIED]

@@ -31,15 +31,7 @@ MODE_OF: dict[Action, Mode] = {
     Action.DESCEND: Mode.DESCEND,
 }
 # If its mode cannot run, an action gives way to the next; the last needs nothing.
-_LADDER = (
-    Action.FALL_BACK_TO_POSITION,
-    Action.FALL_BACK_TO_ALTITUDE,
-    Action.FALL_BACK_TO_STABILIZED,
-    Action.HOLD,
-    Action.RETURN,
-    Action.LAND,
-    Action.DESCEND,
-)
+_LADDER = tuple(MODE_OF)
 # Modes flown by sticks need no taking over.
 _CAN_BE_TAKEN_OVER = (Action.HOLD, Action.RETURN, Action.LAND, Action.DESCEND)
 # A vehicle that lands or returns already does not begin a return.
@@ -84,7 +76,6 @@ class Failsafe:
         self._armed = False
         self._intended: Mode | None = None
         self._delay_us = 0
-        self._announce = False
         self._settled: tuple[FailsafeSituation, int, Decision] | None = None
         """Situation, changes of parameters, and what they came to, while nothing acts and no delay runs."""
 
@@ -120,9 +111,7 @@ class Failsafe:
         return decision
 
     def _announcement(self, action: Action, delayed: Action) -> tuple[str, ...]:
-        tells = action > self.action or (action is not Action.NONE and self._announce)
-        self._announce = False
-        if not tells or action is Action.WARN:
+        if action <= self.action or action is Action.WARN:
             return ()
         if action is Action.HOLD and delayed is not Action.NONE:
             return (f"Failsafe activated: entering Hold for {round(1e-6 * self._delay_us)} seconds",)
@@ -155,10 +144,9 @@ class Failsafe:
             takeover = Takeover.BY_MODE_SWITCH
             if parameters["COM_FAIL_ACT_T"] > _NO_DELAY_S:
                 takeover = Takeover.ALWAYS
-                if response.action is not Action.WARN and self._delay_us == 0:
+                if self._delay_us == 0:
                     self._delay_us = int(1e6 * parameters["COM_FAIL_ACT_T"])
         self._active[trigger] = _Active(response, takeover)
-        self._announce = self._announce or response.action is Action.WARN
         if response.action >= Action.HOLD:
             self.took_over = False
 

@@ -21,7 +21,6 @@ from sim_vehicle.autopilot.messages import Severity, Texts
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
-from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
@@ -60,7 +59,7 @@ class MissionFlight:
     def begin(self, view: View) -> None:
         """The mode was entered: from the item that is current, or from the first if the mission is over."""
         store = self._store
-        if self._was_disarmed and self._was_flown and store.current + 1 == len(store.mission.items):
+        if self._was_disarmed and self._was_flown and store.current + 1 == len(store.mission):
             store.current = 0
         self._was_disarmed, self._was_flown = False, True
         self._announce(view)
@@ -90,7 +89,7 @@ class MissionFlight:
         self._work = Work.ITEM
         progress = self._store.progress
         progress.reached, progress.finished = -1, False
-        if self._store.mission.items and progress.valid:
+        if self._store.mission and progress.valid:
             if not self.runs:
                 self._texts.say(Severity.INFO, "Executing Mission")
             self.runs = True
@@ -102,9 +101,9 @@ class MissionFlight:
     def _plan_climb(self, view: View) -> None:
         """From below the first place it climbs before it goes there."""
         self._climb_down_m = None
-        for item in self._store.mission.items[self._store.current :]:
+        for item in self._store.mission[self._store.current :]:
             if item.command in kinds.WITH_POSITION:
-                down_m = self._place(item, view)[2]
+                down_m = place_of(item, self._origin, view.home_ned_m)[2]
                 if view.position_ned_m[2] - down_m > self._parameters["NAV_MC_ALT_RAD"]:
                     self._climb_down_m = down_m
                 return
@@ -119,7 +118,7 @@ class MissionFlight:
             self._given = []
         if not self.runs:
             return
-        item = self._store.mission.items[self._store.current]
+        item = self._store.mission[self._store.current]
         if not self._is_over(item, view):
             return
         if self._work is not Work.CLIMB:
@@ -157,7 +156,7 @@ class MissionFlight:
 
     def _advance(self) -> bool:
         """On to the next item; False behind the last."""
-        if self._store.current + 1 >= len(self._store.mission.items):
+        if self._store.current + 1 >= len(self._store.mission):
             return False
         self._store.current += 1
         return True
@@ -181,7 +180,7 @@ class MissionFlight:
             here = stop_point(view.position_ned_m, view.velocity_ned_m_s, self._parameters)
             self.target = NavigatorTarget(Kind.IDLE if view.landed else Kind.HOLD, here)
             return
-        item = self._store.mission.items[self._store.current]
+        item = self._store.mission[self._store.current]
         if item.command in kinds.WITH_POSITION:
             self._fly_to(item, view)
             return
@@ -193,7 +192,7 @@ class MissionFlight:
         self._given.append(item)
 
     def _fly_to(self, item: StoredItem, view: View) -> None:
-        place = self._place(item, view)
+        place = place_of(item, self._origin, view.home_ned_m)
         north, east, _ = view.position_ned_m
         before, self._work = self._work, Work.ITEM
         if before is Work.ITEM and self._climb_down_m is not None:
@@ -221,16 +220,13 @@ class MissionFlight:
         else:
             self.target = NavigatorTarget(Kind.LAND, place)
 
-    def _place(self, item: StoredItem, view: View) -> Vector3:
-        return place_of(item, self._origin, view.home_ned_m)
 
-
-def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, view: View) -> str | None:
+def problem_of(items: Sequence[StoredItem], origin: Origin, view: View) -> str | None:
     """Why an uploaded mission may not be flown, in PX4's words; None where it may (FeasibilityChecker.cpp)."""
     if items and items[0].command == kinds.LAND and view.landed:
         return "Mission rejected: starts with landing"
     home, has_place = view.home_ned_m, False
-    for number, item in enumerate(items, start=1):
+    for item in items:
         if item.command not in kinds.WITH_POSITION:
             continue
         place = place_of(item, origin, home)
@@ -238,7 +234,5 @@ def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, vie
             return "Mission rejected: Takeoff altitude below home altitude!"
         if item.command == kinds.TAKEOFF and has_place:
             return "Mission rejected: takeoff not first waypoint item"
-        if not fence.allows(place):
-            return f"Geofence violation for waypoint {number}"
         has_place = True
     return None

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_TAKEOFF
-from sim_vehicle.autopilot.flight_commands import DO_REPOSITION
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.flight_commands import DO_REPOSITION, NAV_TAKEOFF
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
