@@ -16,6 +16,7 @@ from sim_vehicle.autopilot.messages import (
     PositionTarget,
     Result,
     Severity,
+    StickInput,
     Texts,
 )
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
@@ -86,13 +87,15 @@ class Autopilot:
         self._commands.append(command)
 
     def receive(self, message: FlightInput) -> None:
-        """Take a setpoint or sticks."""
+        """Take a setpoint, sticks or a target to follow."""
         if isinstance(message, PositionTarget):
             self.setpoint(message)
         elif isinstance(message, AttitudeTarget):
             self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
-        else:
+        elif isinstance(message, StickInput):
             self.commander.sticks.heard(message, self._now_us)
+        else:
+            self.navigator.follow(message)
 
     def setpoint(self, target: PositionTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""

@@ -1,6 +1,6 @@
-"""Commands that steer a flight: where to, how fast, along which mission.
+"""Commands that steer a flight: where to, how fast, round what, along which mission.
 
-Sources: PX4's Commander::handle_command and navigator_main.cpp.
+Sources: PX4's Commander::handle_command, navigator_main.cpp and FlightModeManager::handleCommand.
 """
 
 import math
@@ -19,6 +19,7 @@ from sim_vehicle.geography import Origin, Place
 from sim_vehicle.quantities import Vector3
 
 NAV_TAKEOFF = 22
+DO_ORBIT = 34
 DO_CHANGE_SPEED = 178
 DO_FLIGHTTERMINATION = 185
 DO_REPOSITION = 192
@@ -82,6 +83,20 @@ def _change_speed(command: Command, flight: CommandedVehicle) -> Result:
     return Result.ACCEPTED
 
 
+def _orbit(command: Command, flight: CommandedVehicle) -> Result:
+    result = flight.request_mode(Mode.ORBIT)
+    if result is not Result.ACCEPTED:
+        flight.texts.say(Severity.CRITICAL, "Orbit command rejected")
+        return result
+    place, altitude_m = _place(command, flight), _given(command.param7)
+    north, east = (None, None) if place is None else place[:2]
+    down_m = None if altitude_m is None else flight.origin.place.altitude_m - altitude_m
+    done = flight.navigator.change_orbit(_given(command.param1), _given(command.param2), (north, east, down_m))
+    if not done:
+        flight.texts.say(Severity.CRITICAL, "Orbit radius limit exceeded")
+    return result
+
+
 def _start_mission(command: Command, flight: CommandedVehicle) -> Result:
     missions, first = flight.missions, _given(command.param1)
     if not missions.progress.valid:
@@ -114,6 +129,7 @@ def _given(value: float) -> float | None:
 
 HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     NAV_TAKEOFF: _take_off,
+    DO_ORBIT: _orbit,
     DO_CHANGE_SPEED: _change_speed,
     DO_FLIGHTTERMINATION: _terminate,
     DO_REPOSITION: _reposition,

@@ -1,13 +1,14 @@
 """What the autopilot hears and says, as values; bytes exist only in `sim_vehicle.mavlink`.
 
-At the end what steers the flight beside commands: setpoints and sticks.
+At the end what steers the flight beside commands: setpoints, sticks and targets to follow.
 """
 
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, TypeAlias
 
-from sim_vehicle.quantities import Axis3, Quaternion
+from sim_vehicle.geography import Place
+from sim_vehicle.quantities import Axis3, Quaternion, Vector3
 
 EVERY_ID = 0
 """A target of 0 addresses every system, or every component."""
@@ -123,4 +124,12 @@ class StickInput:
     """1 and more: the first link and those after it."""
 
 
-FlightInput: TypeAlias = PositionTarget | AttitudeTarget | StickInput
+@dataclass(frozen=True, slots=True)
+class FollowTarget:
+    """FOLLOW_TARGET: where a target is and how it moves."""
+
+    place: Place
+    velocity_ned_m_s: Vector3
+
+
+FlightInput: TypeAlias = PositionTarget | AttitudeTarget | StickInput | FollowTarget

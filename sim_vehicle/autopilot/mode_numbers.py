@@ -35,11 +35,13 @@ def custom_mode(main: int, sub: int = 0) -> int:
 NUMBERS: dict[Mode, ModeNumbers] = {
     Mode.ALTCTL: ModeNumbers(custom_mode(2), _STICKS, 4, "Altitude"),
     Mode.POSCTL: ModeNumbers(custom_mode(3), _STICKS, 1, "Position"),
+    Mode.ORBIT: ModeNumbers(custom_mode(3, 1), _AUTO, 2, "Orbit"),
     Mode.TAKEOFF: ModeNumbers(custom_mode(4, 2), _AUTO, 8, "Takeoff"),
     Mode.LOITER: ModeNumbers(custom_mode(4, 3), _AUTO, 0, "Hold"),
     Mode.MISSION: ModeNumbers(custom_mode(4, 4), _AUTO, 6, "Mission"),
     Mode.RETURN: ModeNumbers(custom_mode(4, 5), _AUTO, 5, "Return"),
     Mode.LAND: ModeNumbers(custom_mode(4, 6), _AUTO, 7, "Land"),
+    Mode.FOLLOW_TARGET: ModeNumbers(custom_mode(4, 8), _AUTO, 0, "Follow Target"),
     # Stabilised too as soon as a setpoint has said what is controlled: see `base_mode`.
     Mode.OFFBOARD: ModeNumbers(custom_mode(6), CUSTOM_FLAG, 0, "Offboard"),
     Mode.STABILIZED: ModeNumbers(custom_mode(7), _STICKS, 0, "Stabilized"),
@@ -48,8 +50,9 @@ NUMBERS: dict[Mode, ModeNumbers] = {
     Mode.DESCEND: ModeNumbers(custom_mode(4, 6), _AUTO, 0, "Descend"),
 }
 
-_NOT_BY_NUMBER = (Mode.DESCEND, Mode.TERMINATION)
+_NOT_BY_NUMBER = (Mode.DESCEND, Mode.TERMINATION, Mode.ORBIT)
 _MODE_OF_CUSTOM = {numbers.custom_mode: mode for mode, numbers in NUMBERS.items() if mode not in _NOT_BY_NUMBER}
+_POSITION_MAIN_MODE = 3
 
 
 def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
@@ -68,6 +71,8 @@ def mode_from_request(base: int, main: int, sub: int) -> Mode | None:
     """
     if not base & CUSTOM_FLAG:
         return None
+    if main == _POSITION_MAIN_MODE:
+        return Mode.POSCTL
     if main == AUTO_MAIN_MODE:
         return _MODE_OF_CUSTOM.get(custom_mode(main, sub)) if sub > 0 else Mode.MISSION
     return _MODE_OF_CUSTOM.get(custom_mode(main))

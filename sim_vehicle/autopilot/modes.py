@@ -22,6 +22,8 @@ class Mode(IntEnum):
     STABILIZED = 15
     TAKEOFF = 17
     LAND = 18
+    FOLLOW_TARGET = 19
+    ORBIT = 21
 
 
 class Need(StrEnum):
@@ -46,6 +48,8 @@ NEEDS: dict[Mode, frozenset[Need]] = {
     Mode.RETURN: _PLACE | {Need.HOME},
     Mode.TAKEOFF: frozenset({Need.LOCAL_POSITION}),
     Mode.LAND: frozenset({Need.LOCAL_POSITION}),
+    Mode.FOLLOW_TARGET: frozenset({Need.LOCAL_POSITION}),
+    Mode.ORBIT: frozenset({Need.LOCAL_POSITION}),
     Mode.OFFBOARD: frozenset({Need.SETPOINTS}),
     Mode.DESCEND: frozenset(),
     Mode.TERMINATION: frozenset(),
@@ -57,6 +61,8 @@ NOT_ARMABLE = frozenset(
         Mode.LAND,
         Mode.RETURN,
         Mode.DESCEND,
+        Mode.FOLLOW_TARGET,
+        Mode.ORBIT,
         Mode.TERMINATION,
     }
 )
@@ -119,6 +125,8 @@ TRANSITIONS: tuple[Transition, ...] = (
     _request(Mode.RETURN),
     _request(Mode.TAKEOFF),
     _request(Mode.LAND, ModeCondition.ALWAYS),
+    _request(Mode.FOLLOW_TARGET),
+    _request(Mode.ORBIT),
     _request(Mode.OFFBOARD),
     _request(Mode.TERMINATION, ModeCondition.ALWAYS),
     Transition((Mode.TAKEOFF,), ModeEvent.TAKEOFF_REACHED, ModeCondition.ARMED, Mode.LOITER),

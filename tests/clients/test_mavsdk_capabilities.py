@@ -7,6 +7,7 @@ import time
 import pytest
 from mavsdk.plugins import mission as mission_types
 from mavsdk.plugins.component_metadata import ComponentMetadata
+from mavsdk.plugins.follow_me import Config, FollowMe, TargetLocation
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.mission import Mission
 from mavsdk.plugins.mission_raw import MissionRaw
@@ -76,6 +77,31 @@ def test_a_ground_stations_plan_is_imported_and_flown():
         wait_until(raw.is_mission_finished, 60, "finished")
         vehicle.wait_for_landing()
         assert vehicle.ned[0] == pytest.approx(12.0, abs=0.6)
+
+
+def test_follow_me_keeps_its_distance_from_a_target_that_walks():
+    # In real time: MAVSDK tells of the target once a second
+    with flown(1) as vehicle:
+        north, east = vehicle.place
+        height_m = vehicle.telemetry.position().absolute_altitude_m
+        vehicle.take_off()
+        follow = FollowMe(vehicle.system)
+        follow.set_config(Config(8.0, 6.0, 0.1, Config.FollowAltitudeMode.CONSTANT, 4.0, 180.0))
+        assert follow.get_config().follow_distance_m == 6.0
+        assert Param(vehicle.system).get_param_float("FLW_TGT_DST") == 6.0
+        follow.start()
+        wait_until(lambda: vehicle.flies(FlightMode.FOLLOW_ME), 5, "following")
+        begun_s = time.monotonic()
+        while (elapsed_s := time.monotonic() - begun_s) < 14.0:
+            # Two metres a second to the north, from ten metres away
+            here = north + (10.0 + 2.0 * elapsed_s) * METRE_DEG
+            follow.set_target_location(TargetLocation(here, east, height_m, 2.0, 0.0, 0.0))
+            time.sleep(0.5)
+        behind_m = 10.0 + 2.0 * elapsed_s - vehicle.ned[0]
+        assert behind_m == pytest.approx(6.0, abs=3.0)
+        assert -vehicle.ned[2] == pytest.approx(8.0, abs=1.0)
+        follow.stop()
+        wait_until(lambda: vehicle.flies(FlightMode.HOLD), 5, "holding")
 
 
 def test_files_and_descriptions_that_there_are_not_are_refused_at_once():

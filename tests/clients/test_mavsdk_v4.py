@@ -5,6 +5,7 @@ import math
 from collections.abc import AsyncGenerator, Awaitable, Callable
 
 import mavsdk.asyncio.plugins.offboard as offboard_types
+import mavsdk.plugins.action as action_types
 import pytest
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, System
 from mavsdk.asyncio.plugins.action import ActionAsync
@@ -14,8 +15,8 @@ from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from simulator import simulator
 
-# FlightMode's numbers.
-HOLD, RETURN = 3, 5
+# FlightMode's numbers; an orbit shows as a kind of position mode.
+HOLD, RETURN, POSITION = 3, 5, 11
 
 
 def flown(scenario: Callable[[System], Awaitable[None]], seconds: float = 120.0) -> None:
@@ -94,7 +95,7 @@ def test_all_parameters_and_single_ones():
     flown(scenario)
 
 
-def test_takeoff_go_to_return_and_land():
+def test_takeoff_go_to_orbit_return_and_land():
     async def scenario(system: System) -> None:
         action, telemetry = ActionAsync(system), TelemetryAsync(system)
         texts: list[str] = []
@@ -112,6 +113,12 @@ def test_takeoff_go_to_return_and_land():
         await action.goto_location(start.latitude_deg + 8e-5, start.longitude_deg, start.absolute_altitude_m, 0.0)
         north_deg = start.latitude_deg + 7e-5
         await first(telemetry.subscribe_position(), lambda place: place.latitude_deg > north_deg, 20.0)
+        behaviour = action_types.OrbitYawBehavior.HOLD_FRONT_TO_CIRCLE_CENTER
+        here = (start.latitude_deg, start.longitude_deg, start.absolute_altitude_m)
+        await action.do_orbit(5.0, 2.0, behaviour, *here)
+        await first(telemetry.subscribe_flight_mode(), lambda mode: int(mode) == POSITION)
+        await action.hold()
+        await first(telemetry.subscribe_flight_mode(), lambda mode: int(mode) == HOLD)
         await action.return_to_launch()
         await first(telemetry.subscribe_flight_mode(), lambda mode: int(mode) == RETURN)
         await land(system)

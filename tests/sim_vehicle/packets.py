@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 KINDS = tuple(dialect.mavlink_map.values())
 # What changes the vehicle when it is addressed to it. Everything else must leave it as it is.
-OBEYED = frozenset({11, 20, 21, 23, 43, 44, 45, 47, 51, 69, 73, 75, 76, 82, 84, 256})
+OBEYED = frozenset({11, 20, 21, 23, 43, 44, 45, 47, 51, 69, 73, 75, 76, 82, 84, 144, 256})
 
 
 def packet(kind: Any, payload: bytes, link: dialect.MAVLink, v1: bool = False) -> bytes:

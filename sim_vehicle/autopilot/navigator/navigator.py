@@ -4,6 +4,8 @@ Source: PX4's navigator (navigator_main.cpp, loiter.cpp, takeoff.cpp, land.cpp) 
 """
 
 from sim_vehicle.autopilot.flight_tasks.auto_flight import AutoFlight
+from sim_vehicle.autopilot.flight_tasks.follow import Follow
+from sim_vehicle.autopilot.flight_tasks.orbit import Orbit
 from sim_vehicle.autopilot.flight_tasks.smoothing import stop_point
 from sim_vehicle.autopilot.flight_tasks.target import (
     Arrival,
@@ -13,7 +15,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     climbs_to,
     takeoff_acceptance,
 )
-from sim_vehicle.autopilot.messages import Severity, Texts
+from sim_vehicle.autopilot.messages import FollowTarget, Severity, Texts
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.mission import MissionFlight, problem_of
@@ -42,6 +44,8 @@ class Navigator:
         self._missions = missions
         self._flight = AutoFlight(parameters)
         self._return = Return(parameters, origin, texts)
+        self._orbit = Orbit(parameters)
+        self._follow = Follow(parameters, origin)
         self._arrival = Arrival()
         self._texts = texts
         self._mode = Mode.LOITER
@@ -80,6 +84,19 @@ class Navigator:
         """DO_CHANGE_SPEED; None goes back to MPC_XY_CRUISE."""
         self._flight.cruise_m_s = speed_m_s
 
+    def change_orbit(
+        self,
+        radius_m: float | None,
+        speed_m_s: float | None,
+        centre_ned_m: tuple[float | None, float | None, float | None],
+    ) -> bool:
+        """DO_ORBIT, when the mode is ORBIT."""
+        return self._orbit.change(self.view, radius_m, speed_m_s, centre_ned_m)
+
+    def follow(self, target: FollowTarget) -> None:
+        """FOLLOW_TARGET."""
+        self._follow.heard(target, self.view.now_us)
+
     # --- modes ---------------------------------------------------------------------------------------------------
 
     def enter(self, mode: Mode) -> None:
@@ -107,6 +124,10 @@ class Navigator:
             self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
         elif mode is Mode.MISSION:
             self.mission.begin(self.view)
+        elif mode is Mode.ORBIT:
+            self._orbit.start(self.view)
+        elif mode is Mode.FOLLOW_TARGET:
+            self._follow.start(self.view)
 
     def disarmed(self) -> None:
         """Nothing is flown any more."""
@@ -189,6 +210,10 @@ class Navigator:
     def demand(self, step_s: float) -> TrajectorySetpoint | None:
         """The next setpoint of the mode; None lets the motors idle."""
         view, mode = self.view, self._mode
+        if mode is Mode.ORBIT:
+            return self._orbit.demand(view, step_s)
+        if mode is Mode.FOLLOW_TARGET:
+            return self._follow.demand(view, step_s)
         if mode is Mode.DESCEND:
             return self.sink(step_s)
         target = self._target_of(mode)
@@ -250,6 +275,11 @@ class Navigator:
     def mission_is_in_progress(self) -> bool:
         """While it is, landing does not disarm."""
         return self._mode is Mode.MISSION and not self._missions.progress.finished
+
+    @property
+    def orbit_status(self) -> tuple[float, Vector3] | None:
+        """Radius, positive for clockwise, and centre; None while no orbit is flown."""
+        return self._orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
 
 
 _BY_TARGET = (Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.MISSION, Mode.LAND)

@@ -1,11 +1,12 @@
-"""What steers the flight on a link: setpoints and sticks."""
+"""What steers the flight on a link: setpoints, sticks, targets to follow."""
 
 from collections.abc import Mapping
 from math import isfinite
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import AttitudeTarget, PositionTarget, StickInput
+from sim_vehicle.autopilot.messages import AttitudeTarget, FollowTarget, PositionTarget, StickInput
+from sim_vehicle.geography import Place
 from sim_vehicle.mavlink.services.service import Board, Channel, Handler
 from sim_vehicle.quantities import Axis3
 
@@ -51,6 +52,11 @@ def _stick(value: int) -> float:
     return value / _FULL_STICK if abs(value) <= _FULL_STICK else 0.0
 
 
+def follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget:
+    v_north, v_east, v_down = (value if isfinite(value) else 0.0 for value in packet.vel)
+    return FollowTarget(Place(packet.lat * 1e-7, packet.lon * 1e-7, packet.alt), (v_north, v_east, v_down))
+
+
 def _axes(mask: int, x: float, y: float, z: float) -> Axis3:
     return (
         None if mask & 1 or not isfinite(x) else x,
@@ -73,4 +79,6 @@ class SetpointService:
             69: lambda packet: receive(stick_input(packet, source)),
             82: lambda packet: receive(attitude_target(packet)),
             84: lambda packet: receive(position_target(packet)),
+            # One without a height is none.
+            144: lambda packet: receive(follow_target(packet)) if isfinite(packet.alt) else None,
         }

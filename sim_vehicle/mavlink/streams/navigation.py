@@ -143,6 +143,22 @@ def position_target_global_int(state: Telemetry) -> Message | None:
     )
 
 
+def orbit_execution_status(state: Telemetry) -> Message | None:
+    """The circle that is flown; nothing while there is none."""
+    orbit = state.autopilot.navigator.orbit_status
+    if orbit is None:
+        return None
+    radius_m, centre_ned_m = orbit
+    place = state.origin.place_at(centre_ned_m)
+    return dialect.MAVLink_orbit_execution_status_message(
+        state.published.time_boot_us,
+        radius_m,
+        dialect.MAV_FRAME_GLOBAL,
+        *units_of(place)[:2],
+        place.altitude_m,
+    )
+
+
 def _heading_centidegrees(yaw_rad: float) -> int:
     return int(100 * math.degrees(yaw_rad % (2 * math.pi))) % 36_000
 

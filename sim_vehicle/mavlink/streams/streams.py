@@ -68,6 +68,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(24, Topic.GPS, navigation.gps_raw_int, Rates(UNLIMITED, 5, 5)),
     StreamKind(87, Topic.POSITION, navigation.position_target_global_int, Rates(10, 1, 1)),
     StreamKind(230, Topic.POSITION, navigation.estimator_status, Rates(1, 0.5, 0.5)),
+    StreamKind(360, Topic.ORBIT, navigation.orbit_execution_status, Rates(5, 2, 2)),
     StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin, Rates(1, 1, 1)),
     StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position, Rates(0.5, 0.5, 0.5)),
     StreamKind(147, Topic.BATTERY, condition.battery_status, Rates(0.5, 0.5, 0.5)),

@@ -2,6 +2,7 @@
 
 from enum import IntEnum
 
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink.telemetry import Telemetry
 
 # vehicle_status is published when it changes and at least at 2 Hz.
@@ -25,10 +26,11 @@ class Topic(IntEnum):
     """New once: it does not move."""
     MAGNETIC_FIELD = 10
     STICKS = 11
+    ORBIT = 12
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.AIR, Topic.STICKS)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.AIR, Topic.STICKS, Topic.ORBIT)
 
 
 class Topics:
@@ -71,6 +73,8 @@ class Topics:
                 versions[topic] += 1
         now_us = state.sample.time_boot_us
         status = (commander.modes.flown, commander.arming.armed, commander.system_status)
+        if status[0] is Mode.ORBIT:
+            versions[Topic.ORBIT] += 1
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us
             versions[Topic.STATUS] += 1

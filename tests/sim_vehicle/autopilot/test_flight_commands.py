@@ -1,12 +1,12 @@
-"""Commands that steer: takeoff to a height, and reposition."""
+"""Commands that steer: takeoff to a height, reposition, orbit, follow."""
 
 import math
 
 import pytest
 
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
-from sim_vehicle.autopilot.flight_commands import DO_REPOSITION, NAV_TAKEOFF
-from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.autopilot.flight_commands import DO_ORBIT, DO_REPOSITION, NAV_TAKEOFF
+from sim_vehicle.autopilot.messages import FollowTarget, Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
 from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, north_east, place, set_mode
@@ -66,3 +66,48 @@ def test_a_reposition_of_nothing_stops_the_vehicle():
 @pytest.mark.parametrize("flags", [0, 2, 3])
 def test_a_reposition_without_the_change_of_mode_is_not_supported(flags):
     assert hovering(5.0).ask(DO_REPOSITION, -1, flags, 0, NAN, NAN, NAN, NAN) is Result.UNSUPPORTED
+
+
+@pytest.mark.parametrize("radius_m", [10.0, -10.0])
+def test_an_orbit_keeps_its_radius_its_speed_and_its_eye_on_the_centre(radius_m):
+    flight = hovering(5.0)
+    asked = (radius_m, 3.0, 0, NAN, *place(20.0, 0.0), SEA_LEVEL_HOME_M + 8.0)
+    assert flight.ask(DO_ORBIT, *asked) is Result.ACCEPTED
+    flight.fly(14.0)
+    for _ in range(20):
+        flight.fly(0.5)
+        out = north_east(flight)[0] - 20.0, north_east(flight)[1]
+        assert math.hypot(*out) == pytest.approx(10.0, abs=1.0)
+        v = flight.state.velocity_ned_m_s
+        assert math.hypot(v[0], v[1]) == pytest.approx(3.0, abs=0.3)
+        # Clockwise seen from above: north, then east
+        assert (out[0] * v[1] - out[1] * v[0] > 0) == (radius_m > 0)
+        looks = math.atan2(-out[1], -out[0])
+        assert abs(math.remainder(yaw_of(flight.state.attitude_wxyz) - looks, 2 * math.pi)) < 0.2
+    assert flight.height_m == pytest.approx(8.0, abs=0.1)
+    assert flight.autopilot.navigator.orbit_status[0] == radius_m
+
+
+def test_an_orbit_too_wide_is_not_flown_and_one_too_fast_is_slowed():
+    flight = hovering(5.0)
+    flight.ask(DO_ORBIT, 2000.0, 3.0, 0, NAN, NAN, NAN, NAN)
+    assert "Orbit radius limit exceeded" in flight.texts()
+    flight.ask(DO_ORBIT, 4.0, 10.0, 0, NAN, *place(4.0, 0.0), NAN)
+    flight.fly(12.0)
+    # v^2 / r stays below 2 m/s^2
+    assert math.hypot(*flight.state.velocity_ned_m_s[:2]) == pytest.approx(math.sqrt(8.0), abs=0.3)
+
+
+def test_following_stays_behind_and_above_and_looks_at_the_target():
+    flight = hovering(5.0, FLW_TGT_HT=10.0, FLW_TGT_DST=6.0)
+    assert set_mode(flight, Mode.FOLLOW_TARGET) is Result.ACCEPTED
+    for second in range(30):
+        there = ORIGIN.place_at((2.0 * second, 0.0, 0.0))
+        flight.autopilot.receive(FollowTarget(there, (2.0, 0.0, 0.0)))
+        flight.fly(1.0)
+    assert 60.0 - north_east(flight)[0] == pytest.approx(6.0, abs=2.0)
+    assert flight.height_m == pytest.approx(10.0, abs=0.1)
+    assert yaw_of(flight.state.attitude_wxyz) == pytest.approx(0.0, abs=0.1)
+    # And without messages it stops
+    flight.fly(8.0)
+    assert math.hypot(*flight.state.velocity_ned_m_s) < 0.1

@@ -32,7 +32,7 @@ def test_armed_a_mode_is_accepted_that_has_what_it_needs(mode):
         assert (without is not None) == (mode is Mode.LAND), need
 
 
-@pytest.mark.parametrize("ends_in", [Mode.LAND, Mode.RETURN, Mode.TAKEOFF])
+@pytest.mark.parametrize("ends_in", [Mode.LAND, Mode.RETURN, Mode.TAKEOFF, Mode.ORBIT, Mode.FOLLOW_TARGET])
 def test_after_disarming_the_mode_before_is_meant(ends_in):
     # Given a flight in OFFBOARD that went on in a mode in which nobody can arm
     state = ModeState()
