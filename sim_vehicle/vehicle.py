@@ -253,11 +253,13 @@ class SimulatedVehicle:
 
     def _sense(self, telemetry: Telemetry) -> None:
         slow, faults, now_us = self._slow, self._plant.faults, telemetry.sample.time_boot_us
+        positioning = self._positioning
         if faults is not None:
-            self._positioning.gps_is_lost = slow.gps_is_blocked = faults.gps_is_lost(self.time_boot_us / 1e6)
+            positioning.gps_is_jammed = faults.gps_is_lost(self.time_boot_us / 1e6)
             self._autopilot.battery.supply_share = faults.voltage_share
         if now_us < slow.due_us:
             return
+        slow.gps_is_blocked = positioning.gps_is_off or positioning.gps_is_jammed
         slow.update(now_us, self._body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss

@@ -36,6 +36,7 @@ DO_SET_ACTUATOR = 187
 REGIONS_OF_INTEREST = (80, 195, 196, 197, 201)
 PREFLIGHT_REBOOT_SHUTDOWN = 246
 RUN_PREARM_CHECKS = 401
+INJECT_FAILURE = 420
 LOGGING_START, LOGGING_STOP = 2510, 2511
 
 # Left by the commander to modules that this vehicle does not have: cameras, gimbals, grippers, the logger, tunes.
@@ -45,6 +46,10 @@ UNANSWERED = frozenset(
     | {LOGGING_START, LOGGING_STOP}
 )
 
+
+# FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.
+_GPS = 4
+_WELL, _OFF = 0, 1
 
 NO_ID = -1
 """No message has it: stands for a parameter that is not a number."""
@@ -138,6 +143,17 @@ def _reboot(command: Command, flight: CommandedVehicle) -> Result:
     return Result.ACCEPTED if _cast(command.param1) == 0 else Result.DENIED
 
 
+def _inject_failure(command: Command, flight: CommandedVehicle) -> Result:
+    """No fix any more; or well again."""
+    unit, kind = _cast(command.param1), _cast(command.param2)
+    if unit != _GPS or kind not in (_WELL, _OFF):
+        return Result.UNSUPPORTED
+    if not flight.parameters["SYS_FAILURE_EN"]:
+        return Result.DENIED
+    flight.commander.positioning.gps_is_off = kind == _OFF
+    return Result.ACCEPTED
+
+
 def _accept(command: Command, flight: CommandedVehicle) -> Result:
     return Result.ACCEPTED
 
@@ -153,6 +169,7 @@ _HANDLERS: dict[int, Callable[[Command, CommandedVehicle], Result | None]] = {
     NAV_LAND: _land,
     NAV_RETURN_TO_LAUNCH: _return,
     PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
+    INJECT_FAILURE: _inject_failure,
     **dict.fromkeys((DO_SET_ACTUATOR, RUN_PREARM_CHECKS, *REGIONS_OF_INTEREST), _accept),
     **dict.fromkeys(UNANSWERED, _leave_unanswered),
 }

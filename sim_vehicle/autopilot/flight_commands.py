@@ -16,6 +16,7 @@ from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin, Place
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
 
 NAV_TAKEOFF = 22
@@ -36,6 +37,7 @@ class CommandedVehicle(Protocol):
     navigator: Navigator
     origin: Origin
     missions: MissionStore
+    parameters: Parameters
     texts: Texts
 
     def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
@@ -58,8 +60,8 @@ def _take_off(command: Command, flight: CommandedVehicle) -> Result:
 def _reposition(command: Command, flight: CommandedVehicle) -> Result:
     if int(_given(command.param2) or 0) != _SWITCH_MODE:
         return Result.UNSUPPORTED
-    if flight.commander.arming.armed:
-        flight.navigator.hold_at(_repositioned(command, flight))
+    if flight.commander.arming.armed and not flight.navigator.hold_at(_repositioned(command, flight)):
+        flight.texts.say(Severity.CRITICAL, "Reposition is outside geofence")
     return flight.request_mode(Mode.LOITER)
 
 

@@ -7,6 +7,7 @@ import time
 import pytest
 from mavsdk.plugins import mission as mission_types
 from mavsdk.plugins.component_metadata import ComponentMetadata
+from mavsdk.plugins.failure import Failure, FailureType, FailureUnit
 from mavsdk.plugins.follow_me import Config, FollowMe, TargetLocation
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.mission import Mission
@@ -77,6 +78,23 @@ def test_a_ground_stations_plan_is_imported_and_flown():
         wait_until(raw.is_mission_finished, 60, "finished")
         vehicle.wait_for_landing()
         assert vehicle.ned[0] == pytest.approx(12.0, abs=0.6)
+
+
+def test_a_gps_that_fails_ends_the_flight_and_failures_may_be_forbidden():
+    # As on a PX4: five seconds of dead reckoning, then it descends, lands and disarms
+    with flown(3) as vehicle:
+        failure, param = Failure(vehicle.system), Param(vehicle.system)
+        param.set_param_int("SYS_FAILURE_EN", 0)
+        with pytest.raises(Exception, match=r"DISABLED|DENIED"):
+            failure.inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
+        param.set_param_int("SYS_FAILURE_EN", 1)
+        vehicle.take_off()
+        failure.inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
+        wait_until(lambda: vehicle.flies(FlightMode.LAND), 10, "descending")
+        assert "Failsafe activated" in vehicle.texts
+        vehicle.wait_for_landing()
+        with pytest.raises(Exception, match="UNSUPPORTED"):
+            failure.inject(FailureUnit.SENSOR_AIRSPEED, FailureType.STUCK, 0)
 
 
 def test_follow_me_keeps_its_distance_from_a_target_that_walks():

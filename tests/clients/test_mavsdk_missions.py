@@ -1,4 +1,4 @@
-"""MAVSDK's plugins for raw missions and sticks, in flight.
+"""MAVSDK's plugins for raw missions, fences and sticks, in flight.
 
 Real time, three times as fast: every flight is short.
 """
@@ -7,7 +7,7 @@ import math
 import time
 
 import pytest
-from mavsdk.plugins import mission_raw
+from mavsdk.plugins import geofence, mission_raw
 from mavsdk.plugins.manual_control import ManualControl
 from mavsdk.plugins.telemetry import FlightMode
 from mavsdk_vehicle import METRE_DEG, flown
@@ -45,6 +45,22 @@ def test_a_mission_is_uploaded_flown_paused_resumed_and_ends_on_the_ground(vehic
     assert vehicle.ned[0] == pytest.approx(6.0, abs=0.6)
     raw.clear_mission()
     assert raw.download_mission() == []
+
+
+def test_a_fence_is_kept_and_places_beyond_it_are_refused(vehicle):
+    north, east = vehicle.place
+    corners = [(-15, -15), (-15, 15), (15, 15), (15, -15)]
+    points = [geofence.Point(north + n * METRE_DEG, east + e * METRE_DEG) for n, e in corners]
+    fence = geofence.Geofence(vehicle.system)
+    fence.upload_geofence(geofence.GeofenceData([geofence.Polygon(points, geofence.FenceType.INCLUSION)], []))
+    vehicle.take_off()
+    height_m = vehicle.telemetry.position().absolute_altitude_m
+    vehicle.action.goto_location(north + 40 * METRE_DEG, east, height_m, math.nan)
+    time.sleep(1.5)
+    assert vehicle.ned[0] < 2.0
+    fence.clear_geofence()
+    vehicle.action.goto_location(north + 5 * METRE_DEG, east, height_m, math.nan)
+    wait_until(lambda: vehicle.ned[0] > 4.0, 20, "a place that no fence forbids")
 
 
 def test_sticks_fly_it_in_position_mode(vehicle):

@@ -10,7 +10,7 @@ from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_IN
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 NAN = math.nan
 PREARM_CHECK = 0x10000000
-REBOOT = 246
+REBOOT, INJECT_FAILURE = 246, 420
 
 
 def results(client: Client, number: int, *params: float, target: tuple[int, int] = (1, 1)) -> list[int]:
@@ -55,6 +55,8 @@ def client() -> Client:
         (ARM_DISARM, (0,), [ACCEPTED]),
         (SET_MODE, (1, 4, 3), [ACCEPTED, ACCEPTED]),
         (SET_MODE, (1, 9), [ACCEPTED, TEMPORARILY_REJECTED]),
+        (INJECT_FAILURE, (4, 1, 0), [ACCEPTED]),
+        (INJECT_FAILURE, (0, 1, 0), [UNSUPPORTED]),
     ],
 )
 def test_answers_on_the_ground(client, number, params, answers):
@@ -87,3 +89,18 @@ def test_set_mode_the_message_is_answered_once(client):
     assert client.results(SET_MODE) == [ACCEPTED]
     client.run(1.0)
     assert client.last("HEARTBEAT").custom_mode == 0x06040000
+
+
+def test_a_lost_gps_shows_and_comes_back(client):
+    results(client, INJECT_FAILURE, 4, 1, 0)
+    client.run(1.0)
+    assert client.last("GPS_RAW_INT").fix_type == 0
+    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x20
+    results(client, INJECT_FAILURE, 4, 0, 0)
+    client.run(1.0)
+    assert client.last("GPS_RAW_INT").fix_type == 3
+
+
+def test_failures_are_refused_where_they_are_switched_off(client):
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"SYS_FAILURE_EN", 0.0, 6))
+    assert results(client, INJECT_FAILURE, 4, 1, 0) == [DENIED]

@@ -189,6 +189,7 @@ class Commander:
             sticks_lost_at_arming=self._were_sticks_lost_at_arming(),
             ground_station_lost=self.ground_station.lost,
             offboard_lost=not back,
+            fence_breached=self._navigator.fence.breached,
             cannot_run=cannot_run(self._available, back),
         )
 
@@ -228,7 +229,7 @@ class Commander:
 
     @property
     def _problems(self) -> list[StatusText]:
-        return preflight_problems(self._parameters, self.ground_station, self.positioning)
+        return preflight_problems(self._parameters, self.ground_station, self._navigator, self.positioning)
 
     @property
     def system_status(self) -> SystemStatus:

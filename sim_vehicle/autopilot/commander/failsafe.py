@@ -76,6 +76,7 @@ class Failsafe:
         self._armed = False
         self._intended: Mode | None = None
         self._delay_us = 0
+        self._announce = False
         self._settled: tuple[FailsafeSituation, int, Decision] | None = None
         """Situation, changes of parameters, and what they came to, while nothing acts and no delay runs."""
 
@@ -111,7 +112,9 @@ class Failsafe:
         return decision
 
     def _announcement(self, action: Action, delayed: Action) -> tuple[str, ...]:
-        if action <= self.action or action is Action.WARN:
+        tells = action > self.action or (action is not Action.NONE and self._announce)
+        self._announce = False
+        if not tells or action is Action.WARN:
             return ()
         if action is Action.HOLD and delayed is not Action.NONE:
             return (f"Failsafe activated: entering Hold for {round(1e-6 * self._delay_us)} seconds",)
@@ -144,9 +147,10 @@ class Failsafe:
             takeover = Takeover.BY_MODE_SWITCH
             if parameters["COM_FAIL_ACT_T"] > _NO_DELAY_S:
                 takeover = Takeover.ALWAYS
-                if self._delay_us == 0:
+                if response.action is not Action.WARN and self._delay_us == 0:
                     self._delay_us = int(1e6 * parameters["COM_FAIL_ACT_T"])
         self._active[trigger] = _Active(response, takeover)
+        self._announce = self._announce or response.action is Action.WARN
         if response.action >= Action.HOLD:
             self.took_over = False
 

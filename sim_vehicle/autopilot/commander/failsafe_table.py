@@ -47,6 +47,7 @@ class FailsafeTrigger(StrEnum):
 
     STICKS_LOST = "manual control lost"
     GROUND_STATION_LOST = "ground station lost"
+    FENCE = "geofence breached"
     MODE_CANNOT_RUN = "mode cannot run"
 
 
@@ -72,6 +73,7 @@ class FailsafeSituation(NamedTuple):
     sticks_lost_at_arming: bool = True
     ground_station_lost: bool = True
     offboard_lost: bool = True
+    fence_breached: bool = False
     cannot_run: frozenset[Mode] = frozenset()
     """Modes whose needs are not met, sticks left aside."""
 
@@ -85,23 +87,32 @@ class FailsafeRow:
     parameter: str
     """Its value chooses the response."""
     responses: Mapping[int, Response]
+    otherwise: Response = Response(Action.NONE)
+    """For values that are not in the table, such as PX4's disarming and terminating."""
 
     def response(self, parameters: Parameters) -> Response:
-        """What these parameters want: nothing by a value that is not in the table, such as PX4's for disarming."""
-        return self.responses.get(int(parameters[self.parameter]), _NOTHING)
+        """What these parameters want."""
+        return self.responses.get(int(parameters[self.parameter]), self.otherwise)
 
 
-def _kept(action: Action) -> Response:
-    return Response(action, Clears.MODE_CHANGE_OR_DISARM)
+def _kept(action: Action, takeover: Takeover = Takeover.AFTER_DELAY) -> Response:
+    return Response(action, Clears.MODE_CHANGE_OR_DISARM, takeover)
 
 
-_NOTHING = Response(Action.NONE)
+_NOTHING, _WARNING = Response(Action.NONE), Response(Action.WARN)
 
 _LINK_LOSS: dict[int, Response] = {
     0: _NOTHING,
     1: _kept(Action.HOLD),
     2: _kept(Action.RETURN),
     3: _kept(Action.LAND),
+}
+_FENCE: dict[int, Response] = {
+    0: _NOTHING,
+    1: _WARNING,
+    2: _kept(Action.HOLD, Takeover.BY_MODE_SWITCH),
+    3: _kept(Action.RETURN),
+    5: _kept(Action.LAND),
 }
 
 # COM_RCL_EXCEPT and COM_DLL_EXCEPT: in which modes a lost link is no matter.
@@ -135,6 +146,7 @@ def _ground_station_lost(now: FailsafeSituation, parameters: Parameters) -> bool
 ROWS: tuple[FailsafeRow, ...] = (
     FailsafeRow(FailsafeTrigger.STICKS_LOST, _sticks_lost, "NAV_RCL_ACT", _LINK_LOSS),
     FailsafeRow(FailsafeTrigger.GROUND_STATION_LOST, _ground_station_lost, "NAV_DLL_ACT", _LINK_LOSS),
+    FailsafeRow(FailsafeTrigger.FENCE, lambda now, parameters: now.fence_breached, "GF_ACTION", _FENCE, _WARNING),
 )
 
 OFFBOARD_LOSS: dict[int, tuple[Action, Mode]] = {

@@ -40,7 +40,7 @@ class GroundStation:
 
 
 class Positioning:
-    """What the estimator makes of a receiver's silence.
+    """The receiver as INJECT_FAILURE or a fault leaves it, and what the estimator makes of its silence.
 
     Without GPS it goes on for a while, then it gives up: a SITL whose GPS was switched off descended 5.1 s later.
     """
@@ -48,15 +48,21 @@ class Positioning:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._lost_us: int | None = None
-        self.gps_is_lost = False
-        """A fault has silenced the receiver."""
+        self.gps_is_off = False
+        """INJECT_FAILURE has silenced the receiver."""
+        self.gps_is_jammed = False
+        """A fault of the simulation has."""
         self.sees_ground = False
         """Optical flow keeps the local position without GPS."""
         self.has_local = self.has_global = True
 
+    @property
+    def is_without_gps(self) -> bool:
+        return self.gps_is_off or self.gps_is_jammed
+
     def update(self, now_us: int) -> None:
         """Let time pass."""
-        if not self.gps_is_lost:
+        if not self.is_without_gps:
             self._lost_us, self.has_local, self.has_global = None, True, True
             return
         if self._lost_us is None:

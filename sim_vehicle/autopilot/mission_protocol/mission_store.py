@@ -15,7 +15,7 @@ Plan: TypeAlias = tuple[StoredItem, ...]
 
 @dataclass(slots=True)
 class MissionStore:
-    """What the links write and the navigator flies: of the three lists the mission alone."""
+    """What the links write and the navigator flies, and keeps within: nothing uses rally points."""
 
     plans: dict[int, Plan] = field(default_factory=dict)
     """By their types; those that were never stored are empty."""
@@ -25,6 +25,7 @@ class MissionStore:
     """A link is receiving a list; no other may begin."""
     mission_changes: int = 0
     """Grows when the mission is another or somebody chose its current item; the navigator compares it."""
+    fence_changes: int = 0
     progress: "Progress" = field(default_factory=lambda: Progress())
 
     @property
@@ -42,6 +43,8 @@ class MissionStore:
             last = max(len(plan) - 1, 0)
             self.current = min(max(self.current if current is None else current, 0), last)
             self.mission_changes += 1
+        elif kind is MissionType.FENCE:
+            self.fence_changes += 1
 
     def choose(self, number: int) -> bool:
         """Make ``number`` the current item; False where there is none."""

@@ -21,6 +21,7 @@ from sim_vehicle.autopilot.messages import Severity, Texts
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem, place_of
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
@@ -221,12 +222,12 @@ class MissionFlight:
             self.target = NavigatorTarget(Kind.LAND, place)
 
 
-def problem_of(items: Sequence[StoredItem], origin: Origin, view: View) -> str | None:
+def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, view: View) -> str | None:
     """Why an uploaded mission may not be flown, in PX4's words; None where it may (FeasibilityChecker.cpp)."""
     if items and items[0].command == kinds.LAND and view.landed:
         return "Mission rejected: starts with landing"
     home, has_place = view.home_ned_m, False
-    for item in items:
+    for number, item in enumerate(items, start=1):
         if item.command not in kinds.WITH_POSITION:
             continue
         place = place_of(item, origin, home)
@@ -234,5 +235,7 @@ def problem_of(items: Sequence[StoredItem], origin: Origin, view: View) -> str |
             return "Mission rejected: Takeoff altitude below home altitude!"
         if item.command == kinds.TAKEOFF and has_place:
             return "Mission rejected: takeoff not first waypoint item"
+        if not fence.allows(place):
+            return f"Geofence violation for waypoint {number}"
         has_place = True
     return None

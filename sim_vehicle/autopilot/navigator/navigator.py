@@ -16,8 +16,10 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     takeoff_acceptance,
 )
 from sim_vehicle.autopilot.messages import FollowTarget, Severity, Texts
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
 from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.autopilot.navigator.mission import MissionFlight, problem_of
 from sim_vehicle.autopilot.navigator.rtl import Return
 from sim_vehicle.control.setpoint import TrajectorySetpoint
@@ -38,6 +40,7 @@ class Navigator:
         self, parameters: Parameters, origin: Origin, missions: MissionStore, view: View, texts: Texts
     ) -> None:
         self.view = view
+        self.fence = Geofence(parameters, origin, texts)
         self.mission = MissionFlight(missions, parameters, origin, texts)
         self._parameters = parameters
         self._origin = origin
@@ -52,8 +55,9 @@ class Navigator:
         self._target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
         self._takeoff_place: tuple[Vector3 | None, float | None] | None = None
         self._reposition: NavigatorTarget | None = None
-        self._seen = (-1, view.home_ned_m)
+        self._seen = (-1, -1, view.home_ned_m)
         self._updated_us = view.now_us
+        self._holds_after_breach = False
         self.takeoff_is_over = False
         self.home_set_us = view.now_us
 
@@ -65,11 +69,14 @@ class Navigator:
         if self._mode is Mode.TAKEOFF and self.view.armed:
             self._begin_takeoff()
 
-    def hold_at(self, target: NavigatorTarget) -> None:
-        """DO_REPOSITION, before the mode becomes LOITER."""
+    def hold_at(self, target: NavigatorTarget) -> bool:
+        """DO_REPOSITION, before the mode becomes LOITER; False where the fence forbids the place."""
+        if not self.fence.allows(target.position_ned_m):
+            return False
         self._reposition = target
         if self._mode is Mode.LOITER:
             self._take_reposition()
+        return True
 
     @property
     def held_place_ned_m(self) -> Vector3:
@@ -148,6 +155,7 @@ class Navigator:
         if self._reposition is not None and self.view.armed:
             self._target = self._reposition
         self._reposition = None
+        self._holds_after_breach = False
 
     def _begin_takeoff(self) -> None:
         place, down_m = self._takeoff_place or (None, None)
@@ -174,6 +182,12 @@ class Navigator:
             return
         self._updated_us = view.now_us
         self.notice_changes()
+        was_breached = self.fence.breached
+        self.fence.update(view, self._holds_after_breach)
+        if self.fence.breached and not was_breached and view.armed:
+            self._hold_after_breach()
+        if self._mode is not Mode.LOITER and not self.fence.breached:
+            self._holds_after_breach = False
         if not view.armed:
             return
         if self._mode is Mode.MISSION:
@@ -185,13 +199,23 @@ class Navigator:
             over = self._arrival.is_reached(self._target, accepts, view, self._parameters)
             self.takeoff_is_over = self.takeoff_is_over or over
 
+    def _hold_after_breach(self) -> None:
+        """GF_ACTION 2 holds where the fence was found breached."""
+        if self._parameters["GF_ACTION"] == _FENCE_HOLDS:
+            self._holds_after_breach = True
+            self._reposition = NavigatorTarget(Kind.HOLD, self.view.position_ned_m)
+            if self._mode is Mode.LOITER:
+                self._target, self._reposition = self._reposition, None
+
     def notice_changes(self) -> None:
         """Uploads, another current item, another home: all are judged anew."""
         missions = self._missions
-        seen = (missions.mission_changes, self.view.home_ned_m)
+        seen = (missions.mission_changes, missions.fence_changes, self.view.home_ned_m)
         if seen == self._seen:
             return
         before, self._seen = self._seen, seen
+        if seen[1] != before[1] or seen[2] != before[2]:
+            self.fence.load(missions.plan(MissionType.FENCE), self.view)
         self._check_mission()
         if seen[0] == before[0]:
             return
@@ -202,7 +226,7 @@ class Navigator:
 
     def _check_mission(self) -> None:
         items = self._missions.mission
-        problem = problem_of(items, self._origin, self.view)
+        problem = problem_of(items, self._origin, self.fence, self.view)
         self._missions.progress.valid = bool(items) and problem is None
         if problem is not None:
             self._texts.say(Severity.CRITICAL, problem)
@@ -282,4 +306,5 @@ class Navigator:
         return self._orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
 
 
+_FENCE_HOLDS = 2
 _BY_TARGET = (Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.MISSION, Mode.LAND)

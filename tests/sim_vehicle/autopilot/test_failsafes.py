@@ -10,7 +10,7 @@ from sim_vehicle.autopilot.commander.failsafe_table import (
     FailsafeTrigger,
     responses_now,
 )
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, INJECT_FAILURE
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
@@ -71,9 +71,9 @@ def test_a_lost_link_can_be_excepted_in_a_mode(mode, mask):
 
 
 def test_of_two_failsafes_the_later_in_the_order_wins():
-    # Given lost sticks, after which it holds, and a lost ground station, after which it lands
-    parameters = Parameters({"COM_FAIL_ACT_T": 0.0, "NAV_RCL_ACT": 1, "NAV_DLL_ACT": 3})
-    now = situation(sticks_lost=True, ground_station_lost=True)
+    # Given a breached fence, which holds, and a lost ground station, after which it lands
+    parameters = Parameters({"COM_FAIL_ACT_T": 0.0, "NAV_DLL_ACT": 3})
+    now = situation(sticks_lost=False, fence_breached=True, ground_station_lost=True)
     assert Failsafe().update(0, now, parameters).action is Action.LAND
     # And a vehicle that returns already begins no return
     returning = situation(intended=Mode.RETURN, sticks_lost=False, ground_station_lost=True)
@@ -180,9 +180,8 @@ def test_killed_in_the_air_it_falls():
     assert flight.height_m == 0.0
 
 
-def lose_gps(flight: Flight, is_lost: bool = True) -> None:
-    flight.autopilot.commander.positioning.gps_is_lost = is_lost
-    flight.step()
+def lose_gps(flight: Flight) -> None:
+    assert flight.ask(INJECT_FAILURE, 4, 1) is Result.ACCEPTED
 
 
 @pytest.mark.parametrize(("intended", "asked"), [(Mode.LOITER, None), (Mode.OFFBOARD, UP)])
@@ -212,6 +211,6 @@ def test_one_that_sees_the_ground_lands_without_gps_and_holds_again_with_it():
     lose_gps(flight)
     flight.fly(5.1)
     assert (flown(flight), flight.autopilot.modes.intended) == (Mode.LAND, Mode.LOITER)
-    lose_gps(flight, False)
+    assert flight.ask(INJECT_FAILURE, 4, 0) is Result.ACCEPTED
     flight.fly(0.1)
     assert flown(flight) is Mode.LOITER
