@@ -240,7 +240,7 @@ def add_sim(commands: Commands) -> None:
     _option(sim, "--sensor-rate", text, type=int, choices=(250, 500, 1000), default=1000)
     text = "where the companion's link sends unasked (default 127.0.0.1:14540 + instance)"
     _option(sim, "--remote", text, "HOST:PORT", type=host_and_port)
-    text = "one more link, e.g. tcpin://0.0.0.0:5760 or serial:///dev/ttyUSB0:57600"
+    text = "one more link, e.g. tcpin://0.0.0.0:5760"
     _option(sim, "--link", text, "URL", action="append", default=[])
     _option(sim, "--instance", "adds N to the UDP ports and to the system's number", "N", type=instance, default=0)
     _option(sim, "--truth", "write what really happened to this .npz file at the end", "FILE")

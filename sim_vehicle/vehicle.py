@@ -85,7 +85,6 @@ class SimulatedVehicle:
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
-            true_body=self._body,
             attitude_setpoint=self._plant.state.attitude_setpoint,
             epoch_at_boot_us=epoch_at_boot_us,
             system=identity.system,

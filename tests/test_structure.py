@@ -22,9 +22,10 @@ OUTSIDE = {
     *("socket", "select", "serial", "asyncio", "threading", "subprocess", "signal"),
     *("time", "datetime", "os", "sys", "shutil", "tempfile", "pathlib", "io"),
 }
-# Built-in airframes and the table of parameters are read where they lie; compiled kernels in the user's cache.
+# Built-in airframes and the tables of parameters are read where they lie; compiled kernels in the user's cache.
 MAY_READ_FILES = {
     "sim_vehicle/airframe.py",
+    "sim_vehicle/parameters/sitl.py",
     "sim_vehicle/parameters/store.py",
     "sim_vehicle/physics/jit.py",
 }

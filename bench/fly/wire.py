@@ -23,13 +23,13 @@ from companion.reflex.monitor import advance, start_monitor
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
 from sim_vehicle.autopilot.messages import Identity
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.streams.streams import KINDS, LateLoops, Stream, interval_from_request
 from sim_vehicle.mavlink.streams.topics import Topic
 from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_IMPULSE, HIT_START_US
-from sim_vehicle.plant.cruise import Cruise
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
@@ -158,14 +158,18 @@ def fly_hit(
     yaw_rad = float(rng.uniform(-math.pi, math.pi))
     obstacle = obstacle_before(case, airframe, start + free_s * velocity, velocity, rng, offset_share)
     scene = Scene.model_validate(obstacle)
-    cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
+    plant = Plant(airframe, scene, case.seed)
+    plant.cruise(_triple(start), _triple(velocity), yaw_rad)
+    # The setpoint keeps to what the vehicle believes, which is late; else it would hurry after it.
+    late_us = round(1e6 * airframe.estimate.delay_s) if airframe.estimate.kind == "markov" else 0
     recording, interval_s = VehicleRecording(), 1e-6 * airframe.imu.integration_interval_us
-    plant, truth, hit_row = cruise.plant, cruise.plant.truth, cruise.plant.state.hit
+    truth, hit_row = plant.truth, plant.state.hit
     left = round((free_s + PATIENCE_S) / interval_s)
     touched = False
     steps = 0
     while left > 0:
-        output = cruise.step()
+        believed_ned_m = _triple(start + 1e-6 * (plant.state.time_us - late_us) * velocity)
+        output = plant.step(TrajectorySetpoint(believed_ned_m, _triple(velocity), yaw_rad=yaw_rad), armed=True)
         steps += 1
         left -= 1
         flown_s, height_m = steps * interval_s, -output.position_ned_m[2]

@@ -1,12 +1,6 @@
 """The `sensors:` and `estimator:` parts of an airframe file: what aids the vehicle's own Kalman filter."""
 
-from typing import Annotated, Self
-
-from pydantic import Field, model_validator
-
 from sim_vehicle.written import NotNegative, Part, Positive
-
-Share = Annotated[float, Field(ge=0, lt=1)]
 
 
 class Aid(Part):
@@ -18,17 +12,6 @@ class Aid(Part):
     """Samples a second."""
     delay_s: NotNegative
     """How late a sample reaches the filter, which fuses it at the time it was taken."""
-    share_lost: Share
-    """Chance that a sample is lost."""
-    lost_between_s: tuple[tuple[NotNegative, NotNegative], ...]
-    """Times since boot between which every sample is lost."""
-
-    @model_validator(mode="after")
-    def _losses_have_length(self) -> Self:
-        for start_s, end_s in self.lost_between_s:
-            if end_s <= start_s:
-                raise ValueError(f"lost_between_s: [{start_s}, {end_s}] ends before it begins")
-        return self
 
 
 class OpticalFlow(Aid):

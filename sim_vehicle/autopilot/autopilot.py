@@ -154,12 +154,8 @@ class Autopilot:
         """Change the mode as a command asks."""
         result = self.commander.request_mode(mode)
         if result is Result.ACCEPTED and says_so is not None:
-            self.say(Severity.INFO, says_so)
+            self.texts.say(Severity.INFO, says_so)
         return result
-
-    def say(self, severity: Severity, text: str) -> None:
-        """Tell the ground stations."""
-        self.texts.say(severity, text)
 
     def _notice_mode(self) -> None:
         previous, self._flown = self._flown, self.modes.flown
@@ -255,10 +251,10 @@ class Autopilot:
         if not self.arming.armed or was_landed == self.detector.landed:
             return
         if was_landed:
-            self.say(Severity.INFO, "Takeoff detected")
+            self.texts.say(Severity.INFO, "Takeoff detected")
             self.navigator.set_home_here()
         else:
-            self.say(Severity.INFO, "Landing detected")
+            self.texts.say(Severity.INFO, "Landing detected")
 
     # --- what is shown -----------------------------------------------------------------------------------
 

@@ -17,7 +17,6 @@ from sim_vehicle.autopilot.modes import Mode
 
 NAV_RETURN_TO_LAUNCH = 20
 NAV_LAND = 21
-NAV_TAKEOFF = flight_commands.NAV_TAKEOFF
 DO_SET_MODE = 176
 COMPONENT_ARM_DISARM = 400
 SET_MESSAGE_INTERVAL = 511
@@ -119,14 +118,14 @@ def _set_mode(command: Command, flight: CommandedVehicle) -> Result:
     if mode is not None:
         return flight.request_mode(mode)
     kind = "base" if not base & CUSTOM_FLAG else "auto" if main == AUTO_MAIN_MODE else "main"
-    flight.say(Severity.CRITICAL, f"Unsupported {kind} mode")
+    flight.texts.say(Severity.CRITICAL, f"Unsupported {kind} mode")
     return Result.TEMPORARILY_REJECTED
 
 
 def _arm_disarm(command: Command, flight: CommandedVehicle) -> Result | None:
     action, forced = _whole(command.param1), _whole(command.param2) == FORCE
     if action not in (0, 1):
-        flight.say(Severity.CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:.3f}")
+        flight.texts.say(Severity.CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:.3f}")
         return None
     return flight.commander.arm() if action == 1 else flight.commander.disarm(forced)
 

@@ -10,7 +10,7 @@ from typing import Protocol
 from sim_vehicle.autopilot.commander.arming import Reason
 from sim_vehicle.autopilot.commander.commander import Commander
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
-from sim_vehicle.autopilot.messages import Command, Result, Severity
+from sim_vehicle.autopilot.messages import Command, Result, Severity, Texts
 from sim_vehicle.autopilot.mission_protocol.mission_items import StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
@@ -38,12 +38,10 @@ class CommandedVehicle(Protocol):
     origin: Origin
     missions: MissionStore
     parameters: Parameters
+    texts: Texts
 
     def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
         """Change the mode; ``says_so`` is the text for a change that was accepted."""
-
-    def say(self, severity: Severity, text: str) -> None:
-        """Tell the ground stations."""
 
 
 def from_mission(given: StoredItem) -> Command:
@@ -63,7 +61,7 @@ def _reposition(command: Command, flight: CommandedVehicle) -> Result:
     if int(_given(command.param2) or 0) != _SWITCH_MODE:
         return Result.UNSUPPORTED
     if flight.commander.arming.armed and not flight.navigator.hold_at(_repositioned(command, flight)):
-        flight.say(Severity.CRITICAL, "Reposition is outside geofence")
+        flight.texts.say(Severity.CRITICAL, "Reposition is outside geofence")
     return flight.request_mode(Mode.LOITER)
 
 
@@ -90,23 +88,23 @@ def _change_speed(command: Command, flight: CommandedVehicle) -> Result:
 def _orbit(command: Command, flight: CommandedVehicle) -> Result:
     result = flight.request_mode(Mode.ORBIT)
     if result is not Result.ACCEPTED:
-        flight.say(Severity.CRITICAL, "Orbit command rejected")
+        flight.texts.say(Severity.CRITICAL, "Orbit command rejected")
         return result
     place, altitude_m = _place(command, flight), _given(command.param7)
     north, east = (None, None) if place is None else place[:2]
     down_m = None if altitude_m is None else flight.origin.place.altitude_m - altitude_m
     done = flight.navigator.change_orbit(_given(command.param1), _given(command.param2), (north, east, down_m))
     if not done:
-        flight.say(Severity.CRITICAL, "Orbit radius limit exceeded")
+        flight.texts.say(Severity.CRITICAL, "Orbit radius limit exceeded")
     return result
 
 
 def _start_mission(command: Command, flight: CommandedVehicle) -> Result:
     missions, first = flight.missions, _given(command.param1)
     if not missions.progress.valid:
-        flight.say(Severity.CRITICAL, "Mission start denied! No valid mission")
+        flight.texts.say(Severity.CRITICAL, "Mission start denied! No valid mission")
         return Result.DENIED
-    if first is None or not -1 <= first < len(missions.mission.items):
+    if first is None or not -1 <= first < len(missions.mission):
         return Result.DENIED
     if first >= 0:
         missions.choose(int(first))

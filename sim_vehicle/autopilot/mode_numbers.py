@@ -33,7 +33,6 @@ def custom_mode(main: int, sub: int = 0) -> int:
 
 
 NUMBERS: dict[Mode, ModeNumbers] = {
-    Mode.MANUAL: ModeNumbers(custom_mode(1), _STICKS, 0, "Manual"),
     Mode.ALTCTL: ModeNumbers(custom_mode(2), _STICKS, 4, "Altitude"),
     Mode.POSCTL: ModeNumbers(custom_mode(3), _STICKS, 1, "Position"),
     Mode.ORBIT: ModeNumbers(custom_mode(3, 1), _AUTO, 2, "Orbit"),
@@ -43,7 +42,6 @@ NUMBERS: dict[Mode, ModeNumbers] = {
     Mode.RETURN: ModeNumbers(custom_mode(4, 5), _AUTO, 5, "Return"),
     Mode.LAND: ModeNumbers(custom_mode(4, 6), _AUTO, 7, "Land"),
     Mode.FOLLOW_TARGET: ModeNumbers(custom_mode(4, 8), _AUTO, 0, "Follow Target"),
-    Mode.PRECISION_LAND: ModeNumbers(custom_mode(4, 9), _AUTO, 0, "Precision Landing"),
     # Stabilised too as soon as a setpoint has said what is controlled: see `base_mode`.
     Mode.OFFBOARD: ModeNumbers(custom_mode(6), CUSTOM_FLAG, 0, "Offboard"),
     Mode.STABILIZED: ModeNumbers(custom_mode(7), _STICKS, 0, "Stabilized"),

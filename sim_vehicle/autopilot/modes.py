@@ -11,7 +11,6 @@ from functools import cache
 class Mode(IntEnum):
     """The modes of a multicopter by PX4's NAVIGATION_STATE numbers."""
 
-    MANUAL = 0
     ALTCTL = 1
     POSCTL = 2
     MISSION = 3
@@ -24,7 +23,6 @@ class Mode(IntEnum):
     TAKEOFF = 17
     LAND = 18
     FOLLOW_TARGET = 19
-    PRECISION_LAND = 20
     ORBIT = 21
 
 
@@ -42,7 +40,6 @@ class Need(StrEnum):
 # mode_requirements.cpp; attitude and rates, which every mode needs, are always there.
 _PLACE = frozenset({Need.LOCAL_POSITION, Need.GLOBAL_POSITION})
 NEEDS: dict[Mode, frozenset[Need]] = {
-    Mode.MANUAL: frozenset({Need.STICKS}),
     Mode.ALTCTL: frozenset({Need.STICKS}),
     Mode.POSCTL: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
     Mode.STABILIZED: frozenset({Need.STICKS}),
@@ -51,7 +48,6 @@ NEEDS: dict[Mode, frozenset[Need]] = {
     Mode.RETURN: _PLACE | {Need.HOME},
     Mode.TAKEOFF: frozenset({Need.LOCAL_POSITION}),
     Mode.LAND: frozenset({Need.LOCAL_POSITION}),
-    Mode.PRECISION_LAND: frozenset({Need.LOCAL_POSITION}),
     Mode.FOLLOW_TARGET: frozenset({Need.LOCAL_POSITION}),
     Mode.ORBIT: frozenset({Need.LOCAL_POSITION}),
     Mode.OFFBOARD: frozenset({Need.SETPOINTS}),
@@ -66,7 +62,6 @@ NOT_ARMABLE = frozenset(
         Mode.RETURN,
         Mode.DESCEND,
         Mode.FOLLOW_TARGET,
-        Mode.PRECISION_LAND,
         Mode.ORBIT,
         Mode.TERMINATION,
     }
@@ -122,7 +117,6 @@ _FLOWN_WITHOUT_STICKS = tuple(mode for mode in Mode if Need.STICKS not in NEEDS[
 # leads out of TERMINATION: `ModeState` holds it. What a failsafe flies instead of the mode that is meant is
 # decided in `failsafe` and never changes what is meant, but for a pilot who takes over.
 TRANSITIONS: tuple[Transition, ...] = (
-    _request(Mode.MANUAL),
     _request(Mode.ALTCTL),
     _request(Mode.POSCTL),
     _request(Mode.STABILIZED),
@@ -131,7 +125,6 @@ TRANSITIONS: tuple[Transition, ...] = (
     _request(Mode.RETURN),
     _request(Mode.TAKEOFF),
     _request(Mode.LAND, ModeCondition.ALWAYS),
-    _request(Mode.PRECISION_LAND),
     _request(Mode.FOLLOW_TARGET),
     _request(Mode.ORBIT),
     _request(Mode.OFFBOARD),

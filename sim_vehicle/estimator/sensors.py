@@ -1,4 +1,4 @@
-"""Aiding sensors: the truth in, samples with their rate, noise, range and losses out."""
+"""Aiding sensors: the truth in, samples with their rate, noise and range out."""
 
 import math
 import random
@@ -24,26 +24,19 @@ AidType = TypeVar("AidType", bound=Aid)
 
 
 class Sensor(Generic[AidType]):
-    """When its samples are due, and which of them are lost."""
+    """When its samples are due."""
 
     def __init__(self, spec: AidType, interval_us: int, rng: random.Random) -> None:
         self._spec, self._rng = spec, rng
         self._interval_us, self._period_us = interval_us, round(1e6 / spec.rate_hz)
-        self._lost_us = [(1e6 * start_s, 1e6 * end_s) for start_s, end_s in spec.lost_between_s]
 
     def is_due(self, time_us: int) -> bool:
         """Whether the interval just ended contains a multiple of the period."""
         return time_us % self._period_us < self._interval_us
 
-    def is_lost(self, time_us: int) -> bool:
-        """Whether the sample of this moment is lost, by the file's plan or by chance."""
-        if any(start <= time_us < end for start, end in self._lost_us):
-            return True
-        return self._spec.share_lost > 0 and self._rng.random() < self._spec.share_lost
-
 
 class FlowSensor(Sensor[OpticalFlow]):
-    """A PX4FLOW: integrates flow and its own gyroscope between samples; what is lost has quality 0."""
+    """A PX4FLOW: integrates flow and its own gyroscope between samples; what is not seen has quality 0."""
 
     def __init__(self, spec: OpticalFlow, interval_us: int, rng: random.Random) -> None:
         super().__init__(spec, interval_us, rng)
@@ -60,7 +53,7 @@ class FlowSensor(Sensor[OpticalFlow]):
         self._camera[optics.FLOW_X : optics.TURN_Z + 1] = 0.0
         self._camera[optics.FASTEST] = 0.0
         integration_us, self._last_us = time_us - self._last_us, time_us
-        if not self._sees(seen) or self.is_lost(time_us):
+        if not self._sees(seen):
             return FlowSample(time_us, integration_us, (0.0, 0.0), (0.0, 0.0, 0.0), NO_QUALITY)
         spec, gauss, seconds = self._spec, self._rng.gauss, 1e-6 * integration_us
         turn_x, turn_y, turn_z = (
@@ -90,14 +83,14 @@ class RangeSensor(Sensor[RangeFinder]):
         """The sample of a true distance, which is only worth computing when one is due."""
         spec = self._spec
         least_m, most_m = spec.distance_min_m, spec.distance_max_m
-        if self.is_lost(time_us) or not least_m <= distance_m <= most_m:
+        if not least_m <= distance_m <= most_m:
             return RangeSample(time_us, None, least_m, most_m)
         measured_m = distance_m + self._bias_m + self._rng.gauss(0, spec.noise_m)
         return RangeSample(time_us, max(measured_m, 0.0), least_m, most_m)
 
 
 class DownwardSensors:
-    """Those that the airframe is fitted with, at their rates, with their noise, range and losses.
+    """Those that the airframe is fitted with, at their rates, with their noise and range.
 
     A sample comes at the moment that it shows. A filter of our own fuses it later, as late as the airframe says; PX4 is
     told that it is not late (EKF2_OF_DELAY and EKF2_RNG_DELAY of 0).
@@ -128,8 +121,8 @@ class CompassSensor(Sensor[Compass]):
     """A magnetometer already turned into a heading. A constant error would only rename north."""
 
     def observe(self, time_us: int, body: Floats) -> HeadingSample | None:
-        """The sample if one is due and not lost."""
-        if not self.is_due(time_us) or self.is_lost(time_us):
+        """The sample if one is due."""
+        if not self.is_due(time_us):
             return None
         return HeadingSample(time_us, true_yaw(body) + self._rng.gauss(0, self._spec.noise_rad))
 
@@ -138,8 +131,8 @@ class CaptureSensor(Sensor[MotionCapture]):
     """Cameras around the room: position and heading, with errors that are new in every frame."""
 
     def observe(self, time_us: int, body: Floats) -> CaptureSample | None:
-        """The sample if one is due and not lost."""
-        if not self.is_due(time_us) or self.is_lost(time_us):
+        """The sample if one is due."""
+        if not self.is_due(time_us):
             return None
         gauss, noise_m = self._rng.gauss, self._spec.noise_m
         x, y, z = body[0:3].tolist()

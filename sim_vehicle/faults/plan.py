@@ -96,10 +96,7 @@ class Faults:
 
     def gps_is_lost(self, time_s: float) -> bool:
         """At that time."""
-        return any(
-            isinstance(fault, spec.AidingLoss) and fault.window_s[0] <= time_s < fault.window_s[1]
-            for fault in self._faults
-        )
+        return any(isinstance(fault, spec.AidingLoss) for fault in self._estimate.acting(time_s))
 
     def _note(self, time_s: float, time_us: int) -> None:
         for fault in self._faults:

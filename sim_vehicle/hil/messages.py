@@ -55,18 +55,7 @@ class MotionCapture:
     attitude_variance_rad2: float
 
 
-@dataclass(frozen=True, slots=True)
-class HilState:
-    """The truth, which PX4 only logs; its acceleration is left at zero."""
-
-    time_us: int
-    place: Place
-    velocity_ned_m_s: Vector3
-    attitude_wxyz: Quaternion
-    angular_velocity_frd_rad_s: Vector3
-
-
-ToPx4: TypeAlias = HilSensor | HilGps | MotionCapture | FlowSample | RangeSample | HilState
+ToPx4: TypeAlias = HilSensor | HilGps | MotionCapture | FlowSample | RangeSample
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,12 @@ between the two is PX4 and not its tuning.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.parameters.sitl import Parameter, same_for_all
 from sim_vehicle.physics.layout import allocation, arms_of
 
 # MAV_PARAM_TYPE, as a .params file writes it.
@@ -27,19 +27,6 @@ EKF_PERIOD_S = 0.01
 Position = Literal["mocap", "gps", "flow"]
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """One of PX4's parameters, with the reason for its value."""
-
-    name: str
-    value: int | float
-    reason: str
-
-    @property
-    def text(self) -> str:
-        return str(self.value) if isinstance(self.value, int) else f"{self.value:.5g}"
-
-
 def px4_parameters(airframe: Airframe, position: Position = "mocap") -> tuple[Parameter, ...]:
     """Everything that must differ from PX4's airframe 10016 (none_iris); ``position``: what PX4 flies by."""
     return (
@@ -47,21 +34,19 @@ def px4_parameters(airframe: Airframe, position: Position = "mocap") -> tuple[Pa
         *_gains(airframe),
         *_limits(airframe),
         *_sensors(airframe, position),
-        *_flight_rules(),
+        *same_for_all("px4", "flight rules"),
     )
 
 
 def _allocation(airframe: Airframe) -> Iterable[Parameter]:
     moment_m = airframe.motors.moment_per_thrust_m
-    yield Parameter("CA_AIRFRAME", 0, "multirotor")
+    yield from same_for_all("px4", "allocation")
     yield Parameter("CA_ROTOR_COUNT", airframe.rotor_count, "in PX4's order")
     for rotor, (direction, radius_m, sign) in enumerate(zip(*arms_of(airframe), strict=True)):
         yield Parameter(f"CA_ROTOR{rotor}_PX", float(radius_m * direction[0]), "motor, metres ahead of the centre")
         yield Parameter(f"CA_ROTOR{rotor}_PY", float(radius_m * direction[1]), "metres to the right")
         yield Parameter(f"CA_ROTOR{rotor}_KM", float(sign * moment_m), "reaction torque over thrust, metres")
         yield Parameter(f"PWM_MAIN_FUNC{rotor + 1}", _FIRST_MOTOR_FUNCTION + rotor, "the motor's output")
-    yield Parameter("THR_MDL_FAC", 0.0, "thrust is linear in the motor command")
-    yield Parameter("MC_AIRMODE", 1, "with little thrust, too, it can be turned level: roll and pitch before thrust")
 
 
 def _greatest_moments_n_m(airframe: Airframe) -> tuple[float, float]:
@@ -104,8 +89,8 @@ def _gains(airframe: Airframe) -> Iterable[Parameter]:
 def _limits(airframe: Airframe) -> Iterable[Parameter]:
     control = airframe.control
     tilt_deg = math.degrees(control.tilt_max_rad)
+    yield from same_for_all("px4", "limits")
     yield Parameter("MPC_THR_HOVER", airframe.hover_fraction, "weight over greatest thrust")
-    yield Parameter("MPC_THR_MIN", 0.05, "as the motors idle")
     yield Parameter("MPC_TILTMAX_AIR", tilt_deg, "degrees; more would not carry the weight")
     yield Parameter("MPC_MAN_TILT_MAX", tilt_deg, "the same for a pilot")
     yield Parameter("MPC_XY_P", control.position_p_per_s, "1/s; eq. 6, as for the built-in autopilot")
@@ -117,57 +102,18 @@ def _limits(airframe: Airframe) -> Iterable[Parameter]:
 def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
     interval_us = airframe.imu.integration_interval_us
     yield Parameter("IMU_INTEG_RATE", round(1e6 / interval_us), "one HIGHRES_IMU a sample of the simulator")
-    # A hit that clips the accelerometer leaves PX4's velocity wrong by 0.7 m/s at 2 m/s and by 4 m/s at 4. PX4 should
-    # then correct the velocity, not the attitude, and soon (bench/notes/px4.md).
-    yield Parameter("EKF2_ACC_NOISE", 1.0, "m/s2; leaves room for what a hit hides from the accelerometer")
+    yield from same_for_all("px4", "sensors")
     gyroscope_noise_rad_s = airframe.imu.gyroscope_noise_rad_s * math.sqrt(1e-6 * interval_us / EKF_PERIOD_S)
     yield Parameter("EKF2_GYR_NOISE", gyroscope_noise_rad_s, "rad/s; the gyroscope's own, over a step of EKF2")
-    yield Parameter("EKF2_TAU_VEL", 0.1, "s; corrections reach the velocity sooner than at 0.25")
-    yield Parameter("EKF2_TAU_POS", 0.1, "s; the same")
-    yield Parameter("EKF2_DELAY_MAX", 50.0, "ms; no sensor here is later, and EKF2 lags by this much")
-    if position == "mocap":
-        yield Parameter("EKF2_EV_CTRL", 11, "motion capture's position, height and yaw")
-        yield Parameter("EKF2_HGT_REF", 3, "height from motion capture")
-        # At the default of 5 PX4 rejects the true position for a second after such a hit, and then jumps.
-        yield Parameter("EKF2_EVP_GATE", 50.0, "standard deviations; a hit must not make the true position incredible")
-        yield Parameter("EKF2_EVP_NOISE", 0.01, "m, the least that PX4 takes")
-        yield Parameter("EKF2_EVA_NOISE", 0.05, "rad, the least that PX4 takes")
-        # With both, PX4 takes motion capture as relative to GPS and no better than it.
-        yield Parameter("EKF2_GPS_CTRL", 0, "no GPS indoors")
-    elif position == "flow":
+    yield from same_for_all("px4", position)
+    if position == "flow":
         sensors = airframe.sensors
-        yield Parameter("EKF2_EV_CTRL", 0, "no motion capture")
-        yield Parameter("EKF2_GPS_CTRL", 0, "no GPS indoors")
-        yield Parameter("EKF2_OF_CTRL", 1, "velocity from optical flow")
-        yield Parameter("EKF2_OF_DELAY", 0.0, "ms; the simulator's samples are of the moment")
-        yield Parameter("EKF2_RNG_CTRL", 2, "the range finder at any speed")
-        yield Parameter("EKF2_RNG_DELAY", 0.0, "ms; the same")
-        yield Parameter("EKF2_HGT_REF", 2, "height from the range finder")
         yield Parameter("EKF2_MIN_RNG", airframe.geometry.foot_depth_m, "m; what it shows on the ground")
         yield Parameter("SENS_FLOW_MAXHGT", sensors.optical_flow.distance_max_m, "m")
         yield Parameter("SENS_FLOW_MAXR", sensors.optical_flow.rate_max_rad_s, "rad/s")
         # On the ground the camera is out of focus and reports a low quality. Above this limit PX4 would not use it, and
         # not arm.
         yield Parameter("SENS_FLOW_MINHGT", airframe.geometry.foot_depth_m / 2, "m; less than on the ground")
-        yield Parameter("SENS_FLOW_ROT", 0, "mounted along the body's axes")
-    else:
-        yield Parameter("EKF2_EV_CTRL", 0, "no motion capture outdoors")
-        # At the default of 5, PX4 rejects the true fix for 5 s after a hit at 3.4 m/s. It flies 14 m off at 3 m/s, then
-        # finds its position invalid and lands.
-        yield Parameter("EKF2_GPS_P_GATE", 50.0, "standard deviations; a hit must not make the true fix incredible")
-        yield Parameter("EKF2_GPS_V_GATE", 50.0, "the same")
-        yield Parameter("EKF2_GPS_P_NOISE", 0.05, "m; the fix is an RTK receiver's")
-        yield Parameter("EKF2_GPS_V_NOISE", 0.1, "m/s; PX4 takes no less than 0.25 for a simulated fix")
-
-
-def _flight_rules() -> Iterable[Parameter]:
-    yield Parameter("COM_RC_IN_MODE", 4, "no sticks")
-    yield Parameter("COM_RCL_EXCEPT", 4, "no remote control needed in OFFBOARD")
-    yield Parameter("COM_OF_LOSS_T", 0.3, "s; a companion that dies leaves PX4 an attitude, safe to hold for so long")
-    yield Parameter("NAV_DLL_ACT", 0, "no ground station needed")
-    yield Parameter("CBRK_SUPPLY_CHK", 894281, "no power module in a simulation")
-    # As rcS starts it, its loop holds up the lockstep until EKF2 has run: with samples in between, for ever.
-    yield Parameter("SDLOG_BACKEND", 0, "no logger that waits for EKF2; `logger start -t -e` begins another")
 
 
 def as_environment(airframe: Airframe, position: Position = "mocap") -> str:

@@ -4,10 +4,12 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.airframes import aiding
 from sim_vehicle.estimator.estimate import to_ned
 from sim_vehicle.geography import HOME, Origin, Place
 from sim_vehicle.hil.messages import Air, HilGps, MotionCapture
-from sim_vehicle.quantities import Quaternion, Vector3
+from sim_vehicle.physics.rotation import turn
+from sim_vehicle.quantities import Floats, Quaternion, Vector3
 
 # Inside the five years of WMM2025; fixed, so that the same flight has the same field.
 FIELD_YEAR = 2026.0
@@ -42,16 +44,11 @@ def air_at(altitude_m: float, noise_pa: float = 0.0) -> Air:
 MAGNETOMETER_PERIOD_US = 20_000
 BAROMETER_PERIOD_US = 20_000
 GPS_PERIOD_US = 100_000
-# PX4 wants external vision at 30 to 50 Hz.
-MOTION_CAPTURE_PERIOD_US = 20_000
 
 # Standard deviation of one sample. An IST8310's 3 mgauss at full rate, averaged down to 50 Hz.
 MAGNETOMETER_NOISE_GAUSS = 0.001
 # A BMP388 at its finest setting has 0.02 Pa, and a flying vehicle's own wind ten times that and more.
 BAROMETER_NOISE_PA = 0.5
-# Camera systems state tenths of a millimetre; a moving vehicle whose markers hide one another has more.
-CAMERA_POSITION_NOISE_M = 0.002
-CAMERA_ATTITUDE_NOISE_RAD = 0.005
 
 
 class Wander:
@@ -111,31 +108,25 @@ class Gps:
 class Cameras:
     """A motion-capture system: position and attitude, with errors that are new in every frame."""
 
-    def __init__(self, rng: random.Random) -> None:
-        self._rng = rng
+    def __init__(self, spec: aiding.MotionCapture, rng: random.Random) -> None:
+        self._spec, self._rng = spec, rng
 
-    def sample(self, time_us: int, position_ned_m: Vector3, attitude_wxyz: Quaternion) -> MotionCapture:
+    def sample(self, time_us: int, body: Floats) -> MotionCapture:
+        """Of the true state (13,)."""
+        spec, seen = self._spec, body[:10].copy()
+        turn(body, *self._error(spec.noise_rad), seen)
+        north, east, down, *_, w, x, y, z = seen.tolist()
         return MotionCapture(
             time_us=time_us,
-            position_ned_m=_sum(position_ned_m, self._error(CAMERA_POSITION_NOISE_M)),
-            attitude_wxyz=turned(attitude_wxyz, self._error(CAMERA_ATTITUDE_NOISE_RAD)),
-            position_variance_m2=CAMERA_POSITION_NOISE_M**2,
-            attitude_variance_rad2=CAMERA_ATTITUDE_NOISE_RAD**2,
+            position_ned_m=_sum((north, east, down), self._error(spec.noise_m)),
+            attitude_wxyz=(w, x, y, z),
+            position_variance_m2=spec.noise_m**2,
+            attitude_variance_rad2=spec.noise_rad**2,
         )
 
     def _error(self, deviation: float) -> Vector3:
         gauss = self._rng.gauss
         return gauss(0, deviation), gauss(0, deviation), gauss(0, deviation)
-
-
-def turned(attitude_wxyz: Quaternion, angle_frd_rad: Vector3) -> Quaternion:
-    """An attitude after a small turn about the body's axes."""
-    w, x, y, z = attitude_wxyz
-    a, b, c = (0.5 * angle for angle in angle_frd_rad)
-    turned_w, turned_x = w - x * a - y * b - z * c, x + w * a + y * c - z * b
-    turned_y, turned_z = y + w * b + z * a - x * c, z + w * c + x * b - y * a
-    norm = math.sqrt(turned_w**2 + turned_x**2 + turned_y**2 + turned_z**2)
-    return turned_w / norm, turned_x / norm, turned_y / norm, turned_z / norm
 
 
 def to_body(attitude_wxyz: Quaternion, vector_ned: Vector3) -> Vector3:

@@ -7,16 +7,13 @@ from sim_vehicle.airframe import Airframe, Imu
 from sim_vehicle.estimator.sensors import DownwardSensors
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil import sensors
-from sim_vehicle.hil.messages import Air, HilSensor, HilState, ToPx4
+from sim_vehicle.hil.messages import Air, HilSensor, ToPx4
 from sim_vehicle.hil.sensors import air_at
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.plant.standing import check_start
 from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import TruthRecorder
-
-# What PX4 asks for when it connects.
-STATE_PERIOD_US = 5_000
 
 # PX4 integrates samples by the trapezoidal rule: at 4 ms every HIGHRES_IMU would be the mean of two of them
 # and show a hit a sample late. A quarter of its interval comes near the 8 kHz of a real sensor.
@@ -48,7 +45,8 @@ class HilVehicle:
         self._magnetometer = sensors.Magnetometer(rng)
         self._rng, self._origin = rng, Origin()
         self._gps = sensors.Gps(airframe, rng, self._origin)
-        self._cameras = sensors.Cameras(rng)
+        self._cameras = sensors.Cameras(airframe.sensors.motion_capture, rng)
+        self._cameras_period_us = round(1e6 / airframe.sensors.motion_capture.rate_hz)
         self.interval_us = self._plant.interval_us
         self._downward = DownwardSensors(airframe.sensors, self.interval_us, random.Random(~seed))
         # Taken once: looking a record's field up costs microseconds.
@@ -57,14 +55,14 @@ class HilVehicle:
 
     @property
     def truth(self) -> TruthRecorder:
-        """What really happened, never sent as anything but truth."""
+        """What really happened, never sent."""
         return self._plant.truth
 
     def step(self, motor_fractions: tuple[float, ...]) -> tuple[ToPx4, ...]:
         """Advance one sample; the inertial sensor's sample comes last, because it sets PX4's clock going."""
         output = self._plant.drive(motor_fractions)
         now_us = self.time_boot_us = output.time_boot_us
-        px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r = self._body.tolist()
+        px, py, pz, vx, vy, vz, qw, qx, qy, qz = self._body[:10].tolist()
         position_ned_m: Vector3 = (px, py, pz)
         velocity_ned_m_s: Vector3 = (vx, vy, vz)
         attitude_wxyz: Quaternion = (qw, qx, qy, qz)
@@ -72,12 +70,9 @@ class HilVehicle:
         faults = self._plant.faults
         if self._is_due(sensors.GPS_PERIOD_US) and not (faults is not None and faults.gps_is_lost(now_us / 1e6)):
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
-        if self._is_due(sensors.MOTION_CAPTURE_PERIOD_US):
-            messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
+        if self._is_due(self._cameras_period_us):
+            messages.append(self._cameras.sample(now_us, self._body))
         messages += self._downward.observe(now_us, self._body, self._plant.seen_faces)
-        if self._is_due(STATE_PERIOD_US):
-            place = self._origin.place_at(position_ned_m)
-            messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))
         is_magnetometer_due = self._is_due(sensors.MAGNETOMETER_PERIOD_US)
         messages.append(
             HilSensor(

@@ -38,24 +38,22 @@ def pulses_from(packet: bytes) -> Pulses | None:
     return Pulses(count, tuple(widths_us)) if magic == _MAGIC else None
 
 
-@dataclass(frozen=True, slots=True)
-class BodyState:
-    """The inertial sensor's sample, and the truth of which ArduPilot makes its other sensors."""
+def state_line(
+    time_us: int,
+    angular_velocity_frd_rad_s: Vector3,
+    specific_force_frd_m_s2: Vector3,
+    position_ned_m: Vector3,
+    attitude_wxyz: Quaternion,
+    velocity_ned_m_s: Vector3,
+) -> bytes:
+    """The inertial sensor's sample, and the truth of which ArduPilot makes its other sensors, as they are sent.
 
-    time_us: int
-    angular_velocity_frd_rad_s: Vector3
-    specific_force_frd_m_s2: Vector3
-    position_ned_m: Vector3
-    attitude_wxyz: Quaternion
-    velocity_ned_m_s: Vector3
-
-    def line(self) -> bytes:
-        """As it is sent. ArduPilot finds keys by the first place of their letters: the order counts."""
-        seconds = f"{self.time_us * 1e-6 * _LONGER:.9f}"
-        gyro, force = _list(self.angular_velocity_frd_rad_s), _list(self.specific_force_frd_m_s2)
-        place, turn, way = _list(self.position_ned_m), _list(self.attitude_wxyz), _list(self.velocity_ned_m_s)
-        text = f'{{"timestamp":{seconds},"imu":{{"gyro":{gyro},"accel_body":{force}}},'
-        return f'\n{text}"position":{place},"quaternion":{turn},"velocity":{way}}}\n'.encode()
+    ArduPilot finds keys by the first place of their letters: the order counts.
+    """
+    gyro, force = _list(angular_velocity_frd_rad_s), _list(specific_force_frd_m_s2)
+    place, turn, way = _list(position_ned_m), _list(attitude_wxyz), _list(velocity_ned_m_s)
+    text = f'{{"timestamp":{time_us * 1e-6 * _LONGER:.9f},"imu":{{"gyro":{gyro},"accel_body":{force}}},'
+    return f'\n{text}"position":{place},"quaternion":{turn},"velocity":{way}}}\n'.encode()
 
 
 def _list(numbers: Vector3 | Quaternion) -> str:

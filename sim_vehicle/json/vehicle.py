@@ -3,7 +3,7 @@
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.errors import AirframeError
 from sim_vehicle.hil.vehicle import sampled_every
-from sim_vehicle.json.messages import BodyState, Pulses
+from sim_vehicle.json.messages import Pulses, state_line
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.plant.standing import check_start
 from sim_vehicle.scene import Scene
@@ -36,12 +36,11 @@ class JsonVehicle:
         output = self._plant.drive(pulses.motor_fractions(self._motors))
         self.time_boot_us = output.time_boot_us
         north, east, down, v_north, v_east, v_down, w, x, y, z = self._body[:10].tolist()
-        state = BodyState(
-            time_us=output.time_boot_us,
-            angular_velocity_frd_rad_s=output.angular_velocity_frd_rad_s,
-            specific_force_frd_m_s2=output.specific_force_frd_m_s2,
-            position_ned_m=(north, east, down),
-            attitude_wxyz=(w, x, y, z),
-            velocity_ned_m_s=(v_north, v_east, v_down),
+        return state_line(
+            output.time_boot_us,
+            output.angular_velocity_frd_rad_s,
+            output.specific_force_frd_m_s2,
+            (north, east, down),
+            (w, x, y, z),
+            (v_north, v_east, v_down),
         )
-        return state.line()

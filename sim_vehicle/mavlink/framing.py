@@ -42,7 +42,6 @@ LOCAL_POSITION_NED = Layout(dialect.MAVLink_local_position_ned_message)
 GLOBAL_POSITION_INT = Layout(dialect.MAVLink_global_position_int_message)
 ODOMETRY = Layout(dialect.MAVLink_odometry_message)
 HIL_SENSOR = Layout(dialect.MAVLink_hil_sensor_message)
-HIL_STATE_QUATERNION = Layout(dialect.MAVLink_hil_state_quaternion_message)
 
 
 @cache

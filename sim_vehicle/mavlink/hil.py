@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, HilGps, HilSensor, MotionCapture, ToPx4
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.mavlink.encode import (
@@ -109,19 +109,12 @@ def _motion_capture(seen: MotionCapture) -> Message:
     )
 
 
-def _state(state: HilState) -> Message:
-    return aiding.hil_state(
-        state.time_us, state.attitude_wxyz, state.angular_velocity_frd_rad_s, state.place, state.velocity_ned_m_s
-    )
-
-
 _FILLED: dict[type[Any], Callable[[Any], Message]] = {
     HilSensor: _sensor,
     HilGps: _gps,
     MotionCapture: _motion_capture,
     FlowSample: aiding.hil_optical_flow,
     RangeSample: aiding.distance_looking_down,
-    HilState: _state,
 }
 
 

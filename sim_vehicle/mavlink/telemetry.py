@@ -8,7 +8,7 @@ from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.quantities import Floats, Vector3
+from sim_vehicle.quantities import Floats, Quaternion, Vector3, quaternion_from_matrix
 
 _KEPT = 0.99
 _ADDED = 1.0 - _KEPT
@@ -51,8 +51,6 @@ class Telemetry:
     attitude_variance_rad2: float
     flow: FlowSample | None = None
     range: RangeSample | None = None
-    true_body: Floats | None = None
-    """The plant's own state (13,), for the truth channel alone."""
     attitude_setpoint: Floats | None = None
     """The attitude control's R_d (3, 3), body to NED."""
     gps: HilGps | None = None
@@ -79,23 +77,8 @@ class Telemetry:
         """The value of a parameter that counts now."""
         return self.autopilot.parameters[name]
 
-    def attitude_setpoint_wxyz(self) -> tuple[float, float, float, float]:
+    def attitude_setpoint_wxyz(self) -> Quaternion:
         """The attitude control's setpoint; level where there is none."""
         if self.attitude_setpoint is None:
             return 1.0, 0.0, 0.0, 0.0
         return quaternion_from_matrix(self.attitude_setpoint.tolist())
-
-
-def quaternion_from_matrix(rows: list[list[float]]) -> tuple[float, float, float, float]:
-    """Of a rotation matrix; the largest component is found first, so that no division is by a small number."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
-    largest = max(range(4), key=squares.__getitem__)
-    n = 2 * math.sqrt(max(squares[largest], 1e-12))
-    if largest == 0:
-        return n / 4, (h - f) / n, (c - g) / n, (d - b) / n
-    if largest == 1:
-        return (h - f) / n, n / 4, (b + d) / n, (c + g) / n
-    if largest == 2:
-        return (c - g) / n, (b + d) / n, n / 4, (f + h) / n
-    return (d - b) / n, (c + g) / n, (f + h) / n, n / 4

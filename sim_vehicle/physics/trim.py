@@ -6,7 +6,7 @@ import numpy as np
 
 from sim_vehicle.physics.estimate import EstimateErrors
 from sim_vehicle.physics.layout import BODY_SIZE, GRAVITY_M_S2, Constants, Disturbance, PlantState
-from sim_vehicle.quantities import Floats, Vector3
+from sim_vehicle.quantities import Floats, Vector3, quaternion_from_matrix
 
 
 def trim(
@@ -27,7 +27,7 @@ def trim(
     acceleration = constants.drag_n_s_m * (velocity - disturbance.wind_ned_m_s) / constants.mass_kg
     upheld = np.array([0.0, 0.0, GRAVITY_M_S2]) - acceleration
     rotation = _leaning(upheld, yaw_rad)
-    state.body[:] = [*position_ned_m, *velocity_ned_m_s, *_quaternion(rotation), 0.0, 0.0, 0.0]
+    state.body[:] = [*position_ned_m, *velocity_ned_m_s, *quaternion_from_matrix(rotation.tolist()), 0.0, 0.0, 0.0]
     state.velocity_integral[:] = acceleration
     state.velocity_integral[0:2] *= GRAVITY_M_S2 / upheld[2]
     state.attitude_setpoint[:] = rotation
@@ -57,13 +57,3 @@ def _leaning(upheld: Floats, yaw_rad: float) -> Floats:
     b2 = np.cross(b3, [math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
     b2 /= np.linalg.norm(b2)
     return np.column_stack([np.cross(b2, b3), b2, b3])
-
-
-def _quaternion(rotation: Floats) -> tuple[float, float, float, float]:
-    """(w, x, y, z) of a rotation that leaves the body's top up, where w and z are not both small."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
-    if xx + yy + zz > 0.0:
-        w = 0.5 * math.sqrt(1.0 + xx + yy + zz)
-        return w, (zy - yz) / (4 * w), (xz - zx) / (4 * w), (yx - xy) / (4 * w)
-    z = 0.5 * math.sqrt(1.0 + zz - xx - yy)
-    return (yx - xy) / (4 * z), (xz + zx) / (4 * z), (yz + zy) / (4 * z), z

@@ -24,7 +24,14 @@ def test_they_are_short(pages, most):
 
 
 def test_a_decision_names_numbers_that_the_code_has():
-    code = "\n".join(path.read_text() for room in ("companion", "sim_vehicle") for path in (ROOT / room).rglob("*.py"))
+    # And its tables
+    paths = (
+        path
+        for room in ("companion", "sim_vehicle")
+        for kind in ("py", "yaml")
+        for path in (ROOT / room).rglob(f"*.{kind}")
+    )
+    code = "\n".join(path.read_text() for path in paths)
     named = set(re.findall(r"`([A-Za-z]\w*_\w+|[A-Z]{4,})`", DECISIONS)) - {"defer_build"}
     assert len(named) > 25
     assert {name for name in named if not re.search(rf"\b{name}\b", code)} == set()

@@ -31,15 +31,7 @@ MODE_OF: dict[Action, Mode] = {
     Action.DESCEND: Mode.DESCEND,
 }
 # If its mode cannot run, an action gives way to the next; the last needs nothing.
-_LADDER = (
-    Action.FALL_BACK_TO_POSITION,
-    Action.FALL_BACK_TO_ALTITUDE,
-    Action.FALL_BACK_TO_STABILIZED,
-    Action.HOLD,
-    Action.RETURN,
-    Action.LAND,
-    Action.DESCEND,
-)
+_LADDER = tuple(MODE_OF)
 # Modes flown by sticks need no taking over.
 _CAN_BE_TAKEN_OVER = (Action.HOLD, Action.RETURN, Action.LAND, Action.DESCEND)
 # A vehicle that lands or returns already does not begin a return.

@@ -6,7 +6,8 @@ mc_att_control.
 
 import math
 
-from sim_vehicle.autopilot.flight_tasks.smoothing import towards
+from sim_vehicle.autopilot.flight_tasks.smoothing import slewed, towards
+from sim_vehicle.autopilot.flight_tasks.takeoff import GRAVITY_M_S2
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import StickInput
 from sim_vehicle.autopilot.modes import Mode
@@ -15,7 +16,6 @@ from sim_vehicle.estimator.estimate import level_to_north_east
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Axis3
 
-GRAVITY_M_S2 = 9.80665
 # Sticks::getPositionExpo: MPC_XY_MAN_EXPO and its like were replaced by this figure.
 EXPO = 0.6
 # Throttle above this is a wish to take off (FlightTaskManualAltitude::_checkTakeoff).
@@ -28,7 +28,7 @@ _STILL_M_S = 1e-3
 _THROTTLE_RISE_PER_S = 0.5
 
 BY_ALTITUDE = (Mode.POSCTL, Mode.ALTCTL)
-BY_STICKS = (*BY_ALTITUDE, Mode.MANUAL, Mode.STABILIZED)
+BY_STICKS = (*BY_ALTITUDE, Mode.STABILIZED)
 
 
 class ManualFlight:
@@ -95,7 +95,7 @@ class ManualFlight:
         wanted = (scale * stick_north - drag * north, scale * stick_east - drag * east)
         if is_free and math.hypot(north, east) < max(drag * math.hypot(north, east) * step_s, _STILL_M_S):
             self._velocity_m_s, wanted = (0.0, 0.0), (0.0, 0.0)
-        self._acceleration_m_s2 = _slewed(self._acceleration_m_s2, wanted, parameters["MPC_JERK_MAX"] * step_s)
+        self._acceleration_m_s2 = slewed(self._acceleration_m_s2, wanted, parameters["MPC_JERK_MAX"] * step_s)
         a_north, a_east = self._acceleration_m_s2
         north, east = self._velocity_m_s
         self._velocity_m_s = (north + a_north * step_s, east + a_east * step_s)
@@ -183,10 +183,3 @@ class ManualFlight:
 def _within_circle(x: float, y: float) -> tuple[float, float]:
     length = math.hypot(x, y)
     return (x / length, y / length) if length > 1.0 else (x, y)
-
-
-def _slewed(value: tuple[float, float], target: tuple[float, float], most: float) -> tuple[float, float]:
-    change = (target[0] - value[0], target[1] - value[1])
-    length = math.hypot(*change)
-    share = 1.0 if length <= most else most / length
-    return value[0] + share * change[0], value[1] + share * change[1]

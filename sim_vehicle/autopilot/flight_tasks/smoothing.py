@@ -56,9 +56,7 @@ class Smoother:
         distance = math.hypot(to_north, to_east)
         speed = _braking_speed(distance, most_m_s2, cruise_m_s, step_s)
         per_metre = speed / distance if distance > 0 else 0.0
-        change_north, change_east = to_north * per_metre - v_north, to_east * per_metre - v_east
-        share = _share(math.hypot(change_north, change_east), most_m_s2 * step_s)
-        v_north, v_east = v_north + share * change_north, v_east + share * change_east
+        v_north, v_east = slewed((v_north, v_east), (to_north * per_metre, to_east * per_metre), most_m_s2 * step_s)
         v_down = self.vertical_velocity(v_down, target_ned_m[2] - down, step_s)
         self.velocity_ned_m_s = (v_north, v_east, v_down)
         self.acceleration_ned_m_s2 = (
@@ -91,11 +89,14 @@ def towards(value: float, target: float, most: float) -> float:
     return min(max(target, value - most), value + most)
 
 
+def slewed(value: tuple[float, float], target: tuple[float, float], most: float) -> tuple[float, float]:
+    """The same for a vector in a plane."""
+    change = (target[0] - value[0], target[1] - value[1])
+    length = math.hypot(*change)
+    share = 1.0 if length <= most else most / length
+    return value[0] + share * change[0], value[1] + share * change[1]
+
+
 def _braking_speed(distance_m: float, acceleration_m_s2: float, most_m_s: float, step_s: float) -> float:
     """The speed from which the setpoint can still stop at the target, and not pass it in one step."""
     return min(most_m_s, math.sqrt(2 * BRAKE_SHARE * acceleration_m_s2 * distance_m), distance_m / step_s)
-
-
-def _share(length: float, most: float) -> float:
-    """How much of a change of that length may happen."""
-    return 1.0 if length <= most else most / length

@@ -9,7 +9,7 @@ from enum import IntEnum
 from sim_vehicle.control.setpoint import FREE, TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
 
-_GRAVITY_M_S2 = 9.80665
+GRAVITY_M_S2 = 9.80665
 
 
 class TakeoffState(IntEnum):
@@ -67,7 +67,7 @@ class Takeoff:
 
     def _ramp_climb_m_s(self, now_us: int) -> float:
         """From where the velocity control would take the whole weight off the motors to MPC_Z_VEL_MAX_UP."""
-        start = -_GRAVITY_M_S2 / self._parameters["MPC_Z_VEL_P_ACC"]
+        start = -GRAVITY_M_S2 / self._parameters["MPC_Z_VEL_P_ACC"]
         progress = self._passed_s(now_us) / self._parameters["MPC_TKO_RAMP_T"]
         return start + progress * (self._parameters["MPC_Z_VEL_MAX_UP"] - start)
 

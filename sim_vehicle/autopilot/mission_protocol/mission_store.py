@@ -1,6 +1,7 @@
 """The uploaded mission, geofence and rally points: one store a vehicle."""
 
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 
@@ -8,21 +9,16 @@ from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, St
 MOST_ITEMS = {MissionType.MISSION: 10_000, MissionType.FENCE: 64, MissionType.RALLY: 32}
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """One of the three lists."""
-
-    items: tuple[StoredItem, ...] = ()
-    checksum: int = 0
+Plan: TypeAlias = tuple[StoredItem, ...]
+"""One of the three lists."""
 
 
 @dataclass(slots=True)
 class MissionStore:
-    """What the links write and the navigator flies."""
+    """What the links write and the navigator flies, and keeps within: nothing uses rally points."""
 
-    mission: Plan = Plan()
-    fence: Plan = Plan()
-    rally: Plan = Plan()
+    plans: dict[int, Plan] = field(default_factory=dict)
+    """By their types; those that were never stored are empty."""
     current: int = 0
     """The mission item that is flown, or will be."""
     uploading: bool = False
@@ -32,31 +28,27 @@ class MissionStore:
     fence_changes: int = 0
     progress: "Progress" = field(default_factory=lambda: Progress())
 
+    @property
+    def mission(self) -> Plan:
+        return self.plan(MissionType.MISSION)
+
     def plan(self, kind: int) -> Plan:
         """The list of that type; an empty one for a type that does not exist."""
-        plans: dict[int, Plan] = {
-            MissionType.MISSION: self.mission,
-            MissionType.FENCE: self.fence,
-            MissionType.RALLY: self.rally,
-        }
-        return plans.get(kind, Plan())
+        return self.plans.get(kind, ())
 
     def replace(self, kind: MissionType, plan: Plan, current: int | None = None) -> None:
         """Store a list in whole. ``current``: the item that its sender marked; None keeps the present one."""
-        if kind is MissionType.FENCE:
-            self.fence = plan
-            self.fence_changes += 1
-        elif kind is MissionType.RALLY:
-            self.rally = plan
-        else:
-            self.mission = plan
-            last = max(len(plan.items) - 1, 0)
+        self.plans[kind] = plan
+        if kind is MissionType.MISSION:
+            last = max(len(plan) - 1, 0)
             self.current = min(max(self.current if current is None else current, 0), last)
             self.mission_changes += 1
+        elif kind is MissionType.FENCE:
+            self.fence_changes += 1
 
     def choose(self, number: int) -> bool:
         """Make ``number`` the current item; False where there is none."""
-        if not 0 <= number < len(self.mission.items):
+        if not 0 <= number < len(self.mission):
             return False
         if number != self.current:
             self.current = number

@@ -60,7 +60,7 @@ class MissionFlight:
     def begin(self, view: View) -> None:
         """The mode was entered: from the item that is current, or from the first if the mission is over."""
         store = self._store
-        if self._was_disarmed and self._was_flown and store.current + 1 == len(store.mission.items):
+        if self._was_disarmed and self._was_flown and store.current + 1 == len(store.mission):
             store.current = 0
         self._was_disarmed, self._was_flown = False, True
         self._announce(view)
@@ -90,7 +90,7 @@ class MissionFlight:
         self._work = Work.ITEM
         progress = self._store.progress
         progress.reached, progress.finished = -1, False
-        if self._store.mission.items and progress.valid:
+        if self._store.mission and progress.valid:
             if not self.runs:
                 self._texts.say(Severity.INFO, "Executing Mission")
             self.runs = True
@@ -102,9 +102,9 @@ class MissionFlight:
     def _plan_climb(self, view: View) -> None:
         """From below the first place it climbs before it goes there."""
         self._climb_down_m = None
-        for item in self._store.mission.items[self._store.current :]:
+        for item in self._store.mission[self._store.current :]:
             if item.command in kinds.WITH_POSITION:
-                down_m = self._place(item, view)[2]
+                down_m = place_of(item, self._origin, view.home_ned_m)[2]
                 if view.position_ned_m[2] - down_m > self._parameters["NAV_MC_ALT_RAD"]:
                     self._climb_down_m = down_m
                 return
@@ -119,7 +119,7 @@ class MissionFlight:
             self._given = []
         if not self.runs:
             return
-        item = self._store.mission.items[self._store.current]
+        item = self._store.mission[self._store.current]
         if not self._is_over(item, view):
             return
         if self._work is not Work.CLIMB:
@@ -157,7 +157,7 @@ class MissionFlight:
 
     def _advance(self) -> bool:
         """On to the next item; False behind the last."""
-        if self._store.current + 1 >= len(self._store.mission.items):
+        if self._store.current + 1 >= len(self._store.mission):
             return False
         self._store.current += 1
         return True
@@ -181,7 +181,7 @@ class MissionFlight:
             here = stop_point(view.position_ned_m, view.velocity_ned_m_s, self._parameters)
             self.target = NavigatorTarget(Kind.IDLE if view.landed else Kind.HOLD, here)
             return
-        item = self._store.mission.items[self._store.current]
+        item = self._store.mission[self._store.current]
         if item.command in kinds.WITH_POSITION:
             self._fly_to(item, view)
             return
@@ -193,7 +193,7 @@ class MissionFlight:
         self._given.append(item)
 
     def _fly_to(self, item: StoredItem, view: View) -> None:
-        place = self._place(item, view)
+        place = place_of(item, self._origin, view.home_ned_m)
         north, east, _ = view.position_ned_m
         before, self._work = self._work, Work.ITEM
         if before is Work.ITEM and self._climb_down_m is not None:
@@ -220,9 +220,6 @@ class MissionFlight:
             self.target = NavigatorTarget(Kind.POSITION, (place[0], place[1], height[2]))
         else:
             self.target = NavigatorTarget(Kind.LAND, place)
-
-    def _place(self, item: StoredItem, view: View) -> Vector3:
-        return place_of(item, self._origin, view.home_ned_m)
 
 
 def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, view: View) -> str | None:

@@ -16,6 +16,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     takeoff_acceptance,
 )
 from sim_vehicle.autopilot.messages import FollowTarget, Severity, Texts
+from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import Geofence
@@ -28,7 +29,6 @@ from sim_vehicle.quantities import Vector3
 
 # The navigator listens to the position at 20 Hz.
 PERIOD_US = 50_000
-LANDING_MODES = (Mode.LAND, Mode.PRECISION_LAND)
 # MISSION_CURRENT calls the mission active in these (MavlinkMissionManager::update_mission_state).
 _MISSION_IS_ACTIVE = (Mode.MISSION, Mode.TAKEOFF, Mode.LAND)
 
@@ -127,7 +127,7 @@ class Navigator:
             self._begin_takeoff()
         elif mode is Mode.RETURN:
             self._return.begin(self.view)
-        elif mode in LANDING_MODES or mode is Mode.DESCEND:
+        elif mode in (Mode.LAND, Mode.DESCEND):
             self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
         elif mode is Mode.MISSION:
             self.mission.begin(self.view)
@@ -215,7 +215,7 @@ class Navigator:
             return
         before, self._seen = self._seen, seen
         if seen[1] != before[1] or seen[2] != before[2]:
-            self.fence.load(missions.fence.items, self.view)
+            self.fence.load(missions.plan(MissionType.FENCE), self.view)
         self._check_mission()
         if seen[0] == before[0]:
             return
@@ -225,7 +225,7 @@ class Navigator:
             self.mission.forget()
 
     def _check_mission(self) -> None:
-        items = self._missions.mission.items
+        items = self._missions.mission
         problem = problem_of(items, self._origin, self.fence, self.view)
         self._missions.progress.valid = bool(items) and problem is None
         if problem is not None:
@@ -307,4 +307,4 @@ class Navigator:
 
 
 _FENCE_HOLDS = 2
-_BY_TARGET = (Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.MISSION, *LANDING_MODES)
+_BY_TARGET = (Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.MISSION, Mode.LAND)

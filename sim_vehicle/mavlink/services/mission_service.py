@@ -57,12 +57,12 @@ class MissionService:
             return
         else:
             self._repeats += 1
-        if progress.reached >= 0 and store.mission.items:
+        if progress.reached >= 0 and store.mission:
             self._link.send(dialect.MAVLink_mission_item_reached_message(progress.reached))
 
     def _current_message(self) -> Message:
         store = self._store
-        count = len(store.mission.items)
+        count = len(store.mission)
         self._state = store.progress.state(count, store.current) or self._state
         mode = _MODE_ACTIVE if store.progress.is_flown else _MODE_SUSPENDED
         return dialect.MAVLink_mission_current_message(store.current, count or _NO_MISSION, self._state, mode)

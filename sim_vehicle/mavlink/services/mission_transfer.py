@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
-from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore, Plan
+from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.services import mission_wire as wire
 from sim_vehicle.mavlink.services.mission_wire import MissionResult
@@ -52,7 +52,6 @@ class MissionTransfer:
         self._count = 0
         self._items: list[StoredItem] = []
         self._marked: int | None = None
-        self._checksum = 0
         self._sent_us = 0
         self._heard_us = 0
 
@@ -80,12 +79,12 @@ class MissionTransfer:
     def _begin_download(self, message: Packet) -> None:
         self.state, self._type, self._peer = TransferState.SENDING, message.mission_type, _peer(message)
         self._heard_us = self._now_us
-        self._next, self._count = 0, len(self._store.plan(message.mission_type).items)
+        self._next, self._count = 0, len(self._store.plan(message.mission_type))
         self._send_count()
 
     def _begin_download_again(self, message: Packet) -> None:
         """A peer that has everything, or asks for the same once more, may begin again; others wait."""
-        is_complete = self._next == len(self._store.plan(self._type).items)
+        is_complete = self._next == len(self._store.plan(self._type))
         if is_complete or self._is_partners(message):
             self._begin_download(message)
 
@@ -97,7 +96,7 @@ class MissionTransfer:
         if not self._is_partners(message):
             return
         self._heard_us = self._now_us
-        number, items = message.seq, self._store.plan(self._type).items
+        number, items = message.seq, self._store.plan(self._type)
         is_next = number == self._next < self._count
         if is_next:
             self._next += 1
@@ -120,14 +119,14 @@ class MissionTransfer:
         if self._store.uploading:
             self._refuse(message)
             return
-        self._peer, self._type, self._checksum = _peer(message), message.mission_type, 0
+        self._peer, self._type = _peer(message), message.mission_type
         self._store.progress.reached = -1
         if message.mission_type not in MOST_ITEMS:
             self._acknowledge(MissionResult.NO_SPACE if message.count else MissionResult.ACCEPTED)
         elif message.count > MOST_ITEMS[MissionType(message.mission_type)]:
             self._acknowledge(MissionResult.NO_SPACE)
         elif message.count == 0:
-            self._store.replace(MissionType(message.mission_type), Plan())
+            self._store.replace(MissionType(message.mission_type), ())
             self._acknowledge(MissionResult.ACCEPTED)
         else:
             self.state, self._store.uploading = TransferState.RECEIVING, True
@@ -166,7 +165,6 @@ class MissionTransfer:
         if not wire.fits(item, self._type):
             self._end(MissionResult.ERROR)
             return
-        self._checksum = wire.checksum(message, self._checksum)
         self._items.append(item)
         if message.current:
             self._marked = message.seq
@@ -177,9 +175,9 @@ class MissionTransfer:
             self._store_list()
 
     def _store_list(self) -> None:
-        if self._checksum != self._store.plan(self._type).checksum:
-            plan = Plan(tuple(self._items), self._checksum)
-            self._store.replace(MissionType(self._type), plan, self._marked)
+        # The same list once more changes nothing; compared as text, because a heading of NaN is the same then, too.
+        if repr(tuple(self._items)) != repr(self._store.plan(self._type)):
+            self._store.replace(MissionType(self._type), tuple(self._items), self._marked)
         self._end(MissionResult.ACCEPTED)
 
     def _acknowledge_again(self, message: Packet) -> None:
@@ -206,7 +204,7 @@ class MissionTransfer:
         kinds = MOST_ITEMS if message.mission_type == MissionType.ALL else [message.mission_type]
         for kind in kinds:
             if kind in MOST_ITEMS:
-                self._store.replace(MissionType(kind), Plan(), 0)
+                self._store.replace(MissionType(kind), (), 0)
         self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ACCEPTED, self._type))
 
     def _set_current(self, message: Packet) -> None:

@@ -5,8 +5,6 @@ be global; one without must be in MAV_FRAME_MISSION. What PX4 does not keep come
 """
 
 import math
-import struct
-import zlib
 from enum import IntEnum
 from typing import TypeAlias
 
@@ -50,13 +48,6 @@ class MissionResult(IntEnum):
     UNSUPPORTED = 3
     NO_SPACE = 4
     CANCELLED = 15
-
-
-def checksum(packet: ItemPacket, before: int) -> int:
-    """PX4's CRC-32 over the items, continued from ``before`` (mavlink_mission.cpp, crc32part)."""
-    params = (packet.param1, packet.param2, packet.param3, packet.param4, packet.x, packet.y, packet.z)
-    raw = struct.pack("<BHB4f2if", packet.frame, packet.command, packet.autocontinue & 0xFF, *params)
-    return zlib.crc32(raw, before ^ 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def parse(packet: ItemPacket) -> StoredItem | MissionResult:

@@ -1,6 +1,6 @@
-"""The aiding sensors' messages and the truth channel, filled as PX4's streams of those names fill them.
+"""The aiding sensors' messages, filled as PX4's streams of those names fill them.
 
-Source: PX4's mavlink/streams/OPTICAL_FLOW_RAD.hpp, DISTANCE_SENSOR.hpp and HIL_STATE_QUATERNION.hpp.
+Source: PX4's mavlink/streams/OPTICAL_FLOW_RAD.hpp and DISTANCE_SENSOR.hpp.
 """
 
 from collections.abc import Callable
@@ -8,11 +8,8 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.geography import Place
-from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.encode import Message, units_of
+from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.quantities import Quaternion, Vector3
 
 _UNKNOWN_DISTANCE = -1.0
 _LASER, _LOOKS_DOWN = dialect.MAV_DISTANCE_SENSOR_LASER, dialect.MAV_SENSOR_ROTATION_PITCH_270
@@ -20,7 +17,6 @@ _BAD_SIGNAL, _GOOD_SIGNAL = 1, 100
 # LeddarOne's beam, as PX4's driver states it: 6 degrees.
 _BEAM_RAD = 0.105
 _UNKNOWN_VARIANCE = 255
-_NO_AIRSPEED, _NO_ACCELERATION = (0, 0), (0, 0, 0)
 
 
 def optical_flow_rad(state: Telemetry) -> Message:
@@ -61,31 +57,4 @@ def distance_looking_down(sample: RangeSample) -> Message:
         _BEAM_RAD,
         (0.0, 0.0, 0.0, 0.0),
         _GOOD_SIGNAL if seen else _BAD_SIGNAL,
-    )
-
-
-def hil_state_quaternion(state: Telemetry) -> Message:
-    """The truth, only ever sent on request."""
-    assert state.true_body is not None, "streamed only where there is a truth"
-    north, east, down, v_north, v_east, v_down, w, x, y, z, p, q, r = state.true_body.tolist()
-    place = state.origin.place_at((north, east, down))
-    return hil_state(state.sample.time_boot_us, (w, x, y, z), (p, q, r), place, (v_north, v_east, v_down))
-
-
-def hil_state(
-    time_us: int,
-    attitude_wxyz: Quaternion,
-    angular_velocity_frd_rad_s: Vector3,
-    place: Place,
-    velocity_ned_m_s: Vector3,
-) -> Message:
-    """HIL_STATE_QUATERNION; accelerations and airspeed are left at zero."""
-    return framing.HIL_STATE_QUATERNION, framing.HIL_STATE_QUATERNION.pack(
-        time_us,
-        *attitude_wxyz,
-        *angular_velocity_frd_rad_s,
-        *units_of(place),
-        *(round(100 * speed) for speed in velocity_ned_m_s),
-        *_NO_AIRSPEED,
-        *_NO_ACCELERATION,
     )

@@ -35,7 +35,6 @@ _LOAD_PER_MILLE = 100
 
 _UNKNOWN_16 = 0xFFFF
 _UNKNOWN_TEMPERATURE = 0x7FFF
-_GRAVITY_M_S2 = 9.80665
 # PWM of the simulated outputs: off, and from least to greatest.
 PWM_OFF_US, PWM_LEAST_US, PWM_SPAN_US = 900, 1000, 1000
 OUTPUTS = 16
@@ -87,12 +86,6 @@ def servo_output_raw(state: Telemetry) -> Message:
     )
 
 
-def actuator_output_status(state: Telemetry) -> Message:
-    motors = [float(width) for width in _pulse_widths(state)]
-    outputs = motors + [float(PWM_OFF_US)] * (OUTPUTS - len(motors))
-    return dialect.MAVLink_actuator_output_status_message(state.sample.time_boot_us, OUTPUTS, outputs + [0.0] * 16)
-
-
 def _pulse_widths(state: Telemetry) -> list[int]:
     if not state.autopilot.arming.armed:
         return [PWM_OFF_US] * 4
@@ -106,15 +99,6 @@ def manual_control(state: Telemetry) -> Message:
         return dialect.MAVLink_manual_control_message(state.system, 0, 0, 500, 0, 0)
     pitch, roll, yaw = (round(1000 * value) for value in (sticks.pitch, sticks.roll, sticks.yaw))
     return dialect.MAVLink_manual_control_message(state.system, pitch, roll, round(500 * (sticks.throttle + 1)), yaw, 0)
-
-
-def scaled_imu(state: Telemetry) -> Message:
-    sample = state.sample
-    force = [_int16(1e3 * value / _GRAVITY_M_S2) for value in sample.specific_force_frd_m_s2]
-    rates = [_int16(1e3 * value) for value in sample.angular_velocity_frd_rad_s]
-    field = [_int16(1e3 * value) for value in state.magnetic_field_frd_gauss]
-    temperature = round(100 * state.air.temperature_c) if state.air is not None else 0
-    return dialect.MAVLink_scaled_imu_message(boot_ms(sample), *force, *rates, *field, temperature)
 
 
 def scaled_pressure(state: Telemetry) -> Message:
@@ -162,7 +146,3 @@ def attitude_target(state: Telemetry) -> Message:
 
 def _millivolts(voltage_v: float) -> int:
     return min(max(round(1e3 * voltage_v), 0), _UNKNOWN_16 - 1)
-
-
-def _int16(value: float) -> int:
-    return min(max(int(value), -32_768), 32_767)

@@ -19,19 +19,18 @@ class Topic(IntEnum):
     STATUS = 3
     FLOW = 4
     RANGE = 5
-    TRUTH = 6
-    GPS = 7
-    AIR = 8
-    BATTERY = 9
-    ORIGIN = 10
+    GPS = 6
+    AIR = 7
+    BATTERY = 8
+    ORIGIN = 9
     """New once: it does not move."""
-    MAGNETIC_FIELD = 11
-    STICKS = 12
-    ORBIT = 13
+    MAGNETIC_FIELD = 10
+    STICKS = 11
+    ORBIT = 12
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.STICKS, Topic.ORBIT)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.AIR, Topic.STICKS, Topic.ORBIT)
 
 
 class Topics:
@@ -63,8 +62,6 @@ class Topics:
         versions[Topic.ALWAYS_NEW] += 1
         versions[Topic.SAMPLE] += 1
         state, commander = self._state, self._state.autopilot.commander
-        if state.true_body is not None:
-            versions[Topic.TRUTH] += 1
         if not new_position:
             return
         # All else is slow enough to be looked at this often only.

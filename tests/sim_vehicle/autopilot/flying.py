@@ -2,11 +2,11 @@
 
 import math
 
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE, NAV_TAKEOFF
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE
+from sim_vehicle.autopilot.flight_commands import NAV_TAKEOFF
 from sim_vehicle.autopilot.messages import PositionTarget, Result, StickInput
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
-from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from sim_vehicle.autopilot.mode_numbers import NUMBERS
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.geography import Origin
@@ -75,7 +75,7 @@ def action(command: int, *params: float) -> StoredItem:
 
 def upload(flight: Flight, *items: StoredItem, kind: MissionType = MissionType.MISSION) -> None:
     """Store a list as a link would."""
-    flight.autopilot.missions.replace(kind, Plan(tuple(items), hash(items) & 0xFFFFFFFF))
+    flight.autopilot.missions.replace(kind, items)
     flight.fly(0.06)
 
 

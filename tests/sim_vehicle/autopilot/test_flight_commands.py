@@ -1,11 +1,11 @@
-"""Commands that steer: takeoff to a height, reposition, orbit, follow, return with its parameters."""
+"""Commands that steer: takeoff to a height, reposition, orbit, follow."""
 
 import math
 
 import pytest
 
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_TAKEOFF
-from sim_vehicle.autopilot.flight_commands import DO_ORBIT, DO_REPOSITION
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.flight_commands import DO_ORBIT, DO_REPOSITION, NAV_TAKEOFF
 from sim_vehicle.autopilot.messages import FollowTarget, Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of

@@ -9,7 +9,6 @@ from sim_vehicle.autopilot.flight_commands import DO_CHANGE_SPEED, MISSION_START
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
-from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.estimate import yaw_of
 from tests.sim_vehicle.autopilot.flying import action, hovering, item, north_east, set_mode, upload
@@ -39,7 +38,7 @@ def test_a_mission_may_be_started_in_whatever_interval_its_upload_ends(steps):
     flight = Flight()
     for _ in range(steps):
         flight.step()
-    flight.autopilot.missions.replace(MissionType.MISSION, Plan((TAKEOFF, NORTH, LAND_AT_HOME), 1))
+    flight.autopilot.missions.replace(MissionType.MISSION, (TAKEOFF, NORTH, LAND_AT_HOME))
     assert flight.ask(MISSION_START, 0) is Result.ACCEPTED
 
 

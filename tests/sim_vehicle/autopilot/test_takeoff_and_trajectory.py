@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH
+from sim_vehicle.autopilot.flight_commands import NAV_TAKEOFF
 from sim_vehicle.autopilot.flight_tasks.auto_flight import land_speed_m_s
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother
 from sim_vehicle.autopilot.modes import Mode

@@ -1,4 +1,4 @@
-"""Aiding sensors: rates, noise, ranges, losses, and what they look at."""
+"""Aiding sensors: rates, noise, ranges, and what they look at."""
 
 import math
 import random
@@ -59,16 +59,6 @@ def test_flow_is_speed_over_distance_and_turns_are_in_both_flow_and_gyroscope():
 def test_flow_that_cannot_be_seen_has_no_quality(state):
     assert {sample.quality for sample in flow_samples(state)} == {NO_QUALITY}
     assert NO_QUALITY not in {sample.quality for sample in flow_samples(body())}
-
-
-def test_losses_by_plan_and_by_chance():
-    planned = flow_samples(body(), 4.0, lost_between_s=((1.0, 2.0),))
-    assert [sample.time_us for sample in planned if sample.quality == NO_QUALITY] == list(
-        range(1_000_000, 2_000_000, 100_000)
-    )
-    by_chance = flow_samples(body(), 200.0, share_lost=0.1)
-    lost = sum(sample.quality == NO_QUALITY for sample in by_chance) / len(by_chance)
-    assert lost == pytest.approx(0.1, abs=0.03)
 
 
 def distance(state, faces=GROUND) -> float:

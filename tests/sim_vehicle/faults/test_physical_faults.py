@@ -8,26 +8,30 @@ import pytest
 from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.faults.wind import Dryden, strengths_and_lengths
-from sim_vehicle.plant.cruise import Cruise
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.physics.throwing import quiet, released
 
 FOLDABLE = load_built_in("foldable")
 QUIET = quiet(FOLDABLE)
 HOVER = (0.0, 0.0, -20.0)
+STAY = TrajectorySetpoint(HOVER, (0.0, 0.0, 0.0), yaw_rad=0.0)
 
 
-def hover(*faults: dict[str, Any], airframe: Airframe = QUIET, seed: int = 1) -> Cruise:
-    return Cruise(airframe, Scene.model_validate({"faults": faults}), HOVER, (0.0, 0.0, 0.0), seed=seed)
+def hover(*faults: dict[str, Any], airframe: Airframe = QUIET, seed: int = 1) -> Plant:
+    plant = Plant(airframe, Scene.model_validate({"faults": faults}), seed)
+    plant.cruise(HOVER, (0.0, 0.0, 0.0), 0.0)
+    return plant
 
 
-def fly(cruise: Cruise, seconds: float) -> list[Any]:
-    return [cruise.step() for _ in range(round(seconds / 0.004))]
+def fly(plant: Plant, seconds: float) -> list[Any]:
+    return [plant.step(STAY, armed=True) for _ in range(round(seconds / 0.004))]
 
 
-def velocity(cruise: Cruise) -> np.ndarray:
-    return np.array(cruise.plant.state.body[3:6])
+def velocity(plant: Plant) -> np.ndarray:
+    return np.array(plant.state.body[3:6])
 
 
 # --- air -------------------------------------------------------------------------------------------------
@@ -62,38 +66,38 @@ def test_turbulence_has_the_strength_and_the_memory_that_the_model_asks_for() ->
 @pytest.mark.parametrize(("motor", "roll", "pitch"), [(0, 1, -1), (1, -1, 1), (2, -1, -1), (3, 1, 1)])
 def test_a_dead_motor_lets_its_corner_fall(motor: int, roll: int, pitch: int) -> None:
     """Front right gone: the right side and the nose go down, roll positive, pitch negative."""
-    cruise = hover({"kind": "motor_failure", "motor": motor, "at_s": 0.1})
-    fly(cruise, 0.1)
-    assert np.abs(cruise.plant.state.body[10:13]).max() < 1e-3
-    fly(cruise, 0.048)
-    p, q = cruise.plant.state.body[10:12]
+    plant = hover({"kind": "motor_failure", "motor": motor, "at_s": 0.1})
+    fly(plant, 0.1)
+    assert np.abs(plant.state.body[10:13]).max() < 1e-3
+    fly(plant, 0.048)
+    p, q = plant.state.body[10:12]
     assert math.copysign(1, p) == roll and math.copysign(1, q) == pitch
     assert abs(p) > 1.0 and abs(q) > 1.0
 
 
 def test_free_fall_is_felt_as_nothing_at_all() -> None:
-    cruise = hover({"kind": "free_fall", "between_s": [0.2, 0.6]})
-    outputs = fly(cruise, 0.6)
+    plant = hover({"kind": "free_fall", "between_s": [0.2, 0.6]})
+    outputs = fly(plant, 0.6)
     # Motors run down in 20 ms; then there is no specific force.
     assert np.abs([output.specific_force_frd_m_s2 for output in outputs[-50:]]).max() < 0.2
-    assert velocity(cruise)[2] == pytest.approx(9.81 * 0.38, rel=0.02)
+    assert velocity(plant)[2] == pytest.approx(9.81 * 0.38, rel=0.02)
 
 
 def test_a_battery_that_sags_takes_thrust_with_the_square_of_its_voltage() -> None:
-    cruise = hover({"kind": "battery_sag", "between_s": [0.0, 2.0], "voltage_share": 0.9})
-    fly(cruise, 4.0)
-    given = cruise.plant.state.motor_thrust_n[:4] / cruise.plant.state.motor_command_n[:4]
+    plant = hover({"kind": "battery_sag", "between_s": [0.0, 2.0], "voltage_share": 0.9})
+    fly(plant, 4.0)
+    given = plant.state.motor_thrust_n[:4] / plant.state.motor_command_n[:4]
     assert given == pytest.approx([0.81] * 4, abs=0.005)
     # The control makes up for it with more throttle.
-    assert float(np.sum(cruise.plant.state.motor_thrust_n[:4])) == pytest.approx(QUIET.mass_kg * 9.81, rel=0.01)
+    assert float(np.sum(plant.state.motor_thrust_n[:4])) == pytest.approx(QUIET.mass_kg * 9.81, rel=0.01)
 
 
 def test_a_payload_that_drops_lets_the_vehicle_jump_by_its_weight() -> None:
-    cruise = hover({"kind": "payload_drop", "at_s": 3.0, "mass_kg": 0.1})
-    before = fly(cruise, 3.0)[-1].specific_force_frd_m_s2[2]
+    plant = hover({"kind": "payload_drop", "at_s": 3.0, "mass_kg": 0.1})
+    before = fly(plant, 3.0)[-1].specific_force_frd_m_s2[2]
     held_n = -before * (QUIET.mass_kg + 0.1)
     assert held_n == pytest.approx((QUIET.mass_kg + 0.1) * 9.81, rel=0.01)
-    first = fly(cruise, 0.004)[-1].specific_force_frd_m_s2[2]
+    first = fly(plant, 0.004)[-1].specific_force_frd_m_s2[2]
     assert first == pytest.approx(-held_n / QUIET.mass_kg, rel=0.01)
 
 
@@ -110,11 +114,11 @@ def test_a_push_gives_its_impulse_and_no_moment_through_the_centre() -> None:
 # --- inertial sensor ---------------------------------------------------------------------------------------
 
 
-def raw_rms(cruise: Cruise) -> np.ndarray:
+def raw_rms(plant: Plant) -> np.ndarray:
     """Of the vibration on the six raw axes, looked at raw sample by raw sample."""
     from sim_vehicle.physics.imu import shake
 
-    plant, shaken, rows = cruise.plant, np.zeros(6), []
+    shaken, rows = np.zeros(6), []
     for _ in range(8000):
         shake(plant.state, 125e-6, plant._constants, plant.disturbance, shaken)
         rows.append(shaken.copy())
@@ -124,22 +128,22 @@ def raw_rms(cruise: Cruise) -> np.ndarray:
 @pytest.mark.parametrize("motor", [None, 1])
 def test_vibration_has_the_strength_that_was_asked_for_at_hover(motor: int | None) -> None:
     asked = {"kind": "vibration", "at_s": 0, "accelerometer_rms_m_s2": 20, "gyroscope_rms_rad_s": 0.5, "motor": motor}
-    cruise = hover(asked)
-    fly(cruise, 0.1)
+    plant = hover(asked)
+    fly(plant, 0.1)
     # Four rotors that turn at nearly the same speed beat; their powers add up in the long run.
     spread = 0.05 if motor is not None else 0.75
-    assert raw_rms(cruise) == pytest.approx([20, 20, 20, 0.5, 0.5, 0.5], rel=spread)
+    assert raw_rms(plant) == pytest.approx([20, 20, 20, 0.5, 0.5, 0.5], rel=spread)
 
 
 def test_a_bias_and_a_stuck_axis_show_in_the_mean_sample() -> None:
-    cruise = hover(
+    plant = hover(
         {"kind": "imu_bias", "between_s": [0.1, 0.2], "accelerometer_frd_m_s2": [0.5, 0, 0],
          "gyroscope_frd_rad_s": [0, 0, 0.1]},
         {"kind": "imu_stuck", "at_s": 0.3, "axis": "accelerometer_z"},
         {"kind": "imu_stuck", "at_s": 0.3, "axis": "gyroscope_y", "value": 2.0},
         {"kind": "free_fall", "at_s": 0.3},
     )  # fmt: skip
-    outputs = fly(cruise, 0.5)
+    outputs = fly(plant, 0.5)
     forces = np.array([output.specific_force_frd_m_s2 for output in outputs])
     rates = np.array([output.angular_velocity_frd_rad_s for output in outputs])
     assert forces[26:48, 0] == pytest.approx(0.5, abs=0.01) and forces[:24, 0] == pytest.approx(0.0, abs=0.01)
@@ -159,13 +163,15 @@ def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: st
          "faults": [{"kind": "estimator_after_clipping", "at_s": 0}]}
     )  # fmt: skip
     speed_m_s = 2.0 if disturbed else 1.0
-    cruise = Cruise(quiet(load_built_in(name)), scene, HOVER, (speed_m_s, 0.0, 0.0))
-    while not cruise.plant.truth.hits:
-        output = cruise.step()
+    plant = Plant(quiet(load_built_in(name)), scene, 1)
+    plant.cruise(HOVER, (speed_m_s, 0.0, 0.0), 0.0)
+    ahead = TrajectorySetpoint((None, 0.0, HOVER[2]), (speed_m_s, 0.0, 0.0), yaw_rad=0.0)
+    while not plant.truth.hits:
+        plant.step(ahead, armed=True)
     errors = []
     for _ in range(12):
-        output = cruise.step()
-        errors.append(np.linalg.norm(np.array(output.velocity_ned_m_s) - velocity(cruise)))
+        output = plant.step(ahead, armed=True)
+        errors.append(np.linalg.norm(np.array(output.velocity_ned_m_s) - velocity(plant)))
     assert output.reset_counter == (4 if disturbed else 0)
     assert bool(max(errors) > 0.2) is disturbed
 
@@ -175,9 +181,9 @@ def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: st
 
 def test_faults_repeat_for_a_seed_and_leave_the_rest_of_the_noise_alone() -> None:
     def path(*faults: dict[str, Any], seed: int = 3) -> np.ndarray:
-        cruise = hover(*faults, airframe=FOLDABLE, seed=seed)
-        fly(cruise, 0.5)
-        return cruise.plant.truth.series()["position_ned_m"]
+        plant = hover(*faults, airframe=FOLDABLE, seed=seed)
+        fly(plant, 0.5)
+        return plant.truth.series()["position_ned_m"]
 
     turbulence = {"kind": "turbulence", "wind_20ft_m_s": 10, "at_s": 0.0}
     assert (path(turbulence) == path(turbulence)).all()

@@ -53,9 +53,7 @@ def connected(port: int) -> closing[Px4Client]:
     return closing(Px4Client(port))
 
 
-DUE_IN_A_SECOND = {
-    "HIL_SENSOR", "HIL_GPS", "HIL_OPTICAL_FLOW", "DISTANCE_SENSOR", "ODOMETRY", "HIL_STATE_QUATERNION",
-}  # fmt: skip
+DUE_IN_A_SECOND = {"HIL_SENSOR", "HIL_GPS", "HIL_OPTICAL_FLOW", "DISTANCE_SENSOR", "ODOMETRY"}
 
 
 def boot(px4: Px4Client) -> None:

@@ -5,10 +5,11 @@ import math
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.hil.messages import HilState
+from sim_vehicle.hil.messages import HilSensor
 from sim_vehicle.hil.parameters import Position, px4_parameters
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
+from tests.sim_vehicle.physics.throwing import quiet
 
 FOLDABLE = load_built_in("foldable")
 
@@ -19,7 +20,7 @@ def values(airframe: Airframe = FOLDABLE, position: Position = "mocap") -> dict[
 
 def test_a_unit_of_roll_torque_turns_as_fast_as_the_gains_assume():
     """A roll torque setpoint s moves each motor by s / sqrt(2); P times the acceleration of s = 1 is the loop."""
-    vehicle = HilVehicle(FOLDABLE, Scene(), 1, sample_interval_us=4_000)
+    vehicle = HilVehicle(quiet(FOLDABLE), Scene(), 1, sample_interval_us=4_000)
     hover, part = values()["MPC_THR_HOVER"], 0.01
     for _ in range(150):
         vehicle.step((0.95,) * 4)
@@ -27,7 +28,7 @@ def test_a_unit_of_roll_torque_turns_as_fast_as_the_gains_assume():
     rates = []
     for _ in range(40):
         messages = vehicle.step((hover - offset, hover + offset, hover + offset, hover - offset))
-        rates += [(m.time_us, m.angular_velocity_frd_rad_s[0]) for m in messages if isinstance(m, HilState)]
+        rates += [(m.time_us, m.angular_velocity_frd_rad_s[0]) for m in messages if isinstance(m, HilSensor)]
     (t0, p0), (t1, p1) = rates[-6], rates[-1]
     per_unit = (p1 - p0) / (1e-6 * (t1 - t0)) / part
     loop_per_s = 2 * FOLDABLE.control.attitude_damping * FOLDABLE.control.attitude_frequency_rad_s

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, HilState, MotionCapture
+from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, MotionCapture
 from sim_vehicle.hil.sensors import air_at, to_body
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
@@ -61,7 +61,6 @@ def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():
     everything = [message for messages in steps for message in messages]
     assert len(of_kind(everything, HilGps)) == 10
     assert len(of_kind(everything, MotionCapture)) == 50
-    assert len(of_kind(everything, HilState)) == 200
     sensors = of_kind(everything, HilSensor)
     assert sum(sensor.magnetic_field_frd_gauss is not None for sensor in sensors) == 50
     assert sum(sensor.air is not None for sensor in sensors) == 50

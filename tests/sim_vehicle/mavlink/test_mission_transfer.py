@@ -60,7 +60,7 @@ def test_lists_survive_loss_repetition_and_reordering(seed, loss, repeat, latest
         for _ in range(25):
             exchange.step()
     # Then the vehicle holds exactly that list, never parts of it
-    stored = exchange.store.mission.items
+    stored = exchange.store.mission
     assert [round(1e7 * item.place.latitude_deg) for item in stored] == [item.x for item in items]
 
 
@@ -109,7 +109,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
 def test_items_that_px4_refuses(item, result):
     exchange = Exchange()
     assert exchange.upload([item]) == result
-    assert exchange.store.mission.items == () and exchange.transfer.state is TransferState.IDLE
+    assert exchange.store.mission == () and exchange.transfer.state is TransferState.IDLE
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_items_that_px4_refuses(item, result):
 def test_what_px4_keeps_of_an_items_parameters(sent, stored):
     exchange = Exchange()
     assert exchange.upload([sent]) == MissionResult.ACCEPTED
-    assert exchange.store.mission.items[0].params[:4] == pytest.approx(stored)
+    assert exchange.store.mission[0].params[:4] == pytest.approx(stored)
 
 
 def test_a_count_of_nothing_clears_and_so_does_clear_all():
@@ -137,7 +137,7 @@ def test_a_count_of_nothing_clears_and_so_does_clear_all():
         changes = exchange.store.mission_changes
         acks = of_type(exchange.ask(message), "MISSION_ACK")
         assert [ack.type for ack in acks] == [MissionResult.ACCEPTED]
-        assert exchange.store.mission.items == () and exchange.store.mission_changes > changes
+        assert exchange.store.mission == () and exchange.store.mission_changes > changes
 
 
 @pytest.mark.parametrize("begin", [receiving, sending])
@@ -167,7 +167,7 @@ def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
     exchange.ask(client.count(2, MISSION))
     exchange.ask(client.ack(MissionResult.CANCELLED, MISSION))
     assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
-    assert len(exchange.store.mission.items) == 4
+    assert len(exchange.store.mission) == 4
 
 
 @pytest.mark.parametrize(
@@ -185,9 +185,9 @@ def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
 )
 def test_a_transfer_is_not_disturbed(begin, message):
     exchange = begin()
-    state, items = exchange.transfer.state, exchange.store.mission.items
+    state, items = exchange.transfer.state, exchange.store.mission
     exchange.ask(message)
-    assert (exchange.transfer.state, exchange.store.mission.items) == (state, items)
+    assert (exchange.transfer.state, exchange.store.mission) == (state, items)
     assert exchange.transfer._next == 0
 
 

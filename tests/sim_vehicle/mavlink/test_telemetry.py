@@ -13,9 +13,8 @@ from sim_vehicle.mavlink.streams.topics import OPTIONAL, Topic
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
-from tests.sim_vehicle.vehicle_client import REQUEST_MESSAGE, Client
+from tests.sim_vehicle.vehicle_client import REQUEST_MESSAGE, SET_MODE, Client
 
-NAN = math.nan
 MISSION_CURRENT = 42
 
 
@@ -139,40 +138,47 @@ def test_the_world_lies_where_the_parameters_say():
 
 
 @pytest.fixture(scope="module")
-def orbiting() -> Client:
+def circling() -> Client:
+    """Ahead at 2 m/s in OFFBOARD, and to the left by a third of a radian a second."""
     client = Client(system=255, component=190)
     client.take_off(8.0)
-    client.command(34, -6.0, 2.0, 0, 0, NAN, NAN, NAN)
-    client.run(20.0)
+
+    def ask() -> None:
+        fields = (0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1 / 3)
+        client.send(dialect.MAVLink_set_position_target_local_ned_message(0, 1, 1, 8, 0x5C7, *fields))
+
+    client.run(0.2, ask)
+    client.command(SET_MODE, 1, 6)
+    client.run(20.0, ask)
     return client
 
 
-def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(orbiting):
-    # Given a vehicle on its way round a circle, its nose to the centre, and the truth at each message
-    x, y, z, vx, vy, vz, qw, qx, qy, qz, p, q, r = orbiting.vehicle.state.body
+def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(circling):
+    # Given a vehicle on its way round a circle, and the truth at each message
+    x, y, z, vx, vy, vz, qw, qx, qy, qz, p, q, r = circling.vehicle.state.body
     for kind in ("LOCAL_POSITION_NED", "ODOMETRY"):
-        told = orbiting.last(kind)
+        told = circling.last(kind)
         assert (told.x, told.y, told.z) == pytest.approx((x, y, z), abs=0.2), kind
         assert (told.vx, told.vy, told.vz) == pytest.approx((vx, vy, vz), abs=0.2), kind
     assert (told.frame_id, told.child_frame_id, told.estimator_type) == (1, 1, 8)
-    turned = orbiting.last("ATTITUDE_QUATERNION")
+    turned = circling.last("ATTITUDE_QUATERNION")
     alike = qw * turned.q1 + qx * turned.q2 + qy * turned.q3 + qz * turned.q4
     assert abs(alike) == pytest.approx(1.0, abs=1e-3)
-    told = orbiting.last("ATTITUDE")
+    told = circling.last("ATTITUDE")
     yaw_rad = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
     roll_rad, pitch_rad = math.atan2(2 * (qw * qx + qy * qz), 1 - 2 * (qx * qx + qy * qy)), 2 * (qw * qy - qz * qx)
     assert math.remainder(told.yaw - yaw_rad, 2 * math.pi) == pytest.approx(0.0, abs=0.05)
-    # It leans inward, which is ahead, by 4 degrees: the nose is down
-    assert (told.roll, told.pitch) == pytest.approx((roll_rad, pitch_rad), abs=0.03) and told.pitch < -0.04
+    # It leans inward, which is to the left, by 4 degrees: the left side is down
+    assert (told.roll, told.pitch) == pytest.approx((roll_rad, pitch_rad), abs=0.03) and told.roll < -0.04
     assert (told.rollspeed, told.pitchspeed, told.yawspeed) == pytest.approx((p, q, r), abs=0.06)
     assert (turned.rollspeed, turned.pitchspeed, turned.yawspeed) == pytest.approx((p, q, r), abs=0.06)
-    felt = orbiting.last("HIGHRES_IMU")
+    felt = circling.last("HIGHRES_IMU")
     assert (felt.xgyro, felt.ygyro, felt.zgyro) == pytest.approx((p, q, r), abs=0.06)
     assert felt.zacc == pytest.approx(-9.8, abs=1.0) and felt.fields_updated & 0x3F == 0x3F
     # It flies at 2 m/s round a circle of 6 m, anticlockwise
     assert math.hypot(vx, vy) == pytest.approx(2.0, abs=0.2) and r == pytest.approx(-1 / 3, abs=0.1)
-    for stamp_us in (felt.time_usec, orbiting.last("ODOMETRY").time_usec, 1000 * told.time_boot_ms):
-        assert orbiting.time_s - 1e-6 * stamp_us < 0.05
+    for stamp_us in (felt.time_usec, circling.last("ODOMETRY").time_usec, 1000 * told.time_boot_ms):
+        assert circling.time_s - 1e-6 * stamp_us < 0.05
 
 
 def test_a_vehicle_with_a_filter_says_how_sure_it_is_of_itself():

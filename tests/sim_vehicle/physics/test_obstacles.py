@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.quantities import quaternion_from_matrix
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.physics.throwing import motors_off, quiet
 
