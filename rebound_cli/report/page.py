@@ -46,9 +46,9 @@ _PAGE = """<!doctype html>
 """
 
 
-def page(flight: ShownFlight, no_position: bool = False) -> str:
+def page(flight: ShownFlight) -> str:
     """The whole file; the same bytes for the same flight."""
-    return assembled(content(flight, no_position), SCRIPTS)
+    return assembled(content(flight), SCRIPTS)
 
 
 def live_page(flight: ShownFlight) -> str:
@@ -88,12 +88,12 @@ def _digest(script: str) -> str:
 def run_report(options: Namespace) -> int:
     """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
     folder = flight_named(runs_folder(options.runs), options.flight).folder
-    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME, options.no_position)
+    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME)
     print(f"The report is in {path}")
     return 0
 
 
-def write_page(flight: ShownFlight, path: Path, no_position: bool = False) -> Path:
+def write_page(flight: ShownFlight, path: Path) -> Path:
     """Raises OSError."""
-    write_whole(path, page(flight, no_position).encode())
+    write_whole(path, page(flight).encode())
     return path

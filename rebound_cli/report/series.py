@@ -22,10 +22,6 @@ ANGLE_DEG, RATIO = 1e-2, 1e-2
 NED, VELOCITY, TURN = ("n", "e", "d"), ("vn", "ve", "vd"), ("qw", "qx", "qy", "qz")
 
 
-# Every one of them says where the vehicle was.
-PLACES = (*NED, "height")
-
-
 @dataclass(frozen=True, slots=True)
 class Line:
     """A column of a table. Of another table than the first line's: its last row, if no older than `held_s`."""
