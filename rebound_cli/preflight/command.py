@@ -26,7 +26,7 @@ SETTING_TAKES_S = 1.0
 def run_preflight(options: Namespace) -> int:
     """Print the findings; 0 when none of them is bad. Raises ConfigurationError, ConnectionSetupError."""
     console, clock = console_for(options.json), Clock()
-    config = companion_settings(options.companion, (), None)
+    config = companion_settings(options.companion)
     connection = open_signed(options)
     try:
         preflight = Preflight(config, clock.now_us(), serial_line(options.connect))

@@ -49,6 +49,7 @@ AROUND_S = 1.0
 # What a page has not before the flight is over.
 UNFLOWN = {"hides": ["h-moments", "h-link"]}
 
+
 def content(flight: ShownFlight) -> dict[str, Any]:
     moments = moments_of(flight)
     return {

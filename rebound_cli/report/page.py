@@ -87,7 +87,7 @@ def _digest(script: str) -> str:
 
 def run_report(options: Namespace) -> int:
     """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
-    folder = flight_named(runs_folder(options.runs), options.flight).folder
+    folder = flight_named(runs_folder(options.runs), str(options.flight)).folder
     path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME)
     print(f"The report is in {path}")
     return 0

@@ -80,9 +80,9 @@ def test_steps_in_which_nothing_came_count(flight):
 
 
 def test_another_detector_is_looked_at_without_comparing(wall_folder, tmp_path, capsys):
-    code, text, _ = replay(capsys, wall_folder, "--any-mode", "--detector", "fused", "--out", tmp_path)
+    code, text, _ = replay(capsys, wall_folder, "--any-mode", "--set", "companion.detector=fused", "--out", tmp_path)
     assert code == 0
-    assert "with --detector, --any-mode the flight's own decisions cannot come again" in text
+    assert "with --set, --any-mode the flight's own decisions cannot come again" in text
     assert "identical" not in text
 
 
@@ -119,13 +119,13 @@ def test_arguments_that_make_no_sense_are_refused(wall_folder, tmp_path, capsys)
     for arguments, words in (
         ((tmp_path,), "no flight.tlog in this folder"),
         ((tmp_path / "none.ulg",), "No such file"),
-        ((wall_folder, "--detector", "magic"), "there is no detector 'magic'"),
+        ((wall_folder, "--set", "companion.detector=magic"), "there is no detector 'magic'"),
         ((wall_folder, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
     ):
         code, _, error = replay(capsys, *arguments)
         assert code == 1 and words in error, error
     for arguments, words in (
-        (("--rate", "50"), "--rate is gone: a log is searched as it was recorded"),
+        (("--rate", "50"), "rebound replay: --rate is gone: a log is searched as it was recorded.\n"),
         (("--expect", "some"), "'some' is not a number of collisions"),
     ):
         with pytest.raises(SystemExit):
