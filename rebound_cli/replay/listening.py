@@ -5,7 +5,7 @@ Nothing is judged or computed here: all numbers are the innovations that the det
 
 import math
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, TypeAlias, cast
@@ -76,7 +76,7 @@ class Rows:
         begin = columns * row % len(self.numbers)
         return self._tested(self.numbers[begin : begin + columns])
 
-    def _tested(self, columns: Sequence[Any]) -> Tested:
+    def _tested(self, columns: Iterable[Any]) -> Tested:
         time_boot_us, phase, *tested = columns
         innovations = zip(tested[::2], tested[1::2], strict=True)
         return Tested(time_boot_us, phase, dict(zip(self.signs, innovations, strict=True)))

@@ -102,6 +102,8 @@ def test_a_hit_has_its_place_its_normal_with_its_error_and_its_reasons(wall_fold
     why = "\n".join(moment["reasons"])
     assert re.search(r"Push sideways: 33\.\d m/s², a hit from 1\.\d on \(\d+\.\d times\): speaks for a contact\.", why)
     assert "A landing: no" in why and "A person's hand: no" in why and "Verdict: wall, a collision" in why
+    # The ground that it landed on is no false alarm
+    assert not any("false alarm" in reason for one in opened.data["moments"] for reason in one["reasons"])
     # And what came nearest to a hit, with why it was none
     (moment,) = (moment for moment in opened.data["moments"] if moment["kind"] == "closest")
     assert "Verdict: no hit." in moment["reasons"][-1]
