@@ -103,12 +103,6 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     assert (fix["latitude"], fix["longitude"], fix["altitude"]) == (47.397742, 8.545594, 488.0)
 
 
-def test_a_ulog_is_answered_by_what_reads_the_same(capsys):
-    with pytest.raises(SystemExit):
-        main(["logs", "export", "--format", "ulg"])
-    assert "ulg is gone: give mcap, which Foxglove and PlotJuggler read" in capsys.readouterr().err
-
-
 def values_of(data):
     if isinstance(data, dict):
         yield from (one for key, value in data.items() for one in ([value] if key == "value" else values_of(value)))
