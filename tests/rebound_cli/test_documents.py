@@ -154,11 +154,8 @@ def test_a_companion_part_that_is_none_is_refused_beside_a_simulated_vehicle_too
     assert complaint(mission_from, given, world_from(given)) == complaint(mission_from, given)
 
 
-def test_an_airframe_file_is_laid_over_its_base(tmp_path):
+def test_what_is_wrong_in_an_airframes_file_names_that_file(tmp_path):
     own = tmp_path / "heavy.yaml"
-    own.write_text("based_on: foldable\nname: heavy\nmass_kg: 1.2\n")
-    world = world_from(document(sets=[f"sim.airframe={own}"]))
-    assert (world.airframe.name, world.airframe.mass_kg) == ("heavy", 1.2)
     own.write_text("based_on: foldable\nname: heavy\nmas_kg: 1.2\n")
     text = complaint(world_from, document(sets=[f"sim.airframe={own}"]))
     assert text.startswith(f"{own}:3: mas_kg: unknown key") and "did you mean 'mass_kg'?" in text

@@ -46,15 +46,9 @@ items:
   - land:
 """)
     # up at 1 m/s and 1 m/s^2; then 4 m at 2 m/s, speeding up with 1 m/s^2 and braking with 2
-    assert [flown.begins_s for flown in legs] == [
-        0.0,
-        pytest.approx(3.0),
-        pytest.approx(6.5),
-        pytest.approx(11.5),
-        None,
-    ]
+    assert [flown.begins_s for flown in legs[:-1]] == pytest.approx([0.0, 3.0, 6.5, 11.5])
     assert [flown.length_m for flown in legs] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
-    assert legs[-1].ends_s is None, "nobody knows how long the wait is"
+    assert legs[-1].begins_s is legs[-1].ends_s is None, "nobody knows how long the wait is"
 
 
 def test_what_stands_in_the_way_is_named_with_the_place():
