@@ -3,7 +3,6 @@
 import re
 import sys
 from collections.abc import Iterator
-from importlib import metadata
 
 DISTRIBUTION = "px4-rebound"
 EXTRAS = dict.fromkeys(("numba", "pygeomag", "matplotlib"), "sim")
@@ -15,6 +14,9 @@ def needed_text(error: ModuleNotFoundError) -> str:
 
     By name, because no index has Rebound: the same words help whoever has a wheel and whoever has a checkout.
     """
+    # Takes a quarter of the program's start.
+    from importlib import metadata
+
     package = (error.name or "").partition(".")[0]
     extra = EXTRAS.get(package)
     if extra is None:
@@ -28,6 +30,8 @@ def needed_text(error: ModuleNotFoundError) -> str:
 
 def _requirements(extra: str) -> Iterator[str]:
     """With their versions, of the installed program; those of an extra that it brings too."""
+    from importlib import metadata
+
     for requirement in metadata.requires(DISTRIBUTION) or ():
         found = re.fullmatch(r"(.+); extra == .(\w+).", requirement)
         if found is None or found[2] != extra:

@@ -49,7 +49,7 @@ def load_mission_document(
     return document
 
 
-def companion_settings(path: Path | None, sets: Sequence[str], detector: str | None) -> "CompanionConfig":
+def companion_settings(path: Path | None, sets: Sequence[str] = ()) -> "CompanionConfig":
     """The companion's for a replay: defaults, a file's, and what the command line changes. Raises DocumentError.
 
     Of the file only the `companion:` part counts.
@@ -58,8 +58,6 @@ def companion_settings(path: Path | None, sets: Sequence[str], detector: str | N
 
     document = load_document(path) if path is not None else Document("no mission file")
     documents.apply_overrides(document, sets)
-    if detector is not None:
-        document.put_option("--detector", ("companion", "detector"), detector)
     return validated(CompanionConfig, document, document.data.get("companion") or {}, ("companion",))
 
 

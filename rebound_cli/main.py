@@ -5,13 +5,15 @@ import errno
 import itertools
 import re
 import sys
+import tomllib
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
 from companion.errors import ConfigurationError, ReboundError
-from rebound_cli import __version__, arguments, exit_codes
+from rebound_cli import __version__, exit_codes
+from rebound_cli.arguments import add_commands
 from rebound_cli.extras import needed_text
 from rebound_cli.shipped import shipped_examples, shipped_missions
 
@@ -23,17 +25,7 @@ _NAMED |= {"airframe": "airframes", "based_on": "airframes", "example": "example
 # Whoever ends these at once leaves a vehicle to itself.
 COMMANDING = ("fly", "guard")
 
-# Commands of earlier versions, and what there is in their place. Studies are in the laboratory now.
-GONE = {
-    name: f"is now 'python -m bench {study}', run in a checkout of Rebound"
-    for name, study in (
-        *((name, name) for name in ("paper", "detectors", "campaign")),
-        *(("results", "paper results"), ("recoveries", "campaign recoveries")),
-    )
-}
-GONE["doctor"] = "is gone: send what 'rebound logs export' and 'journalctl --unit=rebound' give"
-GONE["identify"] = "is gone: press an arm on a scale for its stiffness, as docs/how-to/airframes.md says"
-GONE["plan"] = "is gone: upload the plan to the vehicle by QGroundControl, and fly it under 'rebound guard'"
+TABLE = tomllib.loads(Path(__file__).with_name("commands.toml").read_text("utf-8"))
 
 
 class _Parser(argparse.ArgumentParser):
@@ -63,10 +55,10 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = _with_plain_sim(sys.argv[1:] if words is None else words)
     command = next(iter(words), "")
-    if command in GONE:
-        print(f"rebound: 'rebound {command}' {GONE[command]}.", file=sys.stderr)
+    if command in TABLE["gone"]:
+        print(f"rebound: 'rebound {command}' {TABLE['gone'][command]}.", file=sys.stderr)
         return exit_codes.ERROR
-    return run(build_parser().parse_args(words), "rebound")
+    return run(build_parser(command).parse_args(words), "rebound")
 
 
 def run(options: argparse.Namespace, program: str) -> int:
@@ -100,20 +92,21 @@ def run(options: argparse.Namespace, program: str) -> int:
     return code
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser(command: str = "") -> argparse.ArgumentParser:
+    """Of that command alone; of all where there is none of that name."""
     text = "Detects a collision of a PX4 multicopter in one IMU sample and recovers from it."
     parser: argparse.ArgumentParser = _Parser(prog="rebound", description=text)
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
-    for add in arguments.COMMANDS:
-        add(commands)
+    commands = TABLE["commands"]
+    add_commands(parser, {command: commands[command]} if command in commands else commands, TABLE["shared"], {})
     return parser
 
 
 def _with_plain_sim(words: Sequence[str]) -> list[str]:
     """`--sim` stands alone before a mission's name too, which argparse would take for its value."""
+    autopilots = TABLE["commands"]["fly"]["options"]["--sim"]["choices"]
     return [
-        "--sim=builtin" if word == "--sim" and after not in arguments.SIMULATED_AUTOPILOTS else word
+        "--sim=builtin" if word == "--sim" and after not in autopilots else word
         for word, after in itertools.zip_longest(words, words[1:])
     ]
 

@@ -37,7 +37,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     file = log_file(options.log)
     folder = options.log if is_run_folder(options.log) else None
     # Options under which a flight is no longer the one that was flown.
-    changing = ("detector", "companion", "set", "any_mode")
+    changing = ("companion", "set", "any_mode")
     changed = [f"--{name.replace('_', '-')}" for name in changing if getattr(options, name) not in (None, [], False)]
     if folder is not None and not changed:
         recording = read_recording(folder)
@@ -52,7 +52,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
     if folder is not None and settings is None:
         console.print(f"with {', '.join(changed)} the flight's own decisions cannot come again and are not compared")
         settings = settings_file(folder)
-    config = companion_settings(settings, options.set, options.detector)
+    config = companion_settings(settings, options.set)
     log = read_log(file)
     modes = None if options.any_mode else GuardConfig().modes
     replay = replay_log(log, config, modes)

@@ -1,7 +1,6 @@
 """The missions and examples that ship with the program, by their names."""
 
 import contextlib
-import importlib.resources
 from pathlib import Path
 
 
@@ -16,6 +15,9 @@ def shipped_examples() -> dict[str, Path]:
 
 def _files_of(package: str, *kinds: str) -> dict[str, Path]:
     """Without the package, none."""
+    # Here, because it takes a tenth of the program's start.
+    import importlib.resources
+
     with contextlib.suppress(ModuleNotFoundError):
         folder = Path(str(importlib.resources.files(package)))
         files = (path for path in sorted(folder.iterdir()) if path.suffix in kinds and path.stem != "__init__")

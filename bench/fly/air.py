@@ -76,14 +76,11 @@ class Injector:
     """What a fault does while it is time; what is not given it leaves alone."""
 
     when: When = When("never")
-    once: Callable[[Air], None] | None = None
-    """When it begins."""
+    once: Callable[[Air], None] | None = None  # when it begins
     to_companion: Act = lambda air, frames: frames
     to_vehicle: Act = lambda air, frames: frames
-    note: Callable[[list[bytes]], None] = lambda frames: None
-    """Sees all that the vehicle says from the beginning on."""
-    ahead_s: float = 0.0
-    """Of the clock that the companion reads."""
+    note: Callable[[list[bytes]], None] = lambda frames: None  # sees all that the vehicle says from the beginning on
+    ahead_s: float = 0.0  # of the clock that the companion reads
     has_pilot: bool = False
 
 
@@ -108,21 +105,15 @@ class Air:
     at_first_item: Callable[[], None] | None = None
     since: dict[str, float] = field(default_factory=dict)
     """When the companion was first in a state; seconds of the vehicle's clock."""
-    stall_s: float = 0.0
-    """How long the process gets no time, from now on."""
-    outside: list[str] = field(default_factory=list)
-    """Setpoints outside the envelope."""
-    pilot_at_s: float | None = None
-    """When a pilot has taken position mode."""
-    is_told: bool = False
-    """Whether the companion has been handed a packet that says so."""
-    after_told: int = 0
-    """Setpoints and commands for mode or arming that it sent afterwards."""
+    stall_s: float = 0.0  # how long the process gets no time, from now on
+    outside: list[str] = field(default_factory=list)  # setpoints outside the envelope
+    pilot_at_s: float | None = None  # when a pilot has taken position mode
+    is_told: bool = False  # whether the companion has been handed a packet that says so
+    after_told: int = 0  # setpoints and commands for mode or arming that it sent afterwards
     has_left_offboard: bool = False
     """Whether somebody else has flown since the first item: PX4's failsafe, its landing, a pilot."""
     has_pilot: bool = False  # seen in his mode since he has taken over
-    is_overruled: bool = False
-    """Whether the vehicle has left the pilot's mode."""
+    is_overruled: bool = False  # whether the vehicle has left the pilot's mode
     _to_vehicle: list[bytes] = field(default_factory=list)
     _waiting: list[bytes] = field(default_factory=list)
     _station: GroundStation | None = None

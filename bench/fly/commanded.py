@@ -36,7 +36,6 @@ class Commanded(VirtualTime):
     """A vehicle that somebody commands before a wall, and a guard."""
 
     guard: Any
-    vehicle: SimulatedVehicle
 
     def __init__(self, airframe: str, parameters: dict[str, float] | None, **scene: Any) -> None:
         wall = {"point_ned_m": [FACE_NORTH_M, 0, -2], "normal_ned": [-1, 0, 0], "width_m": 8, "height_m": 20}
@@ -47,10 +46,6 @@ class Commanded(VirtualTime):
         self._unread: list[bytes] = []
         self._repeated: list[Callable[[], None]] = []
         self.every(1.0, self._beat)
-
-    @property
-    def time_s(self) -> float:
-        return 1e-6 * self.vehicle.time_boot_us
 
     @property
     def now_us(self) -> int:

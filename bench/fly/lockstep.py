@@ -99,11 +99,6 @@ class Stepped(VirtualTime):
         self.events = []
 
     @property
-    def time_s(self) -> float:
-        """Of the vehicle, since it was switched on."""
-        return 1e-6 * self.vehicle.time_boot_us
-
-    @property
     def state(self) -> str:
         return str(self.programs[0].status().state)
 

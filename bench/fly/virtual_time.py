@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from companion.report import Event
+from sim_vehicle.vehicle import SimulatedVehicle
 
 INTERVAL_US = 4_000
 EPOCH_US = 1_600_000_000_000_000
@@ -14,7 +15,13 @@ EPOCH_US = 1_600_000_000_000_000
 class VirtualTime(ABC):
     """Goes on by intervals of the vehicle's, until something is so; and what has been told meanwhile."""
 
+    vehicle: SimulatedVehicle
     events: list[Event]
+
+    @property
+    def time_s(self) -> float:
+        """Of the vehicle, since it was switched on."""
+        return 1e-6 * self.vehicle.time_boot_us
 
     @property
     @abstractmethod

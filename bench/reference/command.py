@@ -3,7 +3,6 @@
 Keys come from the JSON schemas of the models that read them, a row a key; the rest from the programs.
 """
 
-import argparse
 import inspect
 import json
 import re
@@ -15,8 +14,7 @@ from typing import Any
 import yaml
 from pydantic import BaseModel
 
-import bench.main
-import rebound_cli.main
+from bench.main import STUDIES
 from companion.flight.states import TABLE as FLIGHT
 from companion.guard.config import GuardConfig
 from companion.guard.states import TABLE as GUARD
@@ -25,6 +23,7 @@ from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from companion.state_table import StateTable
 from rebound_cli.check.schema import DescribedSchema
+from rebound_cli.main import TABLE
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.scene import Scene
 
@@ -191,20 +190,19 @@ def mission() -> dict[str, str]:
 
 def commands() -> dict[str, str]:
     return {
-        "commands": table(("command", "does", "more"), _commands(rebound_cli.main.build_parser())),
-        "studies": table(("study", "does", "more"), _commands(bench.main.build_parser())),
+        "commands": table(("command", "does", "more"), _commands("rebound", TABLE["commands"])),
+        "studies": table(("study", "does", "more"), _commands("python -m bench", STUDIES["commands"])),
     }
 
 
-def _commands(parser: argparse.ArgumentParser, does: str = "") -> Iterator[tuple[str, str, str]]:
-    """Those that run something, each with all words of its name and the page that its description names."""
-    if parser.get_default("run") is not None:
-        page = re.search(r"docs/([\w/-]+)\.md", parser.description or "")
-        yield code(parser.prog), does, f"[{page[1].rpartition('/')[2]}](../{page[1]}.md)" if page else ""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for said in action._choices_actions:
-                yield from _commands(action.choices[said.dest], said.help or "")
+def _commands(program: str, commands: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Those that run something, each with all words of its name and the page that it names."""
+    for name, told in commands.items():
+        if "run" in told:
+            page = re.search(r"docs/([\w/-]+)\.md", told["more"])
+            link = f"[{page[1].rpartition('/')[2]}](../{page[1]}.md)" if page else ""
+            yield code(f"{program} {name}"), told["does"], link
+        yield from _commands(f"{program} {name}", told.get("commands", {}))
 
 
 def messages() -> dict[str, str]:

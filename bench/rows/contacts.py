@@ -79,12 +79,8 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
     tilt_deg = tilts_deg(series["attitude_wxyz"])
     if tilt_deg.max() > 90.0:
         yield "tumbled", f"leant by {tilt_deg.max():.0f} deg {flight.at(time_us[int(tilt_deg.argmax())])}"
-    airborne = np.flatnonzero(height_m > AIRBORNE_M)
-    if len(airborne) == 0:
-        return
-    touching = np.flatnonzero(height_m[airborne[0] :] < TOUCHING_M)
-    if len(touching) and not tilt_deg.max() > 90.0:
-        index = int(airborne[0] + touching[0])
+    index = first_touch(height_m, TOUCHING_M)
+    if index is not None and not tilt_deg.max() > 90.0:
         sink_m_s = float(series["velocity_ned_m_s"][index - 1, 2])
         if sink_m_s > LANDING_SPEED_MOST_M_S:
             yield "fell", f"reached the ground with {sink_m_s:.1f} m/s {flight.at(time_us[index])}"
@@ -96,6 +92,13 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
     outside_m = max(fence.outside_by_m((float(n), float(e), float(d))) for n, e, d in places)
     if outside_m > OUTSIDE_MOST_M:
         yield "left the fence", f"by {outside_m:.1f} m"
+
+
+def first_touch(height_m: Floats, below_m: float) -> int | None:
+    """The first row on the ground after one in the air; None where there is none."""
+    airborne = np.flatnonzero(height_m > AIRBORNE_M)
+    touching = np.flatnonzero(height_m[airborne[0] :] < below_m) if len(airborne) else airborne
+    return int(airborne[0] + touching[0]) if len(touching) else None
 
 
 def heights_m(flight: JudgedFlight) -> Floats:

@@ -123,14 +123,10 @@ def level(hits: pd.DataFrame) -> pd.DataFrame:
 
 def mission_bars(flights: pd.DataFrame, hits: pd.DataFrame, wanted: Mapping[str, float]) -> list[Bar]:
     bars: list[Bar] = []
-    names = list(dict.fromkeys(flights["airframe"]))
-    for name in names:
-        flown = flights[flights["airframe"] == name]
-        bars.append(
-            share_bar(f"{name}: missions that end as they say, without a crash", flown["is_good"], wanted.get(name))
-        )
-    for name in names:
-        bars += _hits(name, hits[hits["airframe"] == name])
+    for name, flown in flights.groupby("airframe", sort=False):
+        what = f"{name}: missions that end as they say, without a crash"
+        bars.append(share_bar(what, flown["is_good"], wanted.get(str(name))))
+        bars += _hits(str(name), hits[hits["airframe"] == name])
     return bars
 
 

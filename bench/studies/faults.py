@@ -7,7 +7,6 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from bench.faults.catalogue import FLOWN, GROUPS
@@ -15,7 +14,7 @@ from bench.fly.air import ENDS, FAILED, HANDED_OVER, KILLED, Fault
 from bench.fly.campaign import Json, Results
 from bench.fly.faulted import FaultedFlight
 from bench.fly.lockstep import NOTICED_M_S, STANDS_M, JudgedFlight
-from bench.rows.contacts import AIRBORNE_M, crashes, heights_m, tilts_deg
+from bench.rows.contacts import crashes, first_touch, heights_m, tilts_deg
 from bench.rows.tables import table
 from bench.studies.study import Shown, run_study
 from companion.errors import ConfigurationError
@@ -155,14 +154,8 @@ def _log(flight: FaultedFlight) -> list[str]:
 
 def _ground_m_s(flown: JudgedFlight) -> float | None:
     """Speed down at the first touch of the ground; None where it stays up."""
-    height_m = heights_m(flown)
-    airborne = np.flatnonzero(height_m > AIRBORNE_M)
-    if not len(airborne):
-        return None
-    touching = np.flatnonzero(height_m[airborne[0] :] < STANDS_M)
-    if not len(touching):
-        return None
-    return round(float(flown.truth.series["velocity_ned_m_s"][airborne[0] + touching[0], 2]), 2)
+    row = first_touch(heights_m(flown), STANDS_M)
+    return None if row is None else round(float(flown.truth.series["velocity_ned_m_s"][row, 2]), 2)
 
 
 def _is_of(hit: Hit, at_s: float) -> bool:

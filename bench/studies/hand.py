@@ -154,21 +154,14 @@ def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[
         "MPC_ACC_UP_MAX": 10.0,
         "MPC_ACC_DOWN_MAX": 10.0,
     }
-    update = {"control": airframe.control.model_copy(update=control)}
-    return airframe.model_copy(update=update | (by_filter(airframe) if rng.random() < FILTER_SHARE else {})), parameters
-
-
-def by_filter(airframe: Airframe) -> dict[str, object]:
-    """The estimate of a filter that motion capture aids: optical flow does not see such flights."""
-    sensors = airframe.sensors
-    lost = {
-        name: getattr(sensors, name).model_copy(update={"fitted": False}) for name in ("optical_flow", "range_finder")
-    }
-    capture = sensors.motion_capture.model_copy(update={"fitted": True})
-    return {
-        "estimate": airframe.estimate.model_copy(update={"kind": "ekf"}),
-        "sensors": sensors.model_copy(update={**lost, "motion_capture": capture}),
-    }
+    data = airframe.model_dump()
+    data["control"] |= control
+    if rng.random() < FILTER_SHARE:
+        # Aided by motion capture: optical flow does not see such flights.
+        data["estimate"]["kind"] = "ekf"
+        for sensor, is_fitted in (("optical_flow", False), ("range_finder", False), ("motion_capture", True)):
+            data["sensors"][sensor]["fitted"] = is_fitted
+    return Airframe.model_validate(data), parameters
 
 
 # --- the table

@@ -70,19 +70,15 @@ def seeds_of(options: Namespace, count: int) -> range:
 
 
 def page_path(out: Path | None, name: str) -> Path:
-    """The page, in a folder that is made or refused before hours are flown for it. Raises RunFolderError.
-
-    `out`: the folder, the page itself or its rows.
-    """
-    out = Path("build") / name if out is None else out
-    path = out.with_suffix(".md") if out.suffix in (".md", ".jsonl") else out / f"{name}.md"
+    """The page, in a folder that is made or refused before hours are flown for it. Raises RunFolderError."""
+    folder = out or Path("build") / name
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RunFolderError(f"The folder {path.parent} cannot be made: {error.strerror}.") from error
-    if not os.access(path.parent, os.W_OK) or path.is_dir():
-        raise RunFolderError(f"{path} cannot be written to.")
-    return path
+        raise RunFolderError(f"The folder {folder} cannot be made: {error.strerror}.") from error
+    if not os.access(folder, os.W_OK):
+        raise RunFolderError(f"{folder} cannot be written to.")
+    return folder / f"{name}.md"
 
 
 def write_page(path: Path, title: str, command: str, shown: Shown) -> None:

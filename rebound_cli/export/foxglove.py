@@ -19,7 +19,7 @@ from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPositio
 from rebound_cli import __version__
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.listening import Numbers
-from rebound_cli.replay.report import finding_data
+from rebound_cli.replay.watching import Finding
 from rebound_cli.report.content import finite, heard_at_us
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.run_folder import HIT_KINDS
@@ -112,8 +112,8 @@ def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
 
 def _test_ratios(flight: ShownFlight) -> tuple[Iterator[Message], Iterator[Message]]:
     """As EKF2 publishes its own: the square of an innovation over its limit."""
-    forces, jumps = flight.findings.listener.tested, flight.findings.listener.tested_velocity
-    of_forces = {"side": forces.side_ratio, "vertical": np.fmax(0.0, forces.beyond_ratio)}
+    forces, jumps = flight.findings.listener.forces.all(), flight.findings.listener.velocities.all()
+    of_forces = {"side": forces.ratio_of("side"), "vertical": np.fmax(0.0, forces.ratio_of("beyond"))}
     return (
         _squares(flight, "/test_ratio/force", forces.time_boot_us, of_forces),
         _squares(flight, "/test_ratio/velocity", jumps.time_boot_us, {"jump": jumps.ratio}),
@@ -138,7 +138,26 @@ def _told(flight: ShownFlight) -> Iterator[Message]:
     for at_us, text in flight.log.texts:
         yield _log(at_us, _INFO, "STATUSTEXT", text)
     for impact in flight.findings.impacts:
-        yield impact.at_us, "/hit", finding_data(impact)
+        yield impact.at_us, "/hit", _hit(impact)
+
+
+def _hit(finding: Finding) -> Json:
+    """What was known in the end, of the state before it."""
+    first, final = finding.first, finding.final
+    return {
+        "is_collision": finding.is_collision,
+        "kind": final.impact.kind.value,
+        "evidence": first.impact.evidence.value,
+        "confidence": final.impact.confidence,
+        "specific_force_frd_m_s2": first.impact.specific_force_frd_m_s2,
+        "threshold_m_s2": finding.threshold_m_s2,
+        "velocity_ned_m_s": first.velocity_ned_m_s,
+        "position_ned_m": first.position_ned_m,
+        "normal_ned": final.normal.direction_ned,
+        "peak_specific_force_m_s2": final.peak_specific_force_m_s2,
+        "impulse_m_s": final.impulse_m_s,
+        "is_lower_bound": final.is_lower_bound,
+    }
 
 
 # --- Foxglove's own messages --------------------------------------------------------------------------------------

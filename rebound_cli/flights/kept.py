@@ -49,10 +49,9 @@ class FlightError(ReboundError):
 
 @dataclass(frozen=True, slots=True)
 class KeptFlight:
-    """A folder of a flight; `begun` is the UTC time of its name."""
+    """A folder of a flight."""
 
     folder: Path
-    begun: str
     size_bytes: int
 
     @property
@@ -116,7 +115,7 @@ def kept_flights(runs: Path) -> list[KeptFlight]:
         # One that another program has just removed is none.
         with suppress(FileNotFoundError):
             if name and not folder.is_symlink() and tlog.is_file() and not (folder / run_folder.AIRFRAME_NAME).exists():
-                found.append((name[1], tlog.stat().st_mtime, KeptFlight(folder, name[1], size_of(folder))))
+                found.append((name[1], tlog.stat().st_mtime, KeptFlight(folder, size_of(folder))))
     return [flight for *_, flight in sorted(found, key=lambda entry: entry[:2])]
 
 
@@ -129,8 +128,7 @@ def flight_named(runs: Path, name: str) -> KeptFlight:
         raise FlightError(f"No flight of a vehicle is in {runs}.{simulated_text(runs)}")
     for folder in (runs / name, Path(name)):
         if (folder / TLOG_NAME).is_file():
-            begun = _NAMED_BY_US.fullmatch(folder.name)
-            return KeptFlight(folder, begun[1] if begun else "", size_of(folder))
+            return KeptFlight(folder, size_of(folder))
     near = nearest(name, [flight.name for flight in flights])
     meant = f"did you mean {near}?" if near else "`rebound logs list` names those that are."
     raise FlightError(f"No flight {name} is in {runs}; {meant}")

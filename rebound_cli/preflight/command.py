@@ -26,7 +26,7 @@ SETTING_TAKES_S = 1.0
 def run_preflight(options: Namespace) -> int:
     """Print the findings; 0 when none of them is bad. Raises ConfigurationError, ConnectionSetupError."""
     console, clock = console_for(options.json), Clock()
-    config = companion_settings(options.companion, (), None)
+    config = companion_settings(options.companion)
     connection = open_signed(options)
     try:
         preflight = Preflight(config, clock.now_us(), serial_line(options.connect))
@@ -76,11 +76,13 @@ def _show(console: Console, preflight: Preflight, found: list[PreflightItem]) ->
     console.print(f"\n  {counts[0]} good, {counts[1]} worth a look, {counts[2]} in the way of a flight")
 
 
-def show_findings(found: Sequence[PreflightItem], width: int, tell: Callable[[str], None]) -> None:
+def show_findings(found: Sequence[PreflightItem], width: int, tell: Callable[[str], None]) -> int:
+    """The exit code: 0 when none of them is bad."""
     for finding in found:
         tell(f"  {finding.verdict.value:4}  {finding.item:{width}} {finding.found}")
         if finding.remedy:
             tell(f"        {'':{width}} -> {finding.remedy}")
+    return int(any(finding.verdict is Verdict.BAD for finding in found))
 
 
 def _fix(

@@ -5,8 +5,9 @@ Nothing is judged or computed here: all numbers are the innovations that the det
 
 import math
 from array import array
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -24,91 +25,74 @@ PHASES = tuple(Phase)
 _NUMBERS = {phase: float(number) for number, phase in enumerate(PHASES)}
 
 
+# What is tested of an IMU sample: f_x and f_y, and f_z outside what propellers can do, negative inside, m/s^2. And of a
+# velocity: its jump, m/s.
+FORCES, JUMPS = ("side", "beyond"), ("jump",)
+
+
 @dataclass(frozen=True, slots=True)
 class Tested:
-    """IMU samples, m/s^2, with the phase before their test. `beyond_thrust_m_s2`: f_z outside what propellers can do;
-    negative inside. NaN where the detector does not say.
-    """
+    """Samples or velocities, with the phase before their test. NaN where the detector does not say."""
 
     time_boot_us: Numbers
     phase: Numbers  # its place in PHASES
-    side_m_s2: Numbers
-    side_threshold_m_s2: Numbers
-    beyond_thrust_m_s2: Numbers
-    beyond_threshold_m_s2: Numbers
+    signs: Mapping[str, tuple[Numbers, Numbers]]  # each innovation and its limit
 
-    @property
-    def side_ratio(self) -> Numbers:
-        return self.side_m_s2 / self.side_threshold_m_s2
-
-    @property
-    def beyond_ratio(self) -> Numbers:
-        return self.beyond_thrust_m_s2 / self.beyond_threshold_m_s2
+    def ratio_of(self, sign: str) -> Numbers:
+        value, limit = self.signs[sign]
+        return value / limit
 
     @property
     def ratio(self) -> Numbers:
-        """The larger of both: a sample shows a contact from 1 on. NaN where nothing is known."""
-        return np.fmax(self.side_ratio, self.beyond_ratio)
-
-
-@dataclass(frozen=True, slots=True)
-class TestedVelocity:
-    """Velocity jumps, m/s, with the phase before their test."""
-
-    time_boot_us: Numbers
-    phase: Numbers  # its place in PHASES
-    jump_m_s: Numbers
-    jump_threshold_m_s: Numbers
+        """The largest: one shows a contact from 1 on. NaN where nothing is known."""
+        ratios: Numbers = reduce(np.fmax, map(self.ratio_of, self.signs))
+        return ratios
 
     @property
-    def ratio(self) -> Numbers:
-        """A velocity shows a contact from 1 on."""
-        return self.jump_m_s / self.jump_threshold_m_s
+    def is_armed(self) -> npt.NDArray[np.bool_]:
+        return np.equal(self.phase, PHASES.index(Phase.ARMED))
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
     """What the detector went by when it fired: the sample, or the velocity, and whether a hand was thinkable."""
 
-    tested: Tested | TestedVelocity
+    tested: Tested
     may_be_hand: bool
 
 
-_COLUMNS, _VELOCITY_COLUMNS = len(fields(Tested)), len(fields(TestedVelocity))
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Grows with the recording, in the order heard."""
 
-
-@dataclass(slots=True)
-class Listener:
-    """Grows with the recording, by six numbers a sample and four a velocity. `shown`: by the boot time of an impact."""
-
+    signs: Sequence[str]
     numbers: "array[float]" = field(default_factory=lambda: array("d"))
-    velocity_numbers: "array[float]" = field(default_factory=lambda: array("d"))
+
+    def all(self) -> Tested:
+        return self._tested(np.array(self.numbers).reshape(-1, 2 + 2 * len(self.signs)).T)
+
+    def one(self, row: int) -> Tested:
+        columns = 2 + 2 * len(self.signs)
+        begin = columns * row % len(self.numbers)
+        return self._tested(self.numbers[begin : begin + columns])
+
+    def _tested(self, columns: Iterable[Any]) -> Tested:
+        time_boot_us, phase, *tested = columns
+        innovations = zip(tested[::2], tested[1::2], strict=True)
+        return Tested(time_boot_us, phase, dict(zip(self.signs, innovations, strict=True)))
+
+
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """`shown`: by the boot time of an impact."""
+
+    forces: Rows = field(default_factory=lambda: Rows(FORCES))
+    velocities: Rows = field(default_factory=lambda: Rows(JUMPS))
     shown: dict[int, Shown] = field(default_factory=dict)
-
-    @property
-    def tested(self) -> Tested:
-        """All samples, in the order heard."""
-        return Tested(*np.array(self.numbers).reshape(-1, _COLUMNS).T)
-
-    @property
-    def tested_velocity(self) -> TestedVelocity:
-        """All velocities that could be compared, in the order heard."""
-        return TestedVelocity(*np.array(self.velocity_numbers).reshape(-1, _VELOCITY_COLUMNS).T)
-
-    def one_tested(self, row: int) -> Tested:
-        return Tested(*_row(self.numbers, row, _COLUMNS))
-
-    def one_velocity(self, row: int) -> TestedVelocity:
-        return TestedVelocity(*_row(self.velocity_numbers, row, _VELOCITY_COLUMNS))
 
     def listen(self, monitor: CollisionMonitor) -> None:
         """To this watch, from now on."""
         monitor.detector = cast(Detector[Any], _ListenedTo(monitor.detector, self))
-
-
-def _row(numbers: "array[float]", row: int, columns: int) -> "array[float]":
-    begin = columns * row % len(numbers)
-    return numbers[begin : begin + columns]
 
 
 class _ListenedTo:
@@ -128,20 +112,20 @@ class _ListenedTo:
         phase = _NUMBERS[state.phase]
         state, impact = self._detector.step(state, sample, situation)
         if isinstance(sample, ImuSample):
-            self._listener.numbers.extend((sample.time_boot_us, phase, *_forces(state)))
+            self._listener.forces.numbers.extend((sample.time_boot_us, phase, *_forces(state)))
         elif isinstance(sample, LocalPosition | Odometry) and isinstance(state, FusedState):
             jump = state.velocity
             if math.isfinite(jump.limit):
-                self._listener.velocity_numbers.extend((sample.time_boot_us, phase, jump.value, jump.limit))
+                self._listener.velocities.numbers.extend((sample.time_boot_us, phase, jump.value, jump.limit))
         if impact is not None:
             self._listener.shown[impact.sample_time_boot_us] = self._shown(state, impact)
         return state, impact
 
     def _shown(self, state: DetectorState, impact: Impact) -> Shown:
         if impact.evidence is Evidence.VELOCITY_JUMP:
-            return Shown(self._listener.one_velocity(-1), False)
+            return Shown(self._listener.velocities.one(-1), False)
         is_soft = isinstance(state, FusedState) and state.may_be_hand(impact.sample_time_boot_us)
-        return Shown(self._listener.one_tested(-1), is_soft)
+        return Shown(self._listener.forces.one(-1), is_soft)
 
 
 def _forces(state: DetectorState) -> tuple[float, ...]:

@@ -4,7 +4,6 @@ import math
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
@@ -180,31 +179,3 @@ def _reproduction_text(again: Reproduction) -> str:
     if again.first_difference is None:
         return f"identical: every decision of the flight came again to the bit ({extent})"
     return f"NOT identical ({extent}): {again.first_difference}"
-
-
-def finding_data(finding: Finding) -> dict[str, Any]:
-    """An impact for a program, without the times that are some log's own. NED unless named FRD, SI units."""
-    first, final, situation = finding.first, finding.final, finding.situation
-    return {
-        "sample_time_boot_us": first.impact.sample_time_boot_us,
-        "is_collision": finding.is_collision,
-        "kind": final.impact.kind.value,
-        "evidence": first.impact.evidence.value,
-        "confidence": round(final.impact.confidence, 4),
-        "specific_force_frd_m_s2": _rounded(first.impact.specific_force_frd_m_s2),
-        "threshold_m_s2": round(finding.threshold_m_s2, 4),
-        "impact_velocity_m_s": _rounded(first.velocity_ned_m_s),
-        "position_m": _rounded(first.position_ned_m),
-        "normal": _rounded(final.normal.direction_ned),
-        "peak_specific_force_m_s2": round(final.peak_specific_force_m_s2, 4),
-        "impulse_m_s": round(final.impulse_m_s, 4),
-        "is_lower_bound": final.is_lower_bound,
-        "is_final": final.is_final,
-        "height_m": None if situation.height_m is None else round(situation.height_m, 4),
-        "landed_state": situation.landed_state.name,
-        "descent_commanded": situation.descent_commanded,
-    }
-
-
-def _rounded(vector: Sequence[float]) -> list[float]:
-    return [round(value, 4) for value in vector]

@@ -61,7 +61,7 @@ def run_tune(options: Namespace) -> int:
     """Print what the flights say and the settings; with --out write these. Raises LogError, ConfigurationError."""
     out: Path | None = options.out
     refuse_existing(out)
-    config = companion_settings(options.companion, (), options.detector)
+    config = companion_settings(options.companion)
     flights = [read_healthy(path, config) for path in options.logs]
     logs = [flight.log for flight in flights]
     found = margins(logs, config)

@@ -6,14 +6,13 @@ Columns of numbers are text: whole multiples of a resolution, little-endian, bas
 import base64
 import json
 import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from companion.reflex.config import LONGEST_SLOW_STEP_US
 from companion.reflex.detector import Phase
 from rebound_cli.replay.listening import PHASES, Numbers
 from rebound_cli.report.moments import Moment, moments_of
@@ -22,9 +21,7 @@ from rebound_cli.report.series import (
     FOLD_M,
     FORCE_M_S2,
     NED,
-    OVERVIEWS,
     PLACE_M,
-    PLACES,
     RATIO,
     SPEED_M_S,
     TIME_S,
@@ -51,16 +48,10 @@ AROUND_S = 1.0
 # What a page has not before the flight is over.
 UNFLOWN = {"hides": ["h-moments", "h-link"]}
 
-# The names of all quantities end in frame and unit: these are the places. In texts they are [north, east, down].
-_PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")
-_PLACES_IN_TEXT = re.compile(r"\[-?\d[\d.]*(?:, -?\d[\d.]*)+\]")
 
-
-def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
-    """Without coordinates where they are not wanted."""
+def content(flight: ShownFlight) -> dict[str, Any]:
     moments = moments_of(flight)
-    events = [_event(flight, event) for event in _told(flight)]
-    data = {
+    return {
         "name": flight.name,
         "sentence": sentence(flight),
         "lines": lines(flight),
@@ -68,38 +59,18 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "averaging_ms": flight.config.estimate.imu_averaging_interval_s * 1e3,
         "tables": _tables(flight, moments),
         "moments": [_moment(flight, moment) for moment in moments],
-        "overviews": [asdict(overview) for overview in OVERVIEWS],
+        # Velocities further apart than this are not compared.
+        "jump_held_s": 1e-6 * LONGEST_SLOW_STEP_US,
         "modes": modes(flight),
         "recovering": recovering(flight),
         "obstacles": obstacles(flight),
         "surfaces": surfaces(flight),
         "vehicle": vehicle(flight),
-        "has_places": not no_position,
         "link": link_rows(flight),
-        "events": events,
+        "events": [_event(flight, event) for event in _told(flight)],
         "summary": flight.summary,
         "versions": flight.versions,
     }
-    return _without_places(data) if no_position else data
-
-
-def _without_places(data: dict[str, Any]) -> dict[str, Any]:
-    """Neither in what is drawn nor in texts and in the summary."""
-    shown = ("name", "sentence", "lines", "events", "summary", "moments")
-    kept = data | {key: without_places(data[key]) for key in shown} | {"obstacles": [], "surfaces": []}
-    for moment in kept["moments"]:
-        moment["place"] = None
-    for table in kept["tables"].values():
-        table["columns"] = {name: column for name, column in table["columns"].items() if name not in PLACES}
-    return kept
-
-
-def without_places(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: without_places(value) for key, value in data.items() if not _PLACE_KEYS.fullmatch(str(key))}
-    if isinstance(data, list):
-        return [without_places(value) for value in data]
-    return _PLACES_IN_TEXT.sub("[left out]", data) if isinstance(data, str) else data
 
 
 def live_content(flight: ShownFlight) -> dict[str, Any]:
@@ -131,17 +102,14 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     near_s = np.array([flight.seconds(moment.at_us) for moment in moments])
     most = _ROWS + round(_ROWS_PER_S * flight.ended_s)
     tested = _tested_columns(flight)
-    loud = np.fmax(
-        tested["side"] / tested["side_threshold"],
-        tested["beyond"] / tested["beyond_threshold"],
-    )
+    loud = np.fmax(tested["side"] / tested["side_threshold"], tested["beyond"] / tested["beyond_threshold"])
     first_us = log.imu_time_boot_us[0] if len(log.imu_time_boot_us) else 0.0
     columns = series(log, flight.started_at_us)
     columns["imu"] = _on_both_clocks(columns["imu"], log.imu_time_boot_us - first_us)
     columns["imu"] |= {name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()}
     watches = tested["phase"] >= PHASES.index(Phase.ARMED)
     columns["imu"]["ratio"] = (np.where(watches, loud, np.nan), RATIO)
-    jumps = flight.findings.listener.tested_velocity
+    jumps = flight.findings.listener.velocities.all()
     columns["jump"] = times(heard_at_us(flight, jumps.time_boot_us), flight.started_at_us) | {
         "ratio": (np.where(jumps.phase >= PHASES.index(Phase.ARMED), jumps.ratio, np.nan), RATIO)
     }
@@ -166,17 +134,13 @@ def _on_both_clocks(columns: Columns, boot_us: Floats) -> Columns:
 
 def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
     """What the detector made of each IMU sample of the log; NaN of those it never got."""
-    tested = flight.findings.listener.tested
+    tested = flight.findings.listener.forces.all()
     # Of a stamp that came twice, after a reboot, the last.
     row_of = {stamp_us: row for row, stamp_us in enumerate(np.ravel(tested.time_boot_us).tolist())}
     rows = [row_of.get(boot_us, -1) for boot_us in flight.log.imu_time_boot_us.tolist()]
-    columns = {
-        "phase": tested.phase,
-        "side": tested.side_m_s2,
-        "side_threshold": tested.side_threshold_m_s2,
-        "beyond": tested.beyond_thrust_m_s2,
-        "beyond_threshold": tested.beyond_threshold_m_s2,
-    }
+    columns = {"phase": tested.phase}
+    for sign, (value, limit) in tested.signs.items():
+        columns |= {sign: value, f"{sign}_threshold": limit}
     return {name: np.append(column, np.nan)[rows] for name, column in columns.items()}
 
 

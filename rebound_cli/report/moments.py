@@ -4,7 +4,7 @@ Each with what was measured and, in words, why it was a hit or why it was none.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from companion.messages import Vector3
 from companion.motion.config import SHOWN_US
 from companion.reflex.detector import ImpactKind, Phase
 from companion.reflex.surface import Normal
-from rebound_cli.replay.listening import PHASES, Shown, Tested, TestedVelocity
+from rebound_cli.replay.listening import PHASES, Shown, Tested
 from rebound_cli.replay.report import bearing, impact_facts, kind_text, speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
@@ -120,39 +120,27 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
     taken_back_us = flight.taken_back_us(finding)
     if taken_back_us is not None:
         yield f"Taken back {(taken_back_us - finding.at_us) / 1e3:.0f} ms later: nothing else bore it out."
-    if flight.truth is not None and touch is None:
+    if flight.truth is not None and touch is None and finding.is_collision:
         yield "The simulator: a false alarm, nothing was touched."
 
 
-def _signs(tested: Tested | TestedVelocity) -> Iterator[str]:
-    if isinstance(tested, TestedVelocity):
-        yield _jump_text(tested)
-    elif not math.isnan(tested.side_m_s2):
-        yield _side_text(tested)
-        yield _thrust_text(tested)
+# What each sign is called, in which unit and to how many digits.
+_SIGNS = {
+    "side": ("Push sideways", "m/s²", 1),
+    "beyond": ("Push along the thrust", "m/s² beyond the propellers", 1),
+    "jump": ("Velocity jump", "m/s that no sample shows", 2),
+}
 
 
-def _side_text(tested: Tested) -> str:
-    side, needed = tested.side_m_s2, tested.side_threshold_m_s2
-    says = "speaks for a contact" if side >= needed else "says nothing"
-    return f"Push sideways: {side:.1f} m/s², a hit from {needed:.1f} on ({side / needed:.1f} times): {says}."
-
-
-def _thrust_text(tested: Tested) -> str:
-    beyond, needed = tested.beyond_thrust_m_s2, tested.beyond_threshold_m_s2
-    if beyond < 0.0:
-        return "Push along the thrust: within what the propellers can do: says nothing."
-    says = "speaks for a contact" if beyond >= needed else "says nothing"
-    return f"Push along the thrust: {beyond:.1f} m/s² beyond the propellers, a hit from {needed:.1f} on: {says}."
-
-
-def _jump_text(tested: TestedVelocity) -> str:
-    jump, needed = tested.jump_m_s, tested.jump_threshold_m_s
-    says = "speaks for a contact" if jump >= needed else "says nothing"
-    return (
-        f"Velocity jump: {jump:.2f} m/s that no sample shows, a hit from {needed:.2f} on "
-        f"({jump / needed:.1f} times): {says}."
-    )
+def _signs(tested: Tested) -> Iterator[str]:
+    for sign, (value, limit) in tested.signs.items():
+        name, unit, digits = _SIGNS[sign]
+        if value < 0.0:
+            yield f"{name}: within what the propellers can do: says nothing."
+        elif not math.isnan(value):
+            says = "speaks for a contact" if value >= limit else "says nothing"
+            needed = f"a hit from {limit:.{digits}f} on ({value / limit:.1f} times)"
+            yield f"{name}: {value:.{digits}f} {unit}, {needed}: {says}."
 
 
 def _hand_text(flight: ShownFlight, finding: Finding, shown: Shown) -> str:
@@ -204,31 +192,27 @@ def _why_missed(flight: ShownFlight, hit: "Hit") -> Iterator[str]:
             if span.start_us <= at_us <= span.end_us:
                 yield f"The detector was {word}: {span.reason}."
     until_us = hit.ended_at_boot_us + flight.config.estimate.imu_averaging_interval_s * 1e6
-    tested = flight.findings.listener.tested
+    forces, jumps = flight.findings.listener.forces, flight.findings.listener.velocities
+    tested, velocities = forces.all(), jumps.all()
     rows = np.flatnonzero((hit.contact_at_boot_us <= tested.time_boot_us) & (tested.time_boot_us <= until_us))
     if not len(rows):
         yield "No IMU sample came while it lasted."
     elif np.any(np.take(tested.phase, rows) == PHASES.index(Phase.CONTACT)):
         yield "It belonged to the contact before: one contact is told once."
     else:
-        loudest = flight.findings.listener.one_tested(rows[_loudest(np.take(tested.ratio, rows))])
-        yield from _signs(loudest)
-    jumps = flight.findings.listener.tested_velocity
-    rows = np.flatnonzero(np.abs(jumps.time_boot_us - hit.contact_at_boot_us - 0.5 * SHOWN_US) <= 0.5 * SHOWN_US)
+        yield from _signs(forces.one(rows[_loudest(np.take(tested.ratio, rows))]))
+    rows = np.flatnonzero(np.abs(velocities.time_boot_us - hit.contact_at_boot_us - 0.5 * SHOWN_US) <= 0.5 * SHOWN_US)
     if len(rows):
-        yield _jump_text(flight.findings.listener.one_velocity(rows[_loudest(np.take(jumps.ratio, rows))]))
+        yield from _signs(jumps.one(rows[_loudest(np.take(velocities.ratio, rows))]))
 
 
 def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Moment]:
     """What came nearest to being taken for a hit, and was not; none where nothing was watched."""
-    listener = flight.findings.listener
-    candidates: tuple[tuple[Tested | TestedVelocity, Callable[[int], Tested | TestedVelocity]], ...]
-    candidates = ((listener.tested, listener.one_tested), (listener.tested_velocity, listener.one_velocity))
-    nearest: list[Tested | TestedVelocity] = []
-    for tested, one in candidates:
-        ratios = _watched(tested, others_boot_us)
+    nearest = []
+    for stream in (flight.findings.listener.forces, flight.findings.listener.velocities):
+        ratios = _watched(stream.all(), others_boot_us)
         if np.any(np.isfinite(ratios)):
-            nearest.append(one(_loudest(ratios)))
+            nearest.append(stream.one(_loudest(ratios)))
     if not nearest:
         return []
     loudest = max(nearest, key=lambda one: float(one.ratio))
@@ -249,9 +233,9 @@ def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Momen
     ]
 
 
-def _watched(tested: Tested | TestedVelocity, others_boot_us: Sequence[float]) -> Floats:
+def _watched(tested: Tested, others_boot_us: Sequence[float]) -> Floats:
     """The ratios, NaN where nobody watched and beside other moments."""
-    watched = tested.phase == PHASES.index(Phase.ARMED)
+    watched = tested.is_armed
     for boot_us in others_boot_us:
         watched &= np.abs(tested.time_boot_us - boot_us) >= _BESIDE_US
     return np.where(watched, tested.ratio, np.nan)

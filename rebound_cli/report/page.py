@@ -25,30 +25,10 @@ STYLES = ("assets/uPlot.min.css", "page.css")
 SCRIPTS = ("data.js", "charts.js", "scene.js", "player.js", "page.js")
 LIVE_SCRIPT = "live.js"
 
-_PAGE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>{title}</title>
-<style>
-{style}
-</style>
-</head>
-<body>
-{body}
-<script type="application/json" id="flight">{data}</script>
-{scripts}
-</body>
-</html>
-"""
 
-
-def page(flight: ShownFlight, no_position: bool = False) -> str:
+def page(flight: ShownFlight) -> str:
     """The whole file; the same bytes for the same flight."""
-    return assembled(content(flight, no_position), SCRIPTS)
+    return assembled(content(flight), SCRIPTS)
 
 
 def live_page(flight: ShownFlight) -> str:
@@ -60,7 +40,7 @@ def assembled(data: dict[str, Any], ours: Sequence[str], may: str = "") -> str:
     data["libraries"] = libraries()
     scripts = [file_text(f"assets/{name}") for name in LIBRARIES] + [file_text(name) for name in ours]
     hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
-    return _PAGE.format(
+    return file_text("shell.html").format(
         policy=f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:{may}",
         title=html.escape(f"{data['name']}: {data['sentence']}"),
         style="\n".join(map(file_text, STYLES)),
@@ -87,13 +67,13 @@ def _digest(script: str) -> str:
 
 def run_report(options: Namespace) -> int:
     """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
-    folder = flight_named(runs_folder(options.runs), options.flight).folder
-    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME, options.no_position)
+    folder = flight_named(runs_folder(options.runs), str(options.flight)).folder
+    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME)
     print(f"The report is in {path}")
     return 0
 
 
-def write_page(flight: ShownFlight, path: Path, no_position: bool = False) -> Path:
+def write_page(flight: ShownFlight, path: Path) -> Path:
     """Raises OSError."""
-    write_whole(path, page(flight, no_position).encode())
+    write_whole(path, page(flight).encode())
     return path

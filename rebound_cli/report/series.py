@@ -1,16 +1,14 @@
-"""The columns and charts of a flight: for its page, live or afterwards. Each as fine as it is kept.
+"""The columns of a flight: for its page, live or afterwards. Each as fine as it is kept.
 
 Finer than any of the sensors, so that two bytes hold most numbers.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from companion.reflex.config import LONGEST_SLOW_STEP_US
 from rebound_cli.results.flight_log import FlightLog
 
 Floats = npt.NDArray[np.float64]
@@ -20,93 +18,6 @@ Columns: TypeAlias = dict[str, tuple[Floats, float]]
 TIME_S, PLACE_M, SPEED_M_S, UNIT, FORCE_M_S2, RATE_RAD_S, FOLD_M = 1e-5, 1e-3, 1e-3, 1e-4, 1e-2, 1e-3, 1e-4
 ANGLE_DEG, RATIO = 1e-2, 1e-2
 NED, VELOCITY, TURN = ("n", "e", "d"), ("vn", "ve", "vd"), ("qw", "qx", "qy", "qz")
-
-
-# Every one of them says where the vehicle was.
-PLACES = (*NED, "height")
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A column of a table. Of another table than the first line's: its last row, if no older than `held_s`."""
-
-    table: str
-    column: str
-    label: str
-    colour: str
-    dashed: bool = False
-    held_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Overview:
-    """A chart of the whole flight. What passes `top` leaves the picture; `level` is a line across it."""
-
-    title: str
-    unit: str
-    lines: Sequence[Line]
-    top: float | None = None
-    level: tuple[float, str] | None = None
-
-
-# Setpoints come twice a second at least while somebody sends any; those by attitude with each IMU sample.
-_PLACE_HELD_S, _ATTITUDE_HELD_S = 1.0, 0.3
-# Velocities further apart than this are not compared.
-_JUMP_HELD_S = 1e-6 * LONGEST_SLOW_STEP_US
-OVERVIEWS = (
-    Overview(
-        "Speed and height",
-        "m/s, m",
-        (Line("path", "speed", "speed, m/s", "blue"), Line("path", "height", "height, m", "orange", dashed=True)),
-    ),
-    Overview(
-        "Place and setpoint",
-        "m",
-        (
-            Line("path", "n", "north", "blue"),
-            Line("setpoint", "n", "its setpoint", "blue", dashed=True, held_s=_PLACE_HELD_S),
-            Line("path", "e", "east", "orange"),
-            Line("setpoint", "e", "its setpoint", "orange", dashed=True, held_s=_PLACE_HELD_S),
-        ),
-    ),
-    Overview(
-        "Lean",
-        "°",
-        (
-            Line("attitude", "roll", "roll, right side down", "blue"),
-            Line("attitude", "pitch", "pitch, nose up", "orange", dashed=True),
-        ),
-    ),
-    Overview(
-        "Tilt, wanted and flown; green: hand-over",
-        "°",
-        (
-            Line("attitude", "tilt", "flown", "blue"),
-            Line("wanted", "tilt", "wanted by the companion", "red", held_s=_ATTITUDE_HELD_S),
-            Line("target", "tilt", "wanted by the vehicle's own control", "orange", True, _ATTITUDE_HELD_S),
-        ),
-    ),
-    Overview(
-        "Thrust, wanted and flown; green: hand-over",
-        "share of the most",
-        (
-            Line("target", "thrust", "flown by the vehicle's own control", "blue"),
-            Line("wanted", "thrust", "wanted by the companion", "red", held_s=_ATTITUDE_HELD_S),
-        ),
-    ),
-    # What a contact makes leaves the picture: what came near to one is looked for.
-    Overview(
-        "How near to a hit, while the detector was on",
-        "thresholds",
-        (
-            Line("imu", "ratio", "push over threshold", "blue"),
-            Line("jump", "ratio", "velocity jump over threshold", "orange", held_s=_JUMP_HELD_S),
-        ),
-        top=1.5,
-        level=(1.0, "a hit from here on"),
-    ),
-    Overview("Specific force sideways", "m/s²", (Line("force", "peak", "largest in a tenth of a second", "blue"),)),
-)
 
 
 def times(at_us: Floats, since_us: float) -> Columns:

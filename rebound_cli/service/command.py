@@ -9,17 +9,16 @@ from companion.guard.config import GuardConfig
 from rebound_cli import documents
 from rebound_cli.documents import DocumentError, load_document, parse_document, validated
 from rebound_cli.inputs import mission_from
+from rebound_cli.preflight.command import show_findings
 from rebound_cli.results.run_folder import read_text
 from rebound_cli.service import files
-from rebound_cli.service.check import run_check
+from rebound_cli.service.check import findings
 from rebound_cli.service.files import FOLDER, SYSUSERS, UDEV, UNIT, UNIT_NAME, PlannedFile, ServiceSettings
 from rebound_cli.service.system import ServiceError, System, hidden_program, serial_group
 
 _SETTINGS_NAME, _GUARD_NAME = "service.yaml", "guard.yaml"
 # A guard by all its defaults, of which the first to be changed is shown.
 _GUARD_TEXT = "# Settings: docs/how-to/guard.md.\nthen: hold\n"
-# What was asked for, beside what is kept.
-_NEW = ".new"
 _BOOT = "It runs from the next boot on."
 _STARTED = f"""It runs now, and from every boot on: rebound service status
 What ran before goes on as it was. Restart it on the ground: sudo systemctl restart {UNIT_NAME}"""
@@ -39,7 +38,7 @@ def run_on(system: System, options: Namespace) -> int:
     if options.what == "uninstall":
         return _uninstall(system, options.dry_run)
     if options.what == "check":
-        return run_check(system, plan)
+        return show_findings(list(findings(system, plan)), 10, print)
     return system.call("systemctl", "status", "--no-pager", UNIT_NAME)
 
 
@@ -56,7 +55,8 @@ def _install(system: System, options: Namespace) -> int:
     for file in planned:
         if not file.is_kept:
             system.write(file.path, file.text)
-        print(f"{'kept' if file.is_kept else 'wrote'} /{file.path}")
+        otherwise = ", which says otherwise: change it there" if file.says_otherwise else ""
+        print(f"{'kept' if file.is_kept else 'wrote'} /{file.path}{otherwise}")
     if settings.device is None:
         (system.root / UDEV).unlink(missing_ok=True)
     is_guard = settings.run == "guard"
@@ -67,10 +67,6 @@ def _install(system: System, options: Namespace) -> int:
     if is_guard and system.is_running:
         # It is ready when the vehicle is heard: nobody waits for that here.
         system.told("systemctl", "start", "--no-block", UNIT_NAME)
-    for file in planned:
-        if file.path.endswith(_NEW):
-            beside = Path(file.path).name
-            print(f"/{file.path.removesuffix(_NEW)} is kept. What you asked for is beside it, as {beside}.")
     print(_NOT_STARTED if not is_guard else _STARTED if system.is_running else _BOOT)
     return 0
 
@@ -91,18 +87,13 @@ def plan(
     if connect is not None:
         document.put_option("--connect", ("connect",), connect)
     asked = validated(ServiceSettings, document, document.data)
-    is_new = not stored.exists()
-    settings = asked if is_new else settings
-    planned = _in_etc(system, _SETTINGS_NAME, asked.text() if is_new or asked != settings else None)
-    has_clients = False
-    for kind in sorted({asked.run, settings.run}):
-        text = None
-        if kind == asked.run and source is not None:
-            text = read_text(source)
-            _check_run(kind, text, str(source))
-        planned += _in_etc(system, f"{kind}.yaml", text)
-        is_between = _check_run(kind, planned[-1].text, f"/{planned[-1].path}")
-        has_clients = is_between if kind == settings.run else has_clients
+    settings = settings if stored.exists() else asked
+    planned = [_in_etc(system, _SETTINGS_NAME, asked.text() if asked != settings or not stored.exists() else None)]
+    text = None if source is None else read_text(source)
+    if text is not None:
+        _check_run(asked.run, text, str(source))
+    planned.append(_in_etc(system, f"{settings.run}.yaml", text if asked.run == settings.run else None))
+    has_clients = _check_run(settings.run, planned[-1].text, f"/{planned[-1].path}")
     planned.append(PlannedFile(SYSUSERS, files.sysusers_text()))
     if settings.device is not None:
         planned.append(PlannedFile(UDEV, files.udev_text(settings.device)))
@@ -110,16 +101,15 @@ def plan(
     return settings, [*planned, PlannedFile(UNIT, unit)]
 
 
-def _in_etc(system: System, name: str, asked: str | None) -> list[PlannedFile]:
-    """A person's file; where there is one already, that one, and beside it what is asked for now."""
+def _in_etc(system: System, name: str, asked: str | None) -> PlannedFile:
+    """A person's file; where there is one already, that one, whatever is asked for now."""
     path = f"{FOLDER}/{name}"
     if (system.root / path).exists():
         stored = read_text(system.root / path)
-        beside = [] if asked in (None, stored) else [PlannedFile(path + _NEW, str(asked))]
-        return [*beside, PlannedFile(path, stored, is_kept=True)]
+        return PlannedFile(path, stored, is_kept=True, says_otherwise=asked not in (None, stored))
     if asked is None and name != _GUARD_NAME:
         raise DocumentError(f"/{path}: no such file; give --mission FILE.")
-    return [PlannedFile(path, asked or _GUARD_TEXT)]
+    return PlannedFile(path, asked or _GUARD_TEXT)
 
 
 def _check_run(kind: str, text: str, name: str) -> bool:

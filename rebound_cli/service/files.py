@@ -85,6 +85,7 @@ class PlannedFile:
     path: str
     text: str
     is_kept: bool = False
+    says_otherwise: bool = False  # than what was asked for
 
 
 def sysusers_text() -> str:

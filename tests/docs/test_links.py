@@ -57,7 +57,7 @@ def test_every_page_that_the_code_names_exists():
         f"{name_of(path)}: {named}"
         for folder in _PROGRAMS
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in (".py", ".yaml", ".json")
+        if path.suffix in (".py", ".yaml", ".json", ".toml")
         for named, anchor in _DOCUMENT.findall(path.read_text(encoding="utf-8"))
         if not (ROOT / named).exists() or (anchor and anchor not in anchors((ROOT / named).read_text(encoding="utf-8")))
     }

@@ -80,6 +80,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("fly", SQUARE, "--lockstep", "--watch"), ("--watch belongs to flights in real time",)),
         (("fly", SQUARE, "--lockstep", "--signing-key", "key"), ("--signing-key belongs to --connect",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
+        (("watch", "missions"), ("no flight is there; give a run's folder",)),
         (("check", WALL, "--set", "obstacles.file=none.json"), ("none.json: no such file",)),
     ],
     ids=lambda given: " ".join(map(str, given[:1])),
@@ -101,6 +102,9 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
         (("sim", "--speed", "fast"), "'fast' is not a speed"),
         (("sim", "--sensor-rate", "333"), "--sensor-rate"),
         (("sim", "--autopilot", "apm"), "--autopilot"),
+        (("replay", "run", "--rate", "50"), "rebound replay: --rate is gone: a log is searched as it was recorded.\n"),
+        (("replay", "run", "--expect", "some"), "'some' is not a number of collisions"),
+        (("logs", "export", "--format", "ulg"), "ulg is gone: give mcap, which Foxglove and PlotJuggler read"),
     ],
 )
 def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):

@@ -5,7 +5,7 @@ import pytest
 from companion.mission.model import Mission
 from companion.reflex.config import GuardsConfig
 from rebound_cli.documents import DocumentError, apply_overrides, load_document, parse_document, validated
-from rebound_cli.inputs import mission_from, resolved, world_from
+from rebound_cli.inputs import mission_from, world_from
 
 MISSION = """\
 name: demo
@@ -115,20 +115,6 @@ def test_a_folder_or_a_binary_file_cannot_be_a_mission(tmp_path):
     assert "not UTF-8" in complaint(load_document, tmp_path / "picture.yaml")
 
 
-def test_set_changes_any_value_and_makes_missing_parts():
-    changed = document(
-        sets=[
-            "items.1.go_to.speed_m_s=2.5",
-            "sim.wind_ned_m_s=[0, 1, 0]",
-            "companion.fused.side_threshold_m_s2=6",
-        ]
-    )
-    mission, world = mission_from(changed), world_from(changed)
-    assert mission.items[1].go_to.speed_m_s == 2.5
-    assert mission.companion.fused.side_threshold_m_s2 == 6
-    assert world.scene.wind_ned_m_s == (0, 1, 0)
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -168,22 +154,8 @@ def test_a_companion_part_that_is_none_is_refused_beside_a_simulated_vehicle_too
     assert complaint(mission_from, given, world_from(given)) == complaint(mission_from, given)
 
 
-def test_the_resolved_mission_is_a_mission_that_means_the_same():
-    given = document(sets=["sim.seed=7"])
-    world = world_from(given)
-    mission = mission_from(given, world)
-    written = resolved(mission, world)
-    again = Mission.model_validate(written)
-    assert [item.action for item in again.items] == [item.action for item in mission.items]
-    assert again.companion == mission.companion
-    assert written["sim"]["seed"] == 7 and written["sim"]["airframe"] == "foldable"
-
-
-def test_an_airframe_file_is_laid_over_its_base(tmp_path):
+def test_what_is_wrong_in_an_airframes_file_names_that_file(tmp_path):
     own = tmp_path / "heavy.yaml"
-    own.write_text("based_on: foldable\nname: heavy\nmass_kg: 1.2\n")
-    world = world_from(document(sets=[f"sim.airframe={own}"]))
-    assert (world.airframe.name, world.airframe.mass_kg) == ("heavy", 1.2)
     own.write_text("based_on: foldable\nname: heavy\nmas_kg: 1.2\n")
     text = complaint(world_from, document(sets=[f"sim.airframe={own}"]))
     assert text.startswith(f"{own}:3: mas_kg: unknown key") and "did you mean 'mass_kg'?" in text

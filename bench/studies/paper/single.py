@@ -31,41 +31,21 @@ DAMPING_PER_S, STIFFNESS_PER_S2, FOLD_MAX_M = 30.0, 500.0, 0.03
 IMPACT_M_S = 1.4
 
 
-@dataclass(frozen=True, slots=True)
-class SpringResponse:
-    """Eq. 2, l'' = -b_s l' - k_s l from l = 0 with l' = v: the wall stops a vehicle that lands on its arms."""
+# Eq. 2, l'' = -b_s l' - k_s l from l = 0 with l' = v: the wall stops a vehicle that lands on its arms.
+_DECAY_PER_S = DAMPING_PER_S / 2.0
+_FREQUENCY_RAD_S = math.sqrt(STIFFNESS_PER_S2 - _DECAY_PER_S**2)
+PEAK_S = math.atan2(_FREQUENCY_RAD_S, _DECAY_PER_S) / _FREQUENCY_RAD_S
+# When b_s l' + k_s l is back at zero: from here on the wall would have to pull.
+FORCE_FREE_S = 2.0 * PEAK_S
+# When l is back at zero, the paper's end of the contact.
+HALF_PERIOD_S = math.pi / _FREQUENCY_RAD_S
 
-    damping_per_s: float
-    stiffness_per_s2: float
-    speed_m_s: float
 
-    @property
-    def _decay_per_s(self) -> float:
-        return self.damping_per_s / 2.0
-
-    @property
-    def _frequency_rad_s(self) -> float:
-        return math.sqrt(self.stiffness_per_s2 - self._decay_per_s**2)
-
-    @property
-    def half_period_s(self) -> float:
-        """When l is back at zero, the paper's end of the contact."""
-        return math.pi / self._frequency_rad_s
-
-    @property
-    def peak_s(self) -> float:
-        return math.atan2(self._frequency_rad_s, self._decay_per_s) / self._frequency_rad_s
-
-    @property
-    def force_free_s(self) -> float:
-        """When b_s l' + k_s l is back at zero: from here on the wall would have to pull."""
-        return 2.0 * self.peak_s
-
-    def at(self, time_s: float | Floats) -> tuple[Floats, Floats]:
-        """Fold (m) and its rate (m/s)."""
-        phase, left = self._frequency_rad_s * np.asarray(time_s), self.speed_m_s * np.exp(-self._decay_per_s * time_s)
-        turn = np.sin(phase) / self._frequency_rad_s
-        return left * turn, left * (np.cos(phase) - self._decay_per_s * turn)
+def spring_response(time_s: float | Floats) -> tuple[Floats, Floats]:
+    """Its fold (m) and the fold's rate (m/s)."""
+    phase, left = _FREQUENCY_RAD_S * np.asarray(time_s), IMPACT_M_S * np.exp(-_DECAY_PER_S * time_s)
+    turn = np.sin(phase) / _FREQUENCY_RAD_S
+    return left * turn, left * (np.cos(phase) - _DECAY_PER_S * turn)
 
 
 # The wall is far above the ground and met at once, so that the fall counts for nothing.
@@ -102,21 +82,18 @@ def head_on(airframe: Airframe, speed_m_s: float) -> HeadOnHit:
     return HeadOnHit(hit, time_s, series["arm_fold_m"].max(axis=1), series["velocity_ned_m_s"][:, 0])
 
 
-PAPERS = SpringResponse(DAMPING_PER_S, STIFFNESS_PER_S2, IMPACT_M_S)
-
-
 def _of_arm(flights: pd.DataFrame) -> Findings:
     airframe = load_built_in("foldable")
     arms, single = airframe.arms, head_on(airframe, IMPACT_M_S)
-    peak_m, _ = PAPERS.at(PAPERS.peak_s)
-    _, free_m_s = PAPERS.at(PAPERS.force_free_s)
+    peak_m, _ = spring_response(PEAK_S)
+    _, free_m_s = spring_response(FORCE_FREE_S)
     rows = (
         claim("damping", arms.damping_per_s),
         claim("stiffness", arms.stiffness_per_s2),
         claim("fold", arms.fold_max_m),
         claim("peak fold", single.hit.max_fold_m, float(peak_m)),
         claim("speed back", single.hit.rebound_speed_m_s / IMPACT_M_S, -float(free_m_s) / IMPACT_M_S),
-        claim("contact", single.hit.contact_duration_s, PAPERS.force_free_s),
+        claim("contact", single.hit.contact_duration_s, FORCE_FREE_S),
     )
     return Findings(rows, {"arm.png": _arm_figure(single, 1e3 * arms.hysteresis_m)})
 
@@ -124,8 +101,8 @@ def _of_arm(flights: pd.DataFrame) -> Findings:
 def _arm_figure(single: HeadOnHit, rests_mm: float) -> Figure:
     figure, axes = new_figure(1, 1, "An arm folds and unfolds: head-on hit at 1.4 m/s", width=8.0, height=4.2)
     axis = axes[0, 0]
-    time_s = np.linspace(0.0, PAPERS.half_period_s, 400)
-    fold_mm, pushed = 1e3 * PAPERS.at(time_s)[0], time_s <= PAPERS.force_free_s
+    time_s = np.linspace(0.0, HALF_PERIOD_S, 400)
+    fold_mm, pushed = 1e3 * spring_response(time_s)[0], time_s <= FORCE_FREE_S
     pulls = {"linestyle": "--", "label": "eq. 2, wall would have to pull"}
     axis.plot(time_s[pushed], fold_mm[pushed], color="tab:orange", linewidth=4, label="eq. 2, wall pushes")
     axis.plot(time_s[~pushed], fold_mm[~pushed], color="tab:orange", **pulls)

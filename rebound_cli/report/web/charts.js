@@ -135,20 +135,60 @@ function fitCharts() {
   for (const { plot, box } of charts) plot.setSize({ width: widthOf(box), height: plot.height });
 }
 
-// The whole flight: what there is to be seen of it, each as a chart with a function that gives its columns.
+// Setpoints come twice a second at least while somebody sends any; those by attitude with each IMU sample.
+const PLACE_HELD_S = 1.0;
+const ATTITUDE_HELD_S = 0.3;
+
+// The charts of the whole flight. A line is a column of a table; of another table than the first line's it is the last
+// row, if no older than `held`. What passes `top` leaves the picture; `level` is a line across it.
+const OVERVIEWS = [
+  { title: "Speed and height", unit: "m/s, m", lines: [
+    { table: "path", column: "speed", label: "speed, m/s", colour: "blue" },
+    { table: "path", column: "height", label: "height, m", colour: "orange", dashed: true },
+  ] },
+  { title: "Place and setpoint", unit: "m", lines: [
+    { table: "path", column: "n", label: "north", colour: "blue" },
+    { table: "setpoint", column: "n", label: "its setpoint", colour: "blue", dashed: true, held: PLACE_HELD_S },
+    { table: "path", column: "e", label: "east", colour: "orange" },
+    { table: "setpoint", column: "e", label: "its setpoint", colour: "orange", dashed: true, held: PLACE_HELD_S },
+  ] },
+  { title: "Lean", unit: "°", lines: [
+    { table: "attitude", column: "roll", label: "roll, right side down", colour: "blue" },
+    { table: "attitude", column: "pitch", label: "pitch, nose up", colour: "orange", dashed: true },
+  ] },
+  { title: "Tilt, wanted and flown; green: hand-over", unit: "°", lines: [
+    { table: "attitude", column: "tilt", label: "flown", colour: "blue" },
+    { table: "wanted", column: "tilt", label: "wanted by the companion", colour: "red", held: ATTITUDE_HELD_S },
+    { table: "target", column: "tilt", label: "wanted by the vehicle's own control", colour: "orange", dashed: true, held: ATTITUDE_HELD_S },
+  ] },
+  { title: "Thrust, wanted and flown; green: hand-over", unit: "share of the most", lines: [
+    { table: "target", column: "thrust", label: "flown by the vehicle's own control", colour: "blue" },
+    { table: "wanted", column: "thrust", label: "wanted by the companion", colour: "red", held: ATTITUDE_HELD_S },
+  ] },
+  // What a contact makes leaves the picture: what came near to one is looked for.
+  { title: "How near to a hit, while the detector was on", unit: "thresholds", top: 1.5, level: [1, "a hit from here on"], lines: [
+    { table: "imu", column: "ratio", label: "push over threshold", colour: "blue" },
+    { table: "jump", column: "ratio", label: "velocity jump over threshold", colour: "orange", held: flight.jump_held_s },
+  ] },
+  { title: "Specific force sideways", unit: "m/s²", lines: [
+    { table: "force", column: "peak", label: "largest in a tenth of a second", colour: "blue" },
+  ] },
+];
+
+// What there is to be seen of them, each with a function that gives its columns.
 function overviews() {
   const isThere = ({ table, column }) => tables[table] && tables[table].has(column) && (tables[table].length || flight.live);
-  return flight.overviews.map((one) => ({ ...one, lines: one.lines.filter(isThere) })).filter((one) => one.lines.length).map((one) => {
+  return OVERVIEWS.map((one) => ({ ...one, lines: one.lines.filter(isThere) })).filter((one) => one.lines.length).map((one) => {
     const series = one.lines.map((line) => ({ label: line.label, colour: `--${line.colour}`, number: line.dashed ? 1 : 0 }));
     if (one.level) series.push({ label: one.level[1], colour: "--red", number: 1 });
     const columns = () => {
       const first = tables[one.lines[0].table];
       const { t } = first.columns;
-      const found = one.lines.map(({ table, column, held_s: held }) =>
+      const found = one.lines.map(({ table, column, held }) =>
         tables[table] === first ? first.columns[column] : Array.from(t, (time) => lastAt(tables[table], column, time, held)));
       return [t, ...found, ...(one.level ? [Array.from(t, () => one.level[0])] : [])].map(plotted);
     };
-    return { title: one.title, unit: one.unit, series, columns, up: one.top === null ? {} : { range: [0, one.top] } };
+    return { title: one.title, unit: one.unit, series, columns, up: one.top === undefined ? {} : { range: [0, one.top] } };
   });
 }
 

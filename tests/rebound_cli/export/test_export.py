@@ -60,7 +60,7 @@ def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(topics
     assert [data["kind"] for _, _, data in topics["/hit"]] == ["wall", "landing"]
     # with how near to a hit each sample and velocity was: the wall and the ground, none between them
     ratios = [data for topic in ("force", "velocity") for _, _, data in topics[f"/test_ratio/{topic}"]]
-    assert len(topics["/test_ratio/force"]) == len(shown.findings.listener.tested.phase)
+    assert len(topics["/test_ratio/force"]) == len(shown.findings.listener.forces.all().phase)
     assert max(data.get("side", 0.0) for data in ratios) > 1.0
     assert 0.0 <= max(data.get("jump", 0.0) for data in ratios) < 1.0
     # At the companion's own times, in nanoseconds
@@ -101,12 +101,6 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     ((schema, _, fix),) = topics["/location"]
     assert schema == "foxglove.LocationFix"
     assert (fix["latitude"], fix["longitude"], fix["altitude"]) == (47.397742, 8.545594, 488.0)
-
-
-def test_a_ulog_is_answered_by_what_reads_the_same(capsys):
-    with pytest.raises(SystemExit):
-        main(["logs", "export", "--format", "ulg"])
-    assert "ulg is gone: give mcap, which Foxglove and PlotJuggler read" in capsys.readouterr().err
 
 
 def values_of(data):

@@ -1,6 +1,5 @@
 """`rebound logs`: what a person sees of the flights on a drone, and takes away."""
 
-import json
 import tarfile
 
 import pytest
@@ -35,21 +34,15 @@ def test_list_has_every_flight_from_the_oldest_on_and_how_it_ended(runs, capsys)
     assert third.startswith(LAST)
     assert total.startswith("3 flights, 1.5 MB")
 
-    assert logs("list", "--runs", runs, "--json") == 0
-    flights = json.loads(capsys.readouterr().out)
-    assert [flight["hits"] for flight in flights] == [0, 2, 0]
-    assert flights[1]["duration_s"] == 2.5 and flights[1]["begun"] == "20260102T000000Z"
-
 
 def test_show_is_of_the_last_flight_and_has_its_events_in_order(runs, capsys):
     assert logs("show", "--runs", runs) == 0
     told = capsys.readouterr().out
     assert told.startswith(f"{LAST}: cut off; 0 hits")
     assert told.index("connected") < told.index("a step came late")
-    assert logs("show", "20260102T000000Z-guard", "--runs", runs, "--json") == 0
-    flight = json.loads(capsys.readouterr().out)
-    assert [event["kind"] for event in flight["events"]] == ["connected", "detection", "detection"]
-    assert flight["summary"] is None
+    assert logs("show", "20260102T000000Z-guard", "--runs", runs) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("20260102T000000Z-guard: cut off; 2 hits") and told.count("detection") == 2
 
 
 def test_without_flights_here_those_of_the_service_are_meant(runs, tmp_path, monkeypatch, capsys):
@@ -73,6 +66,7 @@ def test_export_is_one_archive_with_every_byte_of_the_flight(runs, tmp_path, cap
 
 
 def test_what_is_not_there_or_cannot_be_written_is_one_sentence(runs, tmp_path, capsys):
-    for words in (("show", "yesterday"), ("export", LAST, "--out", tmp_path / "no" / "out.tar.gz")):
-        assert logs(*words, "--runs", runs) == 1
+    out = tmp_path / "no" / "out.tar.gz"
+    for words in (("logs", "show", "yesterday"), ("report", "yesterday"), ("logs", "export", LAST, "--out", out)):
+        assert main([*map(str, words), "--runs", str(runs)]) == 1
         assert capsys.readouterr().err.count("\n") == 1

@@ -63,13 +63,6 @@ def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_oth
     assert limits_of(DiskConfig.model_validate(config), disk_bytes) == limits
 
 
-@pytest.mark.parametrize(
-    ("used", "free", "to_go"), [(900, 300, 0), (1000, 200, 0), (1200, 300, 200), (900, 150, 50), (1200, 150, 200)]
-)
-def test_what_has_to_go_is_what_passes_the_budget_or_what_the_disk_lacks(used, free, to_go):
-    assert DiskLimits(max_use=1000, keep_free=200).to_go(used, free) == to_go
-
-
 def test_the_oldest_without_a_hit_go_first_those_with_one_last_and_the_present_one_never(tmp_path, disk):
     # Given five flights of 1 MB, the oldest and the third with a hit, on a disk that lacks a little
     for day, hits in ((1, 2), (2, 0), (3, 1), (4, 0)):

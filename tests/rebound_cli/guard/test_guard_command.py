@@ -98,15 +98,8 @@ def test_a_vehicle_at_rest_fills_one_record_after_the_other_and_one_that_is_arme
     monkeypatch.setattr(run_folder, "RUNS_FOLDER", runs)
     monkeypatch.setattr(kept, "LAST_BYTES", 100_000)
     monkeypatch.setattr(kept, "LOOK_EVERY_US", 500_000)
-    words = (
-        "guard",
-        "--connect",
-        rebound_vehicle.tcp_address,
-        "--set",
-        "companion.disk.max_use_mb=0.8",
-        *QUICK,
-        *PATIENT,
-    )
+    budget = ("--set", "companion.disk.max_use_mb=0.8")
+    words = ("guard", "--connect", rebound_vehicle.tcp_address, *budget, *QUICK, *PATIENT)
     while_armed = []
 
     def pilot():

@@ -47,11 +47,6 @@ def test_the_imu_at_rest(tmp_path, name):
     assert log.started_at_us == 1_000_000
 
 
-def test_of_several_imus_the_first(tmp_path):
-    log = read(tmp_path, [COPTER, *IMU, *imu([1_000_000], force=(5.0, 0.0, 0.0), instance=1)])
-    assert len(of(log, ImuSample)) == 2
-
-
 def test_a_sample_holds_what_its_low_pass_filter_has_not_forgotten(tmp_path):
     # Given the filter's cut-off among the parameters
     log = read(tmp_path, [COPTER, ("PARM", 0, "INS_ACCEL_FILTER", 20.0, 20.0), *IMU])
@@ -132,18 +127,12 @@ def test_modes_are_those_of_px4_that_do_the_same(tmp_path):
     assert [mode_name(beat.custom_mode) for beat in beats] == ["STABILIZED", "POSCTL", "AUTO.LOITER"]
 
 
-def test_the_climb_rate_that_is_asked_for(tmp_path):
-    log = read(tmp_path, [COPTER, *IMU, ("PSCD", 1_000_000, -3.0, 0.25, 9.0)])
+def test_the_climb_rate_the_clipped_samples_and_the_frame_are_those_of_the_first_sensor(tmp_path):
+    second = [*imu([1_000_000], force=(5.0, 0.0, 0.0), instance=1), ("VIBE", 1_000_000, 1, 0.0, 0.0, 0.0, 2)]
+    rows = [("PSCD", 1_000_000, -3.0, 0.25, 9.0), ("VIBE", 1_000_000, 0, 3.0, 0.0, 4.0, 17), *second]
+    log = read(tmp_path, [COPTER, *IMU, *rows, ("PARM", 0, "FRAME_CLASS", 4.0, 0.0)])
     assert of(log, PositionTarget) == [PositionTarget(None, 0.25)]
-
-
-def test_clipped_samples_are_counted(tmp_path):
-    rows = [COPTER, *IMU, ("VIBE", 1_000_000, 0, 3.0, 0.0, 4.0, 17), ("VIBE", 1_000_000, 1, 0.0, 0.0, 0.0, 2)]
-    assert of(read(tmp_path, rows), Vibration) == [Vibration(1_000_000, 0.0, 5.0, (17, 0, 0))]
-
-
-def test_what_the_vehicle_says_of_itself(tmp_path):
-    log = read(tmp_path, [COPTER, *IMU, ("PARM", 0, "FRAME_CLASS", 4.0, 0.0)])
+    assert of(log, Vibration) == [Vibration(1_000_000, 0.0, 5.0, (17, 0, 0))] and len(of(log, ImuSample)) == 2
     assert log.vehicle == "ArduCopter V4.5.7 (2a3dc4b7), octorotor"
 
 

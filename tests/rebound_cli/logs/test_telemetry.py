@@ -37,20 +37,23 @@ class Writer:
         )
         self.send(message, system, at_us=at_us)
 
+    def read(self, folder):
+        path = folder / "flight.tlog"
+        path.write_bytes(self.content)
+        return read_log(path)
+
 
 @pytest.fixture
-def path(tmp_path):
-    return tmp_path / "flight.tlog"
+def log():
+    return Writer()
 
 
-def test_the_vehicles_samples_come_with_the_time_they_were_heard(path):
-    log = Writer()
+def test_the_vehicles_samples_come_with_the_time_they_were_heard(log, tmp_path):
     log.heartbeat()
     for x in (1.0, 2.0, 3.0):
         log.imu(x=x)
     log.send(dialect.MAVLink_extended_sys_state_message(0, 2))
-    path.write_bytes(log.content)
-    read = read_log(path)
+    read = log.read(tmp_path)
     assert [type(heard.sample) for heard in read.heard] == [Heartbeat, ImuSample, ImuSample, ImuSample, ExtendedState]
     assert [heard.at_us - EPOCH_US for heard in read.heard] == [0, 4000, 8000, 12_000, 16_000]
     assert [sample.specific_force_frd_m_s2[0] for _, sample in read.imu()] == [1.0, 2.0, 3.0]
@@ -59,9 +62,8 @@ def test_the_vehicles_samples_come_with_the_time_they_were_heard(path):
     assert "EXTENDED_SYS_STATE is not in it" not in read.losses
 
 
-def test_of_several_systems_the_known_vehicle_with_imu_samples_is_taken(path):
+def test_of_several_systems_the_known_vehicle_with_imu_samples_is_taken(log, tmp_path):
     # Given a ground station, a gimbal, a vehicle of an unknown autopilot and two PX4 vehicles on one link
-    log = Writer()
     log.heartbeat(system=255, component=190, kind=GROUND_STATION, autopilot=NO_AUTOPILOT)
     log.heartbeat(system=1, component=154, kind=26, autopilot=NO_AUTOPILOT)
     log.heartbeat(system=3, autopilot=GENERIC)
@@ -70,9 +72,8 @@ def test_of_several_systems_the_known_vehicle_with_imu_samples_is_taken(path):
     for _ in range(3):
         log.imu(system=3, x=3.0)
         log.imu(system=5, x=5.0)
-    path.write_bytes(log.content)
     # Then the one that can be looked at is, and the other is named
-    read = read_log(path)
+    read = log.read(tmp_path)
     assert [sample.specific_force_frd_m_s2[0] for _, sample in read.imu()] == [5.0] * 3
     assert any("system 5 was taken, not 4" in loss for loss in read.losses)
 
@@ -85,32 +86,25 @@ def test_of_several_systems_the_known_vehicle_with_imu_samples_is_taken(path):
         (lambda log: log.heartbeat(), "no HIGHRES_IMU from system 1"),
     ],
 )
-def test_a_log_without_a_vehicle_to_look_at_is_one_sentence(path, fill, words):
-    log = Writer()
+def test_a_log_without_a_vehicle_to_look_at_is_one_sentence(log, tmp_path, fill, words):
     fill(log)
     fill(log)
-    path.write_bytes(log.content)
     with pytest.raises(LogError, match=words):
-        read_log(path)
+        log.read(tmp_path)
 
 
-def test_bytes_that_are_no_log_are_one_sentence(path):
-    path.write_bytes(bytes(range(256)) * 20)
-    with pytest.raises(LogError, match="not a telemetry log"):
-        read_log(path)
-    path.write_bytes(b"")
-    with pytest.raises(LogError, match="empty"):
-        read_log(path)
+def test_bytes_that_are_no_log_are_one_sentence(log, tmp_path):
+    for log.content, words in ((bytes(range(256)) * 20, "not a telemetry log"), (b"", "empty")):
+        with pytest.raises(LogError, match=words):
+            log.read(tmp_path)
 
 
-def test_a_clock_that_is_set_back_loses_nothing(path):
-    log = Writer()
+def test_a_clock_that_is_set_back_loses_nothing(log, tmp_path):
     log.heartbeat()
     log.imu()
     for _ in range(5):
         log.imu(at_us=EPOCH_US - 3_600_000_000)
-    path.write_bytes(log.content)
-    assert len(read_log(path).imu()) == 6
+    assert len(log.read(tmp_path).imu()) == 6
 
 
 @pytest.mark.parametrize(
@@ -121,8 +115,7 @@ def test_a_clock_that_is_set_back_loses_nothing(path):
         (0x007, PositionTarget(None, 0.25)),
     ],
 )
-def test_what_the_position_control_was_asked_for(path, mask, expected):
-    log = Writer()
+def test_what_the_position_control_was_asked_for(log, tmp_path, mask, expected):
     log.heartbeat()
     log.imu()
     log.imu()
@@ -131,5 +124,6 @@ def test_what_the_position_control_was_asked_for(path, mask, expected):
             7, 1, mask, 1.0, 2.0, -3.0, 0.5, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0
         )
     )
-    path.write_bytes(log.content)
-    assert [heard.sample for heard in read_log(path).heard if isinstance(heard.sample, PositionTarget)] == [expected]
+    assert [heard.sample for heard in log.read(tmp_path).heard if isinstance(heard.sample, PositionTarget)] == [
+        expected
+    ]

@@ -62,7 +62,7 @@ def tune(capsys, *arguments):
 
 def test_the_settings_written_are_what_fly_reads(tmp_path, capsys):
     log, out = healthy_log(tmp_path / "healthy.ulg", 20.0), tmp_path / "mine.yaml"
-    code, text, _ = tune(capsys, log, "--detector", "fused", "--out", out)
+    code, text, _ = tune(capsys, log, "--out", out)
     assert code == 0
     assert "no false alarm, never blind" in text and "19 s in the air" in text
     # Then the file says what was printed, every number with its reason above it
@@ -92,8 +92,6 @@ def test_what_the_file_to_begin_with_says_of_other_things_is_kept(tmp_path, caps
 def test_logs_that_teach_nothing_are_refused(tmp_path, capsys):
     code, text, error = tune(capsys, healthy_log(tmp_path / "short.ulg", 6.0))
     assert code == 1 and text == "" and "too short a flight to learn from, 5 s in the air" in error
-    code, _, error = tune(capsys, healthy_log(tmp_path / "long.ulg", 20.0), "--detector", "magic")
-    assert code == 1 and "there is no detector 'magic'" in error
 
 
 def falling(log):

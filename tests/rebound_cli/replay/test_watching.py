@@ -26,11 +26,8 @@ def test_a_hit_is_found_with_what_was_known_then():
 def test_a_flight_without_a_hit_has_none_and_its_story_is_told():
     findings = watch_log(flight(hit_us=None), LATERAL)
     assert findings.impacts == [] and findings.blind == []
-    assert [text for _, text in findings.happenings if "from" not in text] == [
-        "mode OFFBOARD",
-        "armed",
-        "took off",
-    ]
+    told = [text for _, text in findings.happenings if "from" not in text]
+    assert told == ["mode OFFBOARD", "armed", "took off"]
     assert [off.reason for off in findings.off] == ["disarmed", "on the ground", "below 0.5 m"]
     assert [off.end_us for off in findings.off] == pytest.approx([SECOND, 2 * SECOND, 2.02 * SECOND], abs=5_000)
 

@@ -7,8 +7,6 @@ import numpy as np
 
 from companion.messages import Attitude, LocalPosition
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import Phase
-from rebound_cli.replay.listening import PHASES
 from rebound_cli.replay.recording import Followed
 from rebound_cli.replay.report import replay_log
 from rebound_cli.replay.watching import Findings
@@ -23,8 +21,8 @@ from tests.rebound_cli.replay.flying import HIT_US, flight
 
 def test_a_sample_beyond_its_threshold_is_a_hit_and_no_other_is(wall):
     fired = {finding.first.impact.sample_time_boot_us for finding in wall.findings.impacts}
-    tested = wall.findings.listener.tested
-    beyond = tested.time_boot_us[(tested.phase == PHASES.index(Phase.ARMED)) & (tested.ratio >= 1.0)]
+    tested = wall.findings.listener.forces.all()
+    beyond = tested.time_boot_us[tested.is_armed & (tested.ratio >= 1.0)]
     # The wall and the touchdown
     assert set(beyond) == fired and len(fired) == 2
     assert wall.findings.listener.shown.keys() == fired
@@ -75,8 +73,9 @@ def test_a_hit_between_the_samples_is_told_by_the_velocity_that_shows_it():
     (told,) = (reason for reason in moment.reasons if reason.startswith("Velocity jump: 0.6"))
     assert told.endswith("speaks for a contact.") and not any("Push" in reason for reason in moment.reasons)
     # and what it was compared with is the detector's own
-    jumps = shown.findings.listener.tested_velocity
-    assert np.count_nonzero(jumps.ratio > 1.0) == 1 and jumps.jump_threshold_m_s.min() >= 0.12
+    jumps = shown.findings.listener.velocities.all()
+    _, limits_m_s = jumps.signs["jump"]
+    assert np.count_nonzero(jumps.ratio > 1.0) == 1 and limits_m_s.min() >= 0.12
 
 
 def test_what_the_simulator_knows_and_nobody_saw_is_told_with_why(wall):

@@ -9,7 +9,6 @@ from contextlib import closing, contextmanager
 import numpy as np
 import pytest
 
-from rebound_cli.main import main
 from rebound_cli.report.live_server import WatchServer
 from rebound_cli.report.tail import COLUMNS, Tail
 from rebound_cli.results.flight_log import read_flight_log
@@ -142,8 +141,3 @@ def test_browsers_that_do_not_read_or_have_gone_disturb_nobody(wall_folder):
         assert stream_until(server, "done")
         for client in lazy:
             client.close()
-
-
-def test_where_there_is_no_flight_that_is_said(tmp_path, capsys):
-    assert main(["watch", str(tmp_path)]) == 1
-    assert "no flight is there; give a run's folder" in capsys.readouterr().err

@@ -40,22 +40,13 @@ def counts(collisions, hits):
         pytest.param([], [hit(10_000)], (0, 1, 0), id="missed"),
         pytest.param([], [hit(10_000), hit(10_500)], (0, 2, 1), id="after a missed contact the next is a recontact"),
         pytest.param(
-            [collision(10_004, None), collision(10_504)],
-            [hit(10_000), hit(10_500)],
-            (0, 0, 1),
-            id="before recovery",
+            [collision(10_004, None), collision(10_504)], [hit(10_000), hit(10_500)], (0, 0, 1), id="before recovery"
         ),
         pytest.param(
-            [collision(10_004, 2.0), collision(12_404)],
-            [hit(10_000), hit(12_400)],
-            (0, 0, 1),
-            id="not yet called",
+            [collision(10_004, 2.0), collision(12_404)], [hit(10_000), hit(12_400)], (0, 0, 1), id="not yet called"
         ),
         pytest.param(
-            [collision(10_004, 2.0), collision(12_604)],
-            [hit(10_000), hit(12_600)],
-            (0, 0, 0),
-            id="after recovery",
+            [collision(10_004, 2.0), collision(12_604)], [hit(10_000), hit(12_600)], (0, 0, 0), id="after recovery"
         ),
     ],
 )
