@@ -130,8 +130,7 @@ def in_room(*items, **changes) -> Flight:
 
 def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
     f = in_room(INTO_WALL, on_collision=ROUND)
-    f.run_to_end(200)
-    report = f.report
+    report = f.run_to_end(200)
     assert report.unreachable == ("2",) and len(report.collisions) <= 4
     assert "no way round what is known; then: land" in f.event("unreachable").text
     told = status_text(f.event("unreachable"), "test", 3)
@@ -148,8 +147,7 @@ def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
 )
 def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
     f = in_room(INTO_WALL, ASIDE, on_collision=ROUND, obstacles={"on_unreachable": then})
-    f.run_to_end(200)
-    report = f.report
+    report = f.run_to_end(200)
     assert report.outcome == ends
     assert ("return" in f.kinds()) is (then == "return")
     assert (3 in items_flown(f)) is (then == "continue")
@@ -160,8 +158,7 @@ def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
 def test_a_wall_known_beforehand_is_not_touched():
     known = [{"touches_ned_m": [[3.2, -1.9, -1.5], [3.2, 1.9, -1.5]], "normal_ned": [-1, 0, 0]}]
     f = in_room(INTO_WALL, on_collision=ROUND, obstacles={"known": known})
-    f.run_to_end(60)
-    report = f.report
+    report = f.run_to_end(60)
     assert report.collisions == () and report.unreachable == ("2",)
 
 

@@ -81,9 +81,7 @@ def test_ctrl_c_hands_the_vehicle_over_as_the_mission_says(state, on_interrupt, 
     stopped_at = f.now_us
 
     f.companion.stop("Ctrl-C")
-    f.run_to_end(8.0 if state == "recovering" else 2.0)
-
-    report = f.report
+    report = f.run_to_end(8.0 if state == "recovering" else 2.0)
     assert f.vehicle.mode == mode
     assert f.vehicle.armed
     assert (report.outcome, report.reason) == ("aborted", "Ctrl-C")

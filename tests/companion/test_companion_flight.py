@@ -18,9 +18,7 @@ def at_wall(**changes) -> Flight:
 
 def test_a_mission_without_a_hit_completes():
     f = flight()
-    f.run_to_end()
-
-    report = f.report
+    report = f.run_to_end()
     assert (report.outcome, report.autopilot, report.collisions) == ("completed", "PX4 1.15.0", ())
     assert report.stream_rates_hz["HIGHRES_IMU"] == pytest.approx(250, rel=0.01)
     assert report.stream_rates_hz["LOCAL_POSITION_NED"] == pytest.approx(50, rel=0.01)
@@ -94,9 +92,7 @@ def test_the_hit_is_answered_in_the_step_that_hears_of_it():
 def test_the_collision_report_tells_what_happened():
     # Steady when it meets the wall: the accelerometer of a vehicle that stays level does not show how it speeds up.
     f = at_wall(companion={"flight": {"speeding_up_m_s2": 2.0}})
-    f.run_to_end()
-
-    report = f.report
+    report = f.run_to_end()
     assert report.outcome == "completed"
     (hit,) = report.collisions
     assert hit.detector == "fused"
@@ -140,8 +136,7 @@ def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
     f.run_to("recovering")
     f.run_to("holding", 3.0)
     assert "not settled" in f.event("recovered").text
-    f.run_to_end()
-    report = f.report
+    report = f.run_to_end()
     assert report.outcome == "completed"
     assert report.collisions[0].settled_after_s is None
 
