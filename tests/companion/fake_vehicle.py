@@ -277,6 +277,14 @@ def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes
     return Flight(companion, vehicle or FakeVehicle())
 
 
+def hovering(vehicle: FakeVehicle | None = None, **changes: Any) -> Flight:
+    """A second after a take-off, in a hold that lasts longer than a test."""
+    f = flight(vehicle, items=[TAKEOFF, {"hold": {"duration_s": 60}}, LANDING], **changes)
+    f.run_to("mission")
+    f.run_for(1.0)
+    return f
+
+
 def strike(f: Flight, x_m_s2: float = 12.0, y_m_s2: float = 0.0, samples: int = 3) -> None:
     """Something pushes the vehicle's body for a few IMU samples."""
     for _ in range(samples):

@@ -4,8 +4,20 @@ import pytest
 
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
+from companion.motion.motors import Damage
 from companion.reflex.config import EstimateConfig
-from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, strike
+from tests.companion.fake_vehicle import (
+    INTO_WALL,
+    LAND,
+    LANDING,
+    LOITER,
+    TAKEOFF,
+    FakeVehicle,
+    at_wall,
+    flight,
+    flying_in,
+    strike,
+)
 from tests.flying import Flight
 
 ASIDE = {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0}}
@@ -72,6 +84,13 @@ def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
     assert f.run_to_end().outcome == "completed"
 
 
+def test_a_motor_that_is_found_hurt_on_the_way_home_ends_it_there_where_the_mission_says_so():
+    f = flying_in("returning", on_damage="land")
+    assert f.state == "returning", "a whole vehicle flies on"
+    f.companion.core.flight.motors.damage = Damage(3, 0.16, 0.995, False)
+    f.run_to("landing", 0.1)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -130,8 +149,7 @@ def in_room(*items, **changes) -> Flight:
 
 def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
     f = in_room(INTO_WALL, on_collision=ROUND)
-    f.run_to_end(200)
-    report = f.report
+    report = f.run_to_end(200)
     assert report.unreachable == ("2",) and len(report.collisions) <= 4
     assert "no way round what is known; then: land" in f.event("unreachable").text
     told = status_text(f.event("unreachable"), "test", 3)
@@ -148,8 +166,7 @@ def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
 )
 def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
     f = in_room(INTO_WALL, ASIDE, on_collision=ROUND, obstacles={"on_unreachable": then})
-    f.run_to_end(200)
-    report = f.report
+    report = f.run_to_end(200)
     assert report.outcome == ends
     assert ("return" in f.kinds()) is (then == "return")
     assert (3 in items_flown(f)) is (then == "continue")
@@ -160,8 +177,7 @@ def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
 def test_a_wall_known_beforehand_is_not_touched():
     known = [{"touches_ned_m": [[3.2, -1.9, -1.5], [3.2, 1.9, -1.5]], "normal_ned": [-1, 0, 0]}]
     f = in_room(INTO_WALL, on_collision=ROUND, obstacles={"known": known})
-    f.run_to_end(60)
-    report = f.report
+    report = f.run_to_end(60)
     assert report.collisions == () and report.unreachable == ("2",)
 
 

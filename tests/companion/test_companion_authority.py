@@ -18,44 +18,31 @@ def assert_silent_from_now(f: Flight) -> None:
     assert len(f.vehicle.commands) == commands
 
 
-@pytest.mark.parametrize("state", IN_THE_AIR)
-def test_a_pilots_mode_change_ends_the_flight_and_the_setpoints_at_once(state):
-    f = flying_in(state)
-
-    f.vehicle.pilot_takes(POSCTL)
-    f.run_to("aborted", 2.0 if state == "landing" else 0.2)
-
-    report = f.report
-    assert f.companion.finished
-    assert report.outcome == "aborted"
-    assert "pilot" in report.reason
-    assert "POSCTL" in report.reason
-    assert_silent_from_now(f)
+def is_disarmed(vehicle: FakeVehicle) -> None:
+    vehicle.armed = False
 
 
 @pytest.mark.parametrize("state", IN_THE_AIR)
-@pytest.mark.parametrize("seen_in", ["heartbeat", "current_mode"])
-def test_a_failsafe_is_called_a_failsafe_and_not_fought(state, seen_in):
+@pytest.mark.parametrize(
+    ("takes", "seen_in", "within_s", "words"),
+    [
+        (lambda vehicle: vehicle.pilot_takes(POSCTL), "current_mode", 0.2, "the pilot took over in POSCTL"),
+        (lambda vehicle: vehicle.failsafe_takes(LOITER), "current_mode", 0.2, "a failsafe of the vehicle took over"),
+        # HEARTBEAT alone tells it once a second, and tells it twice before it counts
+        (lambda vehicle: vehicle.failsafe_takes(LOITER), "heartbeat", 2.1, "a failsafe of the vehicle took over"),
+        (is_disarmed, "heartbeat", 2.1, "disarmed"),
+    ],
+    ids=["pilot", "failsafe", "failsafe in heartbeats", "disarmed"],
+)
+def test_whoever_takes_the_vehicle_ends_the_flight_and_is_named(state, takes, seen_in, within_s, words):
     f = flying_in(state)
     f.vehicle.no_current_mode = seen_in == "heartbeat"
-
-    f.vehicle.failsafe_takes(LOITER)
-    # HEARTBEAT alone tells it once a second, and tells it twice before it counts
-    f.run_to("aborted", 3.7 if state == "landing" else 2.1)
-
-    report = f.report
-    assert report.outcome == "aborted"
-    assert "failsafe" in report.reason
-    assert "pilot" not in report.reason
-    assert_silent_from_now(f)
-
-
-@pytest.mark.parametrize("state", ON_SETPOINTS)
-def test_a_disarmed_vehicle_ends_the_flight(state):
-    f = flying_in(state)
-    f.vehicle.armed = False
-    f.run_to("aborted", 2.1)
-    assert "disarmed" in f.report.reason
+    takes(f.vehicle)
+    if state == "landing" and takes is is_disarmed:
+        f.run_to("done", within_s)
+        return
+    f.run_to("aborted", within_s + 1.8 if state == "landing" else within_s)
+    assert f.companion.finished and f.report.outcome == "aborted" and words in f.report.reason
     assert_silent_from_now(f)
 
 
@@ -94,9 +81,7 @@ def test_ctrl_c_hands_the_vehicle_over_as_the_mission_says(state, on_interrupt, 
     stopped_at = f.now_us
 
     f.companion.stop("Ctrl-C")
-    f.run_to_end(8.0 if state == "recovering" else 2.0)
-
-    report = f.report
+    report = f.run_to_end(8.0 if state == "recovering" else 2.0)
     assert f.vehicle.mode == mode
     assert f.vehicle.armed
     assert (report.outcome, report.reason) == ("aborted", "Ctrl-C")

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from tests.companion import fake_vehicle
-from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, FakeVehicle, flight, strike
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, FakeVehicle, flight, hovering, strike
 from tests.flying import Flight
 
 AND_BACK = {"go_to": {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}}
@@ -18,9 +18,7 @@ def at_wall(**changes) -> Flight:
 
 def test_a_mission_without_a_hit_completes():
     f = flight()
-    f.run_to_end()
-
-    report = f.report
+    report = f.run_to_end()
     assert (report.outcome, report.autopilot, report.collisions) == ("completed", "PX4 1.15.0", ())
     assert report.stream_rates_hz["HIGHRES_IMU"] == pytest.approx(250, rel=0.01)
     assert report.stream_rates_hz["LOCAL_POSITION_NED"] == pytest.approx(50, rel=0.01)
@@ -69,17 +67,8 @@ def test_nothing_arms_before_the_plan_is_confirmed():
     assert {m.command for _, m in f.vehicle.commands} <= {511, 512}
     assert f.vehicle.setpoints == []
     plan = f.companion.plan_text()
-    for words in (
-        "PX4 1.15.0",
-        "quadrotor",
-        "take off to 1.5 m",
-        "15 m",
-        "6 m",
-        "recovery law adaptive",
-        "hold for 3 s",
-        "HIGHRES_IMU",
-    ):
-        assert words in plan
+    said = ("PX4 1.15.0", "quadrotor", "take off to 1.5 m", "15 m", "6 m", "recovery law adaptive", "hold for 3 s")
+    assert all(words in plan for words in (*said, "HIGHRES_IMU"))
 
     f.companion.confirm_plan()
     f.run_to("takeoff", 0.1)
@@ -103,9 +92,7 @@ def test_the_hit_is_answered_in_the_step_that_hears_of_it():
 def test_the_collision_report_tells_what_happened():
     # Steady when it meets the wall: the accelerometer of a vehicle that stays level does not show how it speeds up.
     f = at_wall(companion={"flight": {"speeding_up_m_s2": 2.0}})
-    f.run_to_end()
-
-    report = f.report
+    report = f.run_to_end()
     assert report.outcome == "completed"
     (hit,) = report.collisions
     assert hit.detector == "fused"
@@ -120,31 +107,21 @@ def test_the_collision_report_tells_what_happened():
     assert 0.0 <= hit.overshoot_m < 0.1
 
 
-def test_a_takeoff_shakes_without_a_detection():
+@pytest.mark.parametrize(
+    ("state", "after_s", "detector"), [("takeoff", 1.6, "off (below 0.5 m)"), ("landing", 2.2, "armed")]
+)
+def test_what_shakes_a_takeoff_or_a_landing_is_no_hit(state, after_s, detector):
     f = flight()
-    f.run_to("takeoff")
-    f.run_for(1.6)
-    assert f.companion.status().detector == "off (below 0.5 m)"
+    f.run_to(state)
+    f.run_for(after_s)
+    assert f.companion.status().detector.startswith(detector)
     strike(f, 15.0, 15.0)
     f.run_to_end()
-    assert f.report.collisions == ()
-
-
-def test_what_shakes_a_landing_is_the_ground():
-    f = flight()
-    f.run_to("landing")
-    f.run_for(2.2)
-    assert f.companion.status().detector.startswith("armed")
-    strike(f, 15.0, 15.0)
-    f.run_to_end()
-    assert f.report.collisions == ()
-    assert "landing" in f.event("contact").text
+    assert f.report.collisions == () and "landing" in f.event("contact").text
 
 
 def test_a_fall_to_the_ground_is_told_as_a_crash():
-    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
-    f.run_to("mission")
-    f.run_for(1.0)
+    f = hovering()
     f.vehicle.position[2] = -0.5
     for _ in range(10):
         f.vehicle.velocity[2] = 4.0
@@ -159,8 +136,7 @@ def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
     f.run_to("recovering")
     f.run_to("holding", 3.0)
     assert "not settled" in f.event("recovered").text
-    f.run_to_end()
-    report = f.report
+    report = f.run_to_end()
     assert report.outcome == "completed"
     assert report.collisions[0].settled_after_s is None
 

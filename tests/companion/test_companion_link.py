@@ -13,8 +13,7 @@ SET_MESSAGE_INTERVAL = 511
 
 def failed(vehicle: FakeVehicle, limit_s: float = 40.0, **changes):
     f = flight(vehicle, **changes)
-    f.run_to_end(limit_s)
-    report = f.report
+    report = f.run_to_end(limit_s)
     assert report.outcome == "failed"
     assert f.state == "aborted"
     return f, report
@@ -118,8 +117,7 @@ def test_streams_are_asked_for_at_the_stated_rates_and_those_that_the_detector_u
 def test_refused_and_unanswered_stream_requests_do_not_stop_a_vehicle_that_streams_anyway():
     f = flight(FakeVehicle(ack=lambda command, count: [] if command == 512 else [4] if command == 511 else [0]))
     f.vehicle.obey = lambda command, count: command != 512
-    f.run_to_end()
-    report = f.report
+    report = f.run_to_end()
     assert report.outcome == "completed"
     assert report.autopilot == "PX4", "the version is optional"
     assert [e.text for e in f.events if e.kind == "command" and "FAILED" in e.text]

@@ -51,7 +51,6 @@ def test_what_was_expected_of_a_flight_that_ended_early_is_told_too():
     f.run_to("mission")
     f.run_for(1.0)
     f.companion.stop("Ctrl-C")
-    f.run_to_end()
-    report = f.report
+    report = f.run_to_end()
     assert report.outcome == "aborted" and report.reason == "Ctrl-C"
     assert [result.met for result in report.expectations] == [True]

@@ -18,7 +18,7 @@ from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
 from companion.reflex.confirmation import Hypothesis
-from tests.companion.fake_vehicle import LOITER, flight, flying_in
+from tests.companion.fake_vehicle import LOITER, flying_in, hovering
 from tests.companion.hostile import attacked
 
 STILL = (0.0, 0.0, 0.0)
@@ -70,9 +70,7 @@ def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_res
 
 def test_a_reset_moves_no_vehicle_and_is_told():
     # Given a vehicle that hovers, and counts its resets
-    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 9}}, {"land": {}}])
-    f.run_to("mission")
-    f.run_for(1.0)
+    f = hovering()
 
     def counted(resets, later_us=0):
         places = dict(zip(("x", "y", "z"), f.vehicle.position, strict=True)) | {"frame_id": 1, "child_frame_id": 1}

@@ -160,6 +160,36 @@ def test_items_that_cannot_be_flown(items, words):
         Mission.model_validate({"name": "t", "limits": {"max_speed_m_s": 5}, "items": [TAKEOFF, *items, LANDING]})
 
 
+GO_TO = {"position_ned_m": [2, 0, -1.5]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"wind": 3}, "Extra inputs"),
+        ({"items": [TAKEOFF, {"go_to": {**GO_TO, "sped": 3}}, LANDING]}, "Extra inputs"),
+        ({"items": [TAKEOFF, {"go_to": {**GO_TO, "speed_m_s": 50}}, LANDING]}, "less than or equal to 12"),
+        ({"items": [TAKEOFF, {"go_to": {**GO_TO, "speed_m_s": True}}, LANDING]}, "valid number"),
+        ({"items": [TAKEOFF, {"go_to": {"position_ned_m": [1, 2]}}, LANDING]}, "required"),
+        ({"items": [TAKEOFF, {"hold": {"duration_s": math.nan}}, LANDING]}, "finite"),
+        ({"items": [TAKEOFF, {}, LANDING]}, "exactly one key"),
+        ({"items": [TAKEOFF, {"hold": {"duration_s": 1}, **LANDING}, LANDING]}, "exactly one key"),
+        ({"items": [LANDING, LANDING]}, "first item must be takeoff"),
+        ({"items": [TAKEOFF, {"hold": {"duration_s": 1}}]}, "last item must be land or return"),
+        ({"items": [TAKEOFF, LANDING, LANDING]}, "item 2 is land"),
+        ({"items": [TAKEOFF, {"go_to": {"position_ned_m": [2, 0, 1.5]}}, LANDING]}, "up is negative"),
+        ({"fence": {"max_height_m": 1}}, r"item 1 \(takeoff\) lies .* above fence.max_height_m"),
+        ({"on_interrupt": "dance"}, "'hold' or 'land'"),
+        ({"companion": {"detector": "magic"}}, "no detector 'magic'"),
+        ({"companion": {"fused": {"treshold": 3}}}, "Extra inputs"),
+        ({"companion": {"flight": {"setpoint_hz": 5.0}}}, "greater than or equal to 20"),
+    ],
+)
+def test_missions_that_cannot_be_flown(changes, words):
+    with pytest.raises(ValidationError, match=words):
+        Mission.model_validate({"name": "t", "items": [TAKEOFF, LANDING], **changes})
+
+
 def test_a_way_that_leaves_a_room_on_its_way_is_refused():
     room = {"polygon_ne_m": [[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]]}
     there = [{"go_to": {"position_ned_m": [5, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 5, -1.5]}}]

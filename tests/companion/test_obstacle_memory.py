@@ -20,10 +20,10 @@ SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 ERROR_RAD = math.radians(15.0)
 
 
-def wall_touch(
-    east_m: float, height_m: float = 1.5, normal=SOUTH, error_deg: float = 15.0, north_m: float = 4.0
-) -> Patch:
-    return Patch(((north_m, east_m, -height_m),), normal, math.radians(error_deg), REACHES_M, 1)
+def wall(*easts_m: float, height_m: float = 1.5, normal=SOUTH, north_m: float = 4.0) -> Patch:
+    """A wall as it is remembered, touched at these places."""
+    places = tuple((north_m, east_m, -height_m) for east_m in easts_m)
+    return Patch(places, normal, ERROR_RAD, REACHES_M, found_at_us=1)
 
 
 def turned(deg: float):
@@ -55,7 +55,7 @@ def test_what_pushes_a_vehicle_on_came_after_it_and_is_no_wall():
 
 
 def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
-    (patch,) = remembered((), [wall_touch(0.0), wall_touch(1.05)], CLEARANCE_M)
+    (patch,) = remembered((), [wall(0.0), wall(1.05)], CLEARANCE_M)
     low_m, high_m = patch.assumed_along_m()
     assert patch.hits == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
 
@@ -63,7 +63,7 @@ def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
 def test_the_places_give_a_better_normal_than_the_pushes():
     """Two touches 2 m apart on a wall turned by 10 degrees, each with a normal 20 degrees off."""
     slope = math.tan(math.radians(10.0))
-    touches = [wall_touch(east_m, normal=turned(30.0), north_m=4.0 - slope * east_m) for east_m in (0.0, 1.0, 2.0)]
+    touches = [wall(east_m, normal=turned(30.0), north_m=4.0 - slope * east_m) for east_m in (0.0, 1.0, 2.0)]
     (patch,) = remembered((), touches, CLEARANCE_M)
     assert patch.normal_ned == pytest.approx(turned(10.0), abs=0.02)
     assert deg(patch.normal_error_rad) < 6.0
@@ -72,23 +72,23 @@ def test_the_places_give_a_better_normal_than_the_pushes():
 @pytest.mark.parametrize(
     "other",
     [
-        wall_touch(0.3, normal=turned(90.0)),  # the other wall of a corner
-        wall_touch(0.0, normal=(1.0, 0.0, 0.0), north_m=4.2),  # its other face
-        wall_touch(4.0),  # far off: a vehicle fits between
-        wall_touch(0.2, north_m=5.0),  # a parallel wall a metre behind
-        wall_touch(0.0, height_m=4.0),  # high above
+        wall(0.3, normal=turned(90.0)),  # the other wall of a corner
+        wall(0.0, normal=(1.0, 0.0, 0.0), north_m=4.2),  # its other face
+        wall(4.0),  # far off: a vehicle fits between
+        wall(0.2, north_m=5.0),  # a parallel wall a metre behind
+        wall(0.0, height_m=4.0),  # high above
     ],
 )
 def test_another_surface_is_another_patch(other):
-    assert len(remembered((), [wall_touch(0.0), other], CLEARANCE_M)) == 2
-    assert not is_same(wall_touch(0.0), other, CLEARANCE_M)
+    assert len(remembered((), [wall(0.0), other], CLEARANCE_M)) == 2
+    assert not is_same(wall(0.0), other, CLEARANCE_M)
 
 
 # --- files
 
 
 def test_a_patch_comes_back_from_a_file_as_it_was():
-    known = remembered((), [wall_touch(0.0), wall_touch(1.05), wall_touch(0.0, normal=turned(90.0))], CLEARANCE_M)
+    known = remembered((), [wall(0.0), wall(1.05), wall(0.0, normal=turned(90.0))], CLEARANCE_M)
     stored = ObstacleFile.model_validate(file_data(known))
     for before, after in zip(known, stored.patches, strict=True):
         patch = after.patch()

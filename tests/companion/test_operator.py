@@ -10,7 +10,7 @@ from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
 from companion.report import Event
-from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight
+from tests.companion.fake_vehicle import INTO_WALL, at_wall, hovering
 
 
 @pytest.mark.parametrize("length", [0, 1, 49, 50, 51, 100, 137])
@@ -38,9 +38,7 @@ def test_the_operator_reads_hit_recovery_and_outcome():
 
 
 def test_a_vehicle_hit_while_it_hovers_is_pushed():
-    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 5}}, LANDING])
-    f.run_to("mission")
-    f.run_for(1.0)
+    f = hovering()
     f.vehicle.push_m_s2 = (0.0, -12.0)
     f.step()
     assert f.messages("STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
@@ -103,8 +101,7 @@ def test_what_a_pilot_may_have_to_act_on_warns_and_what_goes_as_planned_does_not
 
 
 def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_end_at_once():
-    f = flight(items=[TAKEOFF, {"hold": {"duration_s": 9}}, LANDING])
-    f.run_to("mission")
+    f = hovering()
     for text in ("first", "second"):
         f.companion.note("late", text)
         f.step()

@@ -105,8 +105,7 @@ def test_a_round_trip_that_grows_in_flight_is_told_once_and_the_flight_goes_on()
     f = flight()
     f.run_to("mission")
     f.vehicle.round_trip_us = 400_000
-    f.run_to_end()
-    report = f.report
+    report = f.run_to_end()
     assert report.outcome == "completed"
     assert f.kinds().count("round_trip") == 1
     assert f.event("round_trip").data["round_trip_us"] == 400_000

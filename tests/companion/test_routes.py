@@ -14,17 +14,12 @@ from companion.mission.item_trajectory import SpeedLimits, passed, trajectory_ar
 from companion.mission.items import OrbitItem, PathItem
 from companion.mission.trajectory import CurveProfile
 from companion.reflex.surface import Normal
+from tests.companion.test_obstacle_memory import ERROR_RAD, SOUTH, wall
 
 REACH_M, MARGIN_M = 0.2, 0.35
 CLEARANCE_M = REACH_M + MARGIN_M
-ERROR_RAD = math.radians(15.0)
 PACE = SpeedLimits(1.5, 2.0)
 START, GOAL = (0.0, 0.0, -1.5), (7.0, 0.0, -1.5)
-
-
-def wall(*easts_m: float, north_m: float = 4.0, error_rad: float = ERROR_RAD, height_m: float = 1.5) -> Patch:
-    places = tuple((north_m, east_m, -height_m) for east_m in easts_m)
-    return Patch(places, (-1.0, 0.0, 0.0), error_rad, REACHES_M, 0)
 
 
 def ceiling(height_m: float, north_m: float = 0.0) -> Patch:
@@ -149,9 +144,6 @@ def first_hit(a, b, width_m, offset_m):
             normal = SOUTH if place[0] < 3.85 else (0.0, math.copysign(1.0, place[1] - offset_m), 0.0)
             return place, tuple(v / math.dist(a, b) for v in velocity), normal
     return None
-
-
-SOUTH = (-1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("error_deg", [0.0, 15.0, 35.0])

@@ -16,7 +16,7 @@ from companion.flight.envelope import SetpointError, Surroundings, bounded
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
-from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
+from tests.companion.fake_vehicle import LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, flight, hovering
 from tests.companion.hostile import attacked
 
 FENCE = Fence(radius_m=8, max_height_m=4, min_height_m=0.5)
@@ -99,20 +99,11 @@ def test_nothing_outside_the_envelope_ever_leaves(place, vehicle, velocity):
 
 # --- in flight
 
-TAKEOFF = {"takeoff": {"height_m": 1.5}}
-
-
-def in_mission(*items, vehicle=None, **changes):
-    f = flight(vehicle, items=[TAKEOFF, *(items or [{"hold": {"duration_s": 60}}]), {"land": {}}], **changes)
-    f.run_to("mission")
-    f.run_for(0.2)
-    return f
-
 
 def test_the_stream_is_held_back_and_it_is_told():
     # Given a flight that has forgotten the limit
     go_to = {"go_to": {"position_ned_m": [6, 0, -1.5]}}
-    f = flight(items=[TAKEOFF, go_to, {"hold": {"duration_s": 3}}, {"land": {}}], limits={"max_speed_m_s": 2.0})
+    f = flight(items=[TAKEOFF, go_to, {"hold": {"duration_s": 3}}, LANDING], limits={"max_speed_m_s": 2.0})
     f.run_to("takeoff")
     f.companion.core.flight.speeds = SpeedLimits(4.0, 4.0)
     f.run_to("mission")
@@ -125,7 +116,7 @@ def test_the_stream_is_held_back_and_it_is_told():
 
 
 def test_an_estimate_that_jumps_does_not_send_the_vehicle_flying():
-    f = in_mission(abort_when={"outside_fence_by_m": None}, fence={"radius_m": 30})
+    f = hovering(abort_when={"outside_fence_by_m": None}, fence={"radius_m": 30})
     f.vehicle.position[0] += 12.0
     sent = len(f.vehicle.setpoints)
     f.run_until(lambda: len(f.vehicle.setpoints) > sent + 1)
@@ -145,7 +136,7 @@ CONDITIONS = [
 @pytest.mark.parametrize(("condition", "happens", "words"), CONDITIONS)
 def test_a_condition_of_the_mission_ends_it(condition, happens, words):
     on_interrupt, mode = ("land", LAND) if "battery" in words else ("hold", LOITER)
-    f = in_mission(vehicle=FakeVehicle(battery_percent=80), abort_when=condition, on_interrupt=on_interrupt)
+    f = hovering(FakeVehicle(battery_percent=80), abort_when=condition, on_interrupt=on_interrupt)
     happens(f.vehicle)
     f.run_to("aborted", 6.0)
     assert words in f.report.reason
@@ -154,7 +145,7 @@ def test_a_condition_of_the_mission_ends_it(condition, happens, words):
 
 
 def test_one_position_outside_the_fence_ends_no_flight_and_two_do():
-    f = in_mission()
+    f = hovering()
 
     def far(later_ms):
         fields = {"time_boot_ms": f.vehicle.time_us // 1000 + later_ms, "x": 40.0, "z": -1.5}

@@ -19,6 +19,10 @@ WAYS = {
     "straight curve": CurveProfile([(0.0, 0.0, -2.0), (1.0, 0.0, -2.0), (5.0, 0.0, -2.0)], 2.0, 2.0),
     "circle": CIRCLE,
     "anticlockwise": CircleProfile((0.0, 0.0, -2.0), 0.5, 0.0, -math.tau, 2.0, 2.0),
+    # Too short to reach its 3 m/s
+    "velocity": trajectory_of(
+        VelocityItem(velocity_ned_m_s=(0.0, -3.0, 0.0), duration_s=2.0), (1.0, 1.0, -2.0), SpeedLimits(1.0, 2.0)
+    ),
     "chain": Chain((LineProfile((0.0, 0.0, -2.0), (1.0, 0.0, -2.0), 2.0, 2.0), CIRCLE)),
 }
 
@@ -50,16 +54,6 @@ def test_a_curve_is_a_natural_cubic_spline():
     trajectory = CurveProfile(ZIGZAG, 3.0, 2.0)
     for t in np.linspace(0.0, trajectory.duration_s, 50):
         assert np.linalg.norm(looked_at - np.array(trajectory.at(t)[0]), axis=1).min() < 1e-3
-
-
-@pytest.mark.parametrize(("velocity", "duration_s", "top"), [([1, 0, 0], 3.0, 1.0), ([0, -3, 0], 2.0, 2.0)])
-def test_a_velocity_lasts_its_time_with_its_ramps(velocity, duration_s, top):
-    item = VelocityItem(velocity_ned_m_s=velocity, duration_s=duration_s)
-    trajectory = trajectory_of(item, (1.0, 1.0, -2.0), SpeedLimits(1.0, 2.0))
-    assert trajectory.duration_s == pytest.approx(duration_s)
-    middle = trajectory.at(0.5 * duration_s)[1]
-    assert math.hypot(*middle) == pytest.approx(top, abs=0.01)
-    assert np.dot(middle, velocity) > 0.0
 
 
 @pytest.mark.parametrize(

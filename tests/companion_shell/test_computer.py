@@ -3,8 +3,8 @@
 from collections import namedtuple
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.packets import decoded
 from companion.mavlink.encode import Encoder
 from companion.messages import ComputerStatus
 from companion.shell import computer
@@ -12,7 +12,6 @@ from companion.shell.computer import ComputerReader
 
 Usage = namedtuple("Usage", "total used free")
 GIB = 1 << 30
-STATUS = ComputerStatus(1_600_000_000_000_000, 90_500, (5, 50, 0, 100), 61, 812, 3792, 9_000, 30_000)
 
 
 @pytest.fixture
@@ -68,27 +67,18 @@ def test_a_computer_without_a_sensor_has_no_temperature(linux):
     assert ComputerReader(linux, linux).read(0).temperature_deg_c is None
 
 
-def decoded(status):
-    (message,) = mav.MAVLink(None).parse_buffer(b"".join(Encoder().packets(status)))
-    return message
-
-
-def test_the_message_has_what_is_known_and_says_of_the_rest_that_it_is_unused():
-    message = decoded(STATUS)
+@pytest.mark.parametrize(
+    ("cores", "cores_sent"), [((5, 50, 0, 100), [5, 50, 0, 100, *[255] * 4]), (tuple(range(12)), list(range(8)))]
+)
+@pytest.mark.parametrize(("temperature", "sent"), [(61, 61), (None, 127), (-20, -20), (150, 126), (-300, -128)])
+def test_the_message_has_what_is_known_and_fits_and_says_of_the_rest_that_it_is_unused(
+    cores, cores_sent, temperature, sent
+):
+    status = ComputerStatus(1_600_000_000_000_000, 90_500, cores, temperature, 812, 3792, 9_000, 30_000)
+    message = decoded(b"".join(Encoder().packets(status)))
     assert message.get_type() == "ONBOARD_COMPUTER_STATUS"
-    assert (message.time_usec, message.uptime, message.type) == (1_600_000_000_000_000, 90_500, 0)
-    assert message.cpu_cores == [5, 50, 0, 100, 255, 255, 255, 255]
-    assert message.temperature_board == 61 and message.temperature_core == [127] * 8
+    assert (message.time_usec, message.uptime) == (1_600_000_000_000_000, 90_500)
+    assert (message.cpu_cores, message.temperature_board) == (cores_sent, sent)
     assert (message.ram_usage, message.ram_total) == (812, 3792)
     assert message.storage_usage == [9_000, *[0xFFFFFFFF] * 3] and message.storage_total == [30_000, *[0xFFFFFFFF] * 3]
-    assert (
-        message.fan_speed == [0x7FFF] * 4
-        and message.gpu_cores == [255] * 4
-        and message.link_tx_rate == [0xFFFFFFFF] * 6
-    )
-
-
-@pytest.mark.parametrize(("temperature", "sent"), [(None, 127), (-20, -20), (150, 126), (-300, -128)])
-def test_of_more_than_eight_cores_the_first_are_told_and_a_temperature_fits_its_byte(temperature, sent):
-    message = decoded(ComputerStatus(0, 0, tuple(range(12)), temperature, 0, 0, 0, 0))
-    assert (message.cpu_cores, message.temperature_board) == (list(range(8)), sent)
+    assert message.temperature_core == [127] * 8 and message.fan_speed == [0x7FFF] * 4

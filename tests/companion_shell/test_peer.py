@@ -1,20 +1,17 @@
 """Whose datagrams are heard on a UDP port, and who is answered."""
 
 import pytest
-from pymavlink.dialects.v20 import development as mav
 
+from bench.fly.packets import made
 from companion.shell.peer import RELEASED_US, Peer
 
 VEHICLE, STRANGER = ("192.168.4.1", 14580), ("10.0.0.66", 4444)
 
 
-def packed(message, component=1) -> bytes:
-    return bytes(message.pack(mav.MAVLink(None, 1, component)))
-
-
-HEARTBEAT = packed(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3))
-CAMERAS = packed(mav.MAVLink_heartbeat_message(30, 8, 0, 0, 3, 3), component=100)
-IMU = packed(mav.MAVLink_highres_imu_message(1, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F))
+OF_PX4 = {"type": 2, "autopilot": 12, "base_mode": 0x1D, "system_status": 3}
+HEARTBEAT = made("HEARTBEAT", OF_PX4)
+CAMERAS = made("HEARTBEAT", {"type": 30, "autopilot": 8}, (1, 100))
+IMU = made("HIGHRES_IMU", {"time_usec": 1, "zacc": -9.8, "fields_updated": 0x3F})
 
 
 def test_before_there_is_a_vehicle_the_last_sender_of_a_packet_is_answered():
@@ -94,10 +91,7 @@ def test_who_was_named_is_heard_alone_before_and_after(port):
 
 def test_where_packets_are_signed_only_genuine_ones_pin_hold_and_move_an_address():
     # Given packets of which those with an even sequence number are genuine
-    end = mav.MAVLink(None, 1, 1)
-    genuine = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3).pack(end))
-    end.seq = 1
-    forged = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3).pack(end))
+    genuine, forged = (made("HEARTBEAT", OF_PX4, number=number) for number in (0, 1))
     peer = Peer(is_genuine=lambda packet: packet[4] % 2 == 0)
     # Then a forged heartbeat pins nothing
     peer.accepts(forged, STRANGER, 0)

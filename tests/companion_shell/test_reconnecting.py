@@ -133,6 +133,14 @@ def test_whoever_waits_begins_without_a_device(by_id, closing):
     assert until_heard(connection) == b"first" and connection.counts.reconnects == 0
 
 
+def test_a_setpoint_to_a_line_that_has_just_gone_is_lost_and_no_error(by_id, closing):
+    line = closing(Line(by_id / "usb-3D_Robotics_PX4_FMU_v5-if00"))
+    connection = closing(open_connection(f"serial://{line.path}:115200"))
+    line.close()
+    connection.send(b"setpoint")
+    assert "lost" in until_told(connection, "lost")
+
+
 def test_a_port_that_may_not_be_opened_is_told_at_once_to_whoever_waits(tmp_path):
     # Waiting gives nobody the rights to a device; here it is a folder
     with pytest.raises(ConnectionSetupError, match="cannot be opened"):

@@ -82,15 +82,6 @@ def test_whoever_flies_into_the_wall_is_recovered_and_nothing_of_his_moves_the_v
     assert any(text.startswith("Taking over") for text in told) and told[-1].startswith("Given back to AUTO.LOITER")
 
 
-@pytest.mark.parametrize("loss_s", [0.3, 1.0])
-def test_from_a_programs_attitudes_px4_changes_its_controllers_at_once(loss_s):
-    """By position where COM_OF_LOSS_T is long: PX4 would hold the program's last attitude for half a second."""
-    air = hit(by_attitudes, {"COM_OF_LOSS_T": loss_s})
-    air.run_for(0.02)
-    first, *_ = air.sent_by("guard", "COMMAND_LONG", air.event_s("take_over"))
-    assert first.command == dialect.MAV_CMD_RUN_PREARM_CHECKS
-
-
 @pytest.mark.parametrize(
     ("flies", "loss_s", "late_s"),
     [(by_places, 1.0, 0.5), (by_places, 1.0, 1.3), (by_places, 0.3, 0.5), (fly_a_mission, 0.3, 0.5)],

@@ -9,7 +9,7 @@ from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, FakeVehicle
 GUIDED, COPTER_LAND, BRAKE = 4, 9, 17
 NUMBERS = {OFFBOARD: GUIDED, LAND: COPTER_LAND, LOITER: BRAKE}
 BY_NUMBER = {number: mode for mode, number in NUMBERS.items()}
-SET_MODE, TAKE_OFF, REQUEST, AUX_FUNCTION = 176, 22, 512, 218
+SET_MODE, TAKE_OFF, ARM, AUX_FUNCTION = 176, 22, 400, 218
 VERSION = 4 << 24 | 6 << 16
 
 
@@ -19,7 +19,6 @@ class FakeCopter(FakeVehicle):
     flight_version: int = VERSION
     parameters: dict[str, float] = field(default_factory=lambda: {"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": 8.0})
     takes_off_to_m: float | None = None
-    does_take_off: bool = True
 
     def send(self, message) -> None:
         kind = message.get_type()
@@ -54,7 +53,7 @@ class FakeCopter(FakeVehicle):
                 BY_NUMBER[int(message.param2)] >> 24,
             )
         super().obey_command(message)
-        if message.command == TAKE_OFF and self.armed and self.does_take_off:
+        if message.command == TAKE_OFF and self.armed and self.obey(TAKE_OFF, self.counts[TAKE_OFF]):
             self.takes_off_to_m = message.param7
 
     def move(self) -> None:
