@@ -81,7 +81,8 @@ class Stepped(ABC, Generic[CoreT]):
     def last_words(self) -> list[tuple[float, bytes]]:
         """What that is now, each so many seconds later."""
         words = () if self._core is None else self._core.last_words
-        return [(later_s, self._encoder.unsent(word)) for later_s, word in words]
+        packets = {word: self._encoder.unsent(word) for word in {word for _, word in words}}
+        return [(later_s, packets[word]) for later_s, word in words]
 
     def next_deadline_us(self) -> int:
         """When `step(b"", now)` is due if nothing arrives before; in the past when it is due at once."""

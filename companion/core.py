@@ -33,6 +33,7 @@ from companion.messages import (
 )
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
+from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO, plus
 from companion.reflex.collision import CollisionReport
 from companion.reflex.config import HELD_S, LEAD_S, NOTICED_S
@@ -255,14 +256,15 @@ class Core(ABC, Generic[FlightT, MachineT]):
     @property
     def last_words(self) -> tuple[tuple[float, Outgoing], ...]:
         """For a vehicle that would drift if this program died now, each so many seconds later: an attitude that tilts
-        it off what it has hit, and a place off it.
+        it off what it has hit, again and again, and at last a place off it.
 
-        It begins the way to a place with the velocity that it believes, and with its attitude as what a level flight
-        takes. So the place waits until the first is right, and the tilt makes the second right.
+        It flies to a place, and holds its height without a thrust that is asked for, by the velocity that it believes,
+        and takes its attitude for what a level flight takes. So until the first is right it is told a thrust, and a
+        tilt that makes the second right.
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest(), self.flight.target
-        words, recovery = flight.vehicle.autopilot.last_words, self.reflex.recovery
-        if not self._leans or words is None or latest is None or recovery is None:
+        words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
+        if not self._leans or words is None or latest is None or recovery is None or held_s is None:
             return ()
         if target is None or target.lean is None:
             return ()  # it goes by a position from the next setpoint on
@@ -271,10 +273,14 @@ class Core(ABC, Generic[FlightT, MachineT]):
         place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
         kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
         since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.sample_time_boot_us)
-        later_s = max(0.0, words.misled_s - since_s)
-        tilt = target.lean.setpoint(now_us, plus(ZERO, words.away_m_s2, (normal[0], normal[1], 0.0)))
-        said = ((later_s, tilt), (later_s + LEAD_S, PositionSetpoint(now_us, kept.position_ned_m, None)))
-        return tuple((at_s, self.resets.sent(word)) for at_s, word in said)
+        until_s = max(0.0, words.misled_s - since_s) + LEAD_S
+        # Its thrust is that of the tilt that is asked for, not of the present one.
+        lean = replace(target.lean, belief=replace(target.lean.belief, attitude_wxyz=LEVEL))
+        tilt = self.resets.sent(lean.setpoint(now_us, plus(ZERO, words.away_m_s2, (normal[0], normal[1], 0.0))))
+        # Twice as often as it has to be: a lost word ends nothing.
+        times = [0.5 * held_s * count for count in range(math.ceil(2.0 * until_s / held_s))]
+        last = self.resets.sent(PositionSetpoint(now_us, kept.position_ned_m, None))
+        return (*((at_s, tilt) for at_s in times), (until_s, last))
 
     @property
     def finished(self) -> bool:

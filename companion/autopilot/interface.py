@@ -62,7 +62,7 @@ class LastWords:
     """What a vehicle is told that a companion has died off an obstacle: to tilt off it, then a place off it."""
 
     misled_s: float
-    """After a hit its own velocity is too wrong for so long to begin the way to a place with."""
+    """After a hit its own velocity is too wrong for so long to fly to a place by, or to hold a height."""
     away_m_s2: float
     away_m: float
 

@@ -3,6 +3,7 @@
 import itertools
 import math
 import struct
+from dataclasses import replace
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega
@@ -110,10 +111,13 @@ def test_force_flying_is_high_only_while_it_is_flown_by_attitude():
 def test_the_last_words_of_a_companion_are_a_lean_and_a_place_off_what_was_hit():
     f = leaning(FakeCopter(wall_north_m=3.0))
     assert f.companion.leaves_word
-    (lean_s, lean), (place_s, place) = f.companion.last_words()
-    # Copter's velocity is wrong for 0.8 s, of which 0.1 s have passed, and leaning takes 0.15 s
-    assert (lean_s, place_s) == pytest.approx((0.7, 0.85), abs=0.03)
-    sent = mav.MAVLink(None).decode(bytearray(lean))
+    *leans, (place_s, place) = f.companion.last_words()
+    # Copter's velocity is wrong for 0.8 s, of which 0.1 s have passed, and leaning takes 0.15 s. Until then a lean is
+    # said twice within the 0.3 s for which it is flown on
+    assert place_s == pytest.approx(0.85, abs=0.03)
+    assert [lean_s for lean_s, _ in leans] == pytest.approx([0.0, 0.15, 0.3, 0.45, 0.6, 0.75])
+    assert len({lean for _, lean in leans}) == 1
+    sent = mav.MAVLink(None).decode(bytearray(leans[0][1]))
     assert sent.get_type() == "SET_ATTITUDE_TARGET"
     w, x, y, z = sent.q
     assert math.degrees(math.asin(2.0 * (w * y - z * x))) == pytest.approx(8.7, abs=1.0)  # 1.5 m/s^2 to the south
@@ -123,7 +127,18 @@ def test_the_last_words_of_a_companion_are_a_lean_and_a_place_off_what_was_hit()
     assert f.vehicle.position[0] - sent.x == pytest.approx(4.0, abs=0.3)
 
 
-def test_later_in_a_recovery_the_last_words_do_not_wait():
+def test_the_thrust_of_the_last_words_carries_it_however_it_leans_now():
+    # Given a vehicle that leans by 35 degrees when its companion dies
+    f = leaning(FakeCopter(wall_north_m=3.0))
+    flown = f.companion.core.flight.target
+    leans = replace(flown.lean, belief=replace(flown.lean.belief, attitude_wxyz=(0.954, 0.0, 0.301, 0.0)))
+    f.companion.core.flight.target = replace(flown, lean=leans)
+    # Then the thrust is gravity's, of 20 m/s^2 at most: what carries it at 35 degrees would lift it by 2 m/s^2
+    (_, lean), *_ = f.companion.last_words()
+    assert mav.MAVLink(None).decode(bytearray(lean)).thrust == pytest.approx(9.81 / 20.0, abs=0.01)
+
+
+def test_later_in_a_recovery_the_place_is_said_soon():
     f = leaning(FakeCopter(wall_north_m=3.0))
     f.companion.core.reflex.hits[-1].sample_time_boot_us -= 1_000_000
     assert [later_s for later_s, _ in f.companion.last_words()] == pytest.approx([0.0, 0.15])
