@@ -6,6 +6,7 @@ Columns of numbers are text: whole multiples of a resolution, little-endian, bas
 import base64
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,6 +23,7 @@ from rebound_cli.report.series import (
     FORCE_M_S2,
     NED,
     PLACE_M,
+    PLACES,
     RATIO,
     SPEED_M_S,
     TIME_S,
@@ -48,10 +50,16 @@ AROUND_S = 1.0
 # What a page has not before the flight is over.
 UNFLOWN = {"hides": ["h-moments", "h-link"]}
 
+# The names of all quantities end in frame and unit: these are the places. In texts they are [north, east, down].
+_PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")
+_PLACES_IN_TEXT = re.compile(r"\[-?\d[\d.]*(?:, -?\d[\d.]*)+\]")
 
-def content(flight: ShownFlight) -> dict[str, Any]:
+
+def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
+    """Without coordinates where they are not wanted."""
     moments = moments_of(flight)
-    return {
+    events = [_event(flight, event) for event in _told(flight)]
+    data = {
         "name": flight.name,
         "sentence": sentence(flight),
         "lines": lines(flight),
@@ -66,11 +74,32 @@ def content(flight: ShownFlight) -> dict[str, Any]:
         "obstacles": obstacles(flight),
         "surfaces": surfaces(flight),
         "vehicle": vehicle(flight),
+        "has_places": not no_position,
         "link": link_rows(flight),
-        "events": [_event(flight, event) for event in _told(flight)],
+        "events": events,
         "summary": flight.summary,
         "versions": flight.versions,
     }
+    return _without_places(data) if no_position else data
+
+
+def _without_places(data: dict[str, Any]) -> dict[str, Any]:
+    """Neither in what is drawn nor in texts and in the summary."""
+    shown = ("name", "sentence", "lines", "events", "summary", "moments")
+    kept = data | {key: without_places(data[key]) for key in shown} | {"obstacles": [], "surfaces": []}
+    for moment in kept["moments"]:
+        moment["place"] = None
+    for table in kept["tables"].values():
+        table["columns"] = {name: column for name, column in table["columns"].items() if name not in PLACES}
+    return kept
+
+
+def without_places(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_places(value) for key, value in data.items() if not _PLACE_KEYS.fullmatch(str(key))}
+    if isinstance(data, list):
+        return [without_places(value) for value in data]
+    return _PLACES_IN_TEXT.sub("[left out]", data) if isinstance(data, str) else data
 
 
 def live_content(flight: ShownFlight) -> dict[str, Any]:

@@ -26,9 +26,9 @@ SCRIPTS = ("data.js", "charts.js", "scene.js", "player.js", "page.js")
 LIVE_SCRIPT = "live.js"
 
 
-def page(flight: ShownFlight) -> str:
+def page(flight: ShownFlight, no_position: bool = False) -> str:
     """The whole file; the same bytes for the same flight."""
-    return assembled(content(flight), SCRIPTS)
+    return assembled(content(flight, no_position), SCRIPTS)
 
 
 def live_page(flight: ShownFlight) -> str:
@@ -68,12 +68,12 @@ def _digest(script: str) -> str:
 def run_report(options: Namespace) -> int:
     """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
     folder = flight_named(runs_folder(options.runs), str(options.flight)).folder
-    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME)
+    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME, options.no_position)
     print(f"The report is in {path}")
     return 0
 
 
-def write_page(flight: ShownFlight, path: Path) -> Path:
+def write_page(flight: ShownFlight, path: Path, no_position: bool = False) -> Path:
     """Raises OSError."""
-    write_whole(path, page(flight).encode())
+    write_whole(path, page(flight, no_position).encode())
     return path

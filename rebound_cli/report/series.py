@@ -20,6 +20,10 @@ ANGLE_DEG, RATIO = 1e-2, 1e-2
 NED, VELOCITY, TURN = ("n", "e", "d"), ("vn", "ve", "vd"), ("qw", "qx", "qy", "qz")
 
 
+# Every one of them says where the vehicle was.
+PLACES = (*NED, "height")
+
+
 def times(at_us: Floats, since_us: float) -> Columns:
     return {"t": ((at_us - since_us) * 1e-6, TIME_S)}
 

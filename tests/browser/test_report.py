@@ -1,6 +1,7 @@
 """A flight's report as a person opens it: from a file, without a network, at a desk and on a phone."""
 
 import json
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -161,6 +162,21 @@ def test_a_mission_that_is_checked_is_shown_before_it_is_flown(opened, tmp_path)
             assert shown.text("#readout") != there and "north" in there
             assert [title for title, chart in shown.charts() if line_share(chart) < LINE] == []
             assert not shown.page.locator("#moment-title").is_visible()
+
+
+def test_without_position_nothing_shows_where_it_was(opened, flight, tmp_path):
+    file = tmp_path / "shared.html"
+    file.write_text(page(flight, no_position=True))
+    with opened(file.as_uri()) as shown:
+        assert shown.text("#readout").splitlines()[0] == "recovering, OFFBOARD"
+        assert "north" not in shown.text("#readout") and shown.complaints == []
+        # No place in a text, such as [3.98, 0.04, -1.53]
+        assert not re.search(r"\[-?\d+\.\d+, ", shown.text("body"))
+        for name in ("path", "setpoint", "truth"):
+            header = saved(shown, f"wall-{name}.csv").partition("\n")[0].split(",")
+            assert header[0] == "t [s]" and not {"n [m]", "e [m]", "d [m]"} & set(header)
+        # The vehicle still turns and folds, where it is drawn
+        assert drawn_share(shown.scene()) > 0.01
 
 
 @pytest.mark.parametrize(

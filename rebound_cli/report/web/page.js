@@ -10,10 +10,10 @@ function addRows(list, rows) {
 function addLegend(list) {
   const entries = [["--red", "recovering"]];
   modeNames.forEach((mode, number) => entries.push([MODE_COLOURS[(number + 1) % MODE_COLOURS.length], mode]));
-  entries.push(["--ink", "◆ setpoint"], ["--red", "➤ normal, with its cone"]);
+  if (flight.has_places) entries.push(["--ink", "◆ setpoint"], ["--red", "➤ normal, with its cone"]);
   if (flight.surfaces.length) entries.push(["--purple", "▱ remembered"]);
   if (flight.obstacles.length) entries.push(["--stone", "▰ obstacle"]);
-  if (tables.truth) entries.push(["--grey", "where it really was"]);
+  if (tables.truth && flight.has_places) entries.push(["--grey", "where it really was"]);
   list.replaceChildren(...entries.map(([variable, text]) => {
     const entry = element("li");
     const swatch = element("span", "", "swatch");

@@ -61,14 +61,16 @@ function fill(world) {
     coloured(new THREE.LineBasicMaterial({ transparent: opacity < 1, opacity }), variable);
   const make = { surface, line, styled };
   const shows = [];
-  shows.push(...flight.obstacles.map((obstacle) => addObstacle(world, obstacle, make)));
-  shows.push(...flight.surfaces.map((known) => addSurface(world, known, make)));
-  shows.push(...flight.moments.filter((moment) => moment.place && moment.normal).map((moment) => addContact(world, moment, make)));
-  addPath(world, make);
-  shows.push(addSetpoint(world, make));
+  if (flight.has_places) {
+    shows.push(...flight.obstacles.map((obstacle) => addObstacle(world, obstacle, make)));
+    shows.push(...flight.surfaces.map((known) => addSurface(world, known, make)));
+    shows.push(...flight.moments.filter((moment) => moment.place && moment.normal).map((moment) => addContact(world, moment, make)));
+    addPath(world, make);
+    shows.push(addSetpoint(world, make));
+  }
   addGround(world, make);
   const vehicle = addVehicle(world, make, "--blue", "--orange", 1);
-  const ghost = tables.truth ? addVehicle(world, make, "--grey", "--grey", 0.35) : null;
+  const ghost = tables.truth && flight.has_places ? addVehicle(world, make, "--grey", "--grey", 0.35) : null;
   const restyle = () => styled.forEach((style) => style());
   restyle();
   return {

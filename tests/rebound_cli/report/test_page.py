@@ -200,6 +200,25 @@ def test_texts_on_the_wire_are_read_whole(tmp_path, wall_folder):
     ]
 
 
+def test_without_position_no_place_is_left(wall_folder, tmp_path, capsys):
+    out = tmp_path / "shared.html"
+    assert main(["report", str(wall_folder), "--no-position", "--out", str(out)]) == 0
+    assert f"The report is in {out}" in capsys.readouterr().out
+    opened = Opened(out.read_text())
+    for table in opened.data["tables"].values():
+        assert not {"n", "e", "d"} & set(table["columns"])
+    assert opened.data["obstacles"] == [] and opened.data["surfaces"] == []
+    assert all(moment["place"] is None for moment in opened.data["moments"])
+    # As texts write places: [3.98, 0.04, -1.53]; and the keys of the summary
+    texts = [event["text"] for event in opened.data["events"]] + opened.data["lines"]
+    assert not [text for text in texts if re.search(r"\[-?\d+\.\d+, ", text)]
+    assert any("[left out]" in text for text in texts)
+    summary = json.dumps(opened.data["summary"])
+    assert "recovery_setpoint_ned_m" not in summary and "touches_ned_m" not in summary
+    # What is no place is still there
+    assert len(opened.table("imu")["fx"]) > 5000
+
+
 def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
     # Given what a guard would have heard of the same flight
     folder = shutil.copytree(wall_folder, tmp_path / "guard")
