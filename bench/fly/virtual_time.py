@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 from companion.report import Event
-from sim_vehicle.vehicle import SimulatedVehicle
 
 INTERVAL_US = 4_000
 EPOCH_US = 1_600_000_000_000_000
@@ -15,7 +14,7 @@ EPOCH_US = 1_600_000_000_000_000
 class VirtualTime(ABC):
     """Goes on by intervals of the vehicle's, until something is so; and what has been told meanwhile."""
 
-    vehicle: SimulatedVehicle
+    vehicle: Any  # the simulated one, or a test's, which needs no numba
     events: list[Event]
 
     @property
