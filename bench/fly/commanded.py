@@ -49,7 +49,7 @@ class Commanded(VirtualTime):
 
     @property
     def now_us(self) -> int:
-        return EPOCH_US + self.vehicle.time_boot_us
+        return EPOCH_US + int(self.vehicle.time_boot_us)
 
     @property
     def state(self) -> State:

@@ -20,7 +20,7 @@ class VirtualTime(ABC):
     @property
     def time_s(self) -> float:
         """Of the vehicle, since it was switched on."""
-        return 1e-6 * self.vehicle.time_boot_us
+        return float(1e-6 * self.vehicle.time_boot_us)
 
     @property
     @abstractmethod
