@@ -3,6 +3,7 @@
 udpout://127.0.0.1:14550          sends to this address, unasked
 udpin://0.0.0.0:14551             waits for clients, as many as come
 tcpin://0.0.0.0:5760              the same on TCP
+serial:///dev/ttyUSB0:57600       a serial line
 
 With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins with.
 """
@@ -11,7 +12,7 @@ import re
 
 from sim_vehicle.errors import LinkAddressError
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind, link_kind
-from sim_vehicle.shell.ports import Address, Port, TcpServerPort, UdpPeerPort, UdpServerPort
+from sim_vehicle.shell.ports import Address, Port, SerialPort, TcpServerPort, UdpPeerPort, UdpServerPort
 from sim_vehicle.vehicle import SimulatedVehicle
 
 # Where PX4's SITL listens and sends unasked, plus its instance: a companion's link and a ground station's.
@@ -20,7 +21,7 @@ GROUND_LISTEN_PORT, GROUND_PORT = 18570, 14550
 
 _ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<where>[^?]+):(?P<number>[0-9]+)(\?set=(?P<set>\w+))?")
 _HIGHEST_PORT = 65_535
-_FORMS = "udpout://HOST:PORT, udpin://HOST:PORT or tcpin://HOST:PORT"
+_FORMS = "udpout://HOST:PORT, udpin://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
 def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
@@ -30,9 +31,11 @@ def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
     scheme, where, number = found["scheme"], found["where"], int(found["number"])
     try:
-        kind = link_kind(found["set"] or "ground")
+        kind = link_kind(found["set"] or ("onboard" if scheme == "serial" else "ground"))
     except LinkAddressError as problem:
         raise LinkAddressError(f"{address!r}: {problem}") from problem
+    if scheme == "serial":
+        return SerialPort(vehicle, kind, where, number)
     if number > _HIGHEST_PORT:
         raise LinkAddressError(f"{address!r} names no port: give one from 0 to {_HIGHEST_PORT}.")
     if scheme == "udpout":

@@ -1,9 +1,11 @@
-"""What the outside of a link is to the loop in `realtime.py`: UDP and TCP."""
+"""What the outside of a link is to the loop in `realtime.py`: UDP, TCP and serial."""
 
 import contextlib
 import errno
 import socket
 from typing import Protocol
+
+import serial
 
 from sim_vehicle.errors import LinkAddressError, PortInUse
 from sim_vehicle.mavlink.link import Link
@@ -90,7 +92,7 @@ MOST_CLIENTS = 32
 
 
 class SocketPort:
-    """What both kinds have."""
+    """What all but serial lines have."""
 
     def __init__(self, kind: socket.SocketKind, host: str, port: int) -> None:
         self._socket = bound_socket(kind, host, port)
@@ -238,3 +240,28 @@ class _Client:
             self.is_gone = len(self._unsent) > _MOST_UNREAD_BYTES
         except OSError:
             self.is_gone = True
+
+
+class SerialPort:
+    """What the line cannot carry at its speed is lost."""
+
+    def __init__(self, vehicle: SimulatedVehicle, kind: LinkKind, device: str, baud: int) -> None:
+        """Raises PortInUse where the device cannot be opened."""
+        try:
+            self._serial = serial.Serial(device, baud, timeout=0, write_timeout=0)
+        except (OSError, ValueError) as problem:
+            raise PortInUse(f"Serial port {device} cannot be opened: {problem}") from problem
+        self._link = connected(vehicle, kind)
+
+    def receive(self) -> None:
+        # A line that is unplugged falls silent.
+        with contextlib.suppress(OSError):
+            self._link.push(self._serial.read(self._serial.in_waiting))
+
+    def send(self) -> None:
+        for packet in self._link.take():
+            with contextlib.suppress(OSError, serial.SerialTimeoutException):
+                self._serial.write(packet)
+
+    def close(self) -> None:
+        self._serial.close()

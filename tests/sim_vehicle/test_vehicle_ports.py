@@ -1,4 +1,4 @@
-"""The vehicle in real time: UDP, TCP, addresses, several vehicles; its pace and how it ends."""
+"""The vehicle in real time: UDP, TCP, serial lines, addresses, several vehicles; its pace and how it ends."""
 
 import socket
 import threading
@@ -73,11 +73,17 @@ def test_an_address_says_whose_streams_it_has(words, kind):
         ("udpout://nobody.invalid:14550", "Host 'nobody.invalid' is unknown"),
         (f"tcpin://{'a' * 64}.de:5760", "Host 'a+.de' is unknown"),
         ("tcpin://127.0.0.1:5\N{SUPERSCRIPT TWO}", "not an address"),
+        ("serial:///dev/ttyUSB0:5\N{SUPERSCRIPT TWO}", "not an address"),
     ],
 )
 def test_a_wrong_address_is_one_sentence(address, words):
     with pytest.raises(LinkAddressError, match=words):
         open_port(new_vehicle(), address)
+
+
+def test_a_serial_port_that_is_not_there_is_one_sentence():
+    with pytest.raises(PortInUse, match="Serial port /dev/none cannot be opened"):
+        open_port(new_vehicle(), "serial:///dev/none:57600")
 
 
 def test_a_port_in_use_is_one_sentence():
