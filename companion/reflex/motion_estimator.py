@@ -173,6 +173,11 @@ class MotionEstimator:
             return False
         return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
 
+    @property
+    def is_reported(self) -> bool:
+        """Whether what the vehicle reports is its motion: the hit was measured whole, or is corrected."""
+        return self.is_fully_measured or (self.has_converged and not self.is_measured_apart)
+
     def _believe(self, motion: MotionState, spread_m_s: float) -> None:
         """The motion by the reports; the horizontal velocity by a receiver, where there is one."""
         velocity, self.spread_m_s = motion.velocity_ned_m_s, spread_m_s

@@ -129,11 +129,7 @@ class Reflex:
         impact, normal, earlier = estimate.impact, level(estimate.normal), self.in_one_recovery()
         place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
         before, law = next(iter(earlier), None), self.law
-        is_second = (
-            law.follows
-            and before is not None
-            and not (before.estimator.has_converged or before.estimator.is_fully_measured)
-        )
+        is_second = law.follows and before is not None and not before.estimator.is_reported
         if before is not None and is_second:
             # The vehicle's estimate is still wrong from the hit before.
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s

@@ -134,6 +134,7 @@ def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_
     go_on(air, found, 0.7)
     # Then it counts again
     assert found.has_converged
+    assert found.is_reported
     assert abs(found.velocity_error_m_s[0]) < SAME_M_S
 
 
@@ -144,7 +145,9 @@ def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
     air.reported_off_m_s = -0.8
     go_on(air, found, 3.5)
     assert found.has_converged
+    # Then a next hit's velocity is the measured one's
     assert found.is_measured_apart
+    assert not found.is_reported
     # When it puts itself right slowly
     for _ in range(40):
         air.reported_off_m_s += 0.01
