@@ -278,7 +278,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         lean = replace(target.lean, belief=replace(target.lean.belief, attitude_wxyz=LEVEL))
         tilt = self.resets.sent(lean.setpoint(now_us, plus(ZERO, words.away_m_s2, (normal[0], normal[1], 0.0))))
         # Twice as often as it has to be: a lost word ends nothing.
-        times = [0.5 * held_s * count for count in range(math.ceil(2.0 * until_s / held_s))]
+        every_s = max(0.5 * held_s, 1.0 / self._setpoint_hz)
+        times = [every_s * count for count in range(math.ceil(until_s / every_s))]
         last = self.resets.sent(PositionSetpoint(now_us, kept.position_ned_m, None))
         return (*((at_s, tilt) for at_s in times), (until_s, last))
 

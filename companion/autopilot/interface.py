@@ -59,7 +59,7 @@ class Wire:
 
 @dataclass(frozen=True, slots=True)
 class LastWords:
-    """What a vehicle is told that a companion has died off an obstacle: to tilt off it, then a place off it."""
+    """What is said to a vehicle whose companion has died near an obstacle: a tilt off it, then a place off it."""
 
     misled_s: float
     """After a hit its own velocity is too wrong for so long to fly to a place by, or to hold a height."""

@@ -257,7 +257,7 @@ class MotionEstimator:
         what was measured. Once the two have agreed for a while the receiver is needed no more.
         """
         off = minus(reported_m_s, self.motion.velocity_ned_m_s)
-        share = elapsed_s / (reflex.COMPARED_S + elapsed_s) if self._hidden_error_m_s != ZERO else 1.0
+        share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
         n, e, _ = error = towards(self._hidden_error_m_s, off, share)
         steady_us, same_us = self._agrees_since_boot_us
         steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)

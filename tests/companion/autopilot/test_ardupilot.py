@@ -138,6 +138,14 @@ def test_the_thrust_of_the_last_words_carries_it_however_it_leans_now():
     assert mav.MAVLink(None).decode(bytearray(lean)).thrust == pytest.approx(9.81 / 20.0, abs=0.01)
 
 
+def test_a_vehicle_that_holds_no_attitude_for_any_time_is_told_one_as_often_as_a_setpoint_is_sent():
+    # GUID_TIMEOUT 0, which Copter takes
+    f = leaning(FakeCopter(wall_north_m=3.0))
+    f.companion.core.reflex.loss_s = 0.0
+    first, second, *_ = f.companion.last_words()
+    assert second[0] - first[0] == pytest.approx(0.02)
+
+
 def test_later_in_a_recovery_the_place_is_said_soon():
     f = leaning(FakeCopter(wall_north_m=3.0))
     f.companion.core.reflex.hits[-1].sample_time_boot_us -= 1_000_000
