@@ -79,6 +79,11 @@ class StreamMonitor:
         for stream in self.streams:
             rate_hz = rates.get(stream.message_id.name, 0.0)
             if rate_hz < stream.min_hz:
+                if rate_hz == 0.0 and stream.sample_type is LocalPosition:
+                    return (
+                        "the vehicle has no position: LOCAL_POSITION_NED does not arrive; wait for GPS, flow or motion "
+                        "capture, and read its arming checks"
+                    )
                 return (
                     f"{stream.message_id.name} arrives at {rate_hz:.1f} Hz and at least {stream.min_hz:g} Hz are "
                     f"needed; give the link more bandwidth (baud rate, {autopilot.rate_parameter}) or check the "
