@@ -58,12 +58,11 @@ class CollisionRecord:
     sample_time_boot_us: int
     detector: str
     contact: Contact
-    contact_normal: Normal  # by the contact's force; level unless the obstacle is steep
+    contact_normal: Normal  # by the contact's force
     peak_specific_force_m_s2: float
     estimator: MotionEstimator
     setpoint_ned_m: Vector3 = ZERO  # where to rest, as its recovery has it now
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
-    after_ned_m_s: Vector3 | None = None  # the velocity after the contact
     hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
     settled_after_s: float | None = None  # from its first sample to the beginning of its rest
     is_over: bool = False  # settled, or given up on
@@ -73,12 +72,11 @@ class CollisionRecord:
     @property
     def normal(self) -> Normal:
         """The obstacle's normal by all that is known now."""
-        after, before = self.after_ned_m_s, self.contact.velocity_ned_m_s
-        if after is None:
-            return self.contact_normal
-        if self.contact_normal.direction_ned[2] == 0.0:
-            after = (after[0], after[1], before[2])  # an upright surface does not lift
-        return level(with_change(self.contact_normal, before, after))
+        after, before = self.estimator.after_ned_m_s, self.contact.velocity_ned_m_s
+        # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
+        if after is None or self.estimator.is_second:
+            return level(self.contact_normal)
+        return level(with_change(self.contact_normal, before, after, self.estimator.after_error_m_s))
 
     def follow(self, state: DetectorState, source: ImpactEstimator, positions: Sequence[LocalPosition]) -> None:
         """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
@@ -93,7 +91,7 @@ class CollisionRecord:
             self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-            self.contact_normal = level(estimate.normal)
+            self.contact_normal = estimate.normal
             self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us)
         self.estimator.imu(strapdown)
         self.estimator.measure(source.doppler)

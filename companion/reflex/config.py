@@ -93,8 +93,6 @@ SHORT = 2
 IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
 # That of an impulse whose clipping does not show: clipped on each axis it is up to 55 degrees off, along a diagonal.
 HIDDEN_RAD = 1.0
-# Standard deviation of a change of velocity, m/s: that of both velocities, and what a controller adds in 0.1 s.
-CHANGE_M_S = 0.3
 # A slower vehicle may have been struck from any side.
 APPROACH_M_S = 0.5
 # Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from

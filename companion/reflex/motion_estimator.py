@@ -21,6 +21,7 @@ from companion.motion.config import (
     DOPPLER_GATE,
     GRAVITY_M_S2,
     LATEST_S,
+    LEVEL_SPREAD_M_S2,
     LONGEST_GAP_US,
     SAME_M_S,
     SHOWN_US,
@@ -60,8 +61,11 @@ class MotionEstimator:
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
+    after_ned_m_s: Vector3 | None = None  # the velocity just after the contact, by when it was known best
+    after_error_m_s: float = math.inf  # its standard deviation
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
+    _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
     _at_boot_us: int = 0  # the bank's time
     _moved_m_s: Vector3 = ZERO  # the integral up to that time
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
@@ -89,7 +93,8 @@ class MotionEstimator:
         """Take what is known of the contact by now: whether it was measured whole, and the time of its last sample."""
         self.is_fully_measured = is_fully_measured and not self.is_second
         if pushed_boot_us > self.pushed_boot_us:
-            self.pushed_boot_us = pushed_boot_us
+            self.pushed_boot_us, self._released_m_s = pushed_boot_us, self._summed_m_s
+            self.after_error_m_s = math.inf
             if not self.is_fully_measured:
                 self._begin()
 
@@ -186,6 +191,16 @@ class MotionEstimator:
             n, e, _ = self._measured.velocity_ned_m_s
             velocity, self.spread_m_s = (n, e, velocity[2]), self._measured.spread_m_s
         self.motion = MotionState(motion.position_ned_m, velocity, self.motion.acceleration_ned_m_s2)
+        self._look_back()
+
+    def _look_back(self) -> None:
+        """The velocity just after the contact: the present one less what the accelerometer has shown since."""
+        since_s = 1e-6 * (self._time_boot_us - self.pushed_boot_us)
+        error_m_s = math.hypot(self.spread_m_s, LEVEL_SPREAD_M_S2 * since_s)
+        if error_m_s < self.after_error_m_s:
+            flown_m_s = minus(self._summed_m_s, self._released_m_s)
+            self.after_ned_m_s = minus(self.motion.velocity_ned_m_s, flown_m_s)
+            self.after_error_m_s = error_m_s
 
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
@@ -281,6 +296,7 @@ class MotionEstimator:
         velocity = towards(was.velocity_ned_m_s, measured.velocity_ned_m_s, share)
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = 0.0
+        self._look_back()
 
     @property
     def velocity_error_m_s(self) -> Vector3:

@@ -81,7 +81,6 @@ class Recovery:
         record = self.record
         is_rejected = record.is_rejected(sample.time_boot_us, self._places)
         record.estimator.update(sample)
-        self._learn(sample)
         rested_s = rebound_m_s = None
         if self.law.follows and (self.leans or not self.law.leans):
             rested_s, rebound_m_s = self._follow(sample)
@@ -104,14 +103,6 @@ class Recovery:
         distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
         since_us = self._monitor.settled_since(sample.time_boot_us, distance_m, right.velocity_ned_m_s)
         return None if since_us is None else max(0.0, 1e-6 * (since_us - record.sample_time_boot_us))
-
-    def _learn(self, sample: LocalPosition) -> None:
-        """Take the velocity after the hit once the vehicle's estimate shows it. Until then the estimated one counts."""
-        record, estimator = self.record, self.record.estimator
-        is_shown = record.after_ned_m_s is None or record.is_rebound(sample.time_boot_us)
-        # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
-        if estimator.has_converged and is_shown and not estimator.is_second:
-            record.after_ned_m_s = estimator.corrected(sample).velocity_ned_m_s
 
     def _state(self) -> MotionState:
         """The present motion. During the contact it has no velocity into the obstacle."""
@@ -155,7 +146,7 @@ class Recovery:
         estimator, contact = self.record.estimator, self._contact
         is_touched = sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S
         is_touched = is_touched or along(estimator.external_m_s2, contact.normal_ned) > reflex.HELD_M_S2
-        if self.record.after_ned_m_s is not None:
+        if estimator.after_ned_m_s is not None and not estimator.is_second:
             known = self.record.normal
             contact = replace(contact, normal_ned=known.direction_ned, normal_error_rad=known.error_rad)
         off_m_s = along(estimator.motion.velocity_ned_m_s, contact.normal_ned)

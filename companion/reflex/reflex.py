@@ -141,7 +141,7 @@ class Reflex:
             sample_time_boot_us=first_us,
             detector=self.config.detector,
             contact=contact,
-            contact_normal=normal,
+            contact_normal=estimate.normal,
             peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
             estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second, fits_models),
         )

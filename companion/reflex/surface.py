@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.messages import Vector3
+from companion.motion.config import SAME_M_S
 from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex.config import (
     APPROACH_M_S,
     APPROACH_RAD,
-    CHANGE_M_S,
     CHANGE_RAD,
     FROM_BEHIND,
     IMPULSE_RAD,
@@ -49,11 +49,12 @@ def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, impulse_rad: floa
     return normal if is_behind else normal.with_direction(back, APPROACH_RAD)
 
 
-def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Normal:
-    """The normal with the change of the velocity by the whole contact."""
+def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3, error_m_s: float) -> Normal:
+    """The normal with the change of the velocity by the whole contact, which is known to `error_m_s`."""
     change_m_s = minus(after_ned_m_s, before_ned_m_s)
     size_m_s = math.hypot(*change_m_s)
-    return normal.with_direction(change_m_s, math.hypot(CHANGE_RAD, CHANGE_M_S / max(size_m_s, 1e-6)))
+    error_rad = math.hypot(SAME_M_S, error_m_s) / max(size_m_s, 1e-6)
+    return normal.with_direction(change_m_s, math.hypot(CHANGE_RAD, error_rad))
 
 
 def away_from(normal_ned: Vector3) -> Vector3:

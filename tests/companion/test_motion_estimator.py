@@ -87,6 +87,22 @@ def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
     assert sum(within) >= 0.95 * len(within)
 
 
+@pytest.mark.parametrize("later_s", [0.06, 1.0])
+def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust_has_added(later_s):
+    # Given a vehicle that leaves at 1 m/s to the south and 2 m/s to the west, and brakes with 3 m/s^2 from then on
+    found, strapdown = reckoned((1.5, -2.5, 0.0)), Strapdown(acceleration_ned_m_s2=(1.0, 3.0, 0.0))
+    found.note_contact(True, HIT_US)
+    for tick in range(1, round(later_s / 0.004) + 1):
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+    # When the first velocity comes, soon or late
+    velocity = (-1.0 + 1.0 * later_s, -2.0 + 3.0 * later_s, 0.0)
+    found.update(LocalPosition(strapdown.time_boot_us, AT, velocity))
+    # Then it is known how the vehicle left, the worse the later
+    assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
+    assert found.after_error_m_s == pytest.approx(0.5 * later_s, abs=0.01)
+
+
 def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into_the_wall_is_not():
     right_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, hides=0.0) if found.has_converged)
     assert right_s < 0.5

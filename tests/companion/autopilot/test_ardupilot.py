@@ -262,7 +262,7 @@ TOO_OLD = "ArduPilot 4.2.3 is too old: ArduPilot 4.3 is the oldest that flies"
         (FakeCopter(vehicle_type=12), ["but: submarine (MAV_TYPE 12)"]),
         (FakeCopter(vehicle_type=20), ["but: VTOL aircraft (MAV_TYPE 20)"]),
         (FakeCopter(flight_version=OLD), [TOO_OLD]),
-        (FakeCopter(no_positions=True), ["LOCAL_POSITION_NED", "SERIALn_BAUD"]),
+        (FakeCopter(no_positions=True), ["no position: LOCAL_POSITION_NED"]),
         (refuses(ARM), ["not armed: arm: the vehicle answered FAILED"]),
         (refuses(TAKE_OFF), ["no take-off: take-off to 1.5 m: the vehicle answered FAILED"]),
     ],
