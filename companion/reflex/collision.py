@@ -72,11 +72,11 @@ class CollisionRecord:
     @property
     def normal(self) -> Normal:
         """The obstacle's normal by all that is known now."""
-        after, before = self.estimator.after_ned_m_s, self.contact.velocity_ned_m_s
-        # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
-        if after is None or self.estimator.is_second:
-            return level(self.contact_normal)
-        return level(with_change(self.contact_normal, before, after, self.estimator.after_error_m_s))
+        normal, estimator = self.contact_normal, self.estimator
+        if estimator.after_ned_m_s is not None:
+            before_m_s, after_m_s = self.contact.velocity_ned_m_s, estimator.after_ned_m_s
+            normal = with_change(normal, before_m_s, after_m_s, estimator.after_error_m_s)
+        return level(normal)
 
     def follow(self, state: DetectorState, source: ImpactEstimator, positions: Sequence[LocalPosition]) -> None:
         """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""

@@ -213,7 +213,7 @@ class MotionEstimator:
             self.has_converged = True
         elif not self._has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
             self._filter(sample, at_us)
-        if self.has_converged and not self.is_measured_apart:
+        if self.has_converged:
             self._correct(sample)
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
@@ -252,7 +252,8 @@ class MotionEstimator:
             # By then a receiver's velocity has come, where there is one.
             is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US
         if self.is_measured_apart:
-            self._believe(estimate, spread_m_s)
+            place = self.motion.position_ned_m if self.has_converged else estimate.position_ned_m
+            self._believe(replace(estimate, position_ned_m=place), spread_m_s)
             self._compare(velocity, error_m_s[2], elapsed_s, is_known, sample.time_boot_us)
         elif self.has_converged or is_known:
             self.has_converged = True
@@ -284,18 +285,21 @@ class MotionEstimator:
         self._hidden_error_m_s = ZERO if self._has_agreed else (n, e, climb_error_m_s)
 
     def _correct(self, sample: LocalPosition) -> None:
-        """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter."""
+        """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter.
+
+        A velocity that is measured apart stays.
+        """
         measured = self.corrected(sample)
         was, share, before, self._newest = self.motion, 1.0, self._newest, measured
         if before is not None:
             elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
             share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
-            if 0.0 < elapsed_s < reflex.COMPARED_S:
+            if 0.0 < elapsed_s < reflex.COMPARED_S and not self.is_measured_apart:
                 self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
-        place = towards(was.position_ned_m, measured.position_ned_m, share)
-        velocity = towards(was.velocity_ned_m_s, measured.velocity_ned_m_s, share)
+        place, velocity = towards(was.position_ned_m, measured.position_ned_m, share), was.velocity_ned_m_s
+        if not self.is_measured_apart:
+            velocity, self.spread_m_s = towards(velocity, measured.velocity_ned_m_s, share), 0.0
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
-        self.spread_m_s = 0.0
         self._look_back()
 
     @property

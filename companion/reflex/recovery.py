@@ -68,6 +68,7 @@ class Recovery:
         record.setpoint_ned_m = self._told_ned_m = self._goal(expected)
         self._has_left = False
         self._slow_since_us: int | None = None
+        self._held_since_us = record.sample_time_boot_us  # by a position
         self._monitor = SettlingMonitor(settled)
 
     def lean(self, full_m_s2: float, yaw_rad: float, held_s: float) -> tuple[Vector3, Lean]:
@@ -84,10 +85,8 @@ class Recovery:
         rested_s = rebound_m_s = None
         if self.law.follows and (self.leans or not self.law.leans):
             rested_s, rebound_m_s = self._follow(sample)
-        settled_s = self._settled_after_s(sample) if self._is_known else None
-        if self.leans:
-            settled_s = None
-        elif settled_s is not None:
+        settled_s = self._settled_after_s(sample)
+        if settled_s is not None:
             record.settled_after_s = settled_s
         return Progress(is_rejected, rested_s, rebound_m_s, settled_s)
 
@@ -98,11 +97,16 @@ class Recovery:
 
     def _settled_after_s(self, sample: LocalPosition) -> float | None:
         """Time from the hit to the beginning of the present rest, s; None as long as that has not lasted."""
-        record, right = self.record, self.record.estimator.corrected(sample)
-        record.follow_recovery(right)
-        distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
-        since_us = self._monitor.settled_since(sample.time_boot_us, distance_m, right.velocity_ned_m_s)
-        return None if since_us is None else max(0.0, 1e-6 * (since_us - record.sample_time_boot_us))
+        record, now_us, motion = self.record, sample.time_boot_us, self.record.estimator.motion
+        place, velocity = motion.position_ned_m, motion.velocity_ned_m_s
+        if self._is_known:
+            right = record.estimator.corrected(sample)
+            record.follow_recovery(right)
+            if not self.leans:
+                place, velocity = right.position_ned_m, right.velocity_ned_m_s
+        since_us = self._monitor.settled_since(now_us, math.dist(place, record.setpoint_ned_m), velocity)
+        is_over = self._is_known and not self.leans and now_us - self._held_since_us >= 1e6 * self._settled.duration_s
+        return max(0.0, 1e-6 * (since_us - record.sample_time_boot_us)) if is_over and since_us is not None else None
 
     def _state(self) -> MotionState:
         """The present motion. During the contact it has no velocity into the obstacle."""
@@ -120,7 +124,7 @@ class Recovery:
         self._surfaces = self._around(self._contact)
         record.setpoint_ned_m = place = self._goal(state)
         if self.leans and self._rests(sample):
-            self.leans, record.overshoot_m = False, 0.0
+            self.leans, self._held_since_us, record.overshoot_m = False, sample.time_boot_us, 0.0
             rested_s = 1e-6 * (sample.time_boot_us - record.sample_time_boot_us)
         elif not self._is_known:
             return None, None
@@ -143,16 +147,15 @@ class Recovery:
 
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. While it is touched it is where the vehicle is: frames and arms fold, obstacles move."""
-        estimator, contact = self.record.estimator, self._contact
+        estimator, normal = self.record.estimator, self.record.normal
         is_touched = sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S
-        is_touched = is_touched or along(estimator.external_m_s2, contact.normal_ned) > reflex.HELD_M_S2
-        if estimator.after_ned_m_s is not None and not estimator.is_second:
-            known = self.record.normal
-            contact = replace(contact, normal_ned=known.direction_ned, normal_error_rad=known.error_rad)
-        off_m_s = along(estimator.motion.velocity_ned_m_s, contact.normal_ned)
+        is_touched = is_touched or along(estimator.external_m_s2, normal.direction_ned) > reflex.HELD_M_S2
+        off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)
         self._has_left = (self._has_left or off_m_s > 0.0) and not is_touched
-        place = estimator.motion.position_ned_m if is_touched else contact.position_ned_m
-        self._contact = replace(contact, position_ned_m=place)
+        place = estimator.motion.position_ned_m if is_touched else self._contact.position_ned_m
+        self._contact = replace(
+            self._contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad
+        )
 
     def _goal(self, motion: MotionState) -> Vector3:
         """The law's goal, moved clear of surfaces and into the fence."""

@@ -105,12 +105,16 @@ def clipped(off_m_s=6.0, rebound_m_s=-3.0):
 
 
 def go_on(air, found, seconds, **settings):
+    """The newest report."""
+    newest = None
     for _ in range(round(seconds / 0.004)):
         sample = air.step(is_free=False, **settings)
         found.imu(air.strapdown)
         found.measure(air.doppler)
         if sample is not None:
+            newest = sample
             found.update(sample)
+    return newest
 
 
 def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_a_while():
@@ -151,9 +155,10 @@ def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
     # When it puts itself right slowly
     for _ in range(40):
         air.reported_off_m_s += 0.01
-        go_on(air, found, 0.1)
-        # Then what is taken off it is its error
+        newest = go_on(air, found, 0.1)
+        # Then what is taken off it is its error, and the place is the reported one less its own
         assert found.velocity_error_m_s[0] == pytest.approx(air.reported_off_m_s, abs=0.12)
+        assert math.dist(found.motion.position_ned_m, found.corrected(newest).position_ned_m) < 0.05
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.0, abs=0.1)
 
 

@@ -81,6 +81,18 @@ def test_it_is_flown_by_attitude_until_it_rests_and_then_by_the_place_where_it_d
     assert [event.kind for event in flight.events].count("hand_over") == 1
 
 
+def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_when_it_rested():
+    # Given a vehicle that rests, clear of the obstacle, from the first report on
+    flight, handed_us, over_us = flight_with(), 0, 0
+    recover, record = recover_in(flight), flight.collisions[0]
+    for since_us in range(100_000, 1_600_000, 20_000):
+        _, sent = hears(flight, recover, since_us, 2.4, 0.0)
+        handed_us = handed_us or (since_us if type(sent) is PositionSetpoint else 0)
+        over_us = over_us or (since_us if record.settled_after_s is not None else 0)
+    assert handed_us == 200_000 and over_us == handed_us + 500_000
+    assert record.settled_after_s == pytest.approx(0.1, abs=0.01)
+
+
 def test_it_is_not_handed_over_on_the_obstacle():
     flight = flight_with()
     recover = recover_in(flight)
