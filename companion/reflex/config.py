@@ -88,11 +88,8 @@ SHORT = 2
 
 # --- the normal
 # Standard deviations of the directions from the normal, rad, on drawn walls, slanted and leaning walls and poles
-# (bench/notes/decisions.md): friction turns a force by 17 degrees. Walls are met at up to 60 degrees, and
-# less often head-on than a quarter, as in the draws.
+# (bench/notes/decisions.md): friction turns a force by 17 degrees, and walls are met at up to 60 degrees.
 IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
-# That of an impulse whose clipping does not show: clipped on each axis it is up to 55 degrees off, along a diagonal.
-HIDDEN_RAD = 1.0
 # A slower vehicle may have been struck from any side.
 APPROACH_M_S = 0.5
 # Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from
@@ -227,8 +224,6 @@ MODEL_ERROR = 0.03
 COMPARED_S = 0.5
 # PX4's EKF2_ABL_LIM: more than this its estimator takes for no bias of the accelerometer.
 MOST_BIAS_M_S2 = 0.4
-# The logistic function with this factor differs from the normal distribution's by less than 1 %.
-LOGISTIC = 1.702
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames
 # return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
 SPREAD = 0.3

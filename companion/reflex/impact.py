@@ -10,7 +10,7 @@ from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, minus, plus
-from companion.reflex.config import CLIPPED_SHARE, HIDDEN_RAD, IMPULSE_RAD, SHORT, EstimateConfig
+from companion.reflex.config import CLIPPED_SHARE, SHORT, EstimateConfig
 from companion.reflex.correction import VelocityValidity
 from companion.reflex.detector import DetectorState, Evidence, Impact, Phase
 from companion.reflex.surface import Normal, normal_of
@@ -193,7 +193,7 @@ class ImpactEstimator:
         )
 
     def _normal(self, impulse_ned: Vector3) -> Normal:
-        return normal_of(impulse_ned, self.came_ned_m_s, HIDDEN_RAD if self.hides_clipping else IMPULSE_RAD)
+        return normal_of(impulse_ned, self.came_ned_m_s, self.hides_clipping)
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
         """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.

@@ -30,7 +30,7 @@ from companion.motion.config import (
 from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import LEVEL, Strapdown
-from companion.motion.vector import ZERO, along, limited, minus, plus, split, towards
+from companion.motion.vector import ZERO, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
@@ -229,7 +229,7 @@ class MotionEstimator:
         # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
         level_m_s2 = minus(self.level_m_s2, self._bias_m_s2)
         if not self.fits_models:
-            # By a wrong tilt a vehicle that leans reports a climb that there is none of. No flight of PX4 has shown it.
+            # By a wrong tilt a vehicle that leans reports a climb that there is none of. PX4 corrects its own sooner.
             level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
         bank.predict(elapsed_s, minus(self._summed_m_s, self._moved_m_s), level_m_s2)
         self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
@@ -244,23 +244,24 @@ class MotionEstimator:
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
-        normal = self.contact.normal_ned
-        bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
-        estimate, spread_m_s, left_m_s = bank.estimate(left)
+        motion, spread_m_s, left_m_s = bank.estimate(left)
+        # Of the height the report is right sooner than any model: a barometer shows no hit.
+        n, e, _ = self.motion.position_ned_m if self.has_converged else motion.position_ned_m
+        estimate = MotionState((n, e, place[2]), motion.velocity_ned_m_s)
         is_known, error_m_s = left_m_s <= SAME_M_S, bank.mean_error(1, g)
         if not self.fits_models:
             # By then a receiver's velocity has come, where there is one.
             is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US
         if self.is_measured_apart:
-            place = self.motion.position_ned_m if self.has_converged else estimate.position_ned_m
-            self._believe(replace(estimate, position_ned_m=place), spread_m_s)
+            self._believe(estimate, spread_m_s)
             self._compare(velocity, error_m_s[2], elapsed_s, is_known, sample.time_boot_us)
         elif self.has_converged or is_known:
             self.has_converged = True
         else:
             self._believe(estimate, spread_m_s)
         if self.has_converged and not self._has_agreed:
-            self.position_error_m = bank.mean_error(0, way_s)
+            n, e, _ = bank.mean_error(0, way_s)
+            self.position_error_m = (n, e, 0.0)
             if self._measured is None:
                 self._hidden_error_m_s = error_m_s
 

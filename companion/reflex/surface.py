@@ -1,8 +1,8 @@
 """Surfaces: an obstacle's normal by a hit, and the half-space that a vehicle keeps out of.
 
-The contact's impulse leans by friction, and by clipping of each axis by itself. The direction that the vehicle came
-from is free. The change of the velocity contains the whole contact, and is known when the vehicle's own estimate shows
-the motion after it. The normal is their mean, weighted by the inverse of each variance.
+The contact's impulse leans by friction, and by clipping of each axis by itself. Where clipping cannot be seen, the
+direction that the vehicle came from takes its place. The change of the velocity contains the whole contact, and is
+known the better the motion after it is. The normal is the mean of both, weighted by the inverse of each variance.
 """
 
 import math
@@ -41,12 +41,12 @@ class Normal:
         return Normal(unit((n, e, d)), (was + more) ** -0.5)
 
 
-def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, impulse_rad: float = IMPULSE_RAD) -> Normal:
-    """The normal by the contact's impulse or force, good to `impulse_rad`, and by the velocity before it."""
-    normal, (n, e, d) = Normal().with_direction(impulse_ned, impulse_rad), velocity_ned_m_s
-    back = unit((-n, -e, -d)) if math.hypot(n, e, d) > APPROACH_M_S else ZERO
-    is_behind = along(normal.direction_ned, back) < FROM_BEHIND
-    return normal if is_behind else normal.with_direction(back, APPROACH_RAD)
+def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, is_hidden: bool = False) -> Normal:
+    """The normal by the contact's impulse or force; where that may be clipped unseen, by the velocity before it."""
+    normal, (n, e, d) = Normal().with_direction(impulse_ned, IMPULSE_RAD), velocity_ned_m_s
+    back = Normal().with_direction((-n, -e, -d), APPROACH_RAD)
+    is_behind = along(normal.direction_ned, back.direction_ned) < FROM_BEHIND
+    return back if is_hidden and math.hypot(n, e, d) > APPROACH_M_S and not is_behind else normal
 
 
 def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3, error_m_s: float) -> Normal:
