@@ -224,6 +224,8 @@ MODEL_ERROR = 0.03
 COMPARED_S = 0.5
 # PX4's EKF2_ABL_LIM: more than this its estimator takes for no bias of the accelerometer.
 MOST_BIAS_M_S2 = 0.4
+# The logistic function with this factor differs from the normal distribution's by less than 1 %.
+LOGISTIC = 1.702
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames
 # return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
 SPREAD = 0.3

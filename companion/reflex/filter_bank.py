@@ -21,7 +21,7 @@ class FilterBank:
     Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
     """
 
-    __slots__ = ("covariance", "log_likelihoods", "state", "tilted")
+    __slots__ = ("covariance", "leaves", "log_likelihoods", "state", "tilted")
 
     def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
         """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
@@ -29,7 +29,7 @@ class FilterBank:
         spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
         self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
-        self.log_likelihoods = np.zeros(models)
+        self.log_likelihoods, self.leaves = np.zeros(models), np.ones(models)
         self.tilted = np.zeros((2, models, 3))  # errors of what is reported by a tilt that is wrong across e
         self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
         self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
@@ -57,6 +57,16 @@ class FilterBank:
         self.covariance = self.covariance - with_it[..., None] * gain[:, None]
         self.log_likelihoods = self.log_likelihoods - (missed**2).sum(axis=1) / size - 3.0 * np.log(size)
 
+    def leave(self, normal: Vector3, along_m_s: float, error_rad: float) -> None:
+        """Take that no vehicle goes on into what it has hit: the probability that a model's velocity left it.
+
+        `along_m_s`: what the vehicle's own thrust has added since; `error_rad`: of the normal.
+        """
+        velocity, variance = self.state[..., 1], self.covariance[:, 1, 1]
+        off_m_s = velocity @ np.array(normal) - along_m_s
+        spread2 = variance + error_rad**2 * (velocity**2).sum(axis=1)
+        self.leaves = np.maximum(0.5 + 0.5 * np.tanh(0.5 * reflex.LOGISTIC * off_m_s / np.sqrt(spread2)), 1e-9)
+
     def estimate(self, left: Floats) -> tuple[MotionState, float, float]:
         """Motion, largest standard deviation of its velocity, largest further swing of the reported velocity.
 
@@ -75,6 +85,6 @@ class FilterBank:
 
     def _probabilities(self) -> Floats:
         """Probability of each model."""
-        share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max()))
+        share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max())) * self.leaves
         share /= share.sum()
         return share

@@ -30,7 +30,7 @@ from companion.motion.config import (
 from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import LEVEL, Strapdown
-from companion.motion.vector import ZERO, limited, minus, plus, split, towards
+from companion.motion.vector import ZERO, along, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
 from companion.reflex.attitude_law import Belief
 from companion.reflex.config import EstimateConfig
@@ -244,6 +244,8 @@ class MotionEstimator:
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
+        normal = self.contact.normal_ned
+        bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
         motion, spread_m_s, left_m_s = bank.estimate(left)
         # Of the height the report is right sooner than any model: a barometer shows no hit.
         n, e, _ = self.motion.position_ned_m if self.has_converged else motion.position_ned_m
