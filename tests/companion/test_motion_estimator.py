@@ -103,6 +103,20 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     assert found.after_error_m_s == pytest.approx(0.5 * later_s, abs=0.01)
 
 
+def test_the_height_is_the_reported_one_while_a_hit_is_corrected():
+    # Given a vehicle that sinks after a clipped hit, and whose velocity does not show it
+    found, strapdown = reckoned((3.0, 0.0, 0.0)), Strapdown()
+    for tick in range(1, 125):
+        since_s = 0.004 * tick
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            place = (AT[0], 0.0, AT[2] + 0.5 * since_s)
+            found.update(LocalPosition(strapdown.time_boot_us, place, (1.0, 0.0, 0.0)))
+    assert not found.has_converged
+    assert found.motion.position_ned_m[2] == pytest.approx(AT[2] + 0.25, abs=0.02)
+
+
 def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into_the_wall_is_not():
     right_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, hides=0.0) if found.has_converged)
     assert right_s < 0.5
