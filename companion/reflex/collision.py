@@ -92,7 +92,7 @@ class CollisionRecord:
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
             self.contact_normal = estimate.normal
-            self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us)
+            self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us, level(estimate.normal))
         self.estimator.imu(strapdown)
         self.estimator.measure(source.doppler)
         if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US:

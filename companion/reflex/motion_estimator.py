@@ -37,6 +37,7 @@ from companion.reflex.config import EstimateConfig
 from companion.reflex.correction import error_response
 from companion.reflex.filter_bank import FilterBank
 from companion.reflex.laws import Contact, MotionState
+from companion.reflex.surface import Normal
 
 
 @dataclass(slots=True)
@@ -50,6 +51,7 @@ class MotionEstimator:
     is_second: bool = False  # the error of an earlier hit was still being corrected
     fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
     motion: MotionState = field(init=False)
+    normal: Normal = field(init=False)  # by the contact's force
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
@@ -80,6 +82,7 @@ class MotionEstimator:
 
     def __post_init__(self) -> None:
         self.motion, self.pushed_boot_us = self.start, self.hit_boot_us
+        self.normal = Normal(self.contact.normal_ned, self.contact.normal_error_rad)
         self._begin()
 
     def _begin(self) -> None:
@@ -89,9 +92,10 @@ class MotionEstimator:
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
-    def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
-        """Take what is known of the contact by now: whether it was measured whole, and the time of its last sample."""
-        self.is_fully_measured = is_fully_measured and not self.is_second
+    def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal) -> None:
+        """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
+        by the force."""
+        self.is_fully_measured, self.normal = is_fully_measured and not self.is_second, normal
         if pushed_boot_us > self.pushed_boot_us:
             self.pushed_boot_us, self._released_m_s = pushed_boot_us, self._summed_m_s
             self.after_error_m_s = math.inf
@@ -244,8 +248,8 @@ class MotionEstimator:
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
-        normal = self.contact.normal_ned
-        bank.leave(normal, along(self._summed_m_s, normal), self.contact.normal_error_rad)
+        normal = self.normal.direction_ned
+        bank.leave(normal, along(self._summed_m_s, normal), self.normal.error_rad)
         motion, spread_m_s, left_m_s = bank.estimate(left)
         # Of the height the report is right sooner than any model: a barometer shows no hit.
         n, e, _ = self.motion.position_ned_m if self.has_converged else motion.position_ned_m

@@ -193,7 +193,7 @@ def test_what_was_measured_before_the_contacts_next_push_does_not_count():
     air, found = clipped()
     go_on(air, found, 0.5)
     assert found.is_measured_apart
-    found.note_contact(is_fully_measured=False, pushed_boot_us=air.now_us)
+    found.note_contact(False, air.now_us, found.normal)
     assert not found.is_measured_apart
 
 

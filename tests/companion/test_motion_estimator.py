@@ -91,7 +91,7 @@ def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
 def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust_has_added(later_s):
     # Given a vehicle that leaves at 1 m/s to the south and 2 m/s to the west, and brakes with 3 m/s^2 from then on
     found, strapdown = reckoned((1.5, -2.5, 0.0)), Strapdown(acceleration_ned_m_s2=(1.0, 3.0, 0.0))
-    found.note_contact(True, HIT_US)
+    found.note_contact(True, HIT_US, found.normal)
     for tick in range(1, round(later_s / 0.004) + 1):
         strapdown.time_boot_us = HIT_US + 4_000 * tick
         found.imu(strapdown)
@@ -200,7 +200,7 @@ def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_a
 def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(is_fully_measured, across_m_s2, wind_m_s2):
     # Given a level vehicle after a hit, and a force across its thrust
     found, strapdown = reckoned(), Strapdown()
-    found.note_contact(is_fully_measured, HIT_US)
+    found.note_contact(is_fully_measured, HIT_US, found.normal)
     for tick in range(1, 500):
         strapdown.imu(HIT_US + 4_000 * tick, (across_m_s2, 0.0, -9.81), ZERO)
         found.imu(strapdown)
@@ -236,7 +236,7 @@ def recovering(**hit):
 def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
     # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
     flight, record, recover = recovering()
-    record.estimator.note_contact(True, HIT_US)
+    record.estimator.note_contact(True, HIT_US, record.contact_normal)
     for at_us in range(100_000, 5_000_000, 20_000):
         recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
         if record.is_over:

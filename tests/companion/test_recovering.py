@@ -45,7 +45,7 @@ def flight_with(
     if estimator is None:
         contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
-        estimator.note_contact(True, HIT_US)
+        estimator.note_contact(True, HIT_US, estimator.normal)
     normal = Normal(SOUTH, 0.2)
     flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, normal, 20.0, estimator))
     return flight
