@@ -98,7 +98,7 @@ class MotionEstimator:
         self.is_fully_measured, self.normal = is_fully_measured and not self.is_second, normal
         if pushed_boot_us > self.pushed_boot_us:
             self.pushed_boot_us, self._released_m_s = pushed_boot_us, self._summed_m_s
-            self.after_error_m_s = math.inf
+            self.after_ned_m_s, self.after_error_m_s = None, math.inf
             if not self.is_fully_measured:
                 self._begin()
 

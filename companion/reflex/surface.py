@@ -42,11 +42,13 @@ class Normal:
 
 
 def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, is_hidden: bool = False) -> Normal:
-    """The normal by the contact's impulse or force; where that may be clipped unseen, by the velocity before it."""
+    """The normal by the contact's impulse or force; where that shows none, or may be clipped unseen, by the velocity
+    before it."""
     normal, (n, e, d) = Normal().with_direction(impulse_ned, IMPULSE_RAD), velocity_ned_m_s
     back = Normal().with_direction((-n, -e, -d), APPROACH_RAD)
     is_behind = along(normal.direction_ned, back.direction_ned) < FROM_BEHIND
-    return back if is_hidden and math.hypot(n, e, d) > APPROACH_M_S and not is_behind else normal
+    is_clear = is_behind or not (is_hidden or normal.direction_ned == ZERO)
+    return normal if is_clear or math.hypot(n, e, d) <= APPROACH_M_S else back
 
 
 def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3, error_m_s: float) -> Normal:

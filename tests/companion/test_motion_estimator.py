@@ -101,6 +101,9 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     # Then it is known how the vehicle left, the worse the later
     assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
     assert found.after_error_m_s == pytest.approx(0.5 * later_s, abs=0.01)
+    # until it is pushed again
+    found.note_contact(True, HIT_US + 1_000, found.normal)
+    assert found.after_ned_m_s is None
 
 
 def test_the_height_is_the_reported_one_while_a_hit_is_corrected():

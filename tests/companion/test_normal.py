@@ -5,7 +5,7 @@ import math
 import pytest
 
 from companion.reflex.config import CHANGE_RAD, IMPULSE_RAD
-from companion.reflex.surface import normal_of, with_change
+from companion.reflex.surface import Normal, normal_of, with_change
 
 
 def turned(angle_deg, size=1.0):
@@ -40,6 +40,11 @@ def test_the_force_shows_the_normal_however_the_vehicle_came(size, speed_m_s):
 )
 def test_where_clipping_is_hidden_the_way_that_the_vehicle_came_takes_the_forces_place(force, speed_m_s, normal_deg):
     assert angle_deg(normal_of(force, (speed_m_s, 0.0, 0.0), is_hidden=True)) == pytest.approx(normal_deg, abs=0.1)
+
+
+def test_without_a_force_the_way_that_it_came_is_all_that_is_known():
+    assert angle_deg(normal_of((0.0, 0.0, 0.0), (2.0, 0.0, 0.0))) == pytest.approx(0.0)
+    assert normal_of((0.0, 0.0, 0.0), (0.4, 0.0, 0.0)) == Normal()
 
 
 def test_the_change_of_the_velocity_turns_it_and_leaves_less_error_than_either():
