@@ -15,7 +15,7 @@ from companion.reflex.detector import DetectorState, Phase
 from companion.reflex.impact import ImpactEstimator
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
-from companion.reflex.surface import Normal, away_from, with_change
+from companion.reflex.surface import Normal, level, with_change
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +45,6 @@ class CollisionReport:
     rebound_speed_m_s: float | None
 
 
-def level(normal: Normal) -> Normal:
-    """The normal of an upright surface; of a steep one as it is."""
-    return Normal(away_from(normal.direction_ned), normal.error_rad)
-
-
 @dataclass(slots=True)
 class CollisionRecord:
     """Positions and velocities in local NED; boot times in the vehicle's clock."""
@@ -58,7 +53,6 @@ class CollisionRecord:
     sample_time_boot_us: int
     detector: str
     contact: Contact
-    contact_normal: Normal  # by the contact's force
     peak_specific_force_m_s2: float
     estimator: MotionEstimator
     setpoint_ned_m: Vector3 = ZERO  # where to rest, as its recovery has it now
@@ -72,9 +66,9 @@ class CollisionRecord:
     @property
     def normal(self) -> Normal:
         """The obstacle's normal by all that is known now."""
-        normal, estimator = self.contact_normal, self.estimator
-        if estimator.after_ned_m_s is not None:
-            before_m_s, after_m_s = self.contact.velocity_ned_m_s, estimator.after_ned_m_s
+        before_m_s, estimator = self.contact.velocity_ned_m_s, self.estimator
+        normal, after_m_s = estimator.normal, estimator.after_ned_m_s
+        if after_m_s is not None:
             normal = with_change(normal, before_m_s, after_m_s, estimator.after_error_m_s)
         return level(normal)
 
@@ -91,8 +85,7 @@ class CollisionRecord:
             self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-            self.contact_normal = estimate.normal
-            self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us, level(estimate.normal))
+            self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal)
         self.estimator.imu(strapdown)
         self.estimator.measure(source.doppler)
         if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US:

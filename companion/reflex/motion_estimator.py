@@ -37,7 +37,7 @@ from companion.reflex.config import EstimateConfig
 from companion.reflex.correction import error_response
 from companion.reflex.filter_bank import FilterBank
 from companion.reflex.laws import Contact, MotionState
-from companion.reflex.surface import Normal
+from companion.reflex.surface import Normal, level
 
 
 @dataclass(slots=True)
@@ -248,7 +248,7 @@ class MotionEstimator:
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
-        normal = self.normal.direction_ned
+        normal = level(self.normal).direction_ned
         bank.leave(normal, along(self._summed_m_s, normal), self.normal.error_rad)
         motion, spread_m_s, left_m_s = bank.estimate(left)
         # Of the height the report is right sooner than any model: a barometer shows no hit.

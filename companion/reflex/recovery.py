@@ -97,16 +97,18 @@ class Recovery:
 
     def _settled_after_s(self, sample: LocalPosition) -> float | None:
         """Time from the hit to the beginning of the present rest, s; None as long as that has not lasted."""
-        record, now_us, motion = self.record, sample.time_boot_us, self.record.estimator.motion
-        place, velocity = motion.position_ned_m, motion.velocity_ned_m_s
+        record, now_us = self.record, sample.time_boot_us
+        right: MotionState | LocalPosition = record.estimator.motion
         if self._is_known:
-            right = record.estimator.corrected(sample)
-            record.follow_recovery(right)
-            if not self.leans:
-                place, velocity = right.position_ned_m, right.velocity_ned_m_s
-        since_us = self._monitor.settled_since(now_us, math.dist(place, record.setpoint_ned_m), velocity)
-        is_over = self._is_known and not self.leans and now_us - self._held_since_us >= 1e6 * self._settled.duration_s
-        return max(0.0, 1e-6 * (since_us - record.sample_time_boot_us)) if is_over and since_us is not None else None
+            corrected = record.estimator.corrected(sample)
+            record.follow_recovery(corrected)
+            right = right if self.leans else corrected
+        distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
+        since_us = self._monitor.settled_since(now_us, distance_m, right.velocity_ned_m_s)
+        is_held = not self.leans and now_us - self._held_since_us >= 1e6 * self._settled.duration_s
+        if since_us is None or not is_held or not self._is_known:
+            return None
+        return max(0.0, 1e-6 * (since_us - record.sample_time_boot_us))
 
     def _state(self) -> MotionState:
         """The present motion. During the contact it has no velocity into the obstacle."""

@@ -16,7 +16,7 @@ from companion.motion.rotation import body_to_ned, tilt_rad
 from companion.motion.vector import plus
 from companion.reflex import config as numbers
 from companion.reflex.attitude_law import Lean
-from companion.reflex.collision import CollisionRecord, level
+from companion.reflex.collision import CollisionRecord
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.confirmation import hypothesis_of
 from companion.reflex.crash import CrashWatch
@@ -27,7 +27,7 @@ from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
 from companion.reflex.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.recovery import Recovery, Room
-from companion.reflex.surface import Surface
+from companion.reflex.surface import Surface, level
 from companion.reflex.sustained_force import SustainedForceMonitor
 
 
@@ -141,7 +141,6 @@ class Reflex:
             sample_time_boot_us=first_us,
             detector=self.config.detector,
             contact=contact,
-            contact_normal=estimate.normal,
             peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
             estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second, fits_models),
         )
@@ -149,7 +148,7 @@ class Reflex:
             reported_wxyz = self.monitor.estimator.strapdown.attitude_wxyz
             force_ned = body_to_ned(reported_wxyz, impact.specific_force_frd_m_s2)
             record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
-        record.estimator.note_contact(estimate.is_fully_measured, first_us, normal)
+        record.estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal)
         surfaces = [
             Surface(each.contact.position_ned_m, each.normal.direction_ned, self.law_config.clearance_m)
             for each in earlier

@@ -45,10 +45,12 @@ def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, is_hidden: bool =
     """The normal by the contact's impulse or force; where that shows none, or may be clipped unseen, by the velocity
     before it."""
     normal, (n, e, d) = Normal().with_direction(impulse_ned, IMPULSE_RAD), velocity_ned_m_s
+    is_unclear = is_hidden or normal.direction_ned == ZERO
+    if not is_unclear or math.hypot(n, e, d) <= APPROACH_M_S:
+        return normal
     back = Normal().with_direction((-n, -e, -d), APPROACH_RAD)
     is_behind = along(normal.direction_ned, back.direction_ned) < FROM_BEHIND
-    is_clear = is_behind or not (is_hidden or normal.direction_ned == ZERO)
-    return normal if is_clear or math.hypot(n, e, d) <= APPROACH_M_S else back
+    return normal if is_behind else back
 
 
 def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3, error_m_s: float) -> Normal:
@@ -63,6 +65,11 @@ def away_from(normal_ned: Vector3) -> Vector3:
     """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
     n, e, d = normal_ned
     return unit((n, e, d if abs(d) > STEEP * math.hypot(n, e, d) else 0.0))
+
+
+def level(normal: Normal) -> Normal:
+    """The normal of an upright surface; of a steep one as it is."""
+    return Normal(away_from(normal.direction_ned), normal.error_rad)
 
 
 @dataclass(frozen=True, slots=True)

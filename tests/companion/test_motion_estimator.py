@@ -22,7 +22,7 @@ WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 
 def reckoned(velocity=(2.0, 0.0, 0.0), normal=SOUTH, restitution=0.2, is_second=False, hit_us=HIT_US, fits=True):
-    contact = Contact(hit_us, AT, velocity, normal)
+    contact = Contact(hit_us, AT, velocity, normal, 0.2)
     return MotionEstimator(contact, hit_us, contact.rebound(restitution), EstimateConfig(), is_second, fits)
 
 
@@ -239,7 +239,7 @@ def recovering(**hit):
 def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
     # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
     flight, record, recover = recovering()
-    record.estimator.note_contact(True, HIT_US, record.contact_normal)
+    record.estimator.note_contact(True, HIT_US, record.estimator.normal)
     for at_us in range(100_000, 5_000_000, 20_000):
         recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
         if record.is_over:

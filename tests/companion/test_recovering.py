@@ -21,7 +21,6 @@ from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.recovery import Recovery
 from companion.reflex.reflex import start_reflex
-from companion.reflex.surface import Normal
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -43,11 +42,10 @@ def flight_with(
     flight.vehicle.attitude = reflex.monitor.gate.latest = Attitude(HIT_US, LEVEL)
     reflex.thrust.full_m_s2, reflex.thrust.known_s = 16.0, learnt_s
     if estimator is None:
-        contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH)
+        contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal)
-    normal = Normal(SOUTH, 0.2)
-    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, normal, 20.0, estimator))
+    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator))
     return flight
 
 
