@@ -89,35 +89,47 @@ def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
 
 @pytest.mark.parametrize("later_s", [0.06, 1.0])
 def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust_has_added(later_s):
-    # Given a vehicle that leaves at 1 m/s to the south and 2 m/s to the west, and brakes with 3 m/s^2 from then on
-    found, strapdown = reckoned((1.5, -2.5, 0.0)), Strapdown(acceleration_ned_m_s2=(1.0, 3.0, 0.0))
-    found.note_contact(True, HIT_US, found.normal)
-    for tick in range(1, round(later_s / 0.004) + 1):
-        strapdown.time_boot_us = HIT_US + 4_000 * tick
-        found.imu(strapdown)
+    # Given a contact of 20 ms whose own force is less than 1 g
+    found, strapdown = reckoned((1.5, -2.5, 0.0)), Strapdown()
+
+    def go_on(seconds, acceleration):
+        for _ in range(round(seconds / 0.004)):
+            strapdown.time_boot_us = (strapdown.time_boot_us or HIT_US) + 4_000
+            strapdown.acceleration_ned_m_s2 = acceleration
+            found.imu(strapdown)
+
+    go_on(0.02, (-9.0, 0.0, 0.0))
+    found.note_contact(True, strapdown.time_boot_us, found.normal)
+    # and a vehicle that leaves at 1 m/s to the south and 2 m/s to the west, and brakes with 3 m/s^2 from then on
+    go_on(later_s, (1.0, 3.0, 0.0))
     # When the first velocity comes, soon or late
     velocity = (-1.0 + 1.0 * later_s, -2.0 + 3.0 * later_s, 0.0)
     found.update(LocalPosition(strapdown.time_boot_us, AT, velocity))
     # Then it is known how the vehicle left, the worse the later
     assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
     assert found.after_error_m_s == pytest.approx(0.5 * later_s, abs=0.01)
+    # and a later one, which is known worse, does not count
+    go_on(0.1, (1.0, 3.0, 0.0))
+    found.update(LocalPosition(strapdown.time_boot_us, AT, (5.0, 5.0, 0.0)))
+    assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
     # until it is pushed again
-    found.note_contact(True, HIT_US + 1_000, found.normal)
+    found.note_contact(True, strapdown.time_boot_us, found.normal)
     assert found.after_ned_m_s is None
 
 
-def test_the_height_is_the_reported_one_while_a_hit_is_corrected():
-    # Given a vehicle that sinks after a clipped hit, and whose velocity does not show it
-    found, strapdown = reckoned((3.0, 0.0, 0.0)), Strapdown()
-    for tick in range(1, 125):
+def test_the_height_is_the_reported_one_while_a_hit_is_corrected_and_after_it():
+    # Given a vehicle whose velocity is wrong downwards, too, and whose heights stand
+    found, strapdown = reckoned((3.0, 0.0, 1.0)), Strapdown()
+    for tick in range(1, 750):
         since_s = 0.004 * tick
         strapdown.time_boot_us = HIT_US + 4_000 * tick
         found.imu(strapdown)
         if tick % 5 == 0:
-            place = (AT[0], 0.0, AT[2] + 0.5 * since_s)
-            found.update(LocalPosition(strapdown.time_boot_us, place, (1.0, 0.0, 0.0)))
-    assert not found.has_converged
-    assert found.motion.position_ned_m[2] == pytest.approx(AT[2] + 0.25, abs=0.02)
+            lacks_m_s, lacks_m = missing(since_s, *PX4)
+            place = (AT[0] - 0.6 * since_s + 3.6 * lacks_m, 0.0, AT[2])
+            found.update(LocalPosition(strapdown.time_boot_us, place, (-0.6 + 3.6 * lacks_m_s, 0.0, 1.5 * lacks_m_s)))
+            assert found.motion.position_ned_m[2] == pytest.approx(AT[2], abs=0.02)
+    assert found.has_converged and found.position_error_m[0] != 0.0 and found.position_error_m[2] == 0.0
 
 
 def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into_the_wall_is_not():
