@@ -159,6 +159,7 @@ def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
         # Then what is taken off it is its error, and the place is the reported one less its own
         assert found.velocity_error_m_s[0] == pytest.approx(air.reported_off_m_s, abs=0.12)
         assert math.dist(found.motion.position_ned_m, found.corrected(newest).position_ned_m) < 0.05
+        assert 0.0 < found.spread_m_s < 0.2, "the velocity is the receiver's, and as good"
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.0, abs=0.1)
 
 

@@ -21,6 +21,7 @@ from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.recovery import Recovery
 from companion.reflex.reflex import start_reflex
+from companion.reflex.surface import Normal
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -89,6 +90,23 @@ def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_whe
         over_us = over_us or (since_us if record.settled_after_s is not None else 0)
     assert handed_us == 200_000 and over_us == handed_us + 500_000
     assert record.settled_after_s == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("after_ned_m_s", "direction_ned"),
+    [
+        ((-1.0, 0.0, 0.0), (-0.97, -0.26, 0.0)),  # the change is south, the force was south-west
+        ((1.5, 0.0, 2.5), (-0.49, -0.32, 0.81)),  # a wall that leans over it pushes it down
+        ((-0.6, 0.0, 0.6), (-0.97, -0.26, 0.0)),  # friction at an upright one does so, too
+    ],
+)
+def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(after_ned_m_s, direction_ned):
+    record = flight_with().collisions[0]
+    half = math.sqrt(0.5)
+    record.estimator.note_contact(True, HIT_US, Normal((-half, -half, 0.0), 0.35))
+    assert record.normal.direction_ned == (-half, -half, 0.0)
+    record.estimator.after_ned_m_s, record.estimator.after_error_m_s = after_ned_m_s, 0.05
+    assert record.normal.direction_ned == pytest.approx(direction_ned, abs=0.02)
 
 
 def test_it_is_not_handed_over_on_the_obstacle():
