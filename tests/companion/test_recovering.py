@@ -109,6 +109,17 @@ def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(
     assert record.normal.direction_ned == pytest.approx(direction_ned, abs=0.02)
 
 
+def test_the_way_off_follows_the_normal_as_it_becomes_known():
+    # Given a force whose first sample shows a wall in the north, and the next ones one in the north-west
+    flight = flight_with()
+    recover, estimator = recover_in(flight), flight.collisions[0].estimator
+    hears(flight, recover, 100_000, 2.95, 0.0)
+    straight_m = flight.collisions[0].setpoint_ned_m[1]
+    estimator.note_contact(True, HIT_US, Normal((-0.8, 0.6, 0.0), 0.1))
+    hears(flight, recover, 120_000, 2.95, 0.0)
+    assert straight_m == pytest.approx(0.0, abs=0.02) and flight.collisions[0].setpoint_ned_m[1] > 0.1
+
+
 def test_it_is_not_handed_over_on_the_obstacle():
     flight = flight_with()
     recover = recover_in(flight)
