@@ -22,12 +22,10 @@ from sim_vehicle.mavlink.streams.topics import Topics
 from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.physics.layout import Constants, PlantState
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.plant.standing import check_start
 from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene
-from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Obstacle, build_world, distance_m
 
 # A signature has one byte for the link.
@@ -68,6 +66,9 @@ class SimulatedVehicle:
         self._companion_link: Link | None = None
         self.parameters = Parameters({**defaults_from(airframe), **(parameters or {})})
         self._plant = Plant(with_parameters(airframe, self.parameters), scene, seed, keeps_path)
+        self.state, self.constants = self._plant.state, self._plant.constants
+        self.truth = self._plant.truth
+        """What really happened, never sent."""
         parameters = self.parameters
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
@@ -75,7 +76,7 @@ class SimulatedVehicle:
         self._positioning = self._autopilot.commander.positioning
         self._positioning.sees_ground = self._plant.onboard is not None
         # Taken once: looking a record's field up costs microseconds.
-        self._body = self._plant.state.body
+        self._body = self.state.body
         identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
         self._telemetry = Telemetry(
             sample=first,
@@ -85,13 +86,13 @@ class SimulatedVehicle:
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
-            attitude_setpoint=self._plant.state.attitude_setpoint,
+            attitude_setpoint=self.state.attitude_setpoint,
             epoch_at_boot_us=epoch_at_boot_us,
             system=identity.system,
         )
         self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin)
         self.interval_us = self._plant.interval_us
-        self.time_boot_us = int(self._plant.state.time_us)
+        self.time_boot_us = int(self.state.time_us)
         self._topics = Topics(self._telemetry)
         self._board = Board(
             identity,
@@ -118,16 +119,6 @@ class SimulatedVehicle:
         self._autopilot.begin_in_flight(NavigatorTarget(Kind.HOLD, goal, yaw_rad, speed_m_s))
         self.time_boot_us = sample.time_boot_us
 
-    @property
-    def state(self) -> PlantState:
-        """What is really so."""
-        return self._plant.state
-
-    @property
-    def truth(self) -> TruthRecorder:
-        """What really happened, never sent."""
-        return self._plant.truth
-
     def add_link(self, kind: LinkKind) -> Link:
         """One more connection, from now on."""
         number, seed = self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far
@@ -147,14 +138,9 @@ class SimulatedVehicle:
     # --- what may be changed between two intervals ---------------------------------------------------------
 
     @property
-    def constants(self) -> Constants:
-        """What does not change in a flight."""
-        return self._plant.constants
-
-    @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Everything that the vehicle can run into but the ground."""
-        return self._plant.world.obstacles
+        return self._plant.around.world.obstacles
 
     @property
     def is_armed(self) -> bool:
@@ -198,7 +184,7 @@ class SimulatedVehicle:
         if problem is not None:
             raise FaultError(f"{problem}.")
         self._faults.append(fault)
-        self._plant.add_fault(fault)
+        self._plant.faults.add(fault)
         for link in self._links:
             if isinstance(link, FaultyLink):
                 link.add(fault)
@@ -206,7 +192,7 @@ class SimulatedVehicle:
     def remove_fault(self, fault: Fault) -> None:
         """End or cancel a fault: the same object that was added."""
         self._faults = [kept for kept in self._faults if kept is not fault]
-        self._plant.remove_fault(fault)
+        self._plant.faults.remove(fault, self.time_boot_us)
         for link in self._links:
             if isinstance(link, FaultyLink):
                 link.remove(fault)
@@ -254,9 +240,9 @@ class SimulatedVehicle:
     def _sense(self, telemetry: Telemetry) -> None:
         slow, faults, now_us = self._slow, self._plant.faults, telemetry.sample.time_boot_us
         positioning = self._positioning
-        if faults is not None:
+        if faults.acts:
             positioning.gps_is_jammed = faults.gps_is_lost(self.time_boot_us / 1e6)
-            self._autopilot.battery.supply_share = faults.voltage_share
+            self._autopilot.battery.supply_share = faults.motors.voltage_share
         if now_us < slow.due_us:
             return
         slow.gps_is_blocked = positioning.gps_is_off or positioning.gps_is_jammed
@@ -271,7 +257,7 @@ class SimulatedVehicle:
         onboard = self._plant.onboard
         if onboard is not None:
             telemetry.flow, telemetry.range = onboard.flow, onboard.range
-        if self._plant.faults is not None or sample.time_boot_us >= self._slow.due_us:
+        if self._plant.faults.acts or sample.time_boot_us >= self._slow.due_us:
             self._sense(telemetry)
         telemetry.vibration.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         if sample.time_boot_us - telemetry.published.time_boot_us < POSITION_PERIOD_US:

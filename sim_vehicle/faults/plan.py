@@ -24,24 +24,27 @@ _OWN_SEED = 0xFA17
 class Faults:
     """The faults of one flight and their state. The same seed gives the same faults."""
 
-    def __init__(self, faults: Sequence[Fault], airframe: Airframe, wind_ned_m_s: Vector3, seed: int) -> None:
+    def __init__(
+        self, faults: Sequence[Fault], airframe: Airframe, wind_ned_m_s: Vector3, seed: int, state: PlantState
+    ) -> None:
         rng = np.random.default_rng((seed, _OWN_SEED))
         step_s = 1e-6 * airframe.imu.integration_interval_us
         raw = airframe.imu.integration_interval_us // airframe.imu.raw_interval_us
-        self._rng, self._rotors = rng, airframe.rotor_count
-        self._shaking, self._motors = Shaking(airframe.rotor_count), Motors()
-        self._estimate = Estimate(airframe.estimate.kind == "markov", step_s, rng)
+        self._rotors = airframe.rotor_count
+        shaking, self.motors = Shaking(airframe.rotor_count), Motors()
+        self.estimate = Estimate(airframe.estimate.kind == "markov", step_s, rng)
         # Which group takes which faults, in the order in which they write.
         self._groups: tuple[tuple[tuple[type[Any], ...], Any], ...] = (
             ((spec.Gust, spec.Turbulence), Air(wind_ned_m_s, step_s, rng)),
-            ((spec.MotorFailure, spec.FreeFall, spec.BatterySag), self._motors),
+            ((spec.MotorFailure, spec.FreeFall, spec.BatterySag), self.motors),
             ((spec.PayloadDrop,), Load()),
             ((spec.Push,), Pushes()),
             ((spec.ImuBias, spec.ImuStuck), InertialSensor(raw)),
-            ((spec.Vibration,), self._shaking),
-            ((spec.EstimatorReset, spec.EstimatorAfterClipping, spec.AidingLoss), self._estimate),
+            ((spec.Vibration,), shaking),
+            ((spec.EstimatorReset, spec.EstimatorAfterClipping, spec.AidingLoss), self.estimate),
         )
-        self._acts: list[Callable[[float, PlantState, Disturbance], None]] = []
+        self.acts: list[Callable[[float, PlantState, Disturbance], None]] = []
+        """Of the groups that ever had a fault: the others have nothing to write."""
         self._faults: list[Fault] = []
         self._turns_at_s = math.inf
         """When the next of them begins or ends."""
@@ -49,6 +52,7 @@ class Faults:
         self.spans: list[FaultSpan] = []
         for fault in faults:
             self.add(fault)
+        shaking.scatter(state, rng)
 
     def add(self, fault: Fault) -> None:
         """Add a fault. It acts in its own window of the boot clock. Raises FaultError for a motor that is not there."""
@@ -58,8 +62,7 @@ class Faults:
         for kinds, group in self._groups:
             if isinstance(fault, kinds):
                 group.add(fault)
-        # A group that never had a fault has nothing to write.
-        self._acts = [group.act for _, group in self._groups if group.had_any]
+        self.acts = [group.act for _, group in self._groups if group.had_any]
 
     def remove(self, fault: Fault, time_us: int) -> None:
         """The very fault that was added is over, or never comes."""
@@ -71,32 +74,18 @@ class Faults:
             if isinstance(fault, kinds):
                 group.remove(fault)
 
-    @property
-    def reset_counter(self) -> int:
-        """How often faults have made the estimate jump."""
-        return self._estimate.reset_counter
-
-    @property
-    def voltage_share(self) -> float:
-        """What is left of the supply's voltage."""
-        return self._motors.voltage_share
-
-    def begin(self, state: PlantState) -> None:
-        """Write what is different from the start on."""
-        self._shaking.scatter(state, self._rng)
-
     def before(self, state: PlantState, disturbance: Disturbance) -> None:
         """Write what holds for the interval that begins now, and note what has begun and ended."""
         time_us = int(state.time_us)
         time_s = time_us / 1e6
         if time_s >= self._turns_at_s:
             self._note(time_s, time_us)
-        for act in self._acts:
+        for act in self.acts:
             act(time_s, state, disturbance)
 
     def gps_is_lost(self, time_s: float) -> bool:
         """At that time."""
-        return any(isinstance(fault, spec.AidingLoss) for fault in self._estimate.acting(time_s))
+        return any(isinstance(fault, spec.AidingLoss) for fault in self.estimate.acting(time_s))
 
     def _note(self, time_s: float, time_us: int) -> None:
         for fault in self._faults:

@@ -13,7 +13,6 @@ from sim_vehicle.plant.plant import Plant
 from sim_vehicle.plant.standing import check_start
 from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.scene import Scene
-from sim_vehicle.truth import TruthRecorder
 
 # PX4 integrates samples by the trapezoidal rule: at 4 ms every HIGHRES_IMU would be the mean of two of them
 # and show a hit a sample late. A quarter of its interval comes near the 8 kHz of a real sensor.
@@ -51,12 +50,9 @@ class HilVehicle:
         self._downward = DownwardSensors(airframe.sensors, self.interval_us, random.Random(~seed))
         # Taken once: looking a record's field up costs microseconds.
         self._body = self._plant.state.body
-        self.time_boot_us = 0
-
-    @property
-    def truth(self) -> TruthRecorder:
+        self.truth = self._plant.truth
         """What really happened, never sent."""
-        return self._plant.truth
+        self.time_boot_us = 0
 
     def step(self, motor_fractions: tuple[float, ...]) -> tuple[ToPx4, ...]:
         """Advance one sample; the inertial sensor's sample comes last, because it sets PX4's clock going."""
@@ -67,12 +63,11 @@ class HilVehicle:
         velocity_ned_m_s: Vector3 = (vx, vy, vz)
         attitude_wxyz: Quaternion = (qw, qx, qy, qz)
         messages: list[ToPx4] = []
-        faults = self._plant.faults
-        if self._is_due(sensors.GPS_PERIOD_US) and not (faults is not None and faults.gps_is_lost(now_us / 1e6)):
+        if self._is_due(sensors.GPS_PERIOD_US) and not self._plant.faults.gps_is_lost(now_us / 1e6):
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
         if self._is_due(self._cameras_period_us):
             messages.append(self._cameras.sample(now_us, self._body))
-        messages += self._downward.observe(now_us, self._body, self._plant.seen_faces)
+        messages += self._downward.observe(now_us, self._body, self._plant.around.flat_faces)
         is_magnetometer_due = self._is_due(sensors.MAGNETOMETER_PERIOD_US)
         messages.append(
             HilSensor(

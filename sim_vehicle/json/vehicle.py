@@ -7,7 +7,6 @@ from sim_vehicle.json.messages import Pulses, state_line
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.plant.standing import check_start
 from sim_vehicle.scene import Scene
-from sim_vehicle.truth import TruthRecorder
 
 # ArduPilot reads its inertial sensors a thousand times a second.
 SAMPLE_INTERVAL_US = 1_000
@@ -24,12 +23,9 @@ class JsonVehicle:
         self._plant = Plant(sampled_every(airframe, SAMPLE_INTERVAL_US), scene, seed)
         self._motors = airframe.rotor_count
         self._body = self._plant.state.body
-        self.time_boot_us = 0
-
-    @property
-    def truth(self) -> TruthRecorder:
+        self.truth = self._plant.truth
         """What really happened."""
-        return self._plant.truth
+        self.time_boot_us = 0
 
     def answer(self, pulses: Pulses) -> bytes:
         """Advance one sample and tell of it."""

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +11,8 @@ from sim_vehicle.control.asked import AskedSetpoint
 from sim_vehicle.control.setpoint import Setpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.faults.plan import Faults
-from sim_vehicle.faults.spec import Fault
 from sim_vehicle.physics.estimate import estimate_errors
-from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
+from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.record import boxed, new_record
 from sim_vehicle.physics.report import HITS_ENDED, KNOWN, REPORT_COLUMNS, SENSED, TRUTH, report_estimate
 from sim_vehicle.physics.touching.proximity import points_behind
@@ -50,15 +48,16 @@ class Plant:
         fine_steps: int = interval.FINE_STEPS,
     ) -> None:
         self._rng = np.random.default_rng(seed)
-        self._constants = constants_from(airframe, self._rng)
+        self.constants = constants_from(airframe, self._rng)
+        """What does not change in a flight, but for `tune`."""
         self.disturbance = calm(scene.wind_ned_m_s)
         self._fine_steps = fine_steps
-        self._raw_samples = int(self._constants.raw_per_interval)
+        self._raw_samples = int(self.constants.raw_per_interval)
         north, east, _ = scene.start.position_ned_m
         centre: Vector3 = (north, east, -airframe.geometry.foot_depth_m)
         self.state = initial_state(centre, math.radians(scene.start.yaw_deg))
         self.interval_us = airframe.imu.integration_interval_us
-        self._around = Surroundings(scene.world(), centre, 0, self.interval_us)
+        self.around = Surroundings(scene.world(), centre, 0, self.interval_us)
         self._errors, self._past = estimate_errors(airframe, self.state.body, self._rng)
         self._errors_box = boxed(self._errors)
         self.onboard: OnboardEstimator | None = None
@@ -76,76 +75,43 @@ class Plant:
         self._rotors, self._motor_max_n = airframe.rotor_count, airframe.motors.max_thrust_n
         self._finished_hits = self.state.finished_hits
         self._state_box = boxed(self.state)
-        self._constants_box, self._disturbance_box = boxed(self._constants), boxed(self.disturbance)
+        self._constants_box, self._disturbance_box = boxed(self.constants), boxed(self.disturbance)
         self._scratch_box = boxed(new_record(Scratch))
         self.truth = TruthRecorder(keeps_path, airframe.rotor_count)
-        self.faults: Faults | None = None
-        self._new_faults = partial(Faults, airframe=airframe, wind_ned_m_s=scene.wind_ned_m_s, seed=seed)
-        if scene.faults:
-            self._begin_faults(scene.faults)
+        self.faults = Faults(scene.faults, airframe, scene.wind_ned_m_s, seed, self.state)
+        self.truth.faults = self.faults.spans
 
     def tune(self, gains: Mapping[str, float | Vector3]) -> None:
         """Change gains and limits of the inner loops, by their names in `Gains`."""
         for name, value in gains.items():
             self._constants_box[name] = value
 
-    @property
-    def constants(self) -> Constants:
-        """What does not change in a flight."""
-        return self._constants
-
-    @property
-    def world(self) -> World:
-        """Ground and obstacles."""
-        return self._around.world
-
-    @property
-    def seen_faces(self) -> Floats:
-        """Ground and obstacles as the optics see them, where they are now."""
-        return self._around.flat_faces
-
     def change_world(self, world: World) -> None:
         """Put other obstacles around the vehicle, none of them through it; a hit on one that goes is over."""
         hit = self.state.hit
         if hit[HIT_ACTIVE] == 1.0:
-            row = np.flatnonzero(world.rows_in(self.world) == int(hit[HIT_FACE]))
+            row = np.flatnonzero(world.rows_in(self.around.world) == int(hit[HIT_FACE]))
             if len(row) == 0:
-                self.truth.add_hit(hit, self.world)
+                self.truth.add_hit(hit, self.around.world)
                 hit[HIT_ACTIVE] = 0.0
             else:
                 hit[HIT_FACE] = row[0]
         x, y, z = self._body[:3].tolist()
-        self._around = self._around.changed(world, (x, y, z), int(self.state.time_us))
-
-    def add_fault(self, fault: Fault) -> None:
-        """One more fault from now on."""
-        if self.faults is None:
-            self._begin_faults(())
-        assert self.faults is not None
-        self.faults.add(fault)
-
-    def remove_fault(self, fault: Fault) -> None:
-        """The very fault that was added is over."""
-        assert self.faults is not None
-        self.faults.remove(fault, int(self.state.time_us))
-
-    def _begin_faults(self, faults: Sequence[Fault]) -> None:
-        self.faults = self._new_faults(faults)
-        self.truth.faults = self.faults.spans
-        self.faults.begin(self.state)
+        self.around = self.around.changed(world, (x, y, z), int(self.state.time_us))
 
     def place(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Put the level vehicle somewhere in flight, for studies of single hits."""
         self.state.body[0:6] = [*position_ned_m, *velocity_ned_m_s]
-        self._around.behind[:] = points_behind(self._around.faces, position_ned_m)
-        if self.onboard is not None:
-            self.onboard.start(self.state.body, self.state.time_us)
+        self._look_around(position_ned_m)
 
     def cruise(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float) -> None:
         """Put the vehicle into a flight that has been steady for a while."""
         remembered = (self._errors, self._past)
-        trim(self.state, remembered, self._constants, self.disturbance, position_ned_m, velocity_ned_m_s, yaw_rad)
-        self._around.behind[:] = points_behind(self._around.faces, position_ned_m)
+        trim(self.state, remembered, self.constants, self.disturbance, position_ned_m, velocity_ned_m_s, yaw_rad)
+        self._look_around(position_ned_m)
+
+    def _look_around(self, position_ned_m: Vector3) -> None:
+        self.around.behind[:] = points_behind(self.around.faces, position_ned_m)
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
 
@@ -165,11 +131,10 @@ class Plant:
         return self._advance(interval.MOTORS_DRIVEN)
 
     def _advance(self, motors: int) -> Estimate:
-        around = self._around
+        around = self.around
         if around.world.movers:
             around.move(int(self.state.time_us))
-        if self.faults is not None:
-            self.faults.before(self.state, self.disturbance)
+        self.faults.before(self.state, self.disturbance)
         advance_interval(
             self._state_box,
             self._asked.box,
@@ -192,7 +157,7 @@ class Plant:
         self.truth.record(self._true_columns)
         if report[HITS_ENDED]:
             for row in self._finished_hits[: int(report[HITS_ENDED])]:
-                self.truth.add_hit(row, self.world)
+                self.truth.add_hit(row, around.world)
         if self.onboard is not None and motors != interval.MOTORS_DRIVEN:
             self._estimate_state(self.onboard, motors == interval.MOTORS_FLYING)
         return self._output()
@@ -200,14 +165,14 @@ class Plant:
     def _estimate_state(self, onboard: "OnboardEstimator", flies: bool) -> None:
         """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""
         estimate, acceleration = self._estimate, self._acceleration_ned_m_s2
-        time_us, faces = int(self._report[0]), self.seen_faces
+        time_us, faces = int(self._report[0]), self.around.flat_faces
         onboard.update(time_us, self._sensed_columns, flies, self._body, faces, estimate, acceleration)
-        if self.faults is not None:
+        if self.faults.acts:
             estimate[0:6] += self.disturbance.estimate_jump
         report_estimate(self._body, estimate, acceleration, self._frame_offset_ned_m, self._report)
 
     def _output(self) -> Estimate:
-        onboard, faults, report = self.onboard, self.faults, self._report.tolist()
+        onboard, report = self.onboard, self._report.tolist()
         fx, fy, fz, p, q, r, clip_x, clip_y, clip_z, px, py, pz, vx, vy, vz, *others = report[KNOWN]
         qw, qx, qy, qz, ax, ay, az, thrust, *motors = others
         resets = 0 if onboard is None else onboard.reset_counter
@@ -222,5 +187,5 @@ class Plant:
             (qw, qx, qy, qz),
             thrust,
             tuple(motors[: self._rotors]),
-            resets if faults is None else resets + faults.reset_counter,
+            resets + self.faults.estimate.reset_counter,
         )

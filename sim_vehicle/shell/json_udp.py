@@ -10,7 +10,6 @@ from sim_vehicle.errors import VehicleEnded
 from sim_vehicle.json.messages import Pulses, pulses_from
 from sim_vehicle.json.vehicle import JsonVehicle
 from sim_vehicle.shell.ports import Address, bound_socket
-from sim_vehicle.truth import TruthRecorder
 
 # Of the SITL's instance 0; each further one has them ten higher (SITL_cmdline.cpp).
 MAVLINK_PORT, JSON_PORT, PORTS_APART = 5760, 9002, 10
@@ -32,7 +31,7 @@ class ArduPilotVehicle:
 
     def __init__(self, body: JsonVehicle, instance: int, is_stopped: Callable[[], bool]) -> None:
         """Waits for the SITL to start. Raises PortInUse, and VehicleEnded when stopped."""
-        self._body = body
+        self._body, self.truth = body, body.truth
         self._answered: int | None = None
         self._states = bound_socket(socket.SOCK_DGRAM, "127.0.0.1", JSON_PORT + PORTS_APART * instance)
         self._states.settimeout(_SILENCE_S)
@@ -52,11 +51,6 @@ class ArduPilotVehicle:
     @property
     def time_boot_us(self) -> int:
         return self._body.time_boot_us
-
-    @property
-    def truth(self) -> TruthRecorder:
-        """What really happened."""
-        return self._body.truth
 
     def start(self, is_stopped: Callable[[], bool]) -> None:
         """Return when it can be armed; what it says until then is old."""

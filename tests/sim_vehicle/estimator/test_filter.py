@@ -73,7 +73,7 @@ def test_position_by_flow_drifts_and_by_cameras_does_not(hover):
 
 def test_the_filter_finds_the_gyroscopes_bias(hover):
     flight, _ = hover
-    true = flight.plant._constants.gyroscope_bias_frd_rad_s
+    true = flight.plant.constants.gyroscope_bias_frd_rad_s
     assert flight.onboard.filter.nominal[10:13] == pytest.approx(true, abs=0.0007)
 
 

@@ -120,7 +120,7 @@ def raw_rms(plant: Plant) -> np.ndarray:
 
     shaken, rows = np.zeros(6), []
     for _ in range(8000):
-        shake(plant.state, 125e-6, plant._constants, plant.disturbance, shaken)
+        shake(plant.state, 125e-6, plant.constants, plant.disturbance, shaken)
         rows.append(shaken.copy())
     return np.sqrt((np.array(rows) ** 2).mean(axis=0))
 
