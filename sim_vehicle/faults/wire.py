@@ -2,9 +2,8 @@
 
 import heapq
 import random
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
-from sim_vehicle.errors import FaultError
 from sim_vehicle.faults.spec import WireFault
 
 _MAVLINK_1, _MAVLINK_2 = 0xFE, 0xFD
@@ -46,9 +45,9 @@ def message_number(frame: bytes) -> int | None:
 class Wire:
     """One direction of a link. The same frames at the same times meet the same fate for the same seed."""
 
-    def __init__(self, faults: Iterable[WireFault], seed: int, number_of: Callable[[str], int] | None = None) -> None:
-        """``number_of`` turns a message's name into its number; needed only where faults name messages."""
-        self._seed, self._number_of = seed, number_of
+    def __init__(self, faults: Iterable[WireFault], seed: int) -> None:
+        """``faults`` have their messages by number."""
+        self._seed = seed
         self._stretches: list[_Stretch] = []
         self._faults_so_far = 0
         self._held: list[tuple[int, int, bytes]] = []
@@ -61,7 +60,7 @@ class Wire:
         """One more fault, with chances of its own."""
         rng = random.Random(self._seed + 7919 * self._faults_so_far)
         self._faults_so_far += 1
-        self._stretches.append(_Stretch(fault, rng, self._number_of))
+        self._stretches.append(_Stretch(fault, rng))
 
     def remove(self, fault: WireFault) -> None:
         """The very fault that was added is over; what it holds back still arrives when it would have."""
@@ -95,17 +94,16 @@ class Wire:
 class _Stretch:
     """One fault and its chances."""
 
-    def __init__(self, fault: WireFault, rng: random.Random, number_of: Callable[[str], int] | None) -> None:
+    def __init__(self, fault: WireFault, rng: random.Random) -> None:
         self.start_s, self.end_s = fault.window_s
         self.fault = fault
         self._rng = rng
-        self._numbers = {_number(message, number_of) for message in fault.messages}
         self._in_burst = False
         self._last_due_us = 0
 
     def hits(self, frame: bytes) -> bool:
         """Whether the fault is about such messages."""
-        return not self._numbers or message_number(frame) in self._numbers
+        return not self.fault.messages or message_number(frame) in self.fault.messages
 
     def fates(self, frame: bytes, due_us: int) -> list[tuple[int, bytes]]:
         """When which copies of a frame arrive."""
@@ -137,11 +135,3 @@ class _Stretch:
     def _damaged(self, frame: bytes) -> bytes:
         place = self._rng.randrange(len(frame))
         return frame[:place] + bytes([frame[place] ^ self._rng.randrange(1, 256)]) + frame[place + 1 :]
-
-
-def _number(message: int | str, number_of: Callable[[str], int] | None) -> int:
-    if isinstance(message, int):
-        return message
-    if number_of is None:
-        raise FaultError(f"message {message!r} has a name, and nobody here knows its number.")
-    return number_of(message)

@@ -29,8 +29,8 @@ class FaultyLink(Link):
 
     def __init__(self, kind: LinkKind, board: Board, number: int, seed: int, faults: Sequence[Fault]) -> None:
         super().__init__(kind, board, number, seed)
-        self._outbound = Wire((), seed, message_number)
-        self._inbound = Wire((), seed ^ _INBOUND_SEED, message_number)
+        self._outbound = Wire((), seed)
+        self._inbound = Wire((), seed ^ _INBOUND_SEED)
         self._on_wire: list[tuple[Fault, Wire, WireFault]] = []
         self._jumps: list[ClockJump] = []
         self._restamper = Restamper()
@@ -82,9 +82,9 @@ def needs_faulty_link(faults: Sequence[Fault]) -> bool:
 
 
 def _as_wire_fault(fault: Fault, direction: str) -> WireFault | None:
-    """What a fault does to packets in one direction, if anything."""
+    """What a fault does to packets in one direction, if anything; its messages by number."""
     if isinstance(fault, WireFault) and fault.direction in (direction, "both"):
-        return fault
+        return fault.model_copy(update={"messages": tuple(map(message_number, fault.messages))})
     if isinstance(fault, ImuDropout) and direction == "to_companion":
         return WireFault(kind="wire", between_s=fault.window_s, loss=1.0, messages=_INERTIAL)
     return None
@@ -135,8 +135,10 @@ class Restamper:
         return changed
 
 
-def message_number(name: str) -> int:
-    """The number of a message by its name; raises FaultError where there is none."""
+def message_number(name: int | str) -> int:
+    """The number of a message by its name or number; raises FaultError for a name that there is not."""
+    if isinstance(name, int):
+        return name
     number = getattr(dialect, f"MAVLINK_MSG_ID_{name.upper()}", None)
     if number is None:
         raise FaultError(f"no MAVLink message is called {name!r}.")
@@ -146,5 +148,4 @@ def message_number(name: str) -> int:
 def check_messages(fault: Fault) -> None:
     """Raise FaultError if a fault of the wire names a message that there is not."""
     for message in fault.messages if isinstance(fault, WireFault) else ():
-        if isinstance(message, str):
-            message_number(message)
+        message_number(message)
