@@ -1,6 +1,5 @@
 """Lockstep with PX4's `simulator_mavlink`, without sockets and clocks: who may speak when.
 
-WAITING   nobody is connected
 STARTING  PX4 is connected and boots; samples go out at their own pace until its first answer
 READY     the last sample is answered: the next may go out
 AWAITING  a sample is out; time stands still on both sides until its answer comes
@@ -25,63 +24,28 @@ FIRST_ANSWER_WORDS = "PX4 answers"
 
 
 class ExchangePhase(Enum):
-    WAITING = auto()
     STARTING = auto()
     READY = auto()
     AWAITING = auto()
 
 
-class ExchangeEvent(Enum):
-    CONNECTED = auto()
-    SENT = auto()
-    ANSWERED = auto()
-    OVERDUE = auto()
-    CLOSED = auto()
-
-
-# Every move there is; anything else is a fault of the program around it and raises KeyError.
-MOVES: dict[tuple[ExchangePhase, ExchangeEvent], ExchangePhase] = {
-    (ExchangePhase.WAITING, ExchangeEvent.CONNECTED): ExchangePhase.STARTING,
-    (ExchangePhase.STARTING, ExchangeEvent.SENT): ExchangePhase.STARTING,
-    (ExchangePhase.STARTING, ExchangeEvent.ANSWERED): ExchangePhase.READY,
-    (ExchangePhase.STARTING, ExchangeEvent.CLOSED): ExchangePhase.WAITING,
-    (ExchangePhase.READY, ExchangeEvent.SENT): ExchangePhase.AWAITING,
-    (ExchangePhase.READY, ExchangeEvent.CLOSED): ExchangePhase.WAITING,
-    (ExchangePhase.AWAITING, ExchangeEvent.ANSWERED): ExchangePhase.READY,
-    (ExchangePhase.AWAITING, ExchangeEvent.OVERDUE): ExchangePhase.READY,
-    (ExchangePhase.AWAITING, ExchangeEvent.CLOSED): ExchangePhase.WAITING,
-}
-
-
 class Exchange:
-    """One PX4 after the other. ``now_us`` is the machine's time, ``time_us`` the vehicle's and PX4's."""
+    """With one PX4, from its connecting to its going. ``now_us`` is the machine's time, ``time_us`` the vehicle's and
+    PX4's.
+    """
 
-    def __init__(self) -> None:
-        self.phase = ExchangePhase.WAITING
+    def __init__(self, now_us: int) -> None:
+        """PX4 has connected: the vehicle that it gets must be a new one, with its clock at zero."""
+        self.phase = ExchangePhase.STARTING
         self.notices: list[str] = []
         """Sentences for the person at the terminal; whoever shows them clears the list."""
-        self._forget()
-
-    def _forget(self) -> None:
         self.motor_fractions: tuple[float, ...] = MOTORS_STOPPED
-        """PX4's last word, zero before its first and after it has gone."""
+        """PX4's last word, zero before its first."""
         self.overdue_answers = 0
         self._sent_time_us = 0
-        self._sent_at_us = 0
-        self._connected_at_us = 0
-        self._is_starting_explained = False
-
-    def connected(self, now_us: int) -> None:
-        """PX4 has connected: the vehicle that it gets must be a new one, with its clock at zero."""
-        self._move(ExchangeEvent.CONNECTED)
-        self._forget()
-        self._connected_at_us = now_us
         self._sent_at_us = now_us - STARTING_PERIOD_US
-
-    def closed(self) -> None:
-        """The connection has ended; PX4 does not come back to it, only a new PX4 does."""
-        self._move(ExchangeEvent.CLOSED)
-        self._forget()
+        self._connected_at_us = now_us
+        self._is_starting_explained = False
 
     def next_sample_at_us(self) -> int | None:
         """The machine's time from which the next sample may go out; None while an answer is awaited."""
@@ -91,7 +55,8 @@ class Exchange:
 
     def sent(self, time_us: int, now_us: int) -> None:
         """Note that the sample of the vehicle's `time_us` was sent at the clock's `now_us`."""
-        self._move(ExchangeEvent.SENT)
+        if self.phase is ExchangePhase.READY:
+            self.phase = ExchangePhase.AWAITING
         self._sent_time_us = time_us
         self._sent_at_us = now_us
 
@@ -104,15 +69,15 @@ class Exchange:
         self.motor_fractions = controls.motor_fractions if controls.armed else MOTORS_STOPPED
         if self.phase is ExchangePhase.STARTING:
             self.notices.append(f"{FIRST_ANSWER_WORDS}: lockstep from {1e-6 * controls.time_us:.3f} s on.")
-            self._move(ExchangeEvent.ANSWERED)
+            self.phase = ExchangePhase.READY
         elif self.phase is ExchangePhase.AWAITING and controls.time_us == self._sent_time_us:
-            self._move(ExchangeEvent.ANSWERED)
+            self.phase = ExchangePhase.READY
         # Any other is one to a sample before the last: sent while booting, or given up already.
 
     def look_at_clock(self, now_us: int) -> None:
         """Give up an answer that is overdue, and say when PX4 does not begin to answer at all."""
         if self.phase is ExchangePhase.AWAITING and now_us - self._sent_at_us >= ANSWER_TIMEOUT_US:
-            self._move(ExchangeEvent.OVERDUE)
+            self.phase = ExchangePhase.READY
             if self.overdue_answers == 0:
                 self.notices.append(f"PX4 has not answered for {1e-6 * ANSWER_TIMEOUT_US:.0f} s; waiting for it.")
             self.overdue_answers += 1
@@ -123,6 +88,3 @@ class Exchange:
                 f"PX4 has sent no motor commands for {1e-6 * STARTING_TIMEOUT_US:.0f} s after connecting: "
                 "look at its console, and whether its airframe is a multicopter with PWM_MAIN_FUNC1..4 set."
             )
-
-    def _move(self, event: ExchangeEvent) -> None:
-        self.phase = MOVES[self.phase, event]

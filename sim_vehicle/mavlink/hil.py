@@ -18,7 +18,6 @@ from sim_vehicle.mavlink.encode import (
     AIR_FIELDS,
     INERTIAL_FIELDS,
     MAGNETIC_FIELDS,
-    Encoder,
     Message,
     air_fields,
     diagonal_covariance,
@@ -27,7 +26,7 @@ from sim_vehicle.mavlink.encode import (
 from sim_vehicle.mavlink.streams import aiding
 
 # PX4 reads neither of them.
-_SIMULATOR = Identity(1, 51)
+SIMULATOR = Identity(1, 51)
 
 _ARMED_FLAG = 0x80
 _LOCKSTEP_FLAG = 0x1
@@ -40,22 +39,16 @@ _NO_COURSE = 65_535
 _LEAST_SPEED_FOR_COURSE_M_S = 0.1
 
 
-class HilEncoder:
-    """Packets to PX4 in one sequence of numbers."""
-
-    def __init__(self) -> None:
-        self._encoder = Encoder(_SIMULATOR)
-
-    def packet(self, message: ToPx4) -> bytes:
-        """The message as a MAVLink 2 packet."""
-        return self._encoder.packet(_FILLED[type(message)](message))
+def filled(message: ToPx4) -> Message:
+    """What the message is on the wire."""
+    return _FILLED[type(message)](message)
 
 
 class HilDecoder:
     """Finds PX4's answers in its stream, which TCP may have cut anywhere."""
 
     def __init__(self) -> None:
-        self._decoder = Decoder(_SIMULATOR, (dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS,))
+        self._decoder = Decoder(SIMULATOR, (dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS,))
 
     def push(self, data: bytes) -> list[ActuatorControls]:
         """The answers completed by ``data``; PX4's greeting (HEARTBEAT, COMMAND_LONG) is dropped."""

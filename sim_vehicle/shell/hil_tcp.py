@@ -8,7 +8,8 @@ from pathlib import Path
 
 from sim_vehicle.hil.exchange import Exchange, ExchangePhase
 from sim_vehicle.hil.vehicle import HilVehicle
-from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
+from sim_vehicle.mavlink.encode import Encoder
+from sim_vehicle.mavlink.hil import SIMULATOR, HilDecoder, filled
 from sim_vehicle.shell.ports import bound_socket
 from sim_vehicle.shell.realtime import RealtimePace
 from sim_vehicle.shell.truth_file import save_truth
@@ -57,15 +58,14 @@ class _Session:
         self._tell = tell
         self._speed = speed
         self._pace = RealtimePace(vehicle.time_boot_us, speed)
-        self._exchange = Exchange()
-        self._encoder, self._decoder = HilEncoder(), HilDecoder()
+        self._exchange = Exchange(_now_us())
+        self._encoder, self._decoder = Encoder(SIMULATOR), HilDecoder()
         self._lockstep_from: tuple[int, int] | None = None
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Exchange samples and motor commands until PX4 goes or ``stop()``."""
         exchange = self._exchange
         self._tell("PX4 has connected.")
-        exchange.connected(_now_us())
         while not stop():
             now_us = _now_us()
             exchange.look_at_clock(now_us)
@@ -83,7 +83,6 @@ class _Session:
     def end(self, truth_path: Path | None) -> None:
         """Write the truth and say how it went."""
         now_us, time_us = _now_us(), self._vehicle.time_boot_us
-        self._exchange.closed()
         if self._lockstep_from is not None:
             wall_s, simulated_s = ((a - b) / 1e6 for a, b in zip((now_us, time_us), self._lockstep_from, strict=True))
             self._tell(f"PX4's flight ends after {simulated_s:.1f} s, flown in {wall_s:.1f} s.")
@@ -109,7 +108,7 @@ class _Session:
         messages = vehicle.step(exchange.motor_fractions)
         # PX4 that has gone is seen at the next receive.
         try:
-            self._link.sendall(b"".join([self._encoder.packet(message) for message in messages]))
+            self._link.sendall(b"".join([self._encoder.packet(filled(message)) for message in messages]))
         except ConnectionError:
             return 0
         exchange.sent(vehicle.time_boot_us, now_us)

@@ -8,13 +8,14 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, MotionCapture
-from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
+from sim_vehicle.mavlink.encode import Encoder
+from sim_vehicle.mavlink.hil import SIMULATOR, HilDecoder, filled
 
 ZURICH = Place(47.397742, 8.545594, 488.123)
 
 
 def on_the_wire(message) -> dialect.MAVLink_message:
-    return dialect.MAVLink(None).decode(bytearray(HilEncoder().packet(message)))
+    return dialect.MAVLink(None).decode(bytearray(Encoder(SIMULATOR).packet(filled(message))))
 
 
 def controls_packet(controls: list[float], mode: int, flags: int, time_us: int = 4_000) -> bytes:

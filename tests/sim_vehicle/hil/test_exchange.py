@@ -19,9 +19,7 @@ def answer(time_us: int, armed: bool = True, is_lockstep: bool = True) -> Actuat
 
 
 def starting() -> Exchange:
-    exchange = Exchange()
-    exchange.connected(0)
-    return exchange
+    return Exchange(0)
 
 
 def in_lockstep() -> Exchange:
