@@ -5,7 +5,7 @@ import numpy as np
 from sim_vehicle.airframe import MOST_ROTORS
 from sim_vehicle.physics.inertia import times
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import Constants, Gains, PlantState
+from sim_vehicle.physics.layout import Constants, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.quantities import Floats
 
@@ -13,7 +13,7 @@ ATTITUDE_LOOP_HZ = 150
 
 
 @njit
-def attitude_control(state: PlantState, constants: Constants, yaw_rate_rad_s: float, gains: Gains) -> None:
+def attitude_control(state: PlantState, constants: Constants, yaw_rate_rad_s: float) -> None:
     """Set the moment tau of ``state``: tau = -k_R e_R - k_W e_W + W x J W + J' W (eq. 5).
 
     e_R = (R_d^T R - R^T R_d)^vee / 2 and e_W = W - R^T R_d W_d (eq. 4), where the asked rate W_d is the
@@ -33,19 +33,19 @@ def attitude_control(state: PlantState, constants: Constants, yaw_rate_rad_s: fl
     for i in range(3):
         asked_rate = product[2, i] * yaw_rate_rad_s
         state.moment_frd_n_m[i] = (
-            -gains.k_r[i] * 0.5 * error[i] - gains.k_omega[i] * (rates[i] - asked_rate) + carried[i]
+            -constants.k_r[i] * 0.5 * error[i] - constants.k_omega[i] * (rates[i] - asked_rate) + carried[i]
         )
 
 
 @njit
-def rate_control(state: PlantState, constants: Constants, asked_frd_rad_s: Floats, gains: Gains) -> None:
+def rate_control(state: PlantState, constants: Constants, asked_frd_rad_s: Floats) -> None:
     """Set the moment of ``state`` for asked body rates: eq. 5 without its e_R."""
     rates = np.empty(3)
     for i in range(3):
         rates[i] = state.body[10 + i] + constants.gyroscope_bias_frd_rad_s[i]
     carried = _carried(state, rates)
     for i in range(3):
-        state.moment_frd_n_m[i] = -gains.k_omega[i] * (rates[i] - asked_frd_rad_s[i]) + carried[i]
+        state.moment_frd_n_m[i] = -constants.k_omega[i] * (rates[i] - asked_frd_rad_s[i]) + carried[i]
 
 
 @njit
@@ -55,12 +55,6 @@ def _carried(state: PlantState, rates: Floats) -> Floats:
     x, y, z = times(state.inertia, p, q, r_z)
     fx, fy, fz = times(state.inertia_rate, p, q, r_z)
     return np.array([q * z - r_z * y + fx, r_z * x - p * z + fy, p * y - q * x + fz])
-
-
-@njit
-def take_thrust(state: PlantState, constants: Constants, thrust: float) -> None:
-    """The collective thrust f as it is asked for, a fraction of all that the motors have."""
-    state.collective_n = thrust * constants.all_motors_max_n
 
 
 @njit

@@ -6,7 +6,7 @@ import numpy as np
 
 from sim_vehicle.airframe import THRUST_MIN
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
+from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
 from sim_vehicle.quantities import Floats, Vector3
 
@@ -23,7 +23,7 @@ ASK_POSITION, ASK_VELOCITY, ASK_ACCELERATION = range(3)
 
 
 @njit
-def position_control(state: PlantState, mass_kg: float, most_n: float, asked: SetpointRows, gains: Gains) -> None:
+def position_control(state: PlantState, asked: SetpointRows, constants: Constants) -> None:
     """Set thrust f and attitude R_d of ``state`` from what is asked (NED, SI).
 
     The D acts on the measured slope only: the paper's d/dt e_v would kick at every new setpoint.
@@ -32,13 +32,13 @@ def position_control(state: PlantState, mass_kg: float, most_n: float, asked: Se
     step_s = 1.0 / POSITION_LOOP_HZ
     acceleration = np.empty(3)
     for axis in range(3):
-        acceleration[axis] = _axis_acceleration(axis, state, asked, gains)
+        acceleration[axis] = _axis_acceleration(axis, state, asked, constants)
     if asked.yaw[1]:
         state.yaw_setpoint_rad = asked.yaw[0]
     else:
         state.yaw_setpoint_rad += asked.yaw[2] * step_s
-    _thrust(acceleration, gains.tilt_max_rad, most_n / mass_kg)
-    state.collective_n = mass_kg * math.sqrt(acceleration @ acceleration)
+    _thrust(acceleration, constants.tilt_max_rad, constants.all_motors_max_n / constants.mass_kg)
+    state.collective_n = constants.mass_kg * math.sqrt(acceleration @ acceleration)
     _attitude(state, acceleration)
 
 

@@ -13,13 +13,7 @@ import numpy as np
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.estimator import strapdown
 from sim_vehicle.estimator.filter import NavigationFilter
-from sim_vehicle.estimator.samples import (
-    NO_QUALITY,
-    CaptureSample,
-    FlowSample,
-    RangeSample,
-    Sample,
-)
+from sim_vehicle.estimator.samples import NO_QUALITY, CaptureSample, FlowSample, RangeSample, Sample
 from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, DownwardSensors
 from sim_vehicle.estimator.strapdown import FORCE, RATES
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
@@ -39,14 +33,10 @@ class RestDetector:
     """Collects windows in which nothing moved while the motors did not fly."""
 
     def __init__(self, interval_us: int) -> None:
-        self._window = max(round(1e6 * WINDOW_S / interval_us), 1)
+        self.window = max(round(1e6 * WINDOW_S / interval_us), 1)
+        """How many samples a mean is made of."""
         self._count = 0
         self._sum = np.zeros(3)
-
-    @property
-    def samples(self) -> int:
-        """How many samples a mean is made of."""
-        return self._window
 
     def update(self, sample: Floats, flies: bool) -> Floats | None:
         """Take one inertial sample; the mean rates of the window that it completes, if any."""
@@ -62,10 +52,10 @@ class RestDetector:
             self._sum[:] = 0.0
         self._sum += sample[RATES : RATES + 3]
         self._count += 1
-        if self._count < self._window:
+        if self._count < self.window:
             return None
         self._count = 0
-        return self._sum / self._window
+        return self._sum / self.window
 
 
 # So that the sensors' noise does not change with what the rest of the simulation draws.
@@ -240,6 +230,6 @@ class OnboardEstimator:
         mean_rates = self._rest.update(sample, flies)
         if mean_rates is None:
             return
-        noise_rad_s = self._airframe.imu.gyroscope_noise_rad_s / math.sqrt(self._rest.samples)
+        noise_rad_s = self._airframe.imu.gyroscope_noise_rad_s / math.sqrt(self._rest.window)
         self.filter.fuse_rest(mean_rates, STILL_SPEED_M_S, noise_rad_s)
         self._fused_us[_Aided.VELOCITY] = horizon_us

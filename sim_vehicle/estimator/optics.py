@@ -6,8 +6,9 @@ import numpy as np
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.physics.touching.meeting import depth_in, within
 from sim_vehicle.quantities import Floats
-from sim_vehicle.world import FACE_ACROSS, FACE_ALONG, FACE_HALF_HEIGHT, FACE_HALF_WIDTH, FACE_NORMAL, FACE_POINT
+from sim_vehicle.world import FACE_NORMAL
 
 # Rows of what the camera holds: flow and turns integrated since its last sample, then how it moves now.
 FLOW_X, FLOW_Y, TURN_X, TURN_Y, TURN_Z, RATE_X, RATE_Y, FASTEST, DISTANCE = range(9)
@@ -17,24 +18,18 @@ CAMERA_ROWS = 9
 @njit
 def distance_below(body: Floats, rotation: Floats, faces: Floats) -> float:
     """Metres from the body's centre along its down axis to the first face seen from its front; inf if none."""
-    nearest = math.inf
+    nearest, seen = math.inf, np.empty(3)
     for face in range(faces.shape[0]):
         towards = 0.0
-        gap = 0.0
         for i in range(3):
-            normal = faces[face, FACE_NORMAL + i]
-            towards += rotation[i, 2] * normal
-            gap += (body[i] - faces[face, FACE_POINT + i]) * normal
+            towards += rotation[i, 2] * faces[face, FACE_NORMAL + i]
+        gap = -depth_in(face, body, faces)
         if towards >= -1e-9 or gap < 0.0:
             continue
         distance = -gap / towards
-        across, along = 0.0, 0.0
         for i in range(3):
-            offset = body[i] + distance * rotation[i, 2] - faces[face, FACE_POINT + i]
-            across += offset * faces[face, FACE_ACROSS + i]
-            along += offset * faces[face, FACE_ALONG + i]
-        inside = abs(across) <= faces[face, FACE_HALF_WIDTH] and abs(along) <= faces[face, FACE_HALF_HEIGHT]
-        if inside and distance < nearest:
+            seen[i] = body[i] + distance * rotation[i, 2]
+        if distance < nearest and within(face, seen, faces, 0.0):
             nearest = distance
     return nearest
 

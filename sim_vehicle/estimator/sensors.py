@@ -8,7 +8,6 @@ import numpy as np
 
 from sim_vehicle.airframes.aiding import Aid, Compass, MotionCapture, OpticalFlow, RangeFinder, Sensors
 from sim_vehicle.estimator import optics
-from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.estimator.samples import (
     BEST_QUALITY,
     NO_QUALITY,
@@ -17,7 +16,7 @@ from sim_vehicle.estimator.samples import (
     HeadingSample,
     RangeSample,
 )
-from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 from sim_vehicle.quantities import Floats
 
 AidType = TypeVar("AidType", bound=Aid)
@@ -124,7 +123,7 @@ class CompassSensor(Sensor[Compass]):
         """The sample if one is due."""
         if not self.is_due(time_us):
             return None
-        return HeadingSample(time_us, true_yaw(body) + self._rng.gauss(0, self._spec.noise_rad))
+        return HeadingSample(time_us, yaw_of(body) + self._rng.gauss(0, self._spec.noise_rad))
 
 
 class CaptureSensor(Sensor[MotionCapture]):
@@ -137,13 +136,7 @@ class CaptureSensor(Sensor[MotionCapture]):
         gauss, noise_m = self._rng.gauss, self._spec.noise_m
         x, y, z = body[0:3].tolist()
         position = (x + gauss(0, noise_m), y + gauss(0, noise_m), z + gauss(0, noise_m))
-        return CaptureSample(time_us, position, true_yaw(body) + gauss(0, self._spec.noise_rad))
-
-
-def true_yaw(body: Floats) -> float:
-    """Heading of the nose; math.pi wraps are left to who compares."""
-    w, x, y, z = body[6:10].tolist()
-    return yaw_of((w, x, y, z))
+        return CaptureSample(time_us, position, yaw_of(body) + gauss(0, self._spec.noise_rad))
 
 
 def wrapped(angle_rad: float) -> float:

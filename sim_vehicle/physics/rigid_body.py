@@ -6,7 +6,6 @@ from sim_vehicle.physics.layout import (
     BODY_SIZE,
     GRAVITY_M_S2,
     Constants,
-    ContactSprings,
     Disturbance,
     PlantState,
     Scratch,
@@ -29,7 +28,6 @@ def derivative(
     touches: bool,
     constants: Constants,
     disturbance: Disturbance,
-    contact: ContactSprings,
     faces: Floats,
     rotation: Floats,
     normal_forces: Floats,
@@ -51,7 +49,7 @@ def derivative(
         add_push(rotation, disturbance, scratch)
     scratch.contact_ned[:] = 0.0
     if touches:
-        contact_wrench(body, rotation, behind, near, contact, faces, scratch, normal_forces)
+        contact_wrench(body, rotation, behind, near, constants, faces, scratch, normal_forces)
 
     p, q, r = body[10], body[11], body[12]
     for i in range(3):
@@ -113,7 +111,6 @@ def runge_kutta_step(
     step_s: float,
     constants: Constants,
     disturbance: Disturbance,
-    contact: ContactSprings,
     faces: Floats,
     moving: Ints,
     forces: Floats,
@@ -149,7 +146,6 @@ def runge_kutta_step(
             touches,
             constants,
             disturbance,
-            contact,
             faces,
             scratch.rotation if stage == 0 else scratch.turned,
             forces[0] if stage == 0 else forces[1],

@@ -2,13 +2,7 @@
 
 import math
 
-from sim_vehicle.control.attitude import (
-    ATTITUDE_LOOP_HZ,
-    allocate_motors,
-    attitude_control,
-    rate_control,
-    take_thrust,
-)
+from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control, rate_control
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
 from sim_vehicle.physics.estimate import update_estimate, update_slope
 from sim_vehicle.physics.imu import add_raw_sample
@@ -119,19 +113,19 @@ def run_loops(state: PlantState, asked: SetpointRows, constants: Constants) -> N
         rest_loops(state)
     elif time_us * POSITION_LOOP_HZ >= state.position_loops * 1_000_000:
         state.position_loops = time_us * POSITION_LOOP_HZ // 1_000_000 + 1
-        position_control(state, constants.mass_kg, constants.all_motors_max_n, asked, constants)
+        position_control(state, asked, constants)
     if time_us * ATTITUDE_LOOP_HZ >= state.attitude_loops * 1_000_000:
         state.attitude_loops = time_us * ATTITUDE_LOOP_HZ // 1_000_000 + 1
         if asked.level != ASKED_TRAJECTORY:
-            take_thrust(state, constants, asked.thrust)
+            state.collective_n = asked.thrust * constants.all_motors_max_n
         if asked.level == ASKED_ATTITUDE:
             for row in range(3):
                 for column in range(3):
                     state.attitude_setpoint[row, column] = asked.attitude[row, column]
         if asked.level == ASKED_RATES:
-            rate_control(state, constants, asked.rates_frd_rad_s, constants)
+            rate_control(state, constants, asked.rates_frd_rad_s)
         else:
-            attitude_control(state, constants, asked.yaw[2], constants)
+            attitude_control(state, constants, asked.yaw[2])
         allocate_motors(state, constants)
 
 
@@ -166,16 +160,16 @@ def move_body(
     scratch: Scratch,
 ) -> None:
     """Move the body through one raw interval, in fine steps while something stiff may touch."""
-    body, contact = state.body, constants
+    body = state.body
     raw_s = 1e-6 * constants.raw_interval_us
-    touches = awake and find_near(body, contact, faces, near, scratch)
+    touches = awake and find_near(body, constants, faces, near, scratch)
     steps, travel_m = 1, 0.0
     if touches:
         matrix_from_quaternion(body, scratch.rotation)
         speed = math.sqrt(body[3] * body[3] + body[4] * body[4] + body[5] * body[5])
-        tip_speed = contact.reach_m * (abs(body[10]) + abs(body[11]) + abs(body[12]))
+        tip_speed = constants.reach_m * (abs(body[10]) + abs(body[11]) + abs(body[12]))
         travel_m = (speed + tip_speed + fastest_m_s(moving, faces)) * raw_s
-        if find_close(body, behind, near, travel_m + TOUCH_MARGIN_M, contact, faces, scratch):
+        if find_close(body, behind, near, travel_m + TOUCH_MARGIN_M, constants, faces, scratch):
             steps = fine_steps
     step_s = raw_s / steps
     for step in range(steps):
@@ -183,14 +177,12 @@ def move_body(
             for point in range(POINTS):
                 scratch.share[point] = state.share[point]
                 scratch.deepest_m[point] = state.depth_m[point] + TRAVEL_FACTOR * travel_m / steps + NEWLY_TOUCHED_M
-        relax_arms(state, step_s, contact, scratch.relaxed_m)
-        runge_kutta_step(
-            state, behind, near, touches, step_s, constants, disturbance, contact, faces, moving, forces, scratch
-        )
-        settle_arms(state, behind, near, touches, step_s, contact, faces, scratch)
+        relax_arms(state, step_s, constants, scratch.relaxed_m)
+        runge_kutta_step(state, behind, near, touches, step_s, constants, disturbance, faces, moving, forces, scratch)
+        settle_arms(state, behind, near, touches, step_s, constants, faces, scratch)
         if touches:
             mass_kg = constants.mass_kg + disturbance.carried_kg
-            note_contact(state, 1e6 * step * step_s, step_s, near, forces[0], contact, faces, mass_kg, scratch)
+            note_contact(state, 1e6 * step * step_s, step_s, near, forces[0], constants, faces, mass_kg, scratch)
 
 
 @inlined

@@ -72,7 +72,7 @@ def test_the_integrator_is_of_fourth_order() -> None:
         forces = np.zeros((2, POINTS, count))
         for _ in range(steps):
             runge_kutta_step(
-                state, behind, near, False, 0.5 / steps, constants, calm((0.0, 0.0, 0.0)), constants,
+                state, behind, near, False, 0.5 / steps, constants, calm((0.0, 0.0, 0.0)),
                 world.faces, np.zeros(0, np.int64), forces, new_record(Scratch),
             )  # fmt: skip
         return np.array(state.body)

@@ -82,7 +82,7 @@ def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
     state.body[10:13] = rates = np.array([2.0, -3.0, 5.0])
     state.inertia[:], state.inertia_rate[:] = [0.0031, 0.0030, 0.0049, 0.0002], [-0.01, -0.02, -0.03, 0.004]
 
-    attitude_control(state, constants, 0.0, constants)
+    attitude_control(state, constants, 0.0)
 
     def full(entries: np.ndarray) -> np.ndarray:
         xx, yy, zz, xy = entries
