@@ -14,7 +14,6 @@ from sim_vehicle.autopilot.messages import (
     CommandAck,
     FlightInput,
     PositionTarget,
-    Result,
     Severity,
     StickInput,
     Texts,
@@ -44,12 +43,7 @@ class LandedState(IntEnum):
 class Autopilot:
     """Commands, setpoints and sticks in; modes, a demand for the control, texts and acks out."""
 
-    def __init__(
-        self,
-        hover_thrust_fraction: float,
-        first: Estimate,
-        parameters: Parameters,
-    ) -> None:
+    def __init__(self, hover_thrust_fraction: float, first: Estimate, parameters: Parameters) -> None:
         self.parameters = parameters
         self.origin = origin_of(parameters)
         self.missions = MissionStore()
@@ -147,15 +141,8 @@ class Autopilot:
         return acks
 
     def _execute(self, command: Command) -> CommandAck | None:
-        result = commands.execute(command, self)
+        result = commands.execute(command, self.commander)
         return None if result is None else commands.answer(command, result)
-
-    def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
-        """Change the mode as a command asks."""
-        result = self.commander.request_mode(mode)
-        if result is Result.ACCEPTED and says_so is not None:
-            self.texts.say(Severity.INFO, says_so)
-        return result
 
     def _notice_mode(self) -> None:
         previous, self._flown = self._flown, self.modes.flown
@@ -200,7 +187,7 @@ class Autopilot:
         """In the interval after the items that gave them: what was reached until then has been told by now."""
         given, self.navigator.mission.commands = self.navigator.mission.commands, []
         for item in given:
-            commands.execute(flight_commands.from_mission(item), self)
+            commands.execute(flight_commands.from_mission(item), self.commander)
 
     def _demand_of_mode(self, step_s: float) -> Setpoint | None:
         mode = self.modes.flown
@@ -236,18 +223,10 @@ class Autopilot:
         return self.navigator.wants_takeoff
 
     def _detect_landing(self) -> None:
-        estimate, was_landed, demand = self._estimate, self.detector.landed, self._demand
+        was_landed, demand = self.detector.landed, self._demand
+        asked_down_m_s = demand.velocity_ned_m_s[2] if isinstance(demand, TrajectorySetpoint) else None
         controls_climb = demand is None or isinstance(demand, TrajectorySetpoint)
-        self.detector.update(
-            self._now_us,
-            self.arming.armed,
-            estimate.velocity_ned_m_s,
-            estimate.angular_velocity_frd_rad_s,
-            estimate.specific_force_frd_m_s2,
-            estimate.thrust_fraction,
-            demand.velocity_ned_m_s[2] if isinstance(demand, TrajectorySetpoint) else None,
-            controls_climb,
-        )
+        self.detector.update(self._estimate, self.arming.armed, asked_down_m_s, controls_climb)
         if not self.arming.armed or was_landed == self.detector.landed:
             return
         if was_landed:

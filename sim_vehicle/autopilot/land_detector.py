@@ -7,6 +7,7 @@ It has no sensor for the ground, so a descent that stalls on an obstacle looks l
 import math
 
 from sim_vehicle.airframe import NO_THRUST_SHARE
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Vector3
 
@@ -67,20 +68,13 @@ class LandDetector:
         self.ground_contact = self.maybe_landed = self.landed = False
 
     def update(
-        self,
-        now_us: int,
-        armed: bool,
-        velocity_ned_m_s: Vector3,
-        angular_velocity_frd_rad_s: Vector3,
-        specific_force_frd_m_s2: Vector3,
-        thrust_fraction: float,
-        asked_down_m_s: float | None,
-        controls_climb: bool = True,
+        self, estimate: Estimate, armed: bool, asked_down_m_s: float | None, controls_climb: bool = True
     ) -> None:
         """Take one estimate; ``asked_down_m_s`` is the mode's own demand, None where it has none.
 
         ``controls_climb`` off: attitude or rates are asked for, so no descent can be; thrust alone must be low.
         """
+        now_us, thrust_fraction = estimate.time_boot_us, estimate.thrust_fraction
         if not armed:
             for stage in (self._contact, self._maybe, self._landed):
                 stage.update(True, now_us)
@@ -90,8 +84,8 @@ class LandDetector:
         on_ground = self.maybe_landed or self.landed
         descent_m_s = DESCENT_FACTOR * self._parameters["LNDMC_Z_VEL_MAX"]
         descends = asked_down_m_s is not None and asked_down_m_s >= descent_m_s
-        still = self._is_still(velocity_ned_m_s)
-        self._free_fall.update(math.hypot(*specific_force_frd_m_s2) < FREE_FALL_M_S2, now_us)
+        still = self._is_still(estimate.velocity_ned_m_s)
+        self._free_fall.update(math.hypot(*estimate.specific_force_frd_m_s2) < FREE_FALL_M_S2, now_us)
         gives_way = thrust_fraction <= self._thrust(LOW_THRUST_SHARE)
         gives_way = gives_way and (descends or on_ground or not controls_climb)
         none = self._thrust(NO_THRUST_SHARE) if controls_climb else self._parameters["MPC_MANTHR_MIN"] + 0.01
@@ -100,7 +94,7 @@ class LandDetector:
             thrust_fraction <= none
             and self.ground_contact
             and not self._free_fall.state
-            and not self._rotates(angular_velocity_frd_rad_s),
+            and not self._rotates(estimate.angular_velocity_frd_rad_s),
             now_us,
         )
         self.landed = self._landed.update(self.maybe_landed, now_us)

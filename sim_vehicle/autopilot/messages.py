@@ -112,8 +112,7 @@ class AttitudeTarget:
     """Along -z of the body, a fraction of the greatest; None where the mask leaves it out."""
 
 
-@dataclass(frozen=True, slots=True)
-class StickInput:
+class StickInput(NamedTuple):
     """Sticks from -1 to 1: right, forward, up and right are positive."""
 
     roll: float

@@ -56,16 +56,7 @@ NEEDS: dict[Mode, frozenset[Need]] = {
 }
 
 # mode_req_prevent_arming: nobody can arm in these.
-NOT_ARMABLE = frozenset(
-    {
-        Mode.LAND,
-        Mode.RETURN,
-        Mode.DESCEND,
-        Mode.FOLLOW_TARGET,
-        Mode.ORBIT,
-        Mode.TERMINATION,
-    }
-)
+NOT_ARMABLE = frozenset({Mode.LAND, Mode.RETURN, Mode.DESCEND, Mode.FOLLOW_TARGET, Mode.ORBIT, Mode.TERMINATION})
 # A vehicle that cannot be armed in its mode, or would take off again at once, goes back after disarming to
 # the mode before (UserModeIntention::change). Out of termination nothing leads.
 NOT_KEPT_AFTER_DISARMING = (NOT_ARMABLE - {Mode.TERMINATION}) | {Mode.TAKEOFF}
@@ -107,28 +98,20 @@ class Transition:
     target: Mode | None
 
 
-def _request(target: Mode, guard: ModeCondition = ModeCondition.CAN_RUN) -> Transition:
-    return Transition(None, ModeEvent.REQUEST, guard, target)
-
-
 _FLOWN_WITHOUT_STICKS = tuple(mode for mode in Mode if Need.STICKS not in NEEDS[mode] and mode is not Mode.TERMINATION)
 
-# Disarmed, PX4 lets every mode be chosen; armed it wants what the mode needs. LAND may always be chosen. Nothing
-# leads out of TERMINATION: `ModeState` holds it. What a failsafe flies instead of the mode that is meant is
+# Disarmed, PX4 lets every mode be chosen; armed it wants what the mode needs. LAND may always be chosen, DESCEND never.
+# Nothing leads out of TERMINATION: `ModeState` holds it. What a failsafe flies instead of the mode that is meant is
 # decided in `failsafe` and never changes what is meant, but for a pilot who takes over.
+_ALWAYS_CHOSEN = (Mode.LAND, Mode.TERMINATION)
 TRANSITIONS: tuple[Transition, ...] = (
-    _request(Mode.ALTCTL),
-    _request(Mode.POSCTL),
-    _request(Mode.STABILIZED),
-    _request(Mode.MISSION),
-    _request(Mode.LOITER),
-    _request(Mode.RETURN),
-    _request(Mode.TAKEOFF),
-    _request(Mode.LAND, ModeCondition.ALWAYS),
-    _request(Mode.FOLLOW_TARGET),
-    _request(Mode.ORBIT),
-    _request(Mode.OFFBOARD),
-    _request(Mode.TERMINATION, ModeCondition.ALWAYS),
+    *(
+        Transition(
+            None, ModeEvent.REQUEST, ModeCondition.ALWAYS if mode in _ALWAYS_CHOSEN else ModeCondition.CAN_RUN, mode
+        )
+        for mode in NEEDS
+        if mode is not Mode.DESCEND
+    ),
     Transition((Mode.TAKEOFF,), ModeEvent.TAKEOFF_REACHED, ModeCondition.ARMED, Mode.LOITER),
     Transition((Mode.MISSION,), ModeEvent.MISSION_FINISHED, ModeCondition.ARMED, Mode.LOITER),
     Transition(_FLOWN_WITHOUT_STICKS, ModeEvent.STICKS, ModeCondition.ARMED, Mode.POSCTL),

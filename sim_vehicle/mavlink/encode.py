@@ -20,7 +20,6 @@ from sim_vehicle.hil.messages import Air
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.quantities import Axis3
 
 # One of pymavlink's, which carry no types, or a `framing.Packed`; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any
@@ -186,20 +185,14 @@ def position_target_local_ned(state: Telemetry) -> Message | None:
         return dialect.MAVLink_position_target_local_ned_message(
             boot_ms(state.published), dialect.MAV_FRAME_LOCAL_NED, 0xDFF, *([NAN] * 11)
         )
-    position, velocity = applied.position_ned_m, applied.velocity_ned_m_s
-    acceleration = applied.acceleration_ned_m_s2
-    values = (*position, *velocity, *acceleration)
+    values = (*applied.position_ned_m, *applied.velocity_ned_m_s, *applied.acceleration_ned_m_s2)
     mask = sum(1 << bit for bit, value in enumerate(values) if value is None)
     mask |= (applied.yaw_rad is None) << 10 | (applied.yaw_rate_rad_s is None) << 11
     return dialect.MAVLink_position_target_local_ned_message(
         boot_ms(state.published),
         dialect.MAV_FRAME_LOCAL_NED,
         mask,
-        *_filled(position),
-        *_filled(velocity),
-        *_filled(acceleration),
-        _or_nan(applied.yaw_rad),
-        _or_nan(applied.yaw_rate_rad_s),
+        *(NAN if value is None else value for value in (*values, applied.yaw_rad, applied.yaw_rate_rad_s)),
     )
 
 
@@ -232,11 +225,3 @@ def diagonal_covariance(first: float, second: float) -> tuple[float, ...]:
     triangle[0] = triangle[6] = triangle[11] = first
     triangle[15] = triangle[18] = triangle[20] = second
     return tuple(triangle)
-
-
-def _filled(vector: Axis3) -> tuple[float, float, float]:
-    return _or_nan(vector[0]), _or_nan(vector[1]), _or_nan(vector[2])
-
-
-def _or_nan(value: float | None) -> float:
-    return NAN if value is None else value

@@ -46,12 +46,9 @@ HIL_SENSOR = Layout(dialect.MAVLink_hil_sensor_message)
 
 @cache
 def flattened(kind: Any) -> tuple[Layout, Callable[[Any], tuple[Any, ...]]] | None:
-    """How a message of pymavlink's becomes its payload; None for one with texts or arrays, and one of a single field.
-
-    And for one that packs itself, in another way than the dialect's.
-    """
-    names, is_theirs = kind.ordered_fieldnames, dialect.mavlink_map.get(kind.id) is kind
-    if not is_theirs or len(names) == 1 or "char" in kind.fieldtypes or any(kind.array_lengths):
+    """How a message of pymavlink's becomes its payload; None for texts, arrays and a single field."""
+    names = kind.ordered_fieldnames
+    if len(names) == 1 or "char" in kind.fieldtypes or any(kind.array_lengths):
         return None
     return Layout(kind), attrgetter(*names)
 

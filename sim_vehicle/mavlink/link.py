@@ -12,7 +12,7 @@ from sim_vehicle.mavlink.services.command_service import CommandService
 from sim_vehicle.mavlink.services.file_service import FileService
 from sim_vehicle.mavlink.services.mission_service import MissionService
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
-from sim_vehicle.mavlink.services.service import Board, BusyService, Channel, Handler, Service
+from sim_vehicle.mavlink.services.service import Board, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
 from sim_vehicle.mavlink.services.texts import TextLink
 from sim_vehicle.mavlink.signing import OPTIONAL
@@ -43,7 +43,6 @@ class Link:
         self.streams = Streams(board.telemetry, board.topics, self._encoder, self.kind, seed)
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
-        self._busy = tuple(service for service in self._services if isinstance(service, BusyService))
         self.handlers: dict[int, Handler] = {
             HEARTBEAT_ID: self._hear_heartbeat,
             4: self._answer_ping,
@@ -107,7 +106,7 @@ class Link:
         if self._texts.heard_us is not None:
             for message in self._texts.due(now_us):
                 self.send(message)
-        for service in self._busy:
+        for service in self._services:
             service.update(now_us)
         self.streams.update()
 

@@ -1,7 +1,9 @@
 """What the streams send: the state of the vehicle as its messages show it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.estimator.estimate import Estimate
@@ -51,7 +53,7 @@ class Telemetry:
     attitude_variance_rad2: float
     flow: FlowSample | None = None
     range: RangeSample | None = None
-    attitude_setpoint: Floats | None = None
+    attitude_setpoint: Floats = field(default_factory=lambda: np.eye(3))
     """The attitude control's R_d (3, 3), body to NED."""
     gps: HilGps | None = None
     air: Air | None = None
@@ -78,7 +80,5 @@ class Telemetry:
         return self.autopilot.parameters[name]
 
     def attitude_setpoint_wxyz(self) -> Quaternion:
-        """The attitude control's setpoint; level where there is none."""
-        if self.attitude_setpoint is None:
-            return 1.0, 0.0, 0.0, 0.0
+        """The attitude control's setpoint."""
         return quaternion_from_matrix(self.attitude_setpoint.tolist())

@@ -1,14 +1,11 @@
-"""Arming and disarming, by command and by itself, and what forbids arming beside what the mode needs.
+"""Arming and disarming, by command and by itself.
 
-Sources: PX4's Commander::arm, Commander::disarm, Commander::handleAutoDisarm and commander/HealthAndArmingChecks
-(rcAndDataLinkCheck, estimatorCheck, geofenceCheck, modeCheck).
+Sources: PX4's Commander::arm, Commander::disarm and Commander::handleAutoDisarm.
 """
 
 from enum import StrEnum
 
-from sim_vehicle.autopilot.commander.watching import GroundStation, Positioning
-from sim_vehicle.autopilot.messages import Result, Severity, StatusText
-from sim_vehicle.autopilot.navigator.navigator import Navigator
+from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.parameters.store import Parameters
 
 
@@ -73,24 +70,3 @@ class Arming:
             return None
         self.armed = False
         return Reason.LANDING
-
-
-# COM_ARM_WO_GPS: 0 refuses, 1 warns, 2 does not care.
-_NOT_WITHOUT_GPS = 0
-
-
-def preflight_problems(
-    parameters: Parameters,
-    ground_station: GroundStation,
-    navigator: Navigator,
-    positioning: Positioning,
-) -> list[StatusText]:
-    """What forbids arming, and what PX4 says about it when somebody tries; empty where nothing does."""
-    found = []
-    if ground_station.lost and parameters["NAV_DLL_ACT"] > 0:
-        found.append(StatusText(Severity.WARNING, "Preflight Fail: No connection to the GCS"))
-    if positioning.is_without_gps and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
-        found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
-    if navigator.fence.breached:
-        found.append(StatusText(Severity.CRITICAL, "Geofence: approaching or outside geofence"))
-    return found

@@ -1,11 +1,12 @@
 """Who is in command: the mode that is meant and the one that flies, arming, and what the failsafes make of it.
 
-Source: PX4's commander/Commander.cpp.
+Sources: PX4's commander/Commander.cpp and commander/HealthAndArmingChecks (rcAndDataLinkCheck, estimatorCheck,
+geofenceCheck, modeCheck).
 """
 
 from enum import IntEnum
 
-from sim_vehicle.autopilot.commander.arming import Arming, Reason, preflight_problems
+from sim_vehicle.autopilot.commander.arming import Arming, Reason
 from sim_vehicle.autopilot.commander.battery import Battery
 from sim_vehicle.autopilot.commander.failsafe import Failsafe
 from sim_vehicle.autopilot.commander.failsafe_table import FailsafeSituation
@@ -32,6 +33,8 @@ from sim_vehicle.parameters.store import Parameters
 PERIOD_US = 20_000
 # COM_RC_OVERRIDE: in which modes moved sticks take over.
 _OVERRIDES_AUTO, _OVERRIDES_OFFBOARD = 1, 2
+# COM_ARM_WO_GPS: 0 refuses, 1 warns, 2 does not care.
+_NOT_WITHOUT_GPS = 0
 
 
 class SystemStatus(IntEnum):
@@ -56,9 +59,9 @@ class Commander:
         self.ground_station = GroundStation(parameters)
         self.battery = Battery(parameters)
         self.positioning = Positioning(parameters)
-        self._texts = texts
-        self._parameters = parameters
-        self._navigator = navigator
+        self.texts = texts
+        self.parameters = parameters
+        self.navigator = navigator
         self._detector = detector
         self._now_us = 0
         self._judged_us = -PERIOD_US
@@ -67,12 +70,14 @@ class Commander:
 
     # --- requests --------------------------------------------------------------------------------------------
 
-    def request_mode(self, mode: Mode) -> Result:
-        """Change the mode as a command asks."""
+    def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
+        """Change the mode as a command asks; ``says_so`` is the text for a change that was accepted."""
         self._ever_requested = True
         if not self.modes.apply(ModeEvent.REQUEST, self._conditions, mode):
             return Result.TEMPORARILY_REJECTED
         self._judge()
+        if says_so is not None:
+            self.texts.say(Severity.INFO, says_so)
         return Result.ACCEPTED
 
     def arm(self, reason: Reason = Reason.COMMAND) -> Result:
@@ -80,14 +85,14 @@ class Commander:
         was_armed = self.arming.armed
         result = self.arming.arm(self._now_us, self.checks_pass)
         if result is not Result.ACCEPTED:
-            self._texts += self._problems
-            self._texts.say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
+            self.texts += self._problems
+            self.texts.say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
         elif not was_armed:
-            self._texts.say(Severity.INFO, f"Armed by {reason}")
+            self.texts.say(Severity.INFO, f"Armed by {reason}")
             self._sticks_lost_at_arming = self.sticks.sticks is None
-            self._navigator.view.armed = True
-            self._navigator.set_home_here()
-            self._navigator.enter(self.modes.flown)
+            self.navigator.view.armed = True
+            self.navigator.set_home_here()
+            self.navigator.enter(self.modes.flown)
             self._judge()
         return result
 
@@ -96,15 +101,15 @@ class Commander:
         was_armed = self.arming.armed
         result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced)
         if result is not Result.ACCEPTED:
-            self._texts.say(Severity.CRITICAL, "Disarming denied: not landed")
+            self.texts.say(Severity.CRITICAL, "Disarming denied: not landed")
         elif was_armed:
             self._disarmed(Reason.COMMAND)
         return result
 
     def _disarmed(self, reason: Reason) -> None:
-        self._texts.say(Severity.INFO, f"Disarmed by {reason}")
-        self._navigator.view.armed = False
-        self._navigator.disarmed()
+        self.texts.say(Severity.INFO, f"Disarmed by {reason}")
+        self.navigator.view.armed = False
+        self.navigator.disarmed()
         self.modes.apply(ModeEvent.DISARMED, self._conditions)
         self._judge()
 
@@ -124,16 +129,15 @@ class Commander:
         if self.arming.armed:
             self._disarm_by_itself()
         if now_us - self._judged_us >= PERIOD_US or setpoints_changed:
-            self._texts += self.ground_station.update(now_us)
+            self.texts += self.ground_station.update(now_us)
             self.positioning.update(now_us)
             self._judge()
 
     def _what_is_over(self) -> ModeEvent | None:
         """Commander::checkForMissionUpdate."""
-        progress = self._navigator.progress
         if self.modes.flown is Mode.MISSION:
-            return ModeEvent.MISSION_FINISHED if progress.finished else None
-        return ModeEvent.TAKEOFF_REACHED if self._navigator.takeoff_is_over else None
+            return ModeEvent.MISSION_FINISHED if self.navigator.missions.progress.finished else None
+        return ModeEvent.TAKEOFF_REACHED if self.navigator.takeoff_is_over else None
 
     def _obey_sticks(self) -> None:
         if self.sticks.sticks is None:
@@ -147,19 +151,19 @@ class Commander:
         if not self.sticks.moving or self.failsafe.acts or not self._sticks_override:
             return
         if self.modes.apply(ModeEvent.STICKS, self._conditions):
-            self._texts.say(Severity.INFO, "Pilot took over using sticks")
+            self.texts.say(Severity.INFO, "Pilot took over using sticks")
             self._judge()
 
     @property
     def _sticks_override(self) -> bool:
-        mode, mask = self.modes.flown, int(self._parameters["COM_RC_OVERRIDE"])
+        mode, mask = self.modes.flown, int(self.parameters["COM_RC_OVERRIDE"])
         if mode is Mode.OFFBOARD:
             return bool(mask & _OVERRIDES_OFFBOARD)
         return Need.STICKS not in NEEDS[mode] and bool(mask & _OVERRIDES_AUTO)
 
     def _disarm_by_itself(self) -> None:
         landed = self._detector.landed
-        if landed and self.arming.taken_off and self._navigator.mission_is_in_progress:
+        if landed and self.arming.taken_off and self.navigator.mission_is_in_progress:
             return
         reason = self.arming.disarm_by_itself(self._now_us, landed)
         if reason is not None:
@@ -168,15 +172,15 @@ class Commander:
     def _judge(self) -> None:
         """Let the failsafes say what flies."""
         self._judged_us = self._now_us
-        decision = self.failsafe.update(self._now_us, self._situation(), self._parameters)
+        decision = self.failsafe.update(self._now_us, self._situation(), self.parameters)
         self.modes.requested = False
         for text in decision.says:
-            self._texts.say(Severity.CRITICAL, text)
+            self.texts.say(Severity.CRITICAL, text)
         if decision.intended is not self.modes.intended:
             self.modes.mean(decision.intended)
         if decision.flown is not self.modes.flown:
             self.modes.flown = decision.flown
-            self._navigator.enter(decision.flown)
+            self.navigator.enter(decision.flown)
 
     def _situation(self) -> FailsafeSituation:
         back = self._flies_setpoints and (self.signal.is_back or not self.failsafe.acts)
@@ -189,7 +193,7 @@ class Commander:
             sticks_lost_at_arming=self._were_sticks_lost_at_arming(),
             ground_station_lost=self.ground_station.lost,
             offboard_lost=not back,
-            fence_breached=self._navigator.fence.breached,
+            fence_breached=self.navigator.fence.breached,
             cannot_run=cannot_run(self._available, back),
         )
 
@@ -218,7 +222,7 @@ class Commander:
             self.positioning.has_global,
             self.sticks.sticks is not None,
             self._flies_setpoints,
-            self._navigator.progress.valid,
+            self.navigator.missions.progress.valid,
         )
 
     @property
@@ -229,7 +233,15 @@ class Commander:
 
     @property
     def _problems(self) -> list[StatusText]:
-        return preflight_problems(self._parameters, self.ground_station, self._navigator, self.positioning)
+        """What forbids arming beside what the mode needs, and what PX4 says about it when somebody tries."""
+        found, parameters = [], self.parameters
+        if self.ground_station.lost and parameters["NAV_DLL_ACT"] > 0:
+            found.append(StatusText(Severity.WARNING, "Preflight Fail: No connection to the GCS"))
+        if self.positioning.is_without_gps and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
+            found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
+        if self.navigator.fence.breached:
+            found.append(StatusText(Severity.CRITICAL, "Geofence: approaching or outside geofence"))
+        return found
 
     @property
     def system_status(self) -> SystemStatus:

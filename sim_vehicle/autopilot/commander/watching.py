@@ -117,12 +117,8 @@ class ManualInput:
         if step_s <= 0.0:
             return
         share = step_s / (step_s + _DIFFERENCE_TIME_CONSTANT_S)
-        moves = (
-            now.roll - before.roll,
-            now.pitch - before.pitch,
-            now.yaw - before.yaw,
-            now.throttle - before.throttle,
-        )
+        # Roll, pitch, throttle and yaw.
+        moves = (new - old for new, old in zip(now[:4], before[:4], strict=True))
         self._speed = [speed + share * (move / step_s - speed) for speed, move in zip(self._speed, moves, strict=True)]
         self.moving = max(map(abs, self._speed)) > 0.01 * self._parameters["COM_RC_STICK_OV"]
 

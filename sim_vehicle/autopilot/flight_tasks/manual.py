@@ -84,9 +84,7 @@ class ManualFlight:
         parameters = self._parameters
         most_m_s, scale = parameters["MPC_VEL_MANUAL"], _DRAG_FACTOR * parameters["MPC_ACC_HOR"]
         forward, right = _within_circle(self._expo(sticks.pitch), self._expo(sticks.roll))
-        stick_north, stick_east = level_to_north_east(
-            forward, right, self._yaw_rad if self._yaw_rad is not None else view.yaw_rad
-        )
+        stick_north, stick_east = level_to_north_east(forward, right, self._heading_rad(view))
         is_free = forward == 0.0 and right == 0.0
         boost = max(2.0, math.sqrt(most_m_s)) if is_free else 1.0
         self._boost += (boost - self._boost) * step_s / (step_s + _BOOST_TIME_CONSTANT_S)

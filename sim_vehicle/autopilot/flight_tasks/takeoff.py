@@ -4,9 +4,10 @@ Source: PX4's mc_pos_control/Takeoff/Takeoff.cpp and MulticopterPositionControl:
 every mode, offboard too: a vehicle leaves the ground some 2.4 s after it is armed with a climbing setpoint.
 """
 
+from dataclasses import replace
 from enum import IntEnum
 
-from sim_vehicle.control.setpoint import FREE, TrajectorySetpoint
+from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
 
 GRAVITY_M_S2 = 9.80665
@@ -99,10 +100,9 @@ def _with_climb_limited(
     if asked_down_m_s >= -climb_m_s:
         return demand
     a_north, a_east, _ = demand.acceleration_ned_m_s2
-    return TrajectorySetpoint(
+    return replace(
+        demand,
         position_ned_m=(north, east, None),
         velocity_ned_m_s=(v_north, v_east, -climb_m_s),
-        acceleration_ned_m_s2=(a_north, a_east, None) if a_north is not None else FREE,
-        yaw_rad=demand.yaw_rad,
-        yaw_rate_rad_s=demand.yaw_rate_rad_s,
+        acceleration_ned_m_s2=(a_north, a_east, None),
     )

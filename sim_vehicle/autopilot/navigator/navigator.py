@@ -17,7 +17,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
 )
 from sim_vehicle.autopilot.messages import FollowTarget, Severity, Texts
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
-from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.autopilot.navigator.mission import MissionFlight, problem_of
@@ -43,8 +43,8 @@ class Navigator:
         self.fence = Geofence(parameters, origin, texts)
         self.mission = MissionFlight(missions, parameters, origin, texts)
         self._parameters = parameters
-        self._origin = origin
-        self._missions = missions
+        self.origin = origin
+        self.missions = missions
         self._flight = AutoFlight(parameters)
         self._return = Return(parameters, origin, texts)
         self._orbit = Orbit(parameters)
@@ -111,7 +111,7 @@ class Navigator:
         previous, self._mode = self._mode, mode
         if previous is Mode.MISSION and mode is not Mode.MISSION:
             self.mission.end()
-        self._missions.progress.is_flown = mode in _MISSION_IS_ACTIVE
+        self.missions.progress.is_flown = mode in _MISSION_IS_ACTIVE
         self.takeoff_is_over = False
         if not self.view.armed:
             return
@@ -209,7 +209,7 @@ class Navigator:
 
     def notice_changes(self) -> None:
         """Uploads, another current item, another home: all are judged anew."""
-        missions = self._missions
+        missions = self.missions
         seen = (missions.mission_changes, missions.fence_changes, self.view.home_ned_m)
         if seen == self._seen:
             return
@@ -225,9 +225,9 @@ class Navigator:
             self.mission.forget()
 
     def _check_mission(self) -> None:
-        items = self._missions.mission
-        problem = problem_of(items, self._origin, self.fence, self.view)
-        self._missions.progress.valid = bool(items) and problem is None
+        items = self.missions.mission
+        problem = problem_of(items, self.origin, self.fence, self.view)
+        self.missions.progress.valid = bool(items) and problem is None
         if problem is not None:
             self._texts.say(Severity.CRITICAL, problem)
 
@@ -291,14 +291,9 @@ class Navigator:
         return None if is_none else target.position_ned_m
 
     @property
-    def progress(self) -> Progress:
-        """The mission's."""
-        return self._missions.progress
-
-    @property
     def mission_is_in_progress(self) -> bool:
         """While it is, landing does not disarm."""
-        return self._mode is Mode.MISSION and not self._missions.progress.finished
+        return self._mode is Mode.MISSION and not self.missions.progress.finished
 
     @property
     def orbit_status(self) -> tuple[float, Vector3] | None:

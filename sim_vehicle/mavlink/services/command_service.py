@@ -1,26 +1,38 @@
-"""COMMAND_LONG and COMMAND_INT: the receiver's answers come at once, the commander's in the next interval."""
+"""COMMAND_LONG and COMMAND_INT, in PX4's two layers.
+
+The receiver answers at once what concerns the link and, for DO_SET_MODE, answers ACCEPTED before anyone has looked at
+it. The commander does the rest in the next interval, and answers once more with the true result. Source:
+MavlinkReceiver::handle_message_command_both of PX4.
+"""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot import commands
-from sim_vehicle.autopilot.messages import EVERY_ID, Command
+from sim_vehicle.autopilot.messages import EVERY_ID, Command, Result
 from sim_vehicle.mavlink import encode
-from sim_vehicle.mavlink.services.service import Board, Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Service
+
+SET_MESSAGE_INTERVAL = 511
+REQUEST_MESSAGE = 512
+REQUEST_AUTOPILOT_CAPABILITIES = 520
+"""Answered whichever component it is for."""
+# The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, HOME_POSITION, FLIGHT_INFORMATION,
+# STORAGE_INFORMATION.
+REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, 410: 242, 528: 264, 525: 261}
 
 _GREATEST_INT32 = 2**31 - 1
 
 
-class CommandService:
+class CommandService(Service):
     """Takes what is meant for this vehicle."""
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
         self._board = board
-        self.handlers: Mapping[int, Handler] = {
+        self.handlers = {
             11: self._set_mode,
             75: lambda packet: self._take(command_from_int(packet)),
             76: lambda packet: self._take(command_from_long(packet)),
@@ -33,13 +45,40 @@ class CommandService:
         self._board.autopilot.command(Command(*source, *target, commands.DO_SET_MODE, packet.base_mode, main, sub))
 
     def _take(self, command: Command) -> None:
-        if not commands.is_for_us(command, self._board.identity):
+        if not self._is_for_us(command):
             return
-        result, is_for_commander = commands.receive(command, self._link.streams)
+        result = self._received(command)
         if result is not None:
             self._link.send(encode.command_ack(commands.answer(command, result)))
-        if is_for_commander:
+        if result is None or command.command == commands.DO_SET_MODE:
             self._board.autopilot.command(command)
+
+    def _is_for_us(self, command: Command) -> bool:
+        """Whether PX4 takes the command: others are not answered, nor are its own echoes."""
+        us = self._board.identity
+        if (command.source_system, command.source_component) == us:
+            return False
+        if command.command == REQUEST_AUTOPILOT_CAPABILITIES:
+            return command.target_system in (us.system, EVERY_ID)
+        return us.is_addressed(command.target_system, command.target_component)
+
+    def _received(self, command: Command) -> Result | None:
+        """The receiver's answer, if it has one."""
+        if command.command == commands.DO_SET_MODE:
+            return Result.ACCEPTED
+        if command.command == SET_MESSAGE_INTERVAL:
+            return Result.ACCEPTED if self._set_interval(command) else Result.FAILED
+        asked = commands.whole(command.param1) if command.command == REQUEST_MESSAGE else REQUESTS.get(command.command)
+        if asked is None:
+            return None
+        return Result.ACCEPTED if self._link.streams.send_now(asked) else Result.DENIED
+
+    def _set_interval(self, command: Command) -> bool:
+        # Response target and the two reserved parameters: PX4 supports none of them.
+        if any(commands.whole(value, unset=0) != 0 for value in (command.param3, command.param4, command.param7)):
+            return False
+        is_given = math.isfinite(command.param2)
+        return is_given and self._link.streams.set_interval(commands.whole(command.param1), command.param2)
 
 
 def command_from_long(packet: dialect.MAVLink_command_long_message) -> Command:

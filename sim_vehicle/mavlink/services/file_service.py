@@ -5,11 +5,10 @@ there; this vehicle has none of either.
 """
 
 import struct
-from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.mavlink.services.service import Board, Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Service
 
 _HEADER = struct.Struct("<HBBBBBBI")
 PAYLOAD_BYTES = 251
@@ -26,12 +25,12 @@ _REFUSALS = {
 _ROOT = (b"", b"/")
 
 
-class FileService:
+class FileService(Service):
     """Says that there is nothing."""
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
-        self.handlers: Mapping[int, Handler] = {110: self._answer}
+        self.handlers = {110: self._answer}
 
     def _answer(self, packet: dialect.MAVLink_file_transfer_protocol_message) -> None:
         asked = bytes(packet.payload)

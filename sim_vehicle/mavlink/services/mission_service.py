@@ -3,13 +3,11 @@
 Source of the progress: PX4's MavlinkMissionManager::send and update_mission_state.
 """
 
-from collections.abc import Mapping
-
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.services.mission_transfer import MESSAGES, MissionTransfer
-from sim_vehicle.mavlink.services.service import Board, Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Service
 
 # MISSION_CURRENT is repeated once a second, and MISSION_ITEM_REACHED with it as often as this.
 CURRENT_PERIOD_US = 1_000_000
@@ -18,7 +16,7 @@ _MODE_ACTIVE, _MODE_SUSPENDED = 1, 2
 _NO_MISSION = 0xFFFF
 
 
-class MissionService:
+class MissionService(Service):
     """One link's transfer of the autopilot's lists, and how far the mission is.
 
     MISSION_CURRENT and MISSION_ITEM_REACHED come at every change, and again for whoever missed it.
@@ -32,7 +30,7 @@ class MissionService:
         self._current, self._reached = store.current, store.progress.reached
         self._repeats = 0
         self._state = 0
-        self.handlers: Mapping[int, Handler] = dict.fromkeys(MESSAGES, self._receive)
+        self.handlers = dict.fromkeys(MESSAGES, self._receive)
 
     def update(self, now_us: int) -> None:
         """Repeats, time-outs, and what the mission has come to."""

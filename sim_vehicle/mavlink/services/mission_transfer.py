@@ -143,7 +143,7 @@ class MissionTransfer:
 
     def _refuse(self, message: Packet) -> None:
         """A transfer goes on that this would disturb."""
-        self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ERROR, self._type))
+        self._acknowledge(MissionResult.ERROR, _peer(message))
 
     def _ask_for_next(self) -> None:
         self._sent_us = self._now_us
@@ -205,13 +205,14 @@ class MissionTransfer:
         for kind in kinds:
             if kind in MOST_ITEMS:
                 self._store.replace(MissionType(kind), (), 0)
-        self._send(dialect.MAVLink_mission_ack_message(*_peer(message), MissionResult.ACCEPTED, self._type))
+        self._acknowledge(MissionResult.ACCEPTED, _peer(message))
 
     def _set_current(self, message: Packet) -> None:
         self._store.choose(message.seq)
 
-    def _acknowledge(self, result: MissionResult) -> None:
-        self._send(dialect.MAVLink_mission_ack_message(*self._peer, result, self._type))
+    def _acknowledge(self, result: MissionResult, peer: tuple[int, int] | None = None) -> None:
+        """To the partner of the last transfer, or to another."""
+        self._send(dialect.MAVLink_mission_ack_message(*(peer or self._peer), result, self._type))
 
     def _is_partners(self, message: Packet) -> bool:
         return message.mission_type == self._type and _peer(message) == self._peer

@@ -53,33 +53,16 @@ class MissionResult(IntEnum):
 def parse(packet: ItemPacket) -> StoredItem | MissionResult:
     """The item as it is stored, or why it is refused."""
     if packet.frame in (*_GLOBAL_FRAMES, *_GLOBAL_INT_FRAMES):
-        return _with_place(packet)
-    if packet.frame == kinds.FRAME_MISSION:
-        return _without_place(packet)
-    return MissionResult.UNSUPPORTED_FRAME
-
-
-def _with_place(packet: ItemPacket) -> StoredItem | MissionResult:
-    kept = _KEPT.get(packet.command)
-    if kept is None:
+        rules, scale = _KEPT.get(packet.command), _DEGREES_PER_UNIT
+    elif packet.frame == kinds.FRAME_MISSION:
+        rules, scale = ("kkkk" if packet.command in kinds.WITHOUT_POSITION else None), 1
+    else:
+        return MissionResult.UNSUPPORTED_FRAME
+    if rules is None:
         return MissionResult.UNSUPPORTED
-    params = tuple(_kept(rule, value) for rule, value in zip(kept, _params(packet), strict=True))
-    return _item(packet, params, packet.x * _DEGREES_PER_UNIT, packet.y * _DEGREES_PER_UNIT)
-
-
-def _without_place(packet: ItemPacket) -> StoredItem | MissionResult:
-    if packet.command not in kinds.WITHOUT_POSITION:
-        return MissionResult.UNSUPPORTED
-    return _item(packet, _params(packet), packet.x, packet.y)
-
-
-def _params(packet: ItemPacket) -> tuple[float, ...]:
-    return packet.param1, packet.param2, packet.param3, packet.param4
-
-
-def _item(packet: ItemPacket, params: tuple[float, ...], x: float, y: float) -> StoredItem:
-    p1, p2, p3, p4 = params
-    return StoredItem(packet.frame, packet.command, packet.autocontinue, (p1, p2, p3, p4, x, y, packet.z))
+    p1, p2, p3, p4 = map(_kept, rules, (packet.param1, packet.param2, packet.param3, packet.param4))
+    params = (p1, p2, p3, p4, packet.x * scale, packet.y * scale, packet.z)
+    return StoredItem(packet.frame, packet.command, packet.autocontinue, params)
 
 
 def _kept(rule: str, value: float) -> float:
@@ -89,11 +72,9 @@ def _kept(rule: str, value: float) -> float:
         return float(value > 0)
     if rule == "h":
         return value % 360.0 if math.isfinite(value) else math.nan
-    return float(_whole(value)) if rule == "n" else 0.0
-
-
-def _whole(value: float) -> int:
-    return int(value + 0.5) if math.isfinite(value) else -1
+    if rule == "n":
+        return float(int(value + 0.5)) if math.isfinite(value) else -1.0
+    return 0.0
 
 
 def fits(item: StoredItem, kind: int) -> bool:

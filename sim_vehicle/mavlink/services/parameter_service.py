@@ -5,18 +5,20 @@ _HASH_CHECK, which spares a ground station a list that it has kept.
 """
 
 import struct
-from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.mavlink.services.service import Board, Channel, Handler
+from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.framing import Layout
+from sim_vehicle.mavlink.services.service import Board, Channel, Service
 from sim_vehicle.parameters.store import Parameters
 
 _FLOAT, _WHOLE = struct.Struct("<f"), struct.Struct("<i")
+_PARAM_VALUE = Layout(dialect.MAVLink_param_value_message)
+# Its payload. A whole number's four bytes are its own: no Python float carries all of them unchanged.
+_FLOAT_VALUE, _WHOLE_VALUE = struct.Struct("<fHH16sB"), struct.Struct("<iHH16sB")
 # PARAM_SET's value comes first after the header, of MAVLink 2 and 1.
 _MARKER_V2, _HEADER_V2, _HEADER_V1 = 0xFD, 10, 6
-
-
 _IS_WHOLE = {dialect.MAV_PARAM_TYPE_INT32: True, dialect.MAV_PARAM_TYPE_REAL32: False}
 
 # PX4 sends so many of a list at a time where the link is fast.
@@ -25,7 +27,7 @@ BURST = 20
 ANNOUNCE_AFTER_US = 5_000
 
 
-class ParameterService:
+class ParameterService(Service):
     """The vehicle's parameters on one link."""
 
     def __init__(self, link: Channel, board: Board) -> None:
@@ -38,7 +40,7 @@ class ParameterService:
         """Index of what is sent next of a list; None while none is sent."""
         self._told = board.parameters.sets
         self._announce_at_us: int | None = None
-        self.handlers: Mapping[int, Handler] = {20: self._read, 21: self._list, 23: self._set}
+        self.handlers = {20: self._read, 21: self._list, 23: self._set}
 
     def update(self, now_us: int) -> None:
         """Go on with the list; tell of what has changed."""
@@ -93,23 +95,9 @@ class ParameterService:
         self._link.send(_parameter_value(self._parameters, name, self._index[name]))
 
 
-class _WholeValue(dialect.MAVLink_param_value_message):  # type: ignore[misc]
-    """PARAM_VALUE whose four bytes are a whole number, which no Python float carries unchanged."""
-
-    layout = struct.Struct("<iHH16sB")
-
-    def pack(self, mav: dialect.MAVLink, force_mavlink1: bool = False) -> bytes:
-        payload = self.layout.pack(
-            self.param_value, self.param_count, self.param_index, self._param_id_raw, self.param_type
-        )
-        packet: bytes = self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
-        return packet
-
-
-def _parameter_value(parameters: Parameters, name: str, index: int) -> dialect.MAVLink_param_value_message:
-    definition, value = parameters.definition(name), parameters.stored(name)
+def _parameter_value(parameters: Parameters, name: str, index: int) -> Message:
+    definition = parameters.definition(name)
     assert definition is not None, "only names of the table are sent"
-    count = len(parameters.names)
-    if definition.is_whole:
-        return _WholeValue(name.encode(), int(value), dialect.MAV_PARAM_TYPE_INT32, count, index)
-    return dialect.MAVLink_param_value_message(name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32, count, index)
+    kind = dialect.MAV_PARAM_TYPE_INT32 if definition.is_whole else dialect.MAV_PARAM_TYPE_REAL32
+    fields = (parameters.stored(name), len(parameters.names), index, name.encode(), kind)
+    return _PARAM_VALUE, (_WHOLE_VALUE if definition.is_whole else _FLOAT_VALUE).pack(*fields)

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias
 
 from sim_vehicle.autopilot.autopilot import Autopilot
-from sim_vehicle.autopilot.commands import StreamControl
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.signing import Signing
+from sim_vehicle.mavlink.streams.streams import Streams
 from sim_vehicle.mavlink.streams.topics import Topics
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.parameters.store import Parameters
@@ -34,25 +34,18 @@ class Channel(Protocol):
     """What a protocol may do with the link that it is spoken on."""
 
     now_us: int
-
-    @property
-    def streams(self) -> StreamControl:
-        """The streams, for who sets their rates."""
+    streams: Streams
+    """For who sets their rates."""
 
     def send(self, message: Message) -> None:
         """Send something that is no stream."""
 
 
-class Service(Protocol):
+class Service:
     """One protocol on one link, each message answered at once. What all links share is the autopilot's."""
 
     handlers: Mapping[int, Handler]
     """What to do with a packet, by its message's id; called in the order of arrival."""
-
-
-@runtime_checkable
-class BusyService(Service, Protocol):
-    """One that also has something to do when nothing has come."""
 
     def update(self, now_us: int) -> None:
         """Called at every interval, after the control and before the streams: answers, repeats, time-outs."""

@@ -1,17 +1,15 @@
 """What steers the flight on a link: setpoints, sticks, targets to follow."""
 
-from collections.abc import Mapping
 from math import isfinite
 
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import AttitudeTarget, FollowTarget, PositionTarget, StickInput
 from sim_vehicle.geography import Place
-from sim_vehicle.mavlink.services.service import Board, Channel, Handler
+from sim_vehicle.mavlink.services.service import Board, Channel, Service
 from sim_vehicle.quantities import Axis3
 
 _FORCE_BIT, _YAW_IGNORED, _YAW_RATE_IGNORED = 0x200, 0x400, 0x800
-_NO_RATES = (0x1, 0x2, 0x4)
 _NO_THRUST, _NO_ATTITUDE = 0x40, 0x80
 _FULL_STICK = 1000
 
@@ -31,15 +29,10 @@ def position_target(packet: dialect.MAVLink_set_position_target_local_ned_messag
 
 def attitude_target(packet: dialect.MAVLink_set_attitude_target_message) -> AttitudeTarget:
     mask = packet.type_mask
-    roll, pitch, yaw = (
-        _value(mask & bit, rate)
-        for bit, rate in zip(
-            _NO_RATES, (packet.body_roll_rate, packet.body_pitch_rate, packet.body_yaw_rate), strict=True
-        )
-    )
+    rates = _axes(mask, packet.body_roll_rate, packet.body_pitch_rate, packet.body_yaw_rate)
     w, x, y, z = packet.q
     thrust = _value(mask & _NO_THRUST, packet.thrust)
-    return AttitudeTarget(None if mask & _NO_ATTITUDE else (w, x, y, z), (roll, pitch, yaw), thrust)
+    return AttitudeTarget(None if mask & _NO_ATTITUDE else (w, x, y, z), rates, thrust)
 
 
 def stick_input(packet: dialect.MAVLink_manual_control_message, source: int) -> StickInput:
@@ -58,24 +51,21 @@ def follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget
 
 
 def _axes(mask: int, x: float, y: float, z: float) -> Axis3:
-    return (
-        None if mask & 1 or not isfinite(x) else x,
-        None if mask & 2 or not isfinite(y) else y,
-        None if mask & 4 or not isfinite(z) else z,
-    )
+    """The mask's lowest bits leave an axis out."""
+    return _value(mask & 1, x), _value(mask & 2, y), _value(mask & 4, z)
 
 
 def _value(ignored: int, value: float) -> float | None:
     return None if ignored or not isfinite(value) else value
 
 
-class SetpointService:
+class SetpointService(Service):
     """Hands them to the autopilot, whatever the mode; PX4 answers none of them."""
 
     def __init__(self, link: Channel, board: Board) -> None:
         receive = board.autopilot.receive
         source = board.autopilot.commander.sticks.new_link_source()
-        self.handlers: Mapping[int, Handler] = {
+        self.handlers = {
             69: lambda packet: receive(stick_input(packet, source)),
             82: lambda packet: receive(attitude_target(packet)),
             84: lambda packet: receive(position_target(packet)),

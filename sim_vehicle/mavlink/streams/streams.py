@@ -179,17 +179,23 @@ class Streams:
         self._now_us = now_us = self._state.sample.time_boot_us
         if self._loops.misses_this_one():
             return
-        versions, encoder, state = self._versions, self._encoder, self._state
+        versions = self._versions
         for stream in self._running:
             if now_us <= stream.due_after_us or stream.seen == versions[stream.topic]:
                 continue
-            kind, stream.seen = stream.kind, versions[stream.topic]
             stream.sent(now_us)
-            if kind.notes:
-                state.renewed = stream.renewed(versions)
-            message = kind.build(state)
-            if message is not None:
-                encoder.send(message)
+            self._send(stream)
+
+    def _send(self, stream: Stream) -> bool:
+        """Whether there was something to say."""
+        versions, state = self._versions, self._state
+        stream.seen = versions[stream.topic]
+        if stream.kind.notes:
+            state.renewed = stream.renewed(versions)
+        message = stream.kind.build(state)
+        if message is not None:
+            self._encoder.send(message)
+        return message is not None
 
     # --- commands ----------------------------------------------------------------------------------------
 
@@ -216,14 +222,6 @@ class Streams:
         stream = self._by_id.get(message_id)
         if stream is None:
             return False
-        version = self._versions[stream.kind.topic]
-        if stream.kind.topic not in SENT_AGAIN and version == stream.seen:
+        if stream.kind.topic not in SENT_AGAIN and self._versions[stream.topic] == stream.seen:
             return False
-        stream.seen = version
-        if stream.kind.notes:
-            self._state.renewed = stream.renewed(self._versions)
-        message = stream.kind.build(self._state)
-        if message is None:
-            return False
-        self._encoder.send(message)
-        return True
+        return self._send(stream)

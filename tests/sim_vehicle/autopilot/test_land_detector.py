@@ -4,6 +4,7 @@ import pytest
 
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.parameters.store import Parameters
+from tests.sim_vehicle.autopilot.kinematic_plant import STANDING
 
 STEP_US = 8_000
 STILL = (0.0, 0.0, 0.0)
@@ -22,9 +23,15 @@ class Detection:
         assert not self.detector.landed
 
     def feed(self, seconds, thrust, asked_down=0.7, velocity=STILL, rate=STILL, force=(0, 0, -9.8), armed=True):
+        estimate = STANDING._replace(
+            velocity_ned_m_s=velocity,
+            angular_velocity_frd_rad_s=rate,
+            specific_force_frd_m_s2=force,
+            thrust_fraction=thrust,
+        )
         for _ in range(round(seconds * 1e6 / STEP_US)):
             self.now_us += STEP_US
-            self.detector.update(self.now_us, armed, velocity, rate, force, thrust, asked_down)
+            self.detector.update(estimate._replace(time_boot_us=self.now_us), armed, asked_down)
 
 
 def test_a_landing_takes_a_second_in_three_stages():
