@@ -100,28 +100,24 @@ class TruthRecorder:
 
     def add_hit(self, row: Floats, world: World) -> None:
         """Add a finished row of `PlantState.finished_hits`."""
-        self._add(
-            Hit(
-                obstacle=world.names[int(row[layout.HIT_FACE])],
-                contact_at_boot_us=float(row[layout.HIT_START_US]),
-                ended_at_boot_us=float(row[layout.HIT_LAST_US]),
-                contact_position_ned_m=vector(row[layout.HIT_POSITION]),
-                impact_velocity_ned_m_s=vector(row[layout.HIT_VELOCITY]),
-                normal_ned=vector(row[layout.HIT_NORMAL]),
-                max_fold_m=float(row[layout.HIT_FOLD_M]),
-                peak_force_n=float(row[layout.HIT_PEAK_N]),
-                rebound_velocity_ned_m_s=vector(row[layout.HIT_EXIT_VELOCITY]),
-                impulse_ned_n_s=vector(row[layout.HIT_IMPULSE]),
-                energy_before_j=float(row[layout.HIT_ENERGY_BEFORE_J]),
-                energy_after_j=float(row[layout.HIT_ENERGY_AFTER_J]),
-                kind=world.kinds[int(row[layout.HIT_FACE])],
-                contact_point_ned_m=vector(row[layout.HIT_POINT]),
-                surface_velocity_ned_m_s=vector(row[layout.HIT_SURFACE_VELOCITY]),
-                frame_offset_ned_m=vector(row[layout.HIT_FRAME_OFFSET]),
-            )
+        hit = Hit(
+            obstacle=world.names[int(row[layout.HIT_FACE])],
+            contact_at_boot_us=float(row[layout.HIT_START_US]),
+            ended_at_boot_us=float(row[layout.HIT_LAST_US]),
+            contact_position_ned_m=vector(row[layout.HIT_POSITION]),
+            impact_velocity_ned_m_s=vector(row[layout.HIT_VELOCITY]),
+            normal_ned=vector(row[layout.HIT_NORMAL]),
+            max_fold_m=float(row[layout.HIT_FOLD_M]),
+            peak_force_n=float(row[layout.HIT_PEAK_N]),
+            rebound_velocity_ned_m_s=vector(row[layout.HIT_EXIT_VELOCITY]),
+            impulse_ned_n_s=vector(row[layout.HIT_IMPULSE]),
+            energy_before_j=float(row[layout.HIT_ENERGY_BEFORE_J]),
+            energy_after_j=float(row[layout.HIT_ENERGY_AFTER_J]),
+            kind=world.kinds[int(row[layout.HIT_FACE])],
+            contact_point_ned_m=vector(row[layout.HIT_POINT]),
+            surface_velocity_ned_m_s=vector(row[layout.HIT_SURFACE_VELOCITY]),
+            frame_offset_ned_m=vector(row[layout.HIT_FRAME_OFFSET]),
         )
-
-    def _add(self, hit: Hit) -> None:
         self.hits.append(hit)
         if self.on_hit is not None:
             self.on_hit(hit)

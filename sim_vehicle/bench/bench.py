@@ -4,8 +4,9 @@
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -19,7 +20,6 @@ from sim_vehicle.mavlink.streams.stream_rates import link_kind
 from sim_vehicle.obstacles import BoxSpec, PoleSpec, WallSpec
 from sim_vehicle.parameters.store import definitions
 from sim_vehicle.scene import Scene, Start
-from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle
 
@@ -44,16 +44,15 @@ class Setup:
 
     def scene(self) -> Scene:
         """The world as a mission file would state it. Raises SceneError."""
-        of_kind = {kind: tuple(spec for spec in self.obstacles if isinstance(spec, kind)) for kind in _KINDS}
         try:
             return Scene.model_validate(
                 {
                     "seed": self.seed,
                     "start": Start(yaw_deg=self.yaw_deg),
                     "wind_ned_m_s": self.wind_ned_m_s,
-                    "walls": of_kind[WallSpec],
-                    "poles": of_kind[PoleSpec],
-                    "boxes": of_kind[BoxSpec],
+                    "walls": tuple(spec for spec in self.obstacles if isinstance(spec, WallSpec)),
+                    "poles": tuple(spec for spec in self.obstacles if isinstance(spec, PoleSpec)),
+                    "boxes": tuple(spec for spec in self.obstacles if isinstance(spec, BoxSpec)),
                     "faults": tuple(self.faults),
                 }
             )
@@ -73,26 +72,16 @@ class Setup:
         return self.airframe if isinstance(self.airframe, Airframe) else load_built_in(self.airframe)
 
 
-_KINDS: tuple[type[ObstacleSpec], ...] = (WallSpec, PoleSpec, BoxSpec)
-
-
-class Handle:
+class Handle(ExitStack):
     """Something that was placed or injected: `remove()` takes it back, and so does the end of a `with` block."""
 
     def __init__(self, take_back: Callable[[], None]) -> None:
-        self._take_back: Callable[[], None] | None = take_back
+        super().__init__()
+        self.callback(take_back)
 
     def remove(self) -> None:
         """From now on it is not there; once is enough, more do no harm."""
-        take_back, self._take_back = self._take_back, None
-        if take_back is not None:
-            take_back()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.remove()
+        self.close()
 
 
 class Bench:
@@ -109,6 +98,8 @@ class Bench:
             parameters=setup.parameters_checked(),
             links_may_fail=True,
         )
+        self.recorded = self.vehicle.truth
+        """The whole flight: its path as arrays, all hits, all faults."""
         self._timeline = Timeline(self.vehicle)
         self._placed = len(setup.obstacles)
         self._strikes = 0
@@ -123,11 +114,6 @@ class Bench:
     def truth(self) -> Truth:
         """What is really so at this moment."""
         return truth_of(self.vehicle)
-
-    @property
-    def recorded(self) -> TruthRecorder:
-        """The whole flight: its path as arrays, all hits, all faults."""
-        return self.vehicle.truth
 
     @property
     def timeline(self) -> tuple[TimelineEntry, ...]:

@@ -3,7 +3,7 @@
 import contextlib
 import errno
 import socket
-from typing import Protocol
+from typing import TypeAlias
 
 import serial
 
@@ -15,19 +15,6 @@ from sim_vehicle.vehicle import SimulatedVehicle
 Address = tuple[str, int]
 
 LONGEST_DATAGRAM = 65_535
-
-
-class Port(Protocol):
-    """A socket, with the links of whoever is at its other end."""
-
-    def receive(self) -> None:
-        """Hand all that has arrived to the links."""
-
-    def send(self) -> None:
-        """Send what the links have ready; what cannot be sent is lost."""
-
-    def close(self) -> None:
-        """Give the socket back."""
 
 
 def connected(vehicle: SimulatedVehicle, kind: LinkKind) -> Link:
@@ -265,3 +252,9 @@ class SerialPort:
 
     def close(self) -> None:
         self._serial.close()
+
+
+Port: TypeAlias = UdpPeerPort | UdpServerPort | TcpServerPort | SerialPort
+"""The outside of a link, with the links of whoever is at its other end. `receive` hands all that has arrived to them.
+`send` sends what they have ready; what cannot be sent is lost.
+"""
