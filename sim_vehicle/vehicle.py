@@ -95,13 +95,7 @@ class SimulatedVehicle:
         self.time_boot_us = int(self.state.time_us)
         self._topics = Topics(self._telemetry)
         self._board = Board(
-            identity,
-            self._autopilot,
-            parameters,
-            self._telemetry,
-            self._topics,
-            signing or Signing(),
-            self.interval_us,
+            identity, self._autopilot, self._telemetry, self._topics, signing or Signing(), self.interval_us
         )
         self._tuned_at = 0
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 from sim_vehicle.faults.spec import WireFault
 
-_MAVLINK_1, _MAVLINK_2 = 0xFE, 0xFD
+MAVLINK_1, MAVLINK_2 = 0xFE, 0xFD
 # Header and checksum around the payload, and what a signature adds.
-_AROUND_1, _AROUND_2, _SIGNATURE, _SIGNED = 8, 12, 13, 0x01
+_AROUND_1, _AROUND_2, _SIGNATURE, SIGNED = 8, 12, 13, 0x01
 
 
 def split(data: bytes) -> list[bytes]:
@@ -28,18 +28,18 @@ def packet_size(data: bytes, start: int) -> int | None:
     """Of the packet that may begin at ``start``; None where none does, or its header is not complete."""
     if start + 3 > len(data):
         return None
-    if data[start] == _MAVLINK_1:
+    if data[start] == MAVLINK_1:
         return _AROUND_1 + data[start + 1]
-    if data[start] == _MAVLINK_2:
-        return _AROUND_2 + data[start + 1] + (_SIGNATURE if data[start + 2] & _SIGNED else 0)
+    if data[start] == MAVLINK_2:
+        return _AROUND_2 + data[start + 1] + (_SIGNATURE if data[start + 2] & SIGNED else 0)
     return None
 
 
 def message_number(frame: bytes) -> int | None:
     """The message's number; None for bytes that are no frame."""
-    if len(frame) >= _AROUND_2 and frame[0] == _MAVLINK_2:
+    if len(frame) >= _AROUND_2 and frame[0] == MAVLINK_2:
         return int.from_bytes(frame[7:10], "little")
-    return frame[5] if len(frame) >= _AROUND_1 and frame[0] == _MAVLINK_1 else None
+    return frame[5] if len(frame) >= _AROUND_1 and frame[0] == MAVLINK_1 else None
 
 
 class Wire:

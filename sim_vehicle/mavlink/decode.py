@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import EVERY_ID, Identity
-from sim_vehicle.faults.wire import packet_size
+from sim_vehicle.faults.wire import MAVLINK_2, SIGNED, packet_size
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.signing import Signing
 
 _MARKER = re.compile(rb"[\xfd\xfe]")
-_MARKER_V2 = 0xFD
-_SIGNED_FLAG = 0x01
 
 # Its target is a system, too, under another name.
 _MANUAL_CONTROL_ID = 69
@@ -78,12 +76,12 @@ class Decoder:
         return messages
 
     def _decode(self, packet: bytes) -> dialect.MAVLink_message | None:
-        if packet[0] == _MARKER_V2 and packet[2] & ~_SIGNED_FLAG:
+        if packet[0] == MAVLINK_2 and packet[2] & ~SIGNED:
             return None
         message = framing.read(packet)
         if message is None:
             return None
-        is_signed = packet[0] == _MARKER_V2 and bool(packet[2] & _SIGNED_FLAG)
+        is_signed = packet[0] == MAVLINK_2 and bool(packet[2] & SIGNED)
         source = message.get_srcSystem(), message.get_srcComponent()
         accepted = self._signing.accepts(packet, is_signed, source, message.get_msgId(), self.signing_is_optional)
         return message if accepted else None

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.errors import FaultError
 from sim_vehicle.faults.spec import ClockJump, Fault, ImuDropout, WireFault
-from sim_vehicle.faults.wire import Wire, split
+from sim_vehicle.faults.wire import MAVLINK_2, SIGNED, Wire, split
 from sim_vehicle.mavlink.decode import ForeignPacket
 from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.services.service import Board
@@ -21,7 +21,6 @@ _INBOUND_SEED = 0x1B
 _STAMPS_US = {"time_boot_ms": 1000, "time_usec": 1}
 # The narrow ones wrap as the vehicle's own counters would; SERVO_OUTPUT_RAW counts microseconds in 32 bits.
 _MASKS = {"uint32_t": 0xFFFFFFFF, "uint64_t": 0xFFFFFFFFFFFFFFFF}
-_SIGNED = 0x01
 
 
 class FaultyLink(Link):
@@ -33,7 +32,6 @@ class FaultyLink(Link):
         self._inbound = Wire((), seed ^ _INBOUND_SEED)
         self._on_wire: list[tuple[Fault, Wire, WireFault]] = []
         self._jumps: list[ClockJump] = []
-        self._restamper = Restamper()
         self._arriving = b""
         for fault in faults:
             self.add(fault)
@@ -72,7 +70,7 @@ class FaultyLink(Link):
         packets = super().take()
         offset_us = round(1e6 * sum(jump.jump_s for jump in self._jumps if jump.window_s[0] <= self.now_us / 1e6))
         if offset_us:
-            packets = tuple(self._restamper.restamp(packet, offset_us) for packet in packets)
+            packets = tuple(restamped(packet, offset_us) for packet in packets)
         return self._outbound.carry(packets, self.now_us)
 
 
@@ -90,49 +88,40 @@ def _as_wire_fault(fault: Fault, direction: str) -> WireFault | None:
     return None
 
 
-class Restamper:
-    """Adds an offset to every time stamp that packets carry of the vehicle's clock."""
+def restamped(frame: bytes, offset_us: int) -> bytes:
+    """The packet with every time stamp of the vehicle's clock moved; as it was if it has none, is signed or damaged."""
+    if len(frame) < 3 or (frame[0] == MAVLINK_2 and frame[2] & SIGNED):
+        return frame
+    try:
+        message = dialect.MAVLink(None).decode(bytearray(frame))
+    except dialect.MAVError:
+        return frame
+    if not _move(message, offset_us):
+        return frame
+    link = dialect.MAVLink(None, message.get_srcSystem(), message.get_srcComponent())
+    link.seq = message.get_seq()
+    packed: bytes = message.pack(link, force_mavlink1=frame[0] != MAVLINK_2)
+    return packed
 
-    def __init__(self) -> None:
-        self._link = dialect.MAVLink(None)
 
-    def restamp(self, frame: bytes, offset_us: int) -> bytes:
-        """The packet with its stamps moved; as it was if it has none, is signed or is damaged."""
-        if len(frame) < 3 or (frame[0] == 0xFD and frame[2] & _SIGNED):
-            return frame
-        try:
-            message = self._link.decode(bytearray(frame))
-        except dialect.MAVError:
-            return frame
-        changed = self._move(message, offset_us)
-        if not changed:
-            return frame
-        link = self._link
-        link.seq, link.srcSystem, link.srcComponent = (
-            message.get_seq(),
-            message.get_srcSystem(),
-            message.get_srcComponent(),
-        )
-        packed: bytes = message.pack(link, force_mavlink1=frame[0] == 0xFE)
-        return packed
-
-    def _move(self, message: Any, offset_us: int) -> bool:
-        changed, name = False, message.get_type()
-        if name == "PING" and message.target_system:
-            # An answer carries the asker's time.
-            return False
-        for field, unit_us in _STAMPS_US.items():
-            value = getattr(message, field, None)
-            if value is not None:
-                mask = _MASKS[message.fieldtypes[message.fieldnames.index(field)]]
-                setattr(message, field, (value + offset_us // unit_us) & mask)
-                changed = True
-        if name == "TIMESYNC":
-            # An answer has the vehicle's time in tc1, a request of its own in ts1.
-            field = "tc1" if message.tc1 else "ts1"
-            setattr(message, field, getattr(message, field) + 1000 * offset_us)
+def _move(message: Any, offset_us: int) -> bool:
+    """Whether it has stamps to move."""
+    changed, name = False, message.get_type()
+    if name == "PING" and message.target_system:
+        # An answer carries the asker's time.
+        return False
+    for field, unit_us in _STAMPS_US.items():
+        value = getattr(message, field, None)
+        if value is not None:
+            mask = _MASKS[message.fieldtypes[message.fieldnames.index(field)]]
+            setattr(message, field, (value + offset_us // unit_us) & mask)
             changed = True
-        return changed
+    if name == "TIMESYNC":
+        # An answer has the vehicle's time in tc1, a request of its own in ts1.
+        field = "tc1" if message.tc1 else "ts1"
+        setattr(message, field, getattr(message, field) + 1000 * offset_us)
+        changed = True
+    return changed
 
 
 def message_number(name: int | str) -> int:

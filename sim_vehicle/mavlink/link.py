@@ -83,7 +83,7 @@ class Link:
         if not self._waiting:
             return []
         data, self._waiting = self._waiting, b""
-        decoder, parameters = self._decoder, self._board.parameters
+        decoder, parameters = self._decoder, self._board.autopilot.parameters
         decoder.foreign = [] if collects_foreign else None
         decoder.signing_is_optional = parameters["MAV_SIGN_CFG"] == OPTIONAL
         for packet in decoder.push(data):

@@ -79,9 +79,11 @@ class Parameters(dict[str, float]):
 
     def __init__(self, own_defaults: Mapping[str, float] | None = None) -> None:
         """``own_defaults``: what this airframe has in place of the table's defaults."""
-        self._definitions = definitions()
+        self.definitions = definitions()
+        """What each is; their order is that of their indices."""
+        self.names = tuple(self.definitions)
         own = own_defaults or {}
-        self.defaults = {name: own.get(name, row.default) for name, row in self._definitions.items()}
+        self.defaults = {name: own.get(name, row.default) for name, row in self.definitions.items()}
         self._stored = dict(self.defaults)
         self.changes = 0
         """Grows with every change of a value that counts."""
@@ -90,22 +92,13 @@ class Parameters(dict[str, float]):
         self._last_set: dict[str, int] = {}
         super().__init__(self.defaults)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All names in the order of their indices."""
-        return tuple(self._definitions)
-
-    def definition(self, name: str) -> Definition | None:
-        """What the parameter is; None where there is none of that name."""
-        return self._definitions.get(name)
-
     def stored(self, name: str) -> float:
         """The value as it was set. Raises KeyError for a name without a row in the table."""
         return self._stored[name]
 
     def set(self, name: str, value: float) -> None:
         """Store ``value``; it counts at once."""
-        row = self._definitions[name]
+        row = self.definitions[name]
         stored = int(value) if row.is_whole else value
         if stored != self._stored[name]:
             self.sets += 1

@@ -8,6 +8,7 @@ import struct
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.faults.wire import MAVLINK_2
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.framing import Layout
 from sim_vehicle.mavlink.services.service import Board, Channel, Service
@@ -18,7 +19,7 @@ _PARAM_VALUE = Layout(dialect.MAVLink_param_value_message)
 # Its payload. A whole number's four bytes are its own: no Python float carries all of them unchanged.
 _FLOAT_VALUE, _WHOLE_VALUE = struct.Struct("<fHH16sB"), struct.Struct("<iHH16sB")
 # PARAM_SET's value comes first after the header, of MAVLink 2 and 1.
-_MARKER_V2, _HEADER_V2, _HEADER_V1 = 0xFD, 10, 6
+_HEADER_V2, _HEADER_V1 = 10, 6
 _IS_WHOLE = {dialect.MAV_PARAM_TYPE_INT32: True, dialect.MAV_PARAM_TYPE_REAL32: False}
 
 # PX4 sends so many of a list at a time where the link is fast.
@@ -33,12 +34,12 @@ class ParameterService(Service):
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
         self._us = board.identity
-        self._parameters = board.parameters
-        self._names = board.parameters.names
+        self._parameters = parameters = board.autopilot.parameters
+        self._names = parameters.names
         self._index = {name: number for number, name in enumerate(self._names)}
         self._next: int | None = None
         """Index of what is sent next of a list; None while none is sent."""
-        self._told = board.parameters.sets
+        self._told = parameters.sets
         self._announce_at_us: int | None = None
         self.handlers = {20: self._read, 21: self._list, 23: self._set}
 
@@ -65,12 +66,12 @@ class ParameterService(Service):
     def _set(self, packet: dialect.MAVLink_param_set_message) -> None:
         if packet.target_system != self._us.system:
             return
-        definition, is_whole = self._parameters.definition(packet.param_id), _IS_WHOLE.get(packet.param_type)
+        definition, is_whole = self._parameters.definitions.get(packet.param_id), _IS_WHOLE.get(packet.param_type)
         if definition is None or is_whole is not definition.is_whole:
             return
         # From the bytes: as a Python float some whole numbers would come back changed (signalling NaNs).
         raw = packet.get_msgbuf()
-        begin = _HEADER_V2 if raw[0] == _MARKER_V2 else _HEADER_V1
+        begin = _HEADER_V2 if raw[0] == MAVLINK_2 else _HEADER_V1
         (value,) = (_WHOLE if is_whole else _FLOAT).unpack_from(raw, begin)
         self._parameters.set(packet.param_id, value)
         self._send(packet.param_id)
@@ -96,8 +97,7 @@ class ParameterService(Service):
 
 
 def _parameter_value(parameters: Parameters, name: str, index: int) -> Message:
-    definition = parameters.definition(name)
-    assert definition is not None, "only names of the table are sent"
-    kind = dialect.MAV_PARAM_TYPE_INT32 if definition.is_whole else dialect.MAV_PARAM_TYPE_REAL32
+    is_whole = parameters.definitions[name].is_whole
+    kind = dialect.MAV_PARAM_TYPE_INT32 if is_whole else dialect.MAV_PARAM_TYPE_REAL32
     fields = (parameters.stored(name), len(parameters.names), index, name.encode(), kind)
-    return _PARAM_VALUE, (_WHOLE_VALUE if definition.is_whole else _FLOAT_VALUE).pack(*fields)
+    return _PARAM_VALUE, (_WHOLE_VALUE if is_whole else _FLOAT_VALUE).pack(*fields)

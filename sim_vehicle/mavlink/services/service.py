@@ -11,7 +11,6 @@ from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.streams import Streams
 from sim_vehicle.mavlink.streams.topics import Topics
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.parameters.store import Parameters
 
 Handler: TypeAlias = Callable[[Any], None]
 
@@ -22,7 +21,6 @@ class Board:
 
     identity: Identity
     autopilot: Autopilot
-    parameters: Parameters
     telemetry: Telemetry
     topics: Topics
     signing: Signing

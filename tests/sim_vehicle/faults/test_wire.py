@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.faults.spec import WireFault
 from sim_vehicle.faults.wire import Wire, split
-from sim_vehicle.mavlink.faulty_link import Restamper
+from sim_vehicle.mavlink.faulty_link import restamped
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.vehicle_client import Client
 
@@ -99,8 +99,7 @@ def test_what_has_no_stamp_of_the_vehicles_is_left_alone() -> None:
     link = dialect.MAVLink(None, 1, 1)
     heartbeat = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3).pack(link)
     answer = dialect.MAVLink_ping_message(777, 1, 255, 190).pack(link)
-    restamper = Restamper()
-    assert restamper.restamp(heartbeat, 10**6) == heartbeat
-    assert restamper.restamp(answer, 10**6) == answer
-    assert restamper.restamp(b"\xfd\x01", 10**6) == b"\xfd\x01"
-    assert restamper.restamp(heartbeat[:-1] + b"\x00", 10**6) == heartbeat[:-1] + b"\x00"
+    assert restamped(heartbeat, 10**6) == heartbeat
+    assert restamped(answer, 10**6) == answer
+    assert restamped(b"\xfd\x01", 10**6) == b"\xfd\x01"
+    assert restamped(heartbeat[:-1] + b"\x00", 10**6) == heartbeat[:-1] + b"\x00"
