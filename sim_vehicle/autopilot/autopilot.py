@@ -89,7 +89,7 @@ class Autopilot:
         elif isinstance(message, StickInput):
             self.commander.sticks.heard(message, self._now_us)
         else:
-            self.navigator.follow(message)
+            self.navigator.follow.heard(message, self.navigator.view.now_us)
 
     def setpoint(self, target: PositionTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""
@@ -135,14 +135,10 @@ class Autopilot:
         if self._commands:
             self.navigator.notice_changes()  # a list that has just come is judged before it is to be flown
             queue, self._commands = self._commands, []
-            acks = [ack for command in queue if (ack := self._execute(command)) is not None]
+            acks = [ack for command in queue if (ack := commands.execute(command, self.commander)) is not None]
         if self.modes.flown is not self._flown:
             self._notice_mode()
         return acks
-
-    def _execute(self, command: Command) -> CommandAck | None:
-        result = commands.execute(command, self.commander)
-        return None if result is None else commands.answer(command, result)
 
     def _notice_mode(self) -> None:
         previous, self._flown = self._flown, self.modes.flown

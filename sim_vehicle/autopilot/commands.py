@@ -47,10 +47,11 @@ def answer(command: Command, result: Result) -> CommandAck:
     return CommandAck(command.command, result, command.source_system, command.source_component)
 
 
-def execute(command: Command, commander: Commander) -> Result | None:
-    """The commander's part: does it and returns its answer; None leaves the command unanswered."""
+def execute(command: Command, commander: Commander) -> CommandAck | None:
+    """The commander's part: does it and answers; None leaves the command unanswered."""
     handler = _HANDLERS.get(command.command)
-    return Result.UNSUPPORTED if handler is None else handler(command, commander)
+    result = Result.UNSUPPORTED if handler is None else handler(command, commander)
+    return None if result is None else answer(command, result)
 
 
 def _set_mode(command: Command, commander: Commander) -> Result:

@@ -58,7 +58,8 @@ def _repositioned(command: Command, commander: Commander) -> NavigatorTarget:
 
 def _change_speed(command: Command, commander: Commander) -> Result:
     speed_m_s = _given(command.param2)
-    commander.navigator.change_speed(speed_m_s if speed_m_s and speed_m_s > 0.0 else None)
+    # None goes back to MPC_XY_CRUISE.
+    commander.navigator.flight.cruise_m_s = speed_m_s if speed_m_s and speed_m_s > 0.0 else None
     return Result.ACCEPTED
 
 
@@ -69,7 +70,8 @@ def _orbit(command: Command, commander: Commander) -> Result:
         return result
     north, east, _ = _place(command, commander) or (None, None, None)
     centre_ned_m = north, east, _down_m(command, commander)
-    done = commander.navigator.change_orbit(_given(command.param1), _given(command.param2), centre_ned_m)
+    navigator, radius_m, speed_m_s = commander.navigator, _given(command.param1), _given(command.param2)
+    done = navigator.orbit.change(navigator.view, radius_m, speed_m_s, centre_ned_m)
     if not done:
         commander.texts.say(Severity.CRITICAL, "Orbit radius limit exceeded")
     return result

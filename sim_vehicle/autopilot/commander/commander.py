@@ -21,7 +21,6 @@ from sim_vehicle.autopilot.modes import (
     ModeEvent,
     ModeState,
     Need,
-    available,
     cannot_run,
     missing,
 )
@@ -217,13 +216,16 @@ class Commander:
 
     @property
     def _available(self) -> frozenset[Need]:
-        return available(
-            self.positioning.has_local,
-            self.positioning.has_global,
-            self.sticks.sticks is not None,
-            self._flies_setpoints,
-            self.navigator.missions.progress.valid,
-        )
+        """What modes may need, as far as it is there."""
+        there = {
+            Need.HOME: True,
+            Need.LOCAL_POSITION: self.positioning.has_local,
+            Need.GLOBAL_POSITION: self.positioning.has_global,
+            Need.STICKS: self.sticks.sticks is not None,
+            Need.SETPOINTS: self._flies_setpoints,
+            Need.MISSION: self.navigator.missions.progress.valid,
+        }
+        return frozenset(need for need, is_there in there.items() if is_there)
 
     @property
     def checks_pass(self) -> bool:

@@ -101,12 +101,7 @@ def _kept(action: Action, takeover: Takeover = Takeover.AFTER_DELAY) -> Response
 
 _NOTHING, _WARNING = Response(Action.NONE), Response(Action.WARN)
 
-_LINK_LOSS: dict[int, Response] = {
-    0: _NOTHING,
-    1: _kept(Action.HOLD),
-    2: _kept(Action.RETURN),
-    3: _kept(Action.LAND),
-}
+_LINK_LOSS: dict[int, Response] = {0: _NOTHING, 1: _kept(Action.HOLD), 2: _kept(Action.RETURN), 3: _kept(Action.LAND)}
 _FENCE: dict[int, Response] = {
     0: _NOTHING,
     1: _WARNING,

@@ -9,7 +9,7 @@ from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, towards
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.quantities import Vector3
+from sim_vehicle.quantities import Axis3, Vector3
 
 RADIUS_MIN_M = 1.0
 ACCELERATION_MAX_M_S2 = 2.0
@@ -37,13 +37,7 @@ class Orbit:
         self._smoother.yaw_rad = view.yaw_rad
         self._approach(view)
 
-    def change(
-        self,
-        view: View,
-        radius_m: float | None,
-        speed_m_s: float | None,
-        centre_ned_m: tuple[float | None, float | None, float | None],
-    ) -> bool:
+    def change(self, view: View, radius_m: float | None, speed_m_s: float | None, centre_ned_m: Axis3) -> bool:
         """Take what a DO_ORBIT says; None leaves as it is. False where the radius is beyond MC_ORBIT_RAD_MAX."""
         clockwise = self._speed_m_s > 0.0 if radius_m is None else radius_m > 0.0
         radius = self._radius_m if radius_m is None else abs(radius_m)

@@ -15,7 +15,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     climbs_to,
     takeoff_acceptance,
 )
-from sim_vehicle.autopilot.messages import FollowTarget, Severity, Texts
+from sim_vehicle.autopilot.messages import Severity, Texts
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.modes import Mode
@@ -45,10 +45,10 @@ class Navigator:
         self._parameters = parameters
         self.origin = origin
         self.missions = missions
-        self._flight = AutoFlight(parameters)
+        self.flight = AutoFlight(parameters)
         self._return = Return(parameters, origin, texts)
-        self._orbit = Orbit(parameters)
-        self._follow = Follow(parameters, origin)
+        self.orbit = Orbit(parameters)
+        self.follow = Follow(parameters, origin)
         self._arrival = Arrival()
         self._texts = texts
         self._mode = Mode.LOITER
@@ -87,23 +87,6 @@ class Navigator:
         """Where the vehicle would stand if it braked now."""
         return stop_point(self.view.position_ned_m, self.view.velocity_ned_m_s, self._parameters)
 
-    def change_speed(self, speed_m_s: float | None) -> None:
-        """DO_CHANGE_SPEED; None goes back to MPC_XY_CRUISE."""
-        self._flight.cruise_m_s = speed_m_s
-
-    def change_orbit(
-        self,
-        radius_m: float | None,
-        speed_m_s: float | None,
-        centre_ned_m: tuple[float | None, float | None, float | None],
-    ) -> bool:
-        """DO_ORBIT, when the mode is ORBIT."""
-        return self._orbit.change(self.view, radius_m, speed_m_s, centre_ned_m)
-
-    def follow(self, target: FollowTarget) -> None:
-        """FOLLOW_TARGET."""
-        self._follow.heard(target, self.view.now_us)
-
     # --- modes ---------------------------------------------------------------------------------------------------
 
     def enter(self, mode: Mode) -> None:
@@ -115,12 +98,12 @@ class Navigator:
         self.takeoff_is_over = False
         if not self.view.armed:
             return
-        self._flight.cruise_m_s = None
+        self.flight.cruise_m_s = None
         # A hold goes on where one is held already, or where a takeoff leads to.
         kept = self._target_of(previous) if previous in _BY_TARGET else None
         keeps = mode is Mode.LOITER and kept is not None and (previous is Mode.TAKEOFF or kept.kind is Kind.HOLD)
         if not keeps:
-            self._flight.start(self.view, at_rest=mode is Mode.TAKEOFF)
+            self.flight.start(self.view, at_rest=mode is Mode.TAKEOFF)
         if mode is Mode.LOITER:
             self._begin_hold(kept if keeps else None)
         elif mode is Mode.TAKEOFF:
@@ -132,9 +115,9 @@ class Navigator:
         elif mode is Mode.MISSION:
             self.mission.begin(self.view)
         elif mode is Mode.ORBIT:
-            self._orbit.start(self.view)
+            self.orbit.start(self.view)
         elif mode is Mode.FOLLOW_TARGET:
-            self._follow.start(self.view)
+            self.follow.start(self.view)
 
     def disarmed(self) -> None:
         """Nothing is flown any more."""
@@ -235,23 +218,23 @@ class Navigator:
         """The next setpoint of the mode; None lets the motors idle."""
         view, mode = self.view, self._mode
         if mode is Mode.ORBIT:
-            return self._orbit.demand(view, step_s)
+            return self.orbit.demand(view, step_s)
         if mode is Mode.FOLLOW_TARGET:
-            return self._follow.demand(view, step_s)
+            return self.follow.demand(view, step_s)
         if mode is Mode.DESCEND:
             return self.sink(step_s)
         target = self._target_of(mode)
         if view.landed and target.kind is not Kind.TAKEOFF:
             return None
-        return self._flight.demand(target, view, step_s)
+        return self.flight.demand(target, view, step_s)
 
     def sink(self, step_s: float) -> TrajectorySetpoint:
         """FlightTaskDescend: down at MPC_LAND_SPEED, whatever is below."""
-        return self._flight.descend(self._target.position_ned_m, self.view, self._parameters["MPC_LAND_SPEED"], step_s)
+        return self.flight.descend(self._target.position_ned_m, self.view, self._parameters["MPC_LAND_SPEED"], step_s)
 
     def sink_here(self) -> None:
         """Begin to sink where the vehicle can stop: a stick mode without sticks."""
-        self._flight.start(self.view)
+        self.flight.start(self.view)
         self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
 
     def _target_of(self, mode: Mode) -> NavigatorTarget:
@@ -298,7 +281,7 @@ class Navigator:
     @property
     def orbit_status(self) -> tuple[float, Vector3] | None:
         """Radius, positive for clockwise, and centre; None while no orbit is flown."""
-        return self._orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
+        return self.orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
 
 
 _FENCE_HOLDS = 2
