@@ -4,13 +4,22 @@ import math
 from itertools import pairwise
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from sim_vehicle.quantities import Vector3
 from sim_vehicle.world import Box, Motion, Pole, plate
 from sim_vehicle.written import Finite, NotNegative, Part
 
 Point = tuple[Finite, Finite, Finite]
+
+
+def _with_direction(vector: Vector3) -> Vector3:
+    if math.hypot(*vector) < 1e-6:
+        raise ValueError("has no direction; [-1, 0, 0] looks south, [0, 0, -1] stands upright")
+    return vector
+
+
+Direction = Annotated[Point, AfterValidator(_with_direction)]
 Length = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 
 
@@ -73,7 +82,7 @@ class WallSpec(ObstacleSpec):
 
     point_ned_m: Point
     """Centre of its front face."""
-    normal_ned: Point
+    normal_ned: Direction
     """The direction that the face looks, of any length."""
     width_m: Length = 10.0
     """Along its level edges."""
@@ -81,12 +90,6 @@ class WallSpec(ObstacleSpec):
     """Along the other two."""
     thickness_m: Length = 0.1
     """Behind the face."""
-
-    @model_validator(mode="after")
-    def _has_direction(self) -> Self:
-        if math.hypot(*self.normal_ned) < 1e-6:
-            raise ValueError("normal_ned has no direction; give the way the face looks, e.g. [-1, 0, 0]")
-        return self
 
     def built(self, number: int) -> Box:
         """The same as a value, with its normal made unit and a name if it had none."""
@@ -99,18 +102,12 @@ class PoleSpec(ObstacleSpec):
 
     point_ned_m: Point
     """Where it stands."""
-    axis_ned: Point = (0.0, 0.0, -1.0)
+    axis_ned: Direction = (0.0, 0.0, -1.0)
     """Which way it goes from there, of any length."""
     height_m: Length = 5.0
     """Its length."""
     radius_m: Annotated[float, Field(ge=0.005, le=100, allow_inf_nan=False)] = 0.1
     """Its half thickness."""
-
-    @model_validator(mode="after")
-    def _has_direction(self) -> Self:
-        if math.hypot(*self.axis_ned) < 1e-6:
-            raise ValueError("axis_ned has no direction; [0, 0, -1] stands upright")
-        return self
 
     def built(self, number: int) -> Pole:
         """The same as a value, with its axis made unit and a name if it had none."""

@@ -57,12 +57,10 @@ class Scene(Part):
 
     def obstacles(self) -> tuple[tuple[str, Obstacle], ...]:
         """Everything that the vehicle can run into but the ground, each with its place in the file."""
-        specs: list[tuple[str, tuple[WallSpec | PoleSpec | BoxSpec, ...]]]
-        specs = [("walls", self.walls), ("poles", self.poles), ("boxes", self.boxes)]
         return tuple(
             (f"sim.{kind}.{index}", spec.built(index + 1))
-            for kind, all_of in specs
-            for index, spec in enumerate(all_of)
+            for kind in ("walls", "poles", "boxes")
+            for index, spec in enumerate(getattr(self, kind))
         )
 
     def world(self) -> World:

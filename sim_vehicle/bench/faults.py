@@ -123,9 +123,7 @@ def ekf_reset(
 ) -> FaultRequest:
     """The estimate jumps and the reset counter goes up; the jump of the position stays."""
     return other(
-        "estimator_reset",
-        position_jump_ned_m=position_jump_ned_m,
-        velocity_jump_ned_m_s=velocity_jump_ned_m_s,
+        "estimator_reset", position_jump_ned_m=position_jump_ned_m, velocity_jump_ned_m_s=velocity_jump_ned_m_s
     )
 
 

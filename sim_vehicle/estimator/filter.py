@@ -29,7 +29,7 @@ from sim_vehicle.estimator.strapdown import (
     down_range,
     heading,
 )
-from sim_vehicle.quantities import Floats, Vector3
+from sim_vehicle.quantities import Floats, Quaternion, Vector3
 
 # A vehicle on its feet on flat ground stands level to about two degrees, heels and gravel included.
 FIRST_TILT_RAD = 0.03
@@ -42,11 +42,7 @@ class NavigationFilter:
     """State and covariance at the time of the last inertial sample used."""
 
     def __init__(
-        self,
-        airframe: Airframe,
-        position_ned_m: Vector3,
-        velocity_ned_m_s: Vector3,
-        attitude_wxyz: tuple[float, float, float, float],
+        self, airframe: Airframe, position_ned_m: Vector3, velocity_ned_m_s: Vector3, attitude_wxyz: Quaternion
     ) -> None:
         imu, tuning = airframe.imu, airframe.estimator
         self._step_s = step_s = 1e-6 * imu.integration_interval_us

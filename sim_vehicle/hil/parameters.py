@@ -133,14 +133,8 @@ def as_params_file(airframe: Airframe, position: Position = "mocap") -> str:
 
 def as_airframe_file(airframe: Airframe, position: Position = "mocap") -> str:
     """A file for PX4's ROMFS/px4fmu_common/init.d-posix/airframes/."""
-    lines = [
-        "#!/bin/sh",
-        "#",
-        f"# @name {airframe.name}: {airframe.description}",
-        "#",
-        f"# @type {_PX4_TYPES[airframe.rotor_count]} x",
-        "#",
-    ]
-    lines += ["", ". ${R}etc/init.d/rc.mc_defaults", ""]
+    described = f"# @name {airframe.name}: {airframe.description}"
+    kind = f"# @type {_PX4_TYPES[airframe.rotor_count]} x"
+    lines = ["#!/bin/sh", "#", described, "#", kind, "#", "", ". ${R}etc/init.d/rc.mc_defaults", ""]
     lines += [f"param set-default {p.name} {p.text}  # {p.reason}" for p in px4_parameters(airframe, position)]
     return "\n".join(lines)

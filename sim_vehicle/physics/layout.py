@@ -267,22 +267,6 @@ def _per_arm(values: Floats) -> Floats:
     return np.concatenate([values, np.zeros((MOST_ROTORS - len(values), *values.shape[1:]))])
 
 
-def _motor_values(airframe: Airframe) -> dict[str, float | Floats]:
-    mix, roll_lever_m, yaw_lever_m = allocation(airframe)
-    motors = airframe.motors
-    return {
-        "yaw_sign": _per_arm(arms_of(airframe)[2]),
-        "mix": _per_arm(mix),
-        "roll_lever_m": roll_lever_m,
-        "yaw_lever_m": yaw_lever_m,
-        "motor_max_n": motors.max_thrust_n,
-        "all_motors_max_n": airframe.most_thrust_n,
-        "motor_idle_n": motors.idle_fraction * motors.max_thrust_n,
-        "motor_time_constant_s": motors.time_constant_s,
-        "moment_per_thrust_m": motors.moment_per_thrust_m,
-    }
-
-
 def _contact_values(airframe: Airframe) -> dict[str, float | Floats]:
     """Contact constants. Two guards share a head-on hit, so each arm carries half of eq. 2's mass."""
     mass_kg, arms, geometry = airframe.mass_kg, airframe.arms, airframe.geometry
@@ -308,13 +292,10 @@ def _contact_values(airframe: Airframe) -> dict[str, float | Floats]:
         "hub_damping": hub_damping,
         "foot_stiffness": foot_stiffness,
         "foot_damping": foot_damping,
-        "guard_friction": airframe.surface.guard_friction,
-        "ground_friction": airframe.surface.ground_friction,
-        "guard_radius_m": geometry.guard_radius_m,
+        **airframe.surface.model_dump(include={"guard_friction", "ground_friction"}),
+        **geometry.model_dump(include={"guard_radius_m", "foot_radius_m", "foot_depth_m"}),
         "guard_half_height_m": geometry.guard_height_m / 2,
         "hub_radius_m": geometry.hub_solid_radius_m,
-        "foot_radius_m": geometry.foot_radius_m,
-        "foot_depth_m": geometry.foot_depth_m,
         "reach_m": geometry.reach_m,
     }
 
@@ -331,25 +312,31 @@ def _gain_values(airframe: Airframe) -> dict[str, float | Floats]:
         "velocity_d": control.velocity_d,
         "k_r": inertia * frequency**2,
         "k_omega": inertia * 2 * control.attitude_damping * frequency,
-        "tilt_max_rad": control.tilt_max_rad,
-        "speed_max_m_s": control.speed_max_m_s,
-        "climb_max_m_s": control.climb_max_m_s,
-        "descent_max_m_s": control.descent_max_m_s,
+        **control.model_dump(include={"tilt_max_rad", "speed_max_m_s", "climb_max_m_s", "descent_max_m_s"}),
     }
 
 
 def constants_from(airframe: Airframe, rng: np.random.Generator) -> Constants:
     """Constants of one flight; the sensor biases are drawn from ``rng``."""
-    imu = airframe.imu
+    imu, motors = airframe.imu, airframe.motors
+    mix, roll_lever_m, yaw_lever_m = allocation(airframe)
     raw_per_interval = imu.integration_interval_us // imu.raw_interval_us
     return new_record(
         Constants,
         **_contact_values(airframe),
         **_gain_values(airframe),
-        **_motor_values(airframe),
         mass_kg=airframe.mass_kg,
         inertia_kg_m2=np.array(airframe.inertia_kg_m2),
         drag_n_s_m=airframe.drag_n_s_m,
+        yaw_sign=_per_arm(arms_of(airframe)[2]),
+        mix=_per_arm(mix),
+        roll_lever_m=roll_lever_m,
+        yaw_lever_m=yaw_lever_m,
+        motor_max_n=motors.max_thrust_n,
+        all_motors_max_n=airframe.most_thrust_n,
+        motor_idle_n=motors.idle_fraction * motors.max_thrust_n,
+        motor_time_constant_s=motors.time_constant_s,
+        moment_per_thrust_m=motors.moment_per_thrust_m,
         raw_interval_us=imu.raw_interval_us,
         raw_per_interval=raw_per_interval,
         accelerometer_range_m_s2=imu.accelerometer_range_m_s2,

@@ -9,6 +9,7 @@ With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins wi
 """
 
 import re
+from contextlib import ExitStack, closing
 
 from sim_vehicle.errors import LinkAddressError
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind, link_kind
@@ -57,12 +58,10 @@ def px4_ports(
     onboard, ground = LinkKind.ONBOARD, LinkKind.GROUND
     ground_listen_port = 0 if listen_port == 0 else GROUND_LISTEN_PORT + instance
     listen_port = COMPANION_LISTEN_PORT + instance if listen_port is None else listen_port
-    ports: list[Port] = []
-    try:
-        ports.append(UdpPeerPort(vehicle, onboard, listen_port, companion or ("127.0.0.1", COMPANION_PORT + instance)))
-        ports.append(UdpPeerPort(vehicle, ground, ground_listen_port, ("127.0.0.1", GROUND_PORT)))
-    except Exception:
-        for port in ports:
-            port.close()
-        raise
-    return ports
+    companion = companion or ("127.0.0.1", COMPANION_PORT + instance)
+    with ExitStack() as opened:
+        # What has been opened before one that cannot be had is closed again.
+        first = opened.enter_context(closing(UdpPeerPort(vehicle, onboard, listen_port, companion)))
+        second = UdpPeerPort(vehicle, ground, ground_listen_port, ("127.0.0.1", GROUND_PORT))
+        opened.pop_all()
+    return [first, second]

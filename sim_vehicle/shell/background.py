@@ -4,7 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -42,18 +42,13 @@ def start_vehicle(
     parameters = {**time_outs_at(speed), **setup.pop("parameters", {})}
     bench = Bench(Setup(parameters=parameters, **setup), time.time_ns() // 1000)
     kind = link_kind(streams)
-    ports: list[Port] = []
-    try:
-        udp = UdpServerPort(bench.vehicle, kind, _HERE, 0)
-        ports.append(udp)
-        tcp = TcpServerPort(bench.vehicle, kind, _HERE, 0)
-        ports.append(tcp)
-        ports += [open_port(bench.vehicle, address) for address in links]
-    except BaseException:
-        for port in ports:
-            port.close()
-        raise
-    return RunningVehicle(bench, ports, udp.local_port, tcp.local_port, speed)
+    with ExitStack() as opened:
+        # What has been opened before one that cannot be had is closed again.
+        udp = opened.enter_context(closing(UdpServerPort(bench.vehicle, kind, _HERE, 0)))
+        tcp = opened.enter_context(closing(TcpServerPort(bench.vehicle, kind, _HERE, 0)))
+        others = [opened.enter_context(closing(open_port(bench.vehicle, address))) for address in links]
+        opened.pop_all()
+    return RunningVehicle(bench, [udp, tcp, *others], udp.local_port, tcp.local_port, speed)
 
 
 def _check(speed: float) -> None:

@@ -35,7 +35,9 @@ def serve_px4(
     ``speed``: simulated seconds a second at most, 0 for as fast as PX4 answers. The truth of each PX4's
     vehicle is written when it goes. Raises PortInUse where ``port`` cannot be had at ``host``, and NotInLockstep.
     """
-    with _listening_socket(host, port) as listener:
+    with bound_socket(socket.SOCK_STREAM, host, port) as listener:
+        listener.listen(1)
+        listener.settimeout(_LONGEST_WAIT_S)
         tell(f"Waiting for PX4 at TCP port {listener.getsockname()[1]}.")
         while not stop():
             link = _accept(listener)
@@ -78,7 +80,9 @@ class _Session:
                 return
             for controls in self._decoder.push(data) if data else ():
                 exchange.received(controls)
-            self._tell_notices()
+            for notice in exchange.notices:
+                self._tell(notice)
+            exchange.notices.clear()
 
     def end(self, truth_path: Path | None) -> None:
         """Write the truth and say how it went."""
@@ -124,21 +128,9 @@ class _Session:
         except BlockingIOError:
             return None
 
-    def _tell_notices(self) -> None:
-        for notice in self._exchange.notices:
-            self._tell(notice)
-        self._exchange.notices.clear()
-
 
 def _now_us() -> int:
     return time.monotonic_ns() // 1000
-
-
-def _listening_socket(host: str, port: int) -> socket.socket:
-    listener = bound_socket(socket.SOCK_STREAM, host, port)
-    listener.listen(1)
-    listener.settimeout(_LONGEST_WAIT_S)
-    return listener
 
 
 def _accept(listener: socket.socket) -> socket.socket | None:

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from sim_vehicle.quantities import Floats
 from sim_vehicle.truth import FaultSpan, Hit, TruthRecorder
 
 # What else is in the file.
 _NO_SERIES = ("hits", "faults", "epoch_at_boot_us", "stalls")
+_HITS = TypeAdapter(list[Hit])
 
 
 def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int, stalls: Sequence[tuple[int, int]] = ()) -> None:
@@ -33,8 +35,7 @@ def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
     """Hits, path and the wall clock (microseconds) at the vehicle's boot time 0."""
     with np.load(path) as stored:
         series = {name: stored[name] for name in stored.files if name not in _NO_SERIES}
-        hits = [Hit(**_as_tuples(fields)) for fields in json.loads(str(stored["hits"]))]
-        return hits, series, int(stored["epoch_at_boot_us"])
+        return _HITS.validate_json(str(stored["hits"])), series, int(stored["epoch_at_boot_us"])
 
 
 def load_faults(path: Path) -> list[FaultSpan]:
@@ -47,7 +48,3 @@ def load_stalls(path: Path) -> list[tuple[int, int]]:
     """Boot times at which the vehicle's clock stood, and for how long."""
     with np.load(path) as stored:
         return [(int(at), int(late)) for at, late in stored["stalls"]] if "stalls" in stored else []
-
-
-def _as_tuples(fields: dict[str, Any]) -> dict[str, Any]:
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}

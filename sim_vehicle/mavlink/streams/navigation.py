@@ -151,11 +151,7 @@ def orbit_execution_status(state: Telemetry) -> Message | None:
     radius_m, centre_ned_m = orbit
     place = state.origin.place_at(centre_ned_m)
     return dialect.MAVLink_orbit_execution_status_message(
-        state.published.time_boot_us,
-        radius_m,
-        dialect.MAV_FRAME_GLOBAL,
-        *units_of(place)[:2],
-        place.altitude_m,
+        state.published.time_boot_us, radius_m, dialect.MAV_FRAME_GLOBAL, *units_of(place)[:2], place.altitude_m
     )
 
 

@@ -98,16 +98,7 @@ def interval_from_request(interval_us: float) -> int:
 class Stream:
     """One running or stopped stream: due when `now_us > due_after_us`; then tell it that it was `sent`."""
 
-    __slots__ = (
-        "_last_us",
-        "default_interval_us",
-        "due_after_us",
-        "interval_us",
-        "kind",
-        "noted",
-        "seen",
-        "topic",
-    )
+    __slots__ = ("_last_us", "default_interval_us", "due_after_us", "interval_us", "kind", "noted", "seen", "topic")
 
     def __init__(self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US) -> None:
         self.kind, self.topic = kind, int(kind.topic)
