@@ -194,11 +194,8 @@ def _fly_ardupilot(flight: Flight, instance: int) -> Flown:
     body = JsonVehicle(world.airframe, world.scene, world.seed)
     flight.console.print(f"Waiting for ArduPilot's SITL at TCP port {port} (docs/how-to/ardupilot.md) ...")
 
-    def is_stopped() -> bool:
-        return flight.interrupts.reason is not None
-
-    with ArduPilotVehicle(body, instance, is_stopped) as vehicle:
-        vehicle.start(is_stopped)
+    with ArduPilotVehicle(body, instance, lambda: flight.interrupts.reason is not None) as vehicle:
+        vehicle.start()
         return _fly_stepped(flight, vehicle)
 
 

@@ -81,8 +81,7 @@ def _recorded(
                         recorder.record_input(now_us, kind, **said)
 
             loop.run(
-                beside,
-                lambda: ring is not None and ring.is_long and guard.armed is False and interrupts.reason is None,
+                beside, lambda: ring is not None and ring.is_long and guard.armed is False and interrupts.reason is None
             )
     finally:
         recorder.close()

@@ -86,11 +86,7 @@ def show_findings(found: Sequence[PreflightItem], width: int, tell: Callable[[st
 
 
 def _fix(
-    console: Console,
-    preflight: Preflight,
-    connection: Connection,
-    clock: Clock,
-    found: list[PreflightItem],
+    console: Console, preflight: Preflight, connection: Connection, clock: Clock, found: list[PreflightItem]
 ) -> list[PreflightItem]:
     """Set what can be set, one by one as the person agrees; the findings afterwards."""
     if preflight.survey.vehicle.armed:

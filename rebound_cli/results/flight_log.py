@@ -47,7 +47,6 @@ class FlightLog:
     position_ned_m: Floats
     velocity_ned_m_s: Floats
     attitude_at_us: Floats
-    attitude_time_boot_us: Floats
     attitude_wxyz: Floats
     setpoint_at_us: Floats
     setpoint_ned_m: Floats  # NaN where a setpoint asked for no place
@@ -111,16 +110,17 @@ def flight_log_of(
                 imu.append((at_us, boot_us, *force, *rates))
             case LocalPosition(boot_us, position, velocity):
                 moved.append((at_us, boot_us, *position, *velocity))
-            case Attitude(boot_us, turn):
-                turned.append((at_us, boot_us, *turn))
+            case Attitude(_, turn):
+                turned.append((at_us, *turn))
             case AttitudeTarget(_, thrust, turn):
                 target.append((at_us, *(turn or (np.nan,) * 4), thrust))
             case PositionTarget(position):
                 asked.append((at_us, *(position or (np.nan, np.nan, np.nan))))
-    widths = ((imu, 8), (moved, 8), (turned, 6), (asked, 4), (target, 6), (wanted, 6))
+    widths = ((imu, 8), (moved, 8), (turned, 5), (asked, 4), (target, 6), (wanted, 6))
     i, m, t, a, c, w = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
     return FlightLog(
         *(i[:, 0], i[:, 1], i[:, 2:5], i[:, 5:8], m[:, 0], m[:, 1], m[:, 2:5], m[:, 5:8]),
-        *(t[:, 0], t[:, 1], t[:, 2:6], a[:, 0], a[:, 1:4]),
-        *(c[:, 0], c[:, 1:6], w[:, 0], w[:, 1:6], tuple(texts)),
+        *(t[:, 0], t[:, 1:5], a[:, 0], a[:, 1:4]),
+        *(c[:, 0], c[:, 1:6], w[:, 0], w[:, 1:6]),
+        tuple(texts),
     )

@@ -131,10 +131,8 @@ class FlightRecorder:
             self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')
         if self._make_room is not None:
             self._make_room(now_us)
-        if received:
-            self._tlog.write(now_us, received)
-        if result.sent_frames:
-            self._tlog.write(now_us, result.sent_frames)
+        for frames in filter(None, (received, result.sent_frames)):
+            self._tlog.write(now_us, frames)
 
     def _sync_lines(self) -> None:
         for file in (self._events_file, self._inputs_file):

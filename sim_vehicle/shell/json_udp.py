@@ -31,7 +31,7 @@ class ArduPilotVehicle:
 
     def __init__(self, body: JsonVehicle, instance: int, is_stopped: Callable[[], bool]) -> None:
         """Waits for the SITL to start. Raises PortInUse, and VehicleEnded when stopped."""
-        self._body, self.truth = body, body.truth
+        self._body, self.truth, self._is_stopped = body, body.truth, is_stopped
         self._answered: int | None = None
         self._states = bound_socket(socket.SOCK_DGRAM, "127.0.0.1", JSON_PORT + PORTS_APART * instance)
         self._states.settimeout(_SILENCE_S)
@@ -52,9 +52,9 @@ class ArduPilotVehicle:
     def time_boot_us(self) -> int:
         return self._body.time_boot_us
 
-    def start(self, is_stopped: Callable[[], bool]) -> None:
+    def start(self) -> None:
         """Return when it can be armed; what it says until then is old."""
-        while self.time_boot_us < READY_US and not is_stopped():
+        while self.time_boot_us < READY_US and not self._is_stopped():
             self.step(b"")
 
     def step(self, received: bytes) -> list[bytes]:

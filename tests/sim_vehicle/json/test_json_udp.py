@@ -92,7 +92,7 @@ def test_boot_goes_on_until_it_can_be_armed(sitl: Sitl, monkeypatch: pytest.Monk
     monkeypatch.setattr(json_udp, "READY_US", 3000)
     for count in range(4):
         sitl.sends(count, b"old")
-    sitl.vehicle.start(lambda: False)
+    sitl.vehicle.start()
     assert sitl.vehicle.time_boot_us == 3000
 
 
