@@ -7,11 +7,10 @@ from sim_vehicle.airframe import Airframe, Imu
 from sim_vehicle.estimator.sensors import DownwardSensors
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil import sensors
-from sim_vehicle.hil.messages import Air, HilSensor, ToPx4
+from sim_vehicle.hil.messages import HilSensor, ToPx4
 from sim_vehicle.hil.sensors import air_at
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.plant.standing import check_start
-from sim_vehicle.quantities import Quaternion, Vector3
 from sim_vehicle.scene import Scene
 
 # PX4 integrates samples by the trapezoidal rule: at 4 ms every HIGHRES_IMU would be the mean of two of them
@@ -59,30 +58,20 @@ class HilVehicle:
         output = self._plant.drive(motor_fractions)
         now_us = self.time_boot_us = output.time_boot_us
         px, py, pz, vx, vy, vz, qw, qx, qy, qz = self._body[:10].tolist()
-        position_ned_m: Vector3 = (px, py, pz)
-        velocity_ned_m_s: Vector3 = (vx, vy, vz)
-        attitude_wxyz: Quaternion = (qw, qx, qy, qz)
         messages: list[ToPx4] = []
         if self._is_due(sensors.GPS_PERIOD_US) and not self._plant.faults.gps_is_lost(now_us / 1e6):
-            messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
+            messages.append(self._gps.sample(now_us, (px, py, pz), (vx, vy, vz)))
         if self._is_due(self._cameras_period_us):
             messages.append(self._cameras.sample(now_us, self._body))
         messages += self._downward.observe(now_us, self._body, self._plant.around.flat_faces)
-        is_magnetometer_due = self._is_due(sensors.MAGNETOMETER_PERIOD_US)
-        messages.append(
-            HilSensor(
-                time_us=now_us,
-                specific_force_frd_m_s2=output.specific_force_frd_m_s2,
-                angular_velocity_frd_rad_s=output.angular_velocity_frd_rad_s,
-                magnetic_field_frd_gauss=self._magnetometer.sample(attitude_wxyz) if is_magnetometer_due else None,
-                air=self._air(pz) if self._is_due(sensors.BAROMETER_PERIOD_US) else None,
-            )
-        )
+        field, air = None, None
+        if self._is_due(sensors.MAGNETOMETER_PERIOD_US):
+            field = self._magnetometer.sample((qw, qx, qy, qz))
+        if self._is_due(sensors.BAROMETER_PERIOD_US):
+            air = air_at(self._origin.place.altitude_m - pz, self._rng.gauss(0, sensors.BAROMETER_NOISE_PA))
+        inertial = output.specific_force_frd_m_s2, output.angular_velocity_frd_rad_s
+        messages.append(HilSensor(now_us, *inertial, field, air))
         return tuple(messages)
-
-    def _air(self, down_m: float) -> Air:
-        altitude_m = self._origin.place.altitude_m - down_m
-        return air_at(altitude_m, self._rng.gauss(0, sensors.BAROMETER_NOISE_PA))
 
     def _is_due(self, period_us: int) -> bool:
         """Whether the interval just simulated contains a multiple of the period."""

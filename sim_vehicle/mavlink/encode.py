@@ -18,10 +18,11 @@ from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.geography import Place
 from sim_vehicle.hil.messages import Air
 from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.framing import HEADER, MAGIC, Layout, flattened
+from sim_vehicle.mavlink.framing import HEADER, MAGIC, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
 
-# One of pymavlink's, which carry no types, or a `framing.Packed`; only `Encoder.packet` looks inside.
+# One of pymavlink's, which carry no types, or a layout and the payload, zeros at its end included; only
+# `Encoder.packet` looks inside.
 Message: TypeAlias = Any
 
 NAN = math.nan
@@ -60,10 +61,8 @@ class Encoder:
         if kind is not tuple and (flat := flattened(kind)) is not None:
             layout, fields_of = flat
             kind, message = tuple, (layout, layout.pack(*fields_of(message)))
-        if kind is tuple:
+        if kind is tuple and not link.signing.sign_outgoing:
             layout, payload = message
-            if link.signing.sign_outgoing:
-                return self._signed(layout, payload)
             # Zeros at the end of a payload are left out, but for its first byte.
             sent = payload.rstrip(b"\0") or payload[:1]
             header = HEADER.pack(len(sent), 0, link.seq, link.srcSystem, link.srcComponent)
@@ -71,14 +70,14 @@ class Encoder:
             framed: bytes = header + layout.number_bytes + sent
             checksum: int = mcrf4xx(framed + layout.checked)
             return MAGIC + framed + checksum.to_bytes(2, "little")
-        packet: bytes = message.pack(link)
-        link.seq = (link.seq + 1) & 0xFF
-        return packet
-
-    def _signed(self, layout: Layout, payload: bytes) -> bytes:
-        """pymavlink's whole packet, which has the signature."""
-        link, theirs = self._link, dialect.MAVLink_message(layout.number, layout.name)
-        packet: bytes = theirs._pack(link, layout.checked[0], payload, False)
+        packet: bytes
+        if kind is tuple:
+            # pymavlink's whole packet, which has the signature.
+            layout, payload = message
+            theirs = dialect.MAVLink_message(layout.number, layout.name)
+            packet = theirs._pack(link, layout.checked[0], payload, False)
+        else:
+            packet = message.pack(link)
         link.seq = (link.seq + 1) & 0xFF
         return packet
 

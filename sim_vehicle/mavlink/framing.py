@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable
 from functools import cache
 from operator import attrgetter, itemgetter
-from typing import Any, TypeAlias
+from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
@@ -30,9 +30,6 @@ class Layout:
         self.checked = bytes((of.crc_extra,))
         """What the checksum counts beside the packet: CRC_EXTRA."""
 
-
-Packed: TypeAlias = tuple[Layout, bytes]
-"""A message as its payload alone, zeros at its end included."""
 
 HIGHRES_IMU = Layout(dialect.MAVLink_highres_imu_message)
 ATTITUDE = Layout(dialect.MAVLink_attitude_message)

@@ -12,21 +12,14 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, HilGps, HilSensor, MotionCapture, ToPx4
-from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.decode import Decoder
-from sim_vehicle.mavlink.encode import (
-    AIR_FIELDS,
-    INERTIAL_FIELDS,
-    MAGNETIC_FIELDS,
-    Message,
-    air_fields,
-    diagonal_covariance,
-    units_of,
-)
+from sim_vehicle.mavlink import encode, framing
+from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.streams import aiding
 
 # PX4 reads neither of them.
 SIMULATOR = Identity(1, 51)
+# What is read of PX4; its greeting (HEARTBEAT, COMMAND_LONG) is dropped.
+ANSWERS = (dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS,)
 
 _ARMED_FLAG = 0x80
 _LOCKSTEP_FLAG = 0x1
@@ -44,22 +37,12 @@ def filled(message: ToPx4) -> Message:
     return _FILLED[type(message)](message)
 
 
-class HilDecoder:
-    """Finds PX4's answers in its stream, which TCP may have cut anywhere."""
-
-    def __init__(self) -> None:
-        self._decoder = Decoder(SIMULATOR, (dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS,))
-
-    def push(self, data: bytes) -> list[ActuatorControls]:
-        """The answers completed by ``data``; PX4's greeting (HEARTBEAT, COMMAND_LONG) is dropped."""
-        return [_answer(packet) for packet in self._decoder.push(data)]
-
-
 def _sensor(sample: HilSensor) -> Message:
     inertial = (*sample.specific_force_frd_m_s2, *sample.angular_velocity_frd_rad_s)
     field, air = sample.magnetic_field_frd_gauss, sample.air
-    fields = INERTIAL_FIELDS | (0 if field is None else MAGNETIC_FIELDS) | (0 if air is None else AIR_FIELDS)
-    slow = (*(field or (0.0, 0.0, 0.0)), *air_fields(air))
+    fields = encode.INERTIAL_FIELDS | (0 if field is None else encode.MAGNETIC_FIELDS)
+    fields |= 0 if air is None else encode.AIR_FIELDS
+    slow = (*(field or (0.0, 0.0, 0.0)), *encode.air_fields(air))
     return framing.HIL_SENSOR, framing.HIL_SENSOR.pack(sample.time_us, *inertial, *slow, fields, 0)
 
 
@@ -73,7 +56,7 @@ def _gps(fix: HilGps) -> Message:
     return dialect.MAVLink_hil_gps_message(
         fix.time_us,
         _FIX_3D,
-        *units_of(fix.place),
+        *encode.units_of(fix.place),
         accuracy_cm,
         accuracy_cm,
         round(100 * speed_m_s),
@@ -93,8 +76,8 @@ def _motion_capture(seen: MotionCapture) -> Message:
         *seen.position_ned_m,
         list(seen.attitude_wxyz),
         *_UNKNOWN_VELOCITY_AND_RATES,
-        diagonal_covariance(seen.position_variance_m2, seen.attitude_variance_rad2),
-        diagonal_covariance(math.nan, math.nan),
+        encode.diagonal_covariance(seen.position_variance_m2, seen.attitude_variance_rad2),
+        encode.diagonal_covariance(math.nan, math.nan),
         0,
         # As MOCAP it would go to a topic that EKF2 does not read.
         dialect.MAV_ESTIMATOR_TYPE_VISION,
@@ -111,7 +94,8 @@ _FILLED: dict[type[Any], Callable[[Any], Message]] = {
 }
 
 
-def _answer(message: Message) -> ActuatorControls:
+def answered(message: Message) -> ActuatorControls:
+    """PX4's answer as a value."""
     motors = message.controls[: len(MOTORS_STOPPED)]
     return ActuatorControls(
         time_us=message.time_usec,

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from sim_vehicle.hil.exchange import Exchange, ExchangePhase
 from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.mavlink.encode import Encoder
-from sim_vehicle.mavlink.hil import SIMULATOR, HilDecoder, filled
+from sim_vehicle.mavlink.hil import ANSWERS, SIMULATOR, answered, filled
 from sim_vehicle.shell.ports import bound_socket
 from sim_vehicle.shell.realtime import RealtimePace
 from sim_vehicle.shell.truth_file import save_truth
@@ -61,7 +62,7 @@ class _Session:
         self._speed = speed
         self._pace = RealtimePace(vehicle.time_boot_us, speed)
         self._exchange = Exchange(_now_us())
-        self._encoder, self._decoder = Encoder(SIMULATOR), HilDecoder()
+        self._encoder, self._decoder = Encoder(SIMULATOR), Decoder(SIMULATOR, ANSWERS)
         self._lockstep_from: tuple[int, int] | None = None
 
     def run(self, stop: Callable[[], bool]) -> None:
@@ -78,8 +79,8 @@ class _Session:
                 return
             if data == b"":
                 return
-            for controls in self._decoder.push(data) if data else ():
-                exchange.received(controls)
+            for packet in self._decoder.push(data or b""):
+                exchange.received(answered(packet))
             for notice in exchange.notices:
                 self._tell(notice)
             exchange.notices.clear()

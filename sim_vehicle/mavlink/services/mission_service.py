@@ -25,20 +25,17 @@ class MissionService(Service):
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
         self._store = store = board.autopilot.missions
-        self._transfer = MissionTransfer(store, link.send)
+        self._transfer = MissionTransfer(store, link)
         self._sent_us = 0
         self._current, self._reached = store.current, store.progress.reached
         self._repeats = 0
         self._state = 0
-        self.handlers = dict.fromkeys(MESSAGES, self._receive)
+        self.handlers = dict.fromkeys(MESSAGES, self._transfer.receive)
 
     def update(self, now_us: int) -> None:
         """Repeats, time-outs, and what the mission has come to."""
         self._report(now_us)
         self._transfer.update(now_us)
-
-    def _receive(self, packet: dialect.MAVLink_message) -> None:
-        self._transfer.receive(packet, self._link.now_us)
 
     def _report(self, now_us: int) -> None:
         """What is due now, nearly always nothing."""

@@ -12,9 +12,9 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore
-from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.services import mission_wire as wire
 from sim_vehicle.mavlink.services.mission_wire import MissionResult
+from sim_vehicle.mavlink.services.service import Channel
 
 # MAVLINK_MISSION_RETRY_TIMEOUT_DEFAULT and MAVLINK_MISSION_PROTOCOL_TIMEOUT_DEFAULT.
 RETRY_US = 250_000
@@ -41,11 +41,10 @@ class TransferState(Enum):
 class MissionTransfer:
     """Messages and the time in; answers out. The lists themselves are the store's."""
 
-    def __init__(self, store: MissionStore, send: Callable[[Message], None]) -> None:
-        """``send`` takes the answers."""
+    def __init__(self, store: MissionStore, link: Channel) -> None:
+        """``link`` takes the answers and has the time."""
         self.state = TransferState.IDLE
-        self._store, self._send = store, send
-        self._now_us = 0
+        self._store, self._link, self._send = store, link, link.send
         self._peer = _NOBODY
         self._type: int = MissionType.MISSION
         self._next = 0
@@ -55,16 +54,14 @@ class MissionTransfer:
         self._sent_us = 0
         self._heard_us = 0
 
-    def receive(self, message: Packet, now_us: int) -> None:
+    def receive(self, message: Packet) -> None:
         """Take a message that is addressed to this vehicle."""
-        self._now_us = now_us
         handler = _HANDLERS.get((message.id, self.state))
         if handler is not None:
             handler(self, message)
 
     def update(self, now_us: int) -> None:
         """Let time pass: repeats and time-outs."""
-        self._now_us = now_us
         if self.state is TransferState.IDLE:
             return
         if now_us - self._heard_us > TIMEOUT_US:
@@ -78,7 +75,7 @@ class MissionTransfer:
 
     def _begin_download(self, message: Packet) -> None:
         self.state, self._type, self._peer = TransferState.SENDING, message.mission_type, _peer(message)
-        self._heard_us = self._now_us
+        self._heard_us = self._link.now_us
         self._next, self._count = 0, len(self._store.plan(message.mission_type))
         self._send_count()
 
@@ -89,19 +86,19 @@ class MissionTransfer:
             self._begin_download(message)
 
     def _send_count(self) -> None:
-        self._sent_us = self._now_us
+        self._sent_us = self._link.now_us
         self._send(dialect.MAVLink_mission_count_message(*self._peer, self._count, self._type))
 
     def _send_item(self, message: Packet) -> None:
         if not self._is_partners(message):
             return
-        self._heard_us = self._now_us
+        self._heard_us = self._link.now_us
         number, items = message.seq, self._store.plan(self._type)
         is_next = number == self._next < self._count
         if is_next:
             self._next += 1
         if (is_next or number == self._next - 1) and number < len(items):
-            self._sent_us = self._now_us
+            self._sent_us = self._link.now_us
             around = (self._peer, number, self._store.current == number, self._type)
             self._send(wire.item_message(items[number], *around))
             return
@@ -115,7 +112,7 @@ class MissionTransfer:
     # --- upload ------------------------------------------------------------------------------------------------
 
     def _begin_upload(self, message: Packet) -> None:
-        self._heard_us = self._now_us
+        self._heard_us = self._link.now_us
         if self._store.uploading:
             self._refuse(message)
             return
@@ -135,7 +132,7 @@ class MissionTransfer:
             self._ask_for_next()
 
     def _repeat_request(self, message: Packet) -> None:
-        self._heard_us = self._now_us
+        self._heard_us = self._link.now_us
         if _peer(message) == self._peer and self._next == 0:
             self._ask_for_next()
         else:
@@ -146,7 +143,7 @@ class MissionTransfer:
         self._acknowledge(MissionResult.ERROR, _peer(message))
 
     def _ask_for_next(self) -> None:
-        self._sent_us = self._now_us
+        self._sent_us = self._link.now_us
         self._send(dialect.MAVLink_mission_request_int_message(*self._peer, self._next, self._type))
 
     def _take_item(self, message: Packet) -> None:
@@ -155,7 +152,7 @@ class MissionTransfer:
         if message.mission_type != self._type:
             self._refuse(message)
             return
-        self._heard_us = self._now_us
+        self._heard_us = self._link.now_us
         if message.seq != self._next:
             return
         item = wire.parse(message)

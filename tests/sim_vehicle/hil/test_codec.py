@@ -8,8 +8,9 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, MotionCapture
+from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.mavlink.encode import Encoder
-from sim_vehicle.mavlink.hil import SIMULATOR, HilDecoder, filled
+from sim_vehicle.mavlink.hil import ANSWERS, SIMULATOR, answered, filled
 
 ZURICH = Place(47.397742, 8.545594, 488.123)
 
@@ -68,7 +69,8 @@ def test_motion_capture_is_an_odometry_in_local_ned_that_ekf2_reads():
     ids=["armed", "disarmed", "without lockstep", "a motor that is off"],
 )
 def test_answers_of_px4(packet, expected):
-    (found,) = HilDecoder().push(packet)
+    (answer,) = Decoder(SIMULATOR, ANSWERS).push(packet)
+    found = answered(answer)
     assert found.motor_fractions == pytest.approx(expected.motor_fractions)
     assert (found.time_us, found.armed, found.is_lockstep) == (expected.time_us, expected.armed, expected.is_lockstep)
 

@@ -1,6 +1,7 @@
 """A ground station's side of the mission protocol, and a wire that loses, repeats and reorders packets."""
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
@@ -90,15 +91,19 @@ class Exchange:
         self.there, self.back = (Wire(faults, seed) for seed in (self.seed, ~self.seed))
         self.asked: list[Any] = []
         self.answers: list[Any] = []
-        self.transfer = MissionTransfer(self.store, self.answers.append)
-        self.now_us = 1_000_000
+        self.link = SimpleNamespace(send=self.answers.append, now_us=1_000_000)
+        self.transfer = MissionTransfer(self.store, self.link)
+
+    @property
+    def now_us(self) -> int:
+        return self.link.now_us
 
     def step(self) -> list[Any]:
-        self.now_us += STEP_US
+        self.link.now_us += STEP_US
         arrived = self.there.carry(self.asked, self.now_us)
         self.asked.clear()
         for message in arrived:
-            self.transfer.receive(message, self.now_us)
+            self.transfer.receive(message)
         self.transfer.update(self.now_us)
         back = self.back.carry(self.answers, self.now_us)
         self.answers.clear()

@@ -89,7 +89,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
     plan = exchange.store.mission
     assert plan == before or len(plan.items) == len({item.place.latitude_deg for item in plan.items})
     # And once everybody is silent, it is free again
-    exchange.now_us += TIMEOUT_US + RETRY_US
+    exchange.link.now_us += TIMEOUT_US + RETRY_US
     exchange.step()
     exchange.step()
     assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
