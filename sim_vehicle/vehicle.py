@@ -116,11 +116,9 @@ class SimulatedVehicle:
     def add_link(self, kind: LinkKind) -> Link:
         """One more connection, from now on."""
         number, seed = self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far
-        link: Link
-        if self._links_may_fail or needs_faulty_link(self._faults):
-            link = FaultyLink(kind, self._board, number, seed, self._faults)
-        else:
-            link = Link(kind, self._board, number, seed)
+        is_faulty = self._links_may_fail or needs_faulty_link(self._faults)
+        parts = kind, self._board, number, seed
+        link = FaultyLink(*parts, self._faults) if is_faulty else Link(*parts)
         self._links_so_far += 1
         self._links.append(link)
         return link

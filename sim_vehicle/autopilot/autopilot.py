@@ -81,22 +81,18 @@ class Autopilot:
         self._commands.append(command)
 
     def receive(self, message: FlightInput) -> None:
-        """Take a setpoint, sticks or a target to follow."""
+        """Take a setpoint, sticks or a target to follow, whatever the mode; a setpoint only flies in OFFBOARD."""
+        is_flown = self.modes.flown is Mode.OFFBOARD
         if isinstance(message, PositionTarget):
-            self.setpoint(message)
+            refusal = self._offboard.take_position(message, self._now_us, is_flown, self._estimate.attitude_wxyz)
+            if refusal is not None:
+                self.texts.append(refusal)
         elif isinstance(message, AttitudeTarget):
-            self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
+            self._offboard.take_attitude(message, self._now_us, is_flown)
         elif isinstance(message, StickInput):
             self.commander.sticks.heard(message, self._now_us)
         else:
             self.navigator.follow.heard(message, self.navigator.view.now_us)
-
-    def setpoint(self, target: PositionTarget) -> None:
-        """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""
-        is_flown, attitude = self.modes.flown is Mode.OFFBOARD, self._estimate.attitude_wxyz
-        refusal = self._offboard.take_position(target, self._now_us, is_flown, attitude)
-        if refusal is not None:
-            self.texts.append(refusal)
 
     def ground_station_heard(self) -> None:
         """A ground station's heartbeat came over some link."""

@@ -36,7 +36,6 @@ UNANSWERED = frozenset(
     | {LOGGING_START, LOGGING_STOP}
 )
 
-
 # FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.
 _GPS = 4
 _WELL, _OFF = 0, 1

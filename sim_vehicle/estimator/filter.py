@@ -9,26 +9,8 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator import strapdown
 from sim_vehicle.estimator.sensors import wrapped
-from sim_vehicle.estimator.strapdown import (
-    D_ACCELEROMETER,
-    D_ATTITUDE,
-    D_FLOW,
-    D_GYROSCOPE,
-    D_POSITION,
-    D_VELOCITY,
-    ERROR_ROWS,
-    FLOW,
-    GYROSCOPE_BIAS,
-    NOMINAL_ROWS,
-    POSITION,
-    QUATERNION,
-    VELOCITY,
-    advance,
-    correct,
-    down_range,
-    heading,
-)
 from sim_vehicle.quantities import Floats, Quaternion, Vector3
 
 # A vehicle on its feet on flat ground stands level to about two degrees, heels and gravel included.
@@ -55,19 +37,19 @@ class NavigationFilter:
                 tuning.clipped_excess_m_s2 * 1e-6 * imu.raw_interval_us,
             ]
         )
-        self.nominal = np.zeros(NOMINAL_ROWS)
-        self.nominal[POSITION : POSITION + 3] = position_ned_m
-        self.nominal[VELOCITY : VELOCITY + 3] = velocity_ned_m_s
-        self.nominal[QUATERNION : QUATERNION + 4] = attitude_wxyz
-        self._ekf = ekf = ExtendedKalmanFilter(ERROR_ROWS, 1)
-        ekf.x = np.zeros(ERROR_ROWS)
-        ekf.Q = np.zeros((ERROR_ROWS, ERROR_ROWS))
-        first = np.zeros(ERROR_ROWS)
-        first[D_ATTITUDE : D_ATTITUDE + 3] = FIRST_TILT_RAD
-        first[D_VELOCITY : D_VELOCITY + 3] = FIRST_VELOCITY_M_S
-        first[D_POSITION : D_POSITION + 3] = FIRST_POSITION_M
-        first[D_GYROSCOPE : D_GYROSCOPE + 3] = imu.gyroscope_bias_rad_s
-        first[D_ACCELEROMETER : D_ACCELEROMETER + 3] = imu.accelerometer_bias_m_s2
+        self.nominal = np.zeros(strapdown.NOMINAL_ROWS)
+        self.nominal[strapdown.POSITION : strapdown.POSITION + 3] = position_ned_m
+        self.nominal[strapdown.VELOCITY : strapdown.VELOCITY + 3] = velocity_ned_m_s
+        self.nominal[strapdown.QUATERNION : strapdown.QUATERNION + 4] = attitude_wxyz
+        self._ekf = ekf = ExtendedKalmanFilter(strapdown.ERROR_ROWS, 1)
+        ekf.x = np.zeros(strapdown.ERROR_ROWS)
+        ekf.Q = np.zeros((strapdown.ERROR_ROWS, strapdown.ERROR_ROWS))
+        first = np.zeros(strapdown.ERROR_ROWS)
+        first[strapdown.D_ATTITUDE : strapdown.D_ATTITUDE + 3] = FIRST_TILT_RAD
+        first[strapdown.D_VELOCITY : strapdown.D_VELOCITY + 3] = FIRST_VELOCITY_M_S
+        first[strapdown.D_POSITION : strapdown.D_POSITION + 3] = FIRST_POSITION_M
+        first[strapdown.D_GYROSCOPE : strapdown.D_GYROSCOPE + 3] = imu.gyroscope_bias_rad_s
+        first[strapdown.D_ACCELEROMETER : strapdown.D_ACCELEROMETER + 3] = imu.accelerometer_bias_m_s2
         ekf.P = np.diag(first**2)
 
     @property
@@ -79,43 +61,43 @@ class NavigationFilter:
     def predict(self, sample: Floats) -> None:
         """Carry state and covariance through one inertial sample (SAMPLE_COLUMNS,)."""
         ekf = self._ekf
-        advance(self.nominal, sample, self._step_s, self._noise, ekf.F, ekf.Q)
+        strapdown.advance(self.nominal, sample, self._step_s, self._noise, ekf.F, ekf.Q)
         ekf.predict()
 
     # --- corrections: each says whether it was fused -------------------------------------------------------
 
     def fuse_flow(self, flow_rad: tuple[float, float], noise_rad: float, gate: float) -> bool:
         """Angle by which the ground has moved past, turns taken out, since `begin_flow`."""
-        innovation = np.array(flow_rad) - self.nominal[FLOW : FLOW + 2]
+        innovation = np.array(flow_rad) - self.nominal[strapdown.FLOW : strapdown.FLOW + 2]
         return self._fuse(innovation, _PICK_FLOW, noise_rad**2, gate)
 
     def begin_flow(self) -> None:
         """Begin the integral of a new flow sample."""
-        self.nominal[FLOW : FLOW + 2] = 0.0
-        self._forget(slice(D_FLOW, D_FLOW + 2), 0.0)
+        self.nominal[strapdown.FLOW : strapdown.FLOW + 2] = 0.0
+        self._forget(slice(strapdown.D_FLOW, strapdown.D_FLOW + 2), 0.0)
 
     def fuse_range(self, distance_m: float, noise_m: float, gate: float) -> bool:
         """Distance along the down axis to the ground."""
-        row = np.empty((1, ERROR_ROWS))
-        innovation = np.array([distance_m - down_range(self.nominal, row[0])])
+        row = np.empty((1, strapdown.ERROR_ROWS))
+        innovation = np.array([distance_m - strapdown.down_range(self.nominal, row[0])])
         return self._fuse(innovation, row, noise_m**2, gate)
 
     def fuse_heading(self, yaw_rad: float, noise_rad: float, gate: float) -> bool:
         """Heading of the nose."""
-        row = np.empty((1, ERROR_ROWS))
-        innovation = np.array([wrapped(yaw_rad - heading(self.nominal, row[0]))])
+        row = np.empty((1, strapdown.ERROR_ROWS))
+        innovation = np.array([wrapped(yaw_rad - strapdown.heading(self.nominal, row[0]))])
         return self._fuse(innovation, row, noise_rad**2, gate)
 
     def fuse_position(self, position_ned_m: Vector3, noise_m: float, gate: float) -> bool:
         """Position as motion capture sees it."""
-        innovation = np.array(position_ned_m) - self.nominal[POSITION : POSITION + 3]
+        innovation = np.array(position_ned_m) - self.nominal[strapdown.POSITION : strapdown.POSITION + 3]
         return self._fuse(innovation, _PICK_POSITION, noise_m**2, gate)
 
     def fuse_rest(self, mean_rates_frd_rad_s: Floats, speed_noise_m_s: float, rate_noise_rad_s: float) -> None:
         """The vehicle stands still: no velocity, and what the gyroscope shows is its bias."""
-        still = -self.nominal[VELOCITY : VELOCITY + 3]
+        still = -self.nominal[strapdown.VELOCITY : strapdown.VELOCITY + 3]
         self._fuse(still, _PICK_VELOCITY, speed_noise_m_s**2, np.inf)
-        bias = mean_rates_frd_rad_s - self.nominal[GYROSCOPE_BIAS : GYROSCOPE_BIAS + 3]
+        bias = mean_rates_frd_rad_s - self.nominal[strapdown.GYROSCOPE_BIAS : strapdown.GYROSCOPE_BIAS + 3]
         self._fuse(bias, _PICK_GYROSCOPE, rate_noise_rad_s**2, np.inf)
 
     def _fuse(self, innovation: Floats, h: Floats, variance: float, gate: float) -> bool:
@@ -127,34 +109,34 @@ class NavigationFilter:
         accepted = all(value * value <= most for value, most in zip(innovation.tolist(), farthest, strict=True))
         if accepted:
             ekf.update(innovation, lambda _: h, lambda error: h @ error, R=r)
-            correct(self.nominal, ekf.x)
+            strapdown.correct(self.nominal, ekf.x)
         return accepted
 
     # --- resets ---------------------------------------------------------------------------------------------
 
     def reset_horizontal_velocity(self, flow_rad: tuple[float, float], seconds: float, noise_rad: float) -> None:
         """Take the flow's word for the velocity: move it by what would explain the whole innovation."""
-        row = np.empty(ERROR_ROWS)
-        distance_m = down_range(self.nominal, row)
-        about_x, about_y = (flow_rad[i] - float(self.nominal[FLOW + i]) for i in range(2))
-        w, x, y, z = self.nominal[QUATERNION : QUATERNION + 4].tolist()
+        row = np.empty(strapdown.ERROR_ROWS)
+        distance_m = strapdown.down_range(self.nominal, row)
+        about_x, about_y = (flow_rad[i] - float(self.nominal[strapdown.FLOW + i]) for i in range(2))
+        w, x, y, z = self.nominal[strapdown.QUATERNION : strapdown.QUATERNION + 4].tolist()
         forward, right = distance_m * about_y / seconds, -distance_m * about_x / seconds
-        self.nominal[VELOCITY] += (1 - 2 * (y * y + z * z)) * forward + 2 * (x * y - w * z) * right
-        self.nominal[VELOCITY + 1] += 2 * (x * y + w * z) * forward + (1 - 2 * (x * x + z * z)) * right
-        self._forget(slice(D_VELOCITY, D_VELOCITY + 2), distance_m * noise_rad / seconds)
+        self.nominal[strapdown.VELOCITY] += (1 - 2 * (y * y + z * z)) * forward + 2 * (x * y - w * z) * right
+        self.nominal[strapdown.VELOCITY + 1] += 2 * (x * y + w * z) * forward + (1 - 2 * (x * x + z * z)) * right
+        self._forget(slice(strapdown.D_VELOCITY, strapdown.D_VELOCITY + 2), distance_m * noise_rad / seconds)
 
     def reset_height(self, distance_m: float, noise_m: float) -> None:
         """Take the range's word for the height."""
-        row = np.empty(ERROR_ROWS)
-        predicted_m = down_range(self.nominal, row)
-        self.nominal[POSITION + 2] += (distance_m - predicted_m) / float(row[D_POSITION + 2])
-        self._forget(slice(D_POSITION + 2, D_POSITION + 3), noise_m)
+        row = np.empty(strapdown.ERROR_ROWS)
+        predicted_m = strapdown.down_range(self.nominal, row)
+        self.nominal[strapdown.POSITION + 2] += (distance_m - predicted_m) / float(row[strapdown.D_POSITION + 2])
+        self._forget(slice(strapdown.D_POSITION + 2, strapdown.D_POSITION + 3), noise_m)
 
     def reset_position(self, position_ned_m: Vector3, noise_m: float, speed_noise_m_s: float) -> None:
         """Take motion capture's word for the position; the velocity that led astray is open again."""
-        self.nominal[POSITION : POSITION + 3] = position_ned_m
-        self._forget(slice(D_POSITION, D_POSITION + 3), noise_m)
-        self._forget(slice(D_VELOCITY, D_VELOCITY + 3), speed_noise_m_s)
+        self.nominal[strapdown.POSITION : strapdown.POSITION + 3] = position_ned_m
+        self._forget(slice(strapdown.D_POSITION, strapdown.D_POSITION + 3), noise_m)
+        self._forget(slice(strapdown.D_VELOCITY, strapdown.D_VELOCITY + 3), speed_noise_m_s)
 
     def _forget(self, rows: slice, deviation: float) -> None:
         """Make rows of the error independent of everything else, with the standard deviation given."""
@@ -166,12 +148,12 @@ class NavigationFilter:
 
 def _pick(start: int, size: int) -> Floats:
     """The matrix H of a measurement that is the error's rows from ``start`` on."""
-    return np.eye(ERROR_ROWS)[start : start + size].copy()
+    return np.eye(strapdown.ERROR_ROWS)[start : start + size].copy()
 
 
 # The shape of the noise of 1 to 3 values.
 _UNIT = {size: np.eye(size) for size in (1, 2, 3)}
-_PICK_FLOW = _pick(D_FLOW, 2)
-_PICK_POSITION = _pick(D_POSITION, 3)
-_PICK_VELOCITY = _pick(D_VELOCITY, 3)
-_PICK_GYROSCOPE = _pick(D_GYROSCOPE, 3)
+_PICK_FLOW = _pick(strapdown.D_FLOW, 2)
+_PICK_POSITION = _pick(strapdown.D_POSITION, 3)
+_PICK_VELOCITY = _pick(strapdown.D_VELOCITY, 3)
+_PICK_GYROSCOPE = _pick(strapdown.D_GYROSCOPE, 3)

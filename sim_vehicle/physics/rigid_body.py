@@ -2,14 +2,7 @@
 
 from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of, times
 from sim_vehicle.physics.jit import inlined, njit
-from sim_vehicle.physics.layout import (
-    BODY_SIZE,
-    GRAVITY_M_S2,
-    Constants,
-    Disturbance,
-    PlantState,
-    Scratch,
-)
+from sim_vehicle.physics.layout import BODY_SIZE, GRAVITY_M_S2, Constants, Disturbance, PlantState, Scratch
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise
 from sim_vehicle.physics.touching.contact import contact_wrench
 from sim_vehicle.quantities import Floats, Ints

@@ -27,20 +27,27 @@ def connected(vehicle: SimulatedVehicle, kind: LinkKind) -> Link:
     return link
 
 
+def _resolved(remote: Address) -> Address:
+    """With the host's number in place of its name, which would be looked up for every packet."""
+    host, port = remote
+    try:
+        *_, address = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0]
+    except (OSError, UnicodeError) as problem:
+        raise LinkAddressError(f"Host {host!r} is unknown: give a name or a number such as 127.0.0.1.") from problem
+    return str(address[0]), port
+
+
 def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket:
     """A non-blocking IPv4 socket of ``kind`` on ``host``:``port``.
 
     Raises PortInUse where it cannot be had, LinkAddressError for a host that cannot be one.
     """
     name = "UDP" if kind is socket.SOCK_DGRAM else "TCP"
-    link = socket.socket(socket.AF_INET, kind)
+    address, link = _resolved((host, port)), socket.socket(socket.AF_INET, kind)
     try:
         if kind is socket.SOCK_STREAM:
             link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        link.bind((host, port))
-    except (UnicodeError, socket.gaierror) as problem:
-        link.close()
-        raise LinkAddressError(f"Host {host!r} is unknown: give a name or a number such as 127.0.0.1.") from problem
+        link.bind(address)
     except OSError as problem:
         link.close()
         if problem.errno == errno.EADDRINUSE:
@@ -113,16 +120,6 @@ class UdpPeerPort(SocketPort):
 
     def send(self) -> None:
         send_datagrams(self._socket, self._link.take(), self._remote)
-
-
-def _resolved(remote: Address) -> Address:
-    """With the host's number in place of its name, which would be looked up for every packet."""
-    host, port = remote
-    try:
-        *_, address = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0]
-    except (OSError, UnicodeError) as problem:
-        raise LinkAddressError(f"Host {host!r} is unknown: give a name or a number such as 127.0.0.1.") from problem
-    return str(address[0]), port
 
 
 class UdpServerPort(SocketPort):

@@ -33,7 +33,7 @@ def in_offboard(setpoint: PositionTarget, **parameters: float) -> Flight:
     flight.fly(0.2, setpoint)
     assert set_mode(flight, Mode.OFFBOARD) is Result.ACCEPTED
     flight.fly(0.5, setpoint)
-    flight.autopilot.setpoint(setpoint)
+    flight.autopilot.receive(setpoint)
     return flight
 
 

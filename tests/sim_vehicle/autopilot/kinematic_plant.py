@@ -100,7 +100,7 @@ class Flight:
         period = round(250 / rate_hz)
         for number in range(round(seconds * 250)):
             if target is not None and number % period == 0:
-                self.autopilot.setpoint(target)
+                self.autopilot.receive(target)
             self.step()
 
     def fly_until(self, condition: object, at_most_s: float, target: PositionTarget | None = None) -> float:
