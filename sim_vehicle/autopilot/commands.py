@@ -27,13 +27,12 @@ REGIONS_OF_INTEREST = (80, 195, 196, 197, 201)
 PREFLIGHT_REBOOT_SHUTDOWN = 246
 RUN_PREARM_CHECKS = 401
 INJECT_FAILURE = 420
-LOGGING_START, LOGGING_STOP = 2510, 2511
 
 # Left by the commander to modules that this vehicle does not have: cameras, gimbals, grippers, the logger, tunes.
 # On a PX4 without them nobody answers either.
-UNANSWERED = frozenset(
-    {203, 204, 205, 206, 214, 242, 243, 500, 530, 531, 532, 1000, 1001, 2003, 3000, 31_010, 31_011, 31_012}
-    | {LOGGING_START, LOGGING_STOP}
+UNANSWERED = (
+    *(203, 204, 205, 206, 214, 242, 243, 500, 530, 531, 532, 1000, 1001, 2003, 2510, 2511, 3000),
+    *(31_010, 31_011, 31_012),
 )
 
 # FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.

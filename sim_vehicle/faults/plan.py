@@ -44,7 +44,7 @@ class Faults:
             ((spec.EstimatorReset, spec.EstimatorAfterClipping, spec.AidingLoss), self.estimate),
         )
         self.acts: list[Callable[[float, PlantState, Disturbance], None]] = []
-        """Of the groups that ever had a fault: the others have nothing to write."""
+        """Empty while there was never a fault; then the notes, and the groups that ever had one of theirs."""
         self._faults: list[Fault] = []
         self._turns_at_s = math.inf
         """When the next of them begins or ends."""
@@ -62,7 +62,7 @@ class Faults:
         for kinds, group in self._groups:
             if isinstance(fault, kinds):
                 group.add(fault)
-        self.acts = [group.act for _, group in self._groups if group.had_any]
+        self.acts = [self._note, *(group.act for _, group in self._groups if group.had_any)]
 
     def remove(self, fault: Fault, time_us: int) -> None:
         """The very fault that was added is over, or never comes."""
@@ -76,10 +76,7 @@ class Faults:
 
     def before(self, state: PlantState, disturbance: Disturbance) -> None:
         """Write what holds for the interval that begins now, and note what has begun and ended."""
-        time_us = int(state.time_us)
-        time_s = time_us / 1e6
-        if time_s >= self._turns_at_s:
-            self._note(time_s, time_us)
+        time_s = int(state.time_us) / 1e6
         for act in self.acts:
             act(time_s, state, disturbance)
 
@@ -87,7 +84,10 @@ class Faults:
         """At that time."""
         return any(isinstance(fault, spec.AidingLoss) for fault in self.estimate.acting(time_s))
 
-    def _note(self, time_s: float, time_us: int) -> None:
+    def _note(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
+        if time_s < self._turns_at_s:
+            return
+        time_us = int(state.time_us)
         for fault in self._faults:
             start_s, end_s = fault.window_s
             if start_s <= time_s and id(fault) not in self._span_of:

@@ -134,7 +134,8 @@ class Plant:
         around = self.around
         if around.world.movers:
             around.move(int(self.state.time_us))
-        self.faults.before(self.state, self.disturbance)
+        if self.faults.acts:
+            self.faults.before(self.state, self.disturbance)
         advance_interval(
             self._state_box,
             self._asked.box,
