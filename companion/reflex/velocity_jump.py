@@ -107,7 +107,8 @@ class VelocityJump:
         1 / degrees of freedom): a standard deviation from few steps is uncertain. Each has three axes, and shares
         velocities with those around it: four are worth as much as one. It is larger by `caution` where the estimate may
         jump without a hit, by vibration between the samples (standard deviation `shaking_m_s2`), and by the velocity's
-        lag where the thrust changes, as in free fall. A rate jump that no motor makes confirms it: half is enough.
+        lag where the thrust changes, as in free fall. Beside a rate jump less is enough: test ratios of one impulse add up,
+        that of the rates to three quarters at most. So half is enough beside one that no motor makes.
         """
         if not self.known:
             return math.inf
@@ -118,8 +119,8 @@ class VelocityJump:
         least_m_s = caution * max(step_m_s, noise_m_s) + unseen_m_s
         (p, q, r), since_us = self.rate_step_frd_rad_s, time_us - self.rate_step_until_us
         most_rad_s = config.rate_step_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
-        is_turned = since_us < LONGEST_SLOW_STEP_US and math.hypot(p, q, r / YAW_SHARE) >= most_rad_s
-        return 0.5 * least_m_s if is_turned else least_m_s
+        turned = math.hypot(p, q, r / YAW_SHARE) / most_rad_s if since_us < LONGEST_SLOW_STEP_US else 0.0
+        return least_m_s * math.sqrt(1.0 - 0.75 * min(turned, 1.0) ** 2)
 
 
 def _rate(a: Vector3, b: Vector3, seconds: float) -> Vector3:

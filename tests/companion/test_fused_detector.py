@@ -149,6 +149,9 @@ def stepped(change_m_s, at_us=3_002_000, turn_frd_rad_s=(0.0, 0.0, 0.0), **scene
         # of that about yaw; beside a turn that no motor makes little of a step is enough
         ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (7.7, 7.7, 0.0)}, 1),
         ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (2.1, 2.1, 0.0)}, 0),
+        # Step and turn are together what neither is alone
+        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (5.4, 5.4, 0.0)}, 1),
+        ((0.0, 0.0, 0.08), {"at_us": 3_010_000, "turn_frd_rad_s": (5.4, 5.4, 0.0)}, 0),
         ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (3.4, 0.0, 0.0)}, 0),
         ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (0.0, 0.0, 3.4)}, 1),
     ],
