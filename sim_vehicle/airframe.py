@@ -219,6 +219,12 @@ class Control(Part):
     descent_max_m_s: Positive
     """PX4's MPC_Z_VEL_MAX_DN."""
 
+    @property
+    def climb_gains(self) -> tuple[float, float]:
+        """Of the velocity along z and of its integral."""
+        p_per_s, i_per_s2 = self.climb_p_per_s, self.climb_i_per_s2
+        return p_per_s or self.velocity_p_per_s, self.velocity_i_per_s2 if i_per_s2 is None else i_per_s2
+
 
 class Airframe(Part):
     """One vehicle. Frames: body forward-right-down; arms in PX4's motor order."""
@@ -333,8 +339,7 @@ class Airframe(Part):
                     f"control: the motors' lag lets {what} swing; lower its frequency_rad_s or motors.time_constant_s"
                 )
         level = self._turning(gains.attitude_frequency_rad_s), gains.velocity_p_per_s, gains.velocity_i_per_s2
-        climb_p, climb_i = gains.climb_p_per_s or level[1], gains.climb_i_per_s2
-        climb = [self.motors.time_constant_s, 1.0], climb_p, level[2] if climb_i is None else climb_i
+        climb = [self.motors.time_constant_s, 1.0], *gains.climb_gains
         for way, (lag, p_per_s, i_per_s2) in (("sideways", level), ("in height", climb)):
             # a = (p + i / s) (k (x_d - x) - s x) - d s^2 x, through the lag and the estimate's delay
             asked = lag[-1] * np.polymul([p_per_s, i_per_s2], [1.0, gains.position_p_per_s])

@@ -15,6 +15,7 @@ MAV_TYPES = {4: 2, 6: 13, 8: 14}
 def defaults_from(airframe: Airframe) -> dict[str, float]:
     """What ``airframe`` has in place of PX4's defaults; one gain for all axes becomes PX4's two."""
     control = airframe.control
+    climb_p_per_s, climb_i_per_s2 = control.climb_gains
     return {
         "COM_OF_LOSS_T": 0.3,  # as `rebound airframe px4` sets it
         "IMU_INTEG_RATE": _MICROSECONDS // airframe.imu.integration_interval_us,
@@ -28,10 +29,10 @@ def defaults_from(airframe: Airframe) -> dict[str, float]:
         "MPC_XY_VEL_P_ACC": control.velocity_p_per_s,
         "MPC_Z_P": control.position_p_per_s,
         "MPC_Z_VEL_D_ACC": control.velocity_d,
-        "MPC_Z_VEL_I_ACC": control.velocity_i_per_s2 if control.climb_i_per_s2 is None else control.climb_i_per_s2,
+        "MPC_Z_VEL_I_ACC": climb_i_per_s2,
         "MPC_Z_VEL_MAX_DN": control.descent_max_m_s,
         "MPC_Z_VEL_MAX_UP": control.climb_max_m_s,
-        "MPC_Z_VEL_P_ACC": control.climb_p_per_s or control.velocity_p_per_s,
+        "MPC_Z_VEL_P_ACC": climb_p_per_s,
     }
 
 

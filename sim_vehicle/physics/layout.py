@@ -303,12 +303,13 @@ def _contact_values(airframe: Airframe) -> dict[str, float | Floats]:
 def _gain_values(airframe: Airframe) -> dict[str, float | Floats]:
     """Gains of eqs. 4-6; the attitude's from the closed loop w^2 and 2 z w, scaled by the inertia."""
     control = airframe.control
+    climb_p_per_s, climb_i_per_s2 = control.climb_gains
     inertia = np.array(airframe.inertia_kg_m2)
     frequency = np.array([control.attitude_frequency_rad_s] * 2 + [control.yaw_frequency_rad_s])
     return {
         "position_p": control.position_p_per_s,
-        "velocity_p": control.velocity_p_per_s,
-        "velocity_i": control.velocity_i_per_s2,
+        "velocity_p": np.array([control.velocity_p_per_s] * 2 + [climb_p_per_s]),
+        "velocity_i": np.array([control.velocity_i_per_s2] * 2 + [climb_i_per_s2]),
         "velocity_d": control.velocity_d,
         "k_r": inertia * frequency**2,
         "k_omega": inertia * 2 * control.attitude_damping * frequency,

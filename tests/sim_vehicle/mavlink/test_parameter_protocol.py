@@ -3,10 +3,14 @@
 import math
 import struct
 
+import numpy as np
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.airframe import built_in_airframes, load_built_in
+from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.physics.layout import constants_from
 from tests.sim_vehicle.vehicle_client import Client
 
 INT32, REAL32, UINT32 = 6, 9, 5
@@ -99,6 +103,14 @@ def test_what_is_out_of_range_is_stored_but_does_not_count(value, counts):
     parameters.set("MPC_Z_VEL_MAX_UP", value)
     assert str(parameters.stored("MPC_Z_VEL_MAX_UP")) == str(value)
     assert parameters["MPC_Z_VEL_MAX_UP"] == counts
+
+
+@pytest.mark.parametrize("name", built_in_airframes())
+def test_the_loops_begin_with_the_gains_that_the_parameters_tell(name):
+    airframe = load_built_in(name)
+    constants, told = constants_from(airframe, np.random.default_rng(1)), position_gains(Parameters(defaults_from(airframe)))
+    for gain, value in told.items():
+        assert np.broadcast_to(constants[gain], np.shape(value)) == pytest.approx(value), gain
 
 
 def test_a_gain_changes_how_the_vehicle_flies():
