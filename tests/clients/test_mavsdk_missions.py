@@ -24,16 +24,18 @@ def test_a_mission_is_uploaded_flown_paused_resumed_and_ends_on_the_ground(vehic
     north, east = vehicle.place
     raw = mission_raw.MissionRaw(vehicle.system)
 
-    def item(number, command, north_m, height_m, hold_s=0.0):
+    def item(number, command, north_m, height_m, hold_s=0.0, kind=0):
         place = round((north + north_m * METRE_DEG) * 1e7), round(east * 1e7)
         first = 1 if number == 0 else 0
-        return mission_raw.MissionItem(number, 6, command, first, 1, hold_s, 0, 0, math.nan, *place, height_m, 0)
+        return mission_raw.MissionItem(number, 6, command, first, 1, hold_s, 0, 0, math.nan, *place, height_m, kind)
 
     items = [item(0, 22, 0, 4), item(1, 16, 12, 4, 1.0), item(2, 16, 6, 4), item(3, 21, 6, 0)]
     raw.upload_mission(items)
     assert [(there.command, there.x, there.z) for there in raw.download_mission()] == [
         (there.command, there.x, there.z) for there in items
     ]
+    raw.upload_rally_points([item(0, 5100, 0, 0, kind=2)])
+    assert [item.command for item in raw.download_rallypoints()] == [5100]
     vehicle.action.arm()
     raw.start_mission()
     wait_until(lambda: raw.mission_progress().current >= 1, 30, "the first place")
