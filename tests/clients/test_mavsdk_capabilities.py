@@ -6,7 +6,6 @@ import time
 import pytest
 from mavsdk.plugins import mission as mission_types
 from mavsdk.plugins.component_metadata import ComponentMetadata
-from mavsdk.plugins.failure import Failure, FailureType, FailureUnit
 from mavsdk.plugins.follow_me import Config, FollowMe, TargetLocation
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.mission import Mission
@@ -37,23 +36,6 @@ def test_a_mission_that_returns_counts_to_its_end_and_lands_at_home():
         wait_until(lambda: vehicle.flies(FlightMode.RETURN_TO_LAUNCH), 5, "returning")
         vehicle.wait_for_landing()
         assert math.hypot(*vehicle.ned[:2]) < 0.5
-
-
-def test_a_gps_that_fails_ends_the_flight_and_failures_may_be_forbidden():
-    # As on a PX4: five seconds of dead reckoning, then it descends, lands and disarms
-    with flown(3) as vehicle:
-        failure, param = Failure(vehicle.system), Param(vehicle.system)
-        param.set_param_int("SYS_FAILURE_EN", 0)
-        with pytest.raises(Exception, match=r"DISABLED|DENIED"):
-            failure.inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
-        param.set_param_int("SYS_FAILURE_EN", 1)
-        vehicle.take_off()
-        failure.inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
-        wait_until(lambda: vehicle.flies(FlightMode.LAND), 10, "descending")
-        assert "Failsafe activated" in vehicle.texts
-        vehicle.wait_for_landing()
-        with pytest.raises(Exception, match="UNSUPPORTED"):
-            failure.inject(FailureUnit.SENSOR_AIRSPEED, FailureType.STUCK, 0)
 
 
 def test_follow_me_keeps_its_distance_from_a_target_that_walks():

@@ -26,7 +26,7 @@ class World:
     def __init__(self, scene):
         self.vehicle = SimulatedVehicle(scene.airframe, scene.scene, scene.seed)
         self.sent, self.custom_mode, self.is_deaf = [], None, False
-        self.is_cut, self.told = False, []  # by the connection
+        self.cut_until_us, self.told = 0, []  # by the connection
         self._pending, self._readings = b"", 0
 
     def now_us(self):
@@ -44,12 +44,17 @@ class World:
             raise OSError("the driver is gone")
         return self._pass() if timeout_s > 0.0 else b""
 
+    def unplug(self):
+        """Pull the plug, and put it in again 0.6 s later."""
+        self.cut_until_us = self.vehicle.time_boot_us + 600_000
+        self.told.append("connection to /dev/ttyACM0 lost, reconnecting")
+
     def news(self):
         return self.told.pop(0) if self.told else None
 
     def send(self, frame):
         self.sent.append(frame)
-        self._pending += b"" if self.is_cut else frame
+        self._pending += b"" if self.cut_until_us else frame
 
     def _pass(self):
         frames = self.vehicle.step(self._pending)
@@ -57,7 +62,10 @@ class World:
         for frame in frames:
             if frame[7:10] == bytes([HEARTBEAT, 0, 0]):
                 self.custom_mode = int.from_bytes(frame[10:14], "little")
-        return b"" if self.is_cut else b"".join(frames)
+        if 0 < self.cut_until_us <= self.vehicle.time_boot_us:
+            self.cut_until_us = 0
+            self.told.append("connected again: /dev/ttyACM1")
+        return b"" if self.cut_until_us else b"".join(frames)
 
 
 def fly(

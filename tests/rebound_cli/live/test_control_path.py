@@ -10,7 +10,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from companion.autopilot.px4.modes import AUTO_LOITER, OFFBOARD
+from companion.autopilot.px4.modes import AUTO_LOITER
 from companion.companion import StepResult
 from companion.mavlink.packet import message_id_of
 from companion.messages import ComputerStatus
@@ -31,7 +31,7 @@ from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.timing import TOO_LATE_US, Timing
 from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, run_here, start, wait_for_event
-from tests.rebound_cli.live.flying import EPOCH_US, fly
+from tests.rebound_cli.live.flying import EPOCH_US, World, fly
 
 
 class Gone:
@@ -44,44 +44,26 @@ class Gone:
         raise BrokenPipeError(32, "Broken pipe")
 
 
-class Broken(ConfirmAtOnce):
-    """Works until the vehicle is in the air."""
+class InTheAir(ConfirmAtOnce):
+    """What happens to the world once the vehicle climbs."""
+
+    def __init__(self, world, happens):
+        super().__init__()
+        self._world, self._happens = world, happens
 
     def poll(self, companion):
         super().poll(companion)
         if companion.status().state == "takeoff" and companion.status().armed:
-            raise ValueError("nobody thought of this")
+            happens, self._happens = self._happens, lambda _: None
+            happens(self._world)
 
 
-class Deaf(ConfirmAtOnce):
-    """Takes the link away once the vehicle climbs."""
-
-    def __init__(self, world):
-        super().__init__()
-        self._world = world
-
-    def poll(self, companion):
-        super().poll(companion)
-        self._world.is_deaf |= companion.status().state == "takeoff" and companion.status().armed
+def breaks(world):
+    raise ValueError("nobody thought of this")
 
 
-class Unplugged(ConfirmAtOnce):
-    """Pulls the plug for so long once the vehicle climbs, and puts it in again."""
-
-    def __init__(self, world, seconds):
-        super().__init__()
-        self._world, self._us, self._since_us = world, seconds * 1e6, None
-
-    def poll(self, companion):
-        super().poll(companion)
-        world = self._world
-        now_us, status = world.vehicle.time_boot_us, companion.status()
-        if self._since_us is None and status.state == "takeoff" and status.armed:
-            self._since_us, world.is_cut = now_us, True
-            world.told.append("connection to /dev/ttyACM0 lost, reconnecting")
-        elif world.is_cut and now_us - self._since_us >= self._us:
-            world.is_cut = False
-            world.told.append("connected again: /dev/ttyACM1")
+def falls_deaf(world):
+    world.is_deaf = True
 
 
 class EverySecond:
@@ -140,10 +122,10 @@ def test_a_reader_that_is_gone_ends_no_flight_and_is_told_and_replayed(tmp_path)
     assert "lost" in [event["kind"] for event in events_of(tmp_path)]
 
 
-@pytest.mark.parametrize(("confirm", "words"), [(lambda _: Broken(), "nobody thought"), (Deaf, "driver is gone")])
-def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, confirm, words):
+@pytest.mark.parametrize(("happens", "words"), [(breaks, "nobody thought"), (falls_deaf, "driver is gone")])
+def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, happens, words):
     # When something beside the control path fails in the air, for good
-    companion, world, recorder, _, problem = fly(tmp_path, confirm=confirm)
+    companion, world, recorder, _, problem = fly(tmp_path, confirm=lambda world: InTheAir(world, happens))
     # Then the vehicle holds by itself, in time, and one sentence says what happened
     failed_us = next(event.time_us for event in recorder.events if event.kind == "aborted")
     assert companion.finished and world.now_us() - failed_us < HANDING_OVER_US
@@ -155,7 +137,7 @@ def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, confir
 
 
 def test_a_link_that_is_back_within_a_second_is_told_and_the_flight_goes_on(tmp_path):
-    companion, world, recorder, _, _ = fly(tmp_path, confirm=lambda world: Unplugged(world, 0.6))
+    companion, world, recorder, _, _ = fly(tmp_path, confirm=lambda world: InTheAir(world, World.unplug))
     assert companion.report().outcome == "completed" and companion.report().collisions == ()
     assert [event.text for event in recorder.events if event.kind == "link"] == [
         "connection to /dev/ttyACM0 lost, reconnecting",
@@ -163,16 +145,6 @@ def test_a_link_that_is_back_within_a_second_is_told_and_the_flight_goes_on(tmp_
     ]
     assert any(b"Connected again: /dev/ttyACM1" in frame for frame in world.sent)
     assert_comes_again(tmp_path)
-
-
-def test_a_link_that_is_back_after_the_vehicle_took_care_of_itself_takes_nothing_back(tmp_path):
-    # Given a vehicle that lost its setpoints for two seconds, and PX4's failsafe acted (COM_OF_LOSS_T)
-    companion, world, recorder, _, _ = fly(tmp_path, confirm=lambda world: Unplugged(world, 2.0))
-    # Then the flight has ended in one sentence, and nobody asks for OFFBOARD again
-    assert "the link has been silent" in companion.report().reason and companion.report().collisions == ()
-    world.sleep(5.0)
-    assert world.custom_mode is not None and world.custom_mode != OFFBOARD
-    assert [event.kind for event in recorder.events].count("aborted") == 1
 
 
 @pytest.mark.realtime

@@ -135,12 +135,12 @@ def test_what_was_recorded_before_a_restart_is_not_heard_after_it(tmp_path: Path
     vehicle.signing.secret_key, vehicle.signing.sign_outgoing = KEY, True
     vehicle.signing.timestamp = stamp_at(now_us)
     recorded = [bytes(STOLEN.pack(vehicle)) for _ in range(20)]
-    first = Line(recorded, now_us)
+    first = Line([b"".join(recorded)], now_us)
     before = session(key_file, first)
     assert before.receive(1.0) and before.signing.refused == {}
     before.close()
     # When they are played again
-    again = Line(recorded, now_us - 86_400_000_000)
+    again = Line([b"".join(recorded)], now_us - 86_400_000_000)
     after = session(key_file, again)
     # Then none is heard, and what is sent is later than all before
     assert after.receive(1.0) == b"" and after.signing.refused == {"old": 20}
@@ -151,17 +151,16 @@ def test_what_was_recorded_before_a_restart_is_not_heard_after_it(tmp_path: Path
 
 
 class Line:
-    """A link that has brought some bytes, and the clock."""
+    """A link on which datagrams wait, and the clock."""
 
-    def __init__(self, received: list[bytes], time_us: int):
-        self._received, self.time_us, self._sent = b"".join(received), time_us, []
+    def __init__(self, waiting: list[bytes], time_us: int):
+        self._waiting, self.time_us, self._sent = waiting, time_us, []
 
     def now_us(self) -> int:
         return self.time_us
 
     def receive(self, timeout_s: float) -> bytes:
-        received, self._received = self._received, b""
-        return received
+        return self._waiting.pop(0) if self._waiting else b""
 
     def send(self, frame: bytes) -> None:
         self._sent.append(frame)
@@ -184,18 +183,13 @@ def session(key_file: Path, line: Any) -> SignedConnection:
 @pytest.mark.parametrize("reason", ["unsigned", "forged"])
 def test_a_flood_that_is_refused_does_not_wake_the_loop_for_each_packet(tmp_path: Path, reason):
     # Given a datagram a packet, three hundred of them, before one that is genuine
-    class Datagrams(Line):
-        def receive(self, timeout_s):
-            return self.waiting.pop(0) if self.waiting else b""
-
-    line = Datagrams([], 1_700_000_000_000_000)
-    end = mav.MAVLink(None, 1, 1)
-    end.signing.timestamp = stamp_at(line.time_us)
+    end, now_us = mav.MAVLink(None, 1, 1), 1_700_000_000_000_000
+    end.signing.timestamp = stamp_at(now_us)
     if reason == "forged":
         end.signing.secret_key, end.signing.sign_outgoing = bytes(range(32)), True
-    line.waiting = [bytes(STOLEN.pack(end)) for _ in range(299)]
+    waiting = [bytes(STOLEN.pack(end)) for _ in range(299)]
     end.signing.secret_key, end.signing.sign_outgoing = KEY, True
-    line.waiting.append(bytes(STOLEN.pack(end)))
+    line = Line([*waiting, bytes(STOLEN.pack(end))], now_us)
     connection = session(tmp_path / "key", line)
     assert connection.receive(0.0) == bytes(STOLEN.pack(mav.MAVLink(None, 1, 1)))
     assert connection.signing.refused == {reason: 299}

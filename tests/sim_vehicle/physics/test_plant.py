@@ -92,19 +92,6 @@ def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
     assert state.moment_frd_n_m == pytest.approx(expected)
 
 
-def test_driven_motors_do_as_they_are_told() -> None:
-    """With an autopilot from outside, 10 % above hover on every motor climbs at a tenth of gravity."""
-    airframe = quiet(load_built_in("foldable"))
-    plant = Plant(airframe, Scene(), seed=1)
-    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
-    share = 1.1 * airframe.hover_fraction
-    for _ in range(250):
-        output = plant.drive((share, share, share, share))
-    assert output.specific_force_frd_m_s2[2] == pytest.approx(-1.1 * 9.81, rel=1e-3)
-    # The motors reach their thrust with a lag of 20 ms, which costs that much of the first free fall.
-    assert plant.state.body[5] == pytest.approx(-0.981 + 1.1 * 9.81 * 0.02, rel=0.02)
-
-
 def test_raw_samples_are_clipped_before_the_mean() -> None:
     """A rigid hit of over 3000 m/s2 for 1 ms shows as 16 g for a quarter of the 4 ms mean, not more."""
     airframe = quiet(load_built_in("rigid"))
