@@ -44,8 +44,12 @@ def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=
     return impacts
 
 
+def pushed(push, length_us=60_000):
+    return lambda t: push if HIT_US <= t < HIT_US + length_us else (0.0, 0.0, 0.0)
+
+
 def wall(strength, length_us=60_000):
-    return lambda t: (-strength, 0.0, 0.0) if HIT_US <= t < HIT_US + length_us else (0.0, 0.0, 0.0)
+    return pushed((-strength, 0.0, 0.0), length_us)
 
 
 # Least and most that follow from what each looks at.
@@ -73,18 +77,12 @@ def test_a_climb_with_its_thrust_told_is_no_hit(detector):
 
 
 def test_the_fixed_threshold_is_for_each_axis_and_not_for_the_magnitude():
-    def slanting(t):
-        return (-18.0, 18.0, 0.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0)
-
-    assert fly("threshold", slanting) == []
+    assert fly("threshold", pushed((-18.0, 18.0, 0.0))) == []
     assert len(fly("threshold", wall(21.0))) == 1
 
 
 def test_the_fixed_threshold_takes_gravity_off_the_body_z_axis():
-    def dropped(t):
-        return (0.0, 0.0, 25.0) if HIT_US <= t < HIT_US + 8_000 else (0.0, 0.0, 0.0)
-
-    (impact,) = fly("threshold", dropped)
+    (impact,) = fly("threshold", pushed((0.0, 0.0, 25.0), 8_000))
     assert impact.impact.specific_force_frd_m_s2[2] == pytest.approx(25.0, abs=0.01)
 
 
@@ -104,12 +102,9 @@ def test_the_fixed_threshold_tells_its_windows_largest_push_eleven_samples_after
 
 def test_the_horizontal_threshold_looks_sideways_alone():
     # Given a level vehicle that is pushed up by 12 m/s^2
-    def lifted(t):
-        return (0.0, 0.0, -12.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0)
-
-    assert fly("fuzzy", lifted) == []
+    assert fly("fuzzy", pushed((0.0, 0.0, -12.0))) == []
     assert fly("fuzzy", wall(9.6)) == [] and len(fly("fuzzy", wall(10.0))) == 1
-    assert len(fly("fuzzy", lambda t: (0.0, -10.0, 0.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0))) == 1
+    assert len(fly("fuzzy", pushed((0.0, -10.0, 0.0)))) == 1
 
 
 # --- `lateral`

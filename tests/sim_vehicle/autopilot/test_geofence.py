@@ -57,24 +57,6 @@ def test_what_shapes_allow(shape, inside, outside):
     assert not found.allows(*outside)
 
 
-@pytest.mark.parametrize(
-    ("action", "mode"),
-    [
-        (0, Mode.OFFBOARD),
-        (1, Mode.OFFBOARD),
-        (2, Mode.LOITER),
-        (3, Mode.RETURN),
-        (5, Mode.LAND),
-    ],
-)
-def test_a_breach_does_what_gf_action_says(action, mode):
-    flight = hovering(5.0, GF_ACTION=action, COM_FAIL_ACT_T=0.0)
-    upload(flight, *KEEP_IN, kind=MissionType.FENCE)
-    outward(flight, 5.0, 6.0)
-    assert flight.autopilot.modes.flown is mode
-    assert flight.autopilot.modes.intended is Mode.OFFBOARD
-
-
 def test_a_breach_is_found_within_a_fifth_of_a_second_and_held_where_it_was_found():
     flight = hovering(5.0)
     upload(flight, *KEEP_IN, kind=MissionType.FENCE)
