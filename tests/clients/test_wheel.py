@@ -119,13 +119,6 @@ def home(tmp_path_factory):
     return str(tmp_path_factory.mktemp("home"))
 
 
-def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path, home):
-    process = start("sim", tmp_path, WHEEL / "sim/bin/rebound", "fly", "wall", "--lockstep", HOME=home)
-    code, stdout, stderr = finished(process, 600)
-    assert code == 0, stderr
-    assert "Hit a wall at" in stdout
-
-
 def typed(page):
     """What a page has somebody type after `rebound`, and what it then shows; `service install` without a change."""
     shown = {shlex.join(shlex.split(command)): text for command, text in consoles(ROOT / page)}

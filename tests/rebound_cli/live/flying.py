@@ -68,23 +68,13 @@ class World:
         return b"" if self.cut_until_us else b"".join(frames)
 
 
-def fly(
-    folder,
-    stream=sys.stderr,
-    confirm=None,
-    computer=None,
-    followed=None,
-    mission_file=SQUARE,
-    world_of=World,
-    over=None,
-):
-    """A hop in virtual time through the loop of real flights; `over`: the connection that its world is flown over."""
+def fly(folder, stream=sys.stderr, confirm=None, computer=None, followed=None, mission_file=SQUARE):
+    """A hop in virtual time through the loop of real flights."""
     document = load_mission_document(mission_file, HOP_SETS if mission_file == SQUARE else ())
     scene = world_from(document)
     mission = mission_from(document, scene)
     companion = Companion(mission)
-    world: Any = world_of(scene)
-    connection = world if over is None else over(world)
+    world: Any = World(scene)
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, {})
     run_folder.write_json(folder / run_folder.SUMMARY_NAME, {})
@@ -92,7 +82,7 @@ def fly(
     confirmation = ConfirmAtOnce() if confirm is None else confirm(world)
     problem = None
     try:
-        loop = Loop(companion, connection, world, recorder, console, Interrupts(), None, computer)
+        loop = Loop(companion, world, world, recorder, console, Interrupts(), None, computer)
         loop.step = None if followed is None else partial(followed.step, companion)
         fly_realtime(companion, loop, confirmation)
     except FlightFaultError as error:

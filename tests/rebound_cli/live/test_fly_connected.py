@@ -39,4 +39,6 @@ def test_a_yes_flies_the_plan_of_a_vehicle_without_truth_and_ctrl_c_ends_it(tmp_
     assert summary["outcome"] == "aborted" and "Ctrl-C" in summary["reason"]
     assert set(summary["refused_packets"]) <= {"old"}
     assert not (folder / "truth.npz").exists()
+    # And no file of the flight holds the key
+    assert not [file for file in folder.iterdir() if key.read_text().strip().encode() in file.read_bytes()]
     assert_comes_again(folder)
