@@ -37,21 +37,6 @@ def start(*arguments, stdin=subprocess.DEVNULL):
     )
 
 
-# Only a command that hangs is waited for so long: on a busy machine one that compiles takes minutes.
-HANGS_S = 600
-
-
-def run(*arguments, timeout_s=HANGS_S):
-    with start(*arguments) as process:
-        try:
-            stdout, stderr = process.communicate(timeout=timeout_s)
-        except subprocess.TimeoutExpired:
-            # Nothing goes on flying behind a test that has failed.
-            process.kill()
-            raise
-    return subprocess.CompletedProcess(arguments, process.returncode, stdout, stderr)
-
-
 def run_here(*arguments):
     """The same without a second of start-up, for what is no matter of processes, signals or pipes."""
     stdout, stderr = io.StringIO(), io.StringIO()

@@ -10,7 +10,7 @@ from tests.rebound_cli.command import (
     HOP,
     SQUARE,
     assert_comes_again,
-    run,
+    run_here,
     start,
     vehicle_on_air,
     wait_for_event,
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.realtime
 def test_a_yes_flies_the_plan_of_a_vehicle_without_truth_and_ctrl_c_ends_it(tmp_path):
     # Given a vehicle and a companion with one key
     folder, key = tmp_path / "run", tmp_path / "key"
-    assert run("key", "new", key).returncode == 0
+    assert run_here("key", "new", key).returncode == 0
     with vehicle_on_air("--signing-key", key) as port:
         words = ("fly", SQUARE, *HOP, "--connect", f"udpin://127.0.0.1:{port}", "--signing-key", key)
         process = start(*words, "--json", "--out", folder, stdin=subprocess.PIPE)

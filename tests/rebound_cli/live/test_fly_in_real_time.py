@@ -16,7 +16,7 @@ from tests.rebound_cli.command import (
     WALL,
     assert_comes_again,
     processes_naming,
-    run,
+    run_here,
     start,
     wait_for_event,
     wait_until_gone,
@@ -66,5 +66,5 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path):
 
 def test_version():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
-    result = run("--version")
+    result = run_here("--version")
     assert (result.returncode, result.stdout) == (0, f"rebound {version}\n")
