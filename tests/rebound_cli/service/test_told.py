@@ -1,6 +1,7 @@
-"""A flight in virtual time under a systemd that listens: ready, how it goes, and the end."""
+"""A flight in virtual time under a systemd that listens: ready, alive, how it goes, and the end."""
 
 import io
+import itertools
 import os
 
 from companion.report import Status
@@ -9,7 +10,7 @@ from rebound_cli.live.console import Console
 from tests.rebound_cli.live.flying import fly
 
 
-def test_each_step_of_a_flight_tells_systemd_how_it_goes_and_whether_it_ends(tmp_path, monkeypatch):
+def test_a_flight_tells_systemd_that_it_is_ready_alive_how_it_goes_and_when_it_ends(tmp_path, monkeypatch):
     # Given a system that gives it the priority that it asks for, but not whoever tests
     asked, told = [], []
     monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
@@ -26,6 +27,8 @@ def test_each_step_of_a_flight_tells_systemd_how_it_goes_and_whether_it_ends(tmp
     assert next(at_us for at_us, is_heard, *_ in told if is_heard) < report.armed_at_us
     endings = [is_ending for *_, is_ending, _ in told]
     assert endings == sorted(endings) and endings.count(True) == 1
+    # Each step is a sign of life
+    assert max(b - a for (a, *_), (b, *_) in itertools.pairwise(told)) < 500_000
     # And the state and the rate of the link
     states = [status for *_, status in told if status.startswith("state takeoff, mode OFFBOARD, ")]
     assert states and all(status.endswith(" kB/s") for status in states)
