@@ -5,7 +5,6 @@ import json
 import resource
 import sys
 import threading
-from typing import Any
 from unittest.mock import Mock
 
 import pytest
@@ -182,38 +181,6 @@ def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
     assert dropped >= 49 and done == list(range(len(done))) and len(done) + dropped == MOST_WAITING + 50
 
 
-class Stepping:
-    """What the loop steps, for its bytes."""
-
-    armed, finished, leaves_word = True, False, False
-
-    def __init__(self, deadline_us):
-        self.received, self.deadline_us, self.notes = [], deadline_us, []
-
-    def next_deadline_us(self):
-        return self.deadline_us
-
-    def step(self, received, now_us):
-        self.received.append(received)
-        return StepResult((), (), ())
-
-    def note(self, kind, text):
-        self.notes.append((kind, text))
-
-
-class Queued:
-    """A socket in which datagrams wait; the clock stands after a stall."""
-
-    def __init__(self, datagrams, now_us):
-        self.datagrams, self._now_us = list(datagrams), now_us
-
-    def now_us(self):
-        return self._now_us
-
-    def receive(self, timeout_s):
-        return self.datagrams.pop(0) if self.datagrams else b""
-
-
 LATE = ("late", "setpoints 3000 ms late, PX4 needs two a second")
 
 
@@ -225,13 +192,16 @@ LATE = ("late", "setpoints 3000 ms late, PX4 needs two a second")
 def test_all_that_has_arrived_is_one_step_that_nobody_keeps_from_being_taken(
     tmp_path, datagrams, late_us, taken, notes
 ):
-    stepping: Any = Stepping(EPOCH_US)
-    queued: Any = Queued(datagrams, EPOCH_US + late_us)
+    # Given a socket in which datagrams wait, and a clock that stands after a stall
+    socket = Mock(receive=Mock(side_effect=[*datagrams, b""]), now_us=lambda: EPOCH_US + late_us)
+    stepped = Mock(armed=True, finished=False, leaves_word=False, next_deadline_us=lambda: EPOCH_US)
+    stepped.step.return_value = StepResult((), (), ())
     recorder = FlightRecorder(tmp_path)
-    Loop(stepping, queued, queued, recorder, Console(sys.stderr), Interrupts()).exchange()
+    Loop(stepped, socket, socket, recorder, Console(sys.stderr), Interrupts()).exchange()
     recorder.close()
-    assert stepping.received == [b"".join(datagrams[:taken])] and len(queued.datagrams) == len(datagrams) - taken
-    assert stepping.notes == notes
+    ((received, _),) = (call.args for call in stepped.step.call_args_list)
+    assert received == b"".join(datagrams[:taken])
+    assert [call.args for call in stepped.note.call_args_list] == notes
 
 
 def test_lateness_is_measured_and_told_each_time_it_doubles():
