@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import resource
 import sys
 import threading
 from unittest.mock import Mock
@@ -26,10 +25,11 @@ from rebound_cli.live.realtime import (
     FlightFaultError,
     Loop,
 )
+from rebound_cli.main import main
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.timing import TOO_LATE_US, Timing
-from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, run_here, start, wait_for_event
+from tests.rebound_cli.command import SQUARE, assert_comes_again, events_of, run_here
 from tests.rebound_cli.live.flying import EPOCH_US, World, fly
 
 
@@ -146,22 +146,11 @@ def test_a_link_that_is_back_within_a_second_is_told_and_the_flight_goes_on(tmp_
     assert_comes_again(tmp_path)
 
 
-@pytest.mark.realtime
-def test_in_a_real_flight_neither_a_limit_of_size_nor_a_pipe_that_closes_matters(tmp_path):
-    # Given a vehicle in the air
-    folder = tmp_path / "run"
-    process = start("fly", SQUARE, "--sim", *HOP, "--out", folder)
-    wait_for_event(folder, "armed")
-    # When its log may grow no more (SIGXFSZ, EFBIG) and its reader closes the pipe (SIGPIPE, EPIPE)
-    size = (folder / "flight.tlog").stat().st_size
-    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size, size))
-    process.stdout.close()
-    # Then it lands as planned; the end of the program says that something was lost
-    assert process.wait(60) == 1
-    assert "Traceback" not in process.stderr.read()
-    process.stderr.close()
-    told = {event["kind"]: event["text"] for event in events_of(folder)}
-    assert "done" in told and "lost" in told
+def test_a_reader_that_goes_ends_a_command_without_a_word(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "stdout", Gone())
+    monkeypatch.setattr(sys, "stderr", told := Mock())
+    assert main(["logs", "list", "--runs", str(tmp_path)]) == 1
+    assert not told.write.called and told.close.called
 
 
 def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
