@@ -86,14 +86,6 @@ def test_a_serial_port_that_is_not_there_is_one_sentence():
         open_port(new_vehicle(), "serial:///dev/none:57600")
 
 
-def test_a_port_in_use_is_one_sentence():
-    with bound() as other:
-        port = other.getsockname()[1]
-        with pytest.raises(PortInUse) as raised:
-            px4_ports(new_vehicle(), 0, port)
-    assert str(raised.value).startswith(f"UDP port {port} is in use")
-
-
 def test_only_this_machine_is_listened_to_unless_another_was_named():
     for remote, here in (
         (("127.0.0.1", 9), "127.0.0.1"),
