@@ -119,8 +119,8 @@ def processes_naming(text):
     return found
 
 
-def wait_until_gone(text, timeout_s=5.0):
-    end_s = time.monotonic() + timeout_s
+def wait_until_gone(text):
+    end_s = time.monotonic() + 5.0
     while processes_naming(text):
         assert time.monotonic() < end_s, f"still running: {processes_naming(text)}"
         time.sleep(0.05)

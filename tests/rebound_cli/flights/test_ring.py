@@ -36,12 +36,12 @@ def names(runs):
 def disk(monkeypatch):
     """A disk with so much free, of which every removed flight gives back what it took."""
 
-    def of(runs, free, total=100 * GIB):
+    def of(runs, free):
         at_first = sum(flight.size_bytes for flight in kept_flights(runs))
 
         def usage(_):
             back = at_first - sum(flight.size_bytes for flight in kept_flights(runs))
-            return Usage(total, 0, free + back)
+            return Usage(100 * GIB, 0, free + back)
 
         monkeypatch.setattr(ring.shutil, "disk_usage", usage)
 

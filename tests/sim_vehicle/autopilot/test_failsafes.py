@@ -54,9 +54,6 @@ def flown(flight: Flight) -> Mode:
     return flight.autopilot.modes.flown
 
 
-# --- the table ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("mode", "mask"), [(Mode.MISSION, 1), (Mode.LOITER, 2), (Mode.TAKEOFF, 2), (Mode.OFFBOARD, 4)])
 def test_a_lost_link_can_be_excepted_in_a_mode(mode, mask):
     lost = situation(intended=mode, sticks_lost=True, ground_station_lost=True)
@@ -78,9 +75,6 @@ def test_of_two_failsafes_the_later_in_the_order_wins():
     # And a vehicle that returns already begins no return
     returning = situation(intended=Mode.RETURN, sticks_lost=False, ground_station_lost=True)
     assert Failsafe().update(0, returning, Parameters({**parameters, "NAV_DLL_ACT": 2})).action is Action.WARN
-
-
-# --- flown ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("value", OFFBOARD_LOSS)

@@ -24,9 +24,6 @@ def leaning(roll_deg: float) -> tuple[float, float, float, float]:
     return math.cos(half), math.sin(half), 0.0, 0.0
 
 
-# --- what they mean ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("message", "flown"),
     [
@@ -44,9 +41,6 @@ def leaning(roll_deg: float) -> tuple[float, float, float, float]:
 )
 def test_what_an_attitude_target_asks_for(message, flown):
     assert offboard.attitude_setpoint(message) == flown
-
-
-# --- flown -------------------------------------------------------------------------------------------------------
 
 
 def test_an_attitude_alone_arms_and_takes_off_without_the_ramp():
@@ -77,9 +71,6 @@ def test_from_an_attitude_to_a_position_it_changes_with_the_commanders_status(co
         steps += 1
     # Then it is flown with the commander's status, which comes twice a second, or at once
     assert (steps * 0.004 <= 0.012) if command is not None else (0.1 < steps * 0.004 <= 0.51)
-
-
-# --- by the real loops ---------------------------------------------------------------------------------------------
 
 
 def thrown_up() -> tuple[Plant, float]:

@@ -22,8 +22,8 @@ from tests.sim_vehicle.physics.throwing import quiet
 NONE = (None, None, None)
 
 
-def at(north: float, east: float, down: float, yaw_rad: float = 0.0) -> TrajectorySetpoint:
-    return TrajectorySetpoint((north, east, down), NONE, NONE, yaw_rad, None)
+def at(north: float, east: float, down: float) -> TrajectorySetpoint:
+    return TrajectorySetpoint((north, east, down), NONE, NONE, 0.0, None)
 
 
 def flown(plant: Plant, setpoint: TrajectorySetpoint | None, seconds: float) -> list[Estimate]:
