@@ -18,13 +18,7 @@ from rebound_cli import fly as command
 from rebound_cli.background import MOST_WAITING, Background
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.live.realtime import (
-    COMPUTER_EVERY_US,
-    HANDING_OVER_US,
-    ConfirmAtOnce,
-    FlightFaultError,
-    Loop,
-)
+from rebound_cli.live.realtime import COMPUTER_EVERY_US, HANDING_OVER_US, ConfirmAtOnce, FlightFaultError, Loop
 from rebound_cli.main import main
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder

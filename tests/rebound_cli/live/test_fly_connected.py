@@ -6,15 +6,7 @@ import subprocess
 
 import pytest
 
-from tests.rebound_cli.command import (
-    HOP,
-    SQUARE,
-    assert_comes_again,
-    run_here,
-    start,
-    vehicle_on_air,
-    wait_for_event,
-)
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, run_here, start, vehicle_on_air, wait_for_event
 
 pytestmark = pytest.mark.realtime
 

@@ -5,13 +5,7 @@ import socket
 
 import pytest
 
-from tests.rebound_cli.command import (
-    WALL,
-    processes_naming,
-    run_here,
-    start,
-    wait_until_gone,
-)
+from tests.rebound_cli.command import WALL, processes_naming, run_here, start, wait_until_gone
 from tests.sim_vehicle.hil.px4_client import Px4Client
 
 pytestmark = pytest.mark.realtime

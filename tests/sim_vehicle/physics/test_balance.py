@@ -7,13 +7,7 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.physics.inertia import ZZ, inertia_of
-from sim_vehicle.physics.layout import (
-    POINTS,
-    Scratch,
-    calm,
-    constants_from,
-    initial_state,
-)
+from sim_vehicle.physics.layout import POINTS, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.record import new_record
 from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.plant.plant import Plant

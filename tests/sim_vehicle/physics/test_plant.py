@@ -10,10 +10,7 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
-from sim_vehicle.physics.layout import (
-    constants_from,
-    initial_state,
-)
+from sim_vehicle.physics.layout import constants_from, initial_state
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.estimator.flying import filtered
