@@ -62,20 +62,3 @@ def test_parameters(vehicle):
         vehicle.param_set_send("MIS_TAKEOFF_ALT", 4.0, mavutil.mavlink.MAV_PARAM_TYPE_REAL32)
         vehicle.recv_match(type="PARAM_VALUE", blocking=True, timeout=2)
     assert vehicle.params["MIS_TAKEOFF_ALT"] == 4.0
-
-
-# mavutil logs nothing of what comes over UDP.
-@pytest.mark.parametrize("vehicle", ["tcp"], indirect=True)
-def test_a_log_of_it_is_read_back(vehicle, tmp_path):
-    path = tmp_path / "flight.tlog"
-    vehicle.setup_logfile(str(path))
-    vehicle.wait_heartbeat(timeout=5)
-    for _ in range(200):
-        vehicle.recv_match(blocking=True, timeout=1)
-    vehicle.logfile.close()
-    vehicle.logfile = None
-    log = mavutil.mavlink_connection(str(path))
-    kinds = set()
-    while (message := log.recv_match()) is not None:
-        kinds.add(message.get_type())
-    assert {"ATTITUDE", "LOCAL_POSITION_NED"} <= kinds and "BAD_DATA" not in kinds

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from pydantic import ValidationError
 
-from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.errors import AirframeError, SceneError
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.json.vehicle import JsonVehicle
@@ -44,18 +44,6 @@ def test_a_wall_through_the_start_is_refused(wall: dict[str, object], free: bool
     else:
         with pytest.raises(SceneError, match=r"sim\.walls\.0: 'wall 1' passes through"):
             check_start_is_free(scene, airframe)
-
-
-def test_an_unknown_airframe_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(AirframeError, match="use one of foldable, hexa, octo, racer, rigid"):
-        load_built_in("folding")
-
-
-def test_a_file_states_only_what_differs_from_its_base() -> None:
-    own = Airframe.model_validate(with_base({"based_on": "foldable", "name": "mine", "arms": {"fold_max_m": 0.05}}))
-    assert own.arms.fold_max_m == 0.05
-    assert own.arms.stiffness_per_s2 == 500
-    assert own.mass_kg == 1.112
 
 
 @pytest.mark.parametrize("vehicle", [SimulatedVehicle, HilVehicle, JsonVehicle])
