@@ -51,8 +51,7 @@ class InTheAir(ConfirmAtOnce):
             happens(self._world)
 
 
-def breaks(world):
-    raise ValueError("nobody thought of this")
+BREAKS = Mock(side_effect=ValueError("nobody thought of this"))
 
 
 def falls_deaf(world):
@@ -115,7 +114,7 @@ def test_a_reader_that_is_gone_ends_no_flight_and_is_told_and_replayed(tmp_path)
     assert "lost" in [event["kind"] for event in events_of(tmp_path)]
 
 
-@pytest.mark.parametrize(("happens", "words"), [(breaks, "nobody thought"), (falls_deaf, "driver is gone")])
+@pytest.mark.parametrize(("happens", "words"), [(BREAKS, "nobody thought"), (falls_deaf, "driver is gone")])
 def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, happens, words):
     # When something beside the control path fails in the air, for good
     companion, world, recorder, _, problem = fly(tmp_path, confirm=lambda world: InTheAir(world, happens))

@@ -41,27 +41,17 @@ def test_without_the_effect_the_estimate_knows_all() -> None:
 
 
 # Of what was hidden, what a real PX4's velocity lacked so long after the hit: the mean of fourteen, by motion capture.
-LACKED = [
-    (0.1, 1.0),
-    (0.3, 0.54),
-    (0.4, 0.22),
-    (0.5, -0.02),
-    (0.7, -0.2),
-    (1.0, -0.14),
-    (1.4, -0.1),
-    (2.0, -0.07),
-    (3.0, -0.05),
-]
+LACKED = {0.1: 1.0, 0.3: 0.54, 0.4: 0.22, 0.5: -0.02, 0.7: -0.2, 1.0: -0.14, 1.4: -0.1, 2.0: -0.07, 3.0: -0.05}
 
 
 def test_the_estimate_finds_back_as_a_real_px4_s_did() -> None:
     """Given a hit, then the velocity lacks what a real PX4's did."""
     hidden, *found = (
         error_after(throw(airframe("rigid"), 2.0, gap_m=0.02, duration_s=0.01 + duration_s))[3]
-        for duration_s in (0.06, *(since_s for since_s, _ in LACKED))
+        for duration_s in (0.06, *LACKED)
     )
 
-    assert [each / hidden for each in found] == pytest.approx([share for _, share in LACKED], abs=0.12)
+    assert [each / hidden for each in found] == pytest.approx([*LACKED.values()], abs=0.12)
 
 
 def test_a_part_is_taken_for_a_tilt() -> None:
