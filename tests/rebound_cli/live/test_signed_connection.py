@@ -1,8 +1,10 @@
 """The connection of --signing-key: what is not genuine is not heard, after a restart neither."""
 
 import hashlib
+import itertools
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from pymavlink.dialects.v20 import development as mav
@@ -24,45 +26,29 @@ def test_what_was_recorded_before_a_restart_is_not_heard_after_it(tmp_path: Path
     vehicle.signing.secret_key, vehicle.signing.sign_outgoing = KEY, True
     vehicle.signing.timestamp = stamp_at(now_us)
     recorded = [bytes(STOLEN.pack(vehicle)) for _ in range(20)]
-    first = Line([b"".join(recorded)], now_us)
+    first = line_with([b"".join(recorded)], now_us)
     before = session(key_file, first)
     assert before.receive(1.0) and before.signing.refused == {}
     before.close()
     # When they are played again
-    again = Line([b"".join(recorded)], now_us - 86_400_000_000)
+    again = line_with([b"".join(recorded)], now_us - 86_400_000_000)
     after = session(key_file, again)
     # Then none is heard, and what is sent is later than all before
     assert after.receive(1.0) == b"" and after.signing.refused == {"old": 20}
     for connection in (before, after):
         connection.send(bytes(STOLEN.pack(mav.MAVLink(None, 1, 191))))
-    assert first.stamps() < again.stamps()
+    assert stamps_on(first) < stamps_on(again)
     after.close()
 
 
-class Line:
-    """A link on which a datagram arrives every 4 ms, and the clock."""
+def line_with(waiting: list[bytes], time_us: int) -> Mock:
+    """A link on which datagrams wait, and a clock that goes on by 4 ms each time it is read."""
+    receive = Mock(side_effect=itertools.chain(waiting, itertools.repeat(b"")))
+    return Mock(receive=receive, now_us=itertools.count(time_us, 4_000).__next__, news=lambda: None)
 
-    def __init__(self, waiting: list[bytes], time_us: int):
-        self._waiting, self.time_us, self._sent = waiting, time_us, []
 
-    def now_us(self) -> int:
-        return self.time_us
-
-    def receive(self, timeout_s: float) -> bytes:
-        self.time_us += 4_000
-        return self._waiting.pop(0) if self._waiting else b""
-
-    def send(self, frame: bytes) -> None:
-        self._sent.append(frame)
-
-    def news(self) -> None:
-        return None
-
-    def close(self) -> None:
-        return None
-
-    def stamps(self) -> list[int]:
-        return [int.from_bytes(packet[-12:-6], "little") for packet in self._sent]
+def stamps_on(line: Mock) -> list[int]:
+    return [int.from_bytes(call.args[0][-12:-6], "little") for call in line.send.call_args_list]
 
 
 def session(key_file: Path, line: Any) -> SignedConnection:
@@ -79,7 +65,7 @@ def test_a_flood_that_is_refused_does_not_wake_the_loop_for_each_packet(tmp_path
         end.signing.secret_key, end.signing.sign_outgoing = bytes(range(32)), True
     waiting = [bytes(STOLEN.pack(end)) for _ in range(299)]
     end.signing.secret_key, end.signing.sign_outgoing = KEY, True
-    line = Line([*waiting, bytes(STOLEN.pack(end))], now_us)
+    line = line_with([*waiting, bytes(STOLEN.pack(end))], now_us)
     connection = session(tmp_path / "key", line)
     assert connection.receive(0.0) == bytes(STOLEN.pack(mav.MAVLink(None, 1, 1)))
     assert connection.signing.refused == {reason: 299}
