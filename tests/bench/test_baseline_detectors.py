@@ -44,8 +44,12 @@ def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=
     return impacts
 
 
+def pushed(push, length_us=60_000):
+    return lambda t: push if HIT_US <= t < HIT_US + length_us else (0.0, 0.0, 0.0)
+
+
 def wall(strength, length_us=60_000):
-    return lambda t: (-strength, 0.0, 0.0) if HIT_US <= t < HIT_US + length_us else (0.0, 0.0, 0.0)
+    return pushed((-strength, 0.0, 0.0), length_us)
 
 
 # Least and most that follow from what each looks at.
@@ -72,19 +76,8 @@ def test_a_climb_with_its_thrust_told_is_no_hit(detector):
     assert fly(detector, lift=climb) == []
 
 
-def test_the_fixed_threshold_is_for_each_axis_and_not_for_the_magnitude():
-    def slanting(t):
-        return (-18.0, 18.0, 0.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0)
-
-    assert fly("threshold", slanting) == []
-    assert len(fly("threshold", wall(21.0))) == 1
-
-
 def test_the_fixed_threshold_takes_gravity_off_the_body_z_axis():
-    def dropped(t):
-        return (0.0, 0.0, 25.0) if HIT_US <= t < HIT_US + 8_000 else (0.0, 0.0, 0.0)
-
-    (impact,) = fly("threshold", dropped)
+    (impact,) = fly("threshold", pushed((0.0, 0.0, 25.0), 8_000))
     assert impact.impact.specific_force_frd_m_s2[2] == pytest.approx(25.0, abs=0.01)
 
 
@@ -102,29 +95,30 @@ def test_the_fixed_threshold_tells_its_windows_largest_push_eleven_samples_after
     assert impact.impact.contact_free_until_boot_us == HIT_US - 5_000  # the first sample's averaging
 
 
-def test_the_horizontal_threshold_looks_sideways_alone():
-    # Given a level vehicle that is pushed up by 12 m/s^2
-    def lifted(t):
-        return (0.0, 0.0, -12.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0)
-
-    assert fly("fuzzy", lifted) == []
-    assert fly("fuzzy", wall(9.6)) == [] and len(fly("fuzzy", wall(10.0))) == 1
-    assert len(fly("fuzzy", lambda t: (0.0, -10.0, 0.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0))) == 1
+def twice(gap_us):
+    return lambda t: wall(10.0, 20_000)(t) if t < HIT_US + 20_000 else wall(10.0, 20_000)(t - 20_000 - gap_us)
 
 
-# --- `lateral`
-
-
-def test_a_sideways_force_is_a_hit_from_its_threshold_on():
-    assert fly("lateral", wall(3.6)) == [] and len(fly("lateral", wall(4.4))) == 1
-
-
-def test_one_contact_is_one_detection_and_the_next_one_another():
-    def twice(gap_us):
-        return lambda t: wall(10.0, 20_000)(t) if t < HIT_US + 20_000 else wall(10.0, 20_000)(t - 20_000 - gap_us)
-
-    assert len(fly("lateral", twice(20_000))) == 1, "20 ms of quiet is still the same contact"
-    assert len(fly("lateral", twice(80_000))) == 2
+@pytest.mark.parametrize(
+    ("detector", "push", "seen"),
+    [
+        # The fixed threshold is for each axis and not for the magnitude
+        ("threshold", pushed((-18.0, 18.0, 0.0)), 0),
+        ("threshold", wall(21.0), 1),
+        # The horizontal one looks sideways alone
+        ("fuzzy", pushed((0.0, 0.0, -12.0)), 0),
+        ("fuzzy", wall(9.6), 0),
+        ("fuzzy", wall(10.0), 1),
+        ("fuzzy", pushed((0.0, -10.0, 0.0)), 1),
+        ("lateral", wall(3.6), 0),
+        ("lateral", wall(4.4), 1),
+        # 20 ms of quiet is still the same contact
+        ("lateral", twice(20_000), 1),
+        ("lateral", twice(80_000), 2),
+    ],
+)
+def test_a_force_is_a_hit_from_its_threshold_on_once_a_contact(detector, push, seen):
+    assert len(fly(detector, push)) == seen
 
 
 @pytest.mark.parametrize("spread_m_s2", [1.0, 3.0])

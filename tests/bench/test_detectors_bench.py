@@ -13,8 +13,6 @@ from companion.reflex.detector import Situation
 from sim_vehicle.plant.plant import Plant
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 
-# --- the short cut --------------------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("rate", ASKED_HZ)
 def test_the_samples_of_a_recording_are_those_of_the_whole_vehicle(rate, monkeypatch):
@@ -56,9 +54,6 @@ def without_landed_state(samples):
     return [ExtendedState if isinstance(sample, ExtendedState) else sample for sample in samples]
 
 
-# --- hits -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", range(10))
 def test_a_hit_is_the_one_that_was_asked_for(seed):
     # Given any approach
@@ -97,9 +92,6 @@ def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
     assert first_us[50] - hit.contact_at_boot_us <= 24_000
     # And where no force reaches the floor, the hit fell between the samples
     assert first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1e6)[0] is None
-
-
-# --- verdicts ---------------------------------------------------------------------------------------------------------
 
 
 def test_the_default_detector_finds_a_hit_at_every_rate_with_no_alarm_before_it():

@@ -28,6 +28,8 @@ def test_a_hit_alone_is_judged_as_the_hit_of_a_whole_mission(airframe, speed_m_s
     assert alone["closing_m_s"] == pytest.approx(speed_m_s, abs=0.15)
     assert alone["again"] == whole["returned"] == 0
     assert max(alone["lost_m"], whole["lost_m"]) < 0.05
+    # As far from its setpoint as a vehicle that has settled may be (SettledConfig.distance_m).
+    assert whole["past_m"] < 0.1
     assert 0.3 * whole["settled_s"] < alone["rest_s"] < whole["settled_s"]
 
 

@@ -7,9 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bench.cases.walls import approach
 from bench.detectors.config import BaselineMission
-from bench.rows.paper import StudyFlight, ends_the_one_before, fly, share_received
+from bench.rows.paper import ends_the_one_before, fly, share_received
 from bench.studies.paper import command, flights, single
 from bench.studies.paper.study import CLAIMS, FAILED, PASSED, claim
 from sim_vehicle.airframe import load_built_in
@@ -18,9 +17,6 @@ from tests.rebound_cli.command import ROOT
 pytestmark = pytest.mark.slow
 
 DOCUMENT = (ROOT / "bench" / "notes" / "paper.md").read_text()
-
-
-# --- verdicts ---------------------------------------------------------------------------------------------------
 
 
 # What the claims' texts are told.
@@ -46,18 +42,12 @@ def test_a_row_that_is_not_a_number_differs():
     assert {verdict(name, float("nan")) for name in CLAIMS} == {FAILED}
 
 
-# --- eq. 2 in closed form -----------------------------------------------------------------------------------------
-
-
 def test_parameter_identification_agrees_with_eq_2():
     assert verdicts(single.ARM, pd.DataFrame()) == {PASSED}
 
 
 def verdicts(study, flights):
     return {row["verdict"] for row in study.conclude(flights).rows}
-
-
-# --- what is measured ---------------------------------------------------------------------------------------------
 
 
 def test_a_rigid_pulse_is_a_millisecond_and_a_foldable_one_is_fifty_times_longer():
@@ -78,9 +68,6 @@ def test_the_share_of_a_hit_that_was_received():
     assert share_received(np.array([1500.0, 5500.0]), 4000, hit) == pytest.approx(1.0)
     assert share_received(np.array([1250.0, 9250.0]), 4000, hit) == pytest.approx(0.25)
     assert share_received(np.array([8000.0]), 4000, hit) == 0.0
-
-
-# --- the studies --------------------------------------------------------------------------------------------------
 
 
 def test_every_flight_states_the_papers_detector_law_and_gain():
@@ -118,16 +105,6 @@ def test_a_guard_that_swings_in_while_the_arms_unfold_ends_the_same_collision():
     # Then it is no second hit; with the arms out, or with the centre moving in, it is one
     assert ends_the_one_before(leaving, 0.012)
     assert not ends_the_one_before(leaving, 0.0) and not ends_the_one_before(arriving, 0.012)
-
-
-# --- the document and the command ---------------------------------------------------------------------------------
-
-
-def test_a_foldable_flight_at_one_metre_per_second_neither_returns_nor_overshoots():
-    row = fly(StudyFlight({}, approach(1.0, cruise_s=1.5), "foldable", 1))
-    assert row["hits"] == 1 and row["seen"] and not row["lost"]
-    assert row["past_m"] <= CLAIMS["foldable overshoot"]["most"]
-    assert 0.15 < row["rebound_m_s"] / row["impact_m_s"] < 0.3
 
 
 def test_every_symbol_and_equation_is_where_the_document_says():

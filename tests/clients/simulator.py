@@ -36,16 +36,19 @@ def free_port(kind: int = socket.SOCK_DGRAM) -> int:
     raise OSError("no port between 20 000 and 32 000 is free")
 
 
+def _rebound(*words: str, **pipes: int) -> subprocess.Popen:
+    """A command of ours, of which what it prints is read."""
+    command = [os.environ.get("REBOUND_PYTHON", sys.executable), "-m", "rebound_cli", *words]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, **pipes)
+
+
 @contextmanager
 def simulator(*options: str) -> Iterator[Simulator]:
     """On free ports; it ends with the block, or with this process."""
     companion, tcp = free_port(), free_port(socket.SOCK_STREAM)
-    command = [os.environ.get("REBOUND_PYTHON", sys.executable), "-m", "rebound_cli", "sim", "--stop-with-stdin"]
-    command += ["--port", "0", "--remote", f"127.0.0.1:{companion}", "--link", f"tcpin://127.0.0.1:{tcp}", *options]
-    process = subprocess.Popen(
-        command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    assert process.stdin is not None and process.stdout is not None
+    links = ["--port", "0", "--remote", f"127.0.0.1:{companion}", "--link", f"tcpin://127.0.0.1:{tcp}"]
+    process = _rebound("sim", "--stop-with-stdin", *links, *options, stdin=subprocess.PIPE)
     try:
         # Before it come lines on what is compiled, where nothing has been compiled yet.
         assert any(line.startswith(b"Simulated vehicle") for line in process.stdout), "the simulator did not start"
@@ -60,21 +63,9 @@ def guarded_simulator(*options: str) -> Iterator[Simulator]:
     """The same behind a guard in between, which hands everything on as the simulator itself would."""
     client, tcp = free_port(), free_port(socket.SOCK_STREAM)
     with simulator(*options) as simulated, tempfile.TemporaryDirectory() as folder:
-        command = [os.environ.get("REBOUND_PYTHON", sys.executable), "-m", "rebound_cli", "guard", "--out", folder]
-        command += [
-            "--connect",
-            f"udpin://127.0.0.1:{simulated.companion_port}",
-            "--between",
-            f"tcpin://127.0.0.1:{tcp}",
-        ]
-        process = subprocess.Popen(
-            [*command, "--between", f"udpout://127.0.0.1:{client}"],
-            cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-        )
-        assert process.stdout is not None
+        between = ["--between", f"tcpin://127.0.0.1:{tcp}", "--between", f"udpout://127.0.0.1:{client}"]
+        vehicle = f"udpin://127.0.0.1:{simulated.companion_port}"
+        process = _rebound("guard", "--out", folder, "--connect", vehicle, *between, stderr=subprocess.STDOUT)
         try:
             assert any(b"standing by" in line for line in process.stdout), "the guard did not connect"
             yield Simulator(client, tcp)

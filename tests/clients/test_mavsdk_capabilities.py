@@ -1,17 +1,14 @@
 """MAVSDK's plugins one by one, each to the end that its example has on a PX4."""
 
-import json
 import math
 import time
 
 import pytest
 from mavsdk.plugins import mission as mission_types
 from mavsdk.plugins.component_metadata import ComponentMetadata
-from mavsdk.plugins.failure import Failure, FailureType, FailureUnit
 from mavsdk.plugins.follow_me import Config, FollowMe, TargetLocation
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.mission import Mission
-from mavsdk.plugins.mission_raw import MissionRaw
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import FlightMode
 from mavsdk_vehicle import METRE_DEG, flown
@@ -39,62 +36,6 @@ def test_a_mission_that_returns_counts_to_its_end_and_lands_at_home():
         wait_until(lambda: vehicle.flies(FlightMode.RETURN_TO_LAUNCH), 5, "returning")
         vehicle.wait_for_landing()
         assert math.hypot(*vehicle.ned[:2]) < 0.5
-
-
-def plan(north: float, east: float) -> str:
-    """As QGroundControl writes one."""
-    rows = [(22, 0.0, 4.0), (16, 12.0, 4.0), (21, 12.0, 0.0)]
-    items = [
-        {
-            "type": "SimpleItem",
-            "command": command,
-            "frame": 3,
-            "autoContinue": True,
-            "doJumpId": number,
-            "params": [0, 0, 0, None, north + north_m * METRE_DEG, east, up_m],
-            "Altitude": up_m,
-            "AltitudeMode": 1,
-            "AMSLAltAboveTerrain": None,
-        }
-        for number, (command, north_m, up_m) in enumerate(rows, 1)
-    ]
-    mission = {"version": 2, "firmwareType": 12, "vehicleType": 2, "cruiseSpeed": 15, "hoverSpeed": 5}
-    mission |= {"items": items, "plannedHomePosition": [north, east, 488]}
-    rally = {"version": 2, "points": [[north, east, 0]]}
-    fence = {"version": 2, "circles": [], "polygons": []}
-    head = {"fileType": "Plan", "version": 1, "groundStation": "QGroundControl"}
-    return json.dumps({**head, "mission": mission, "rallyPoints": rally, "geoFence": fence})
-
-
-def test_a_ground_stations_plan_is_imported_and_flown():
-    with flown(3) as vehicle:
-        raw = MissionRaw(vehicle.system)
-        imported = raw.import_qgroundcontrol_mission_from_string(plan(*vehicle.place))
-        raw.upload_mission(imported.mission_items)
-        raw.upload_rally_points(imported.rally_items)
-        assert [item.command for item in raw.download_rallypoints()] == [5100]
-        vehicle.action.arm()
-        raw.start_mission()
-        wait_until(raw.is_mission_finished, 60, "finished")
-        vehicle.wait_for_landing()
-        assert vehicle.ned[0] == pytest.approx(12.0, abs=0.6)
-
-
-def test_a_gps_that_fails_ends_the_flight_and_failures_may_be_forbidden():
-    # As on a PX4: five seconds of dead reckoning, then it descends, lands and disarms
-    with flown(3) as vehicle:
-        failure, param = Failure(vehicle.system), Param(vehicle.system)
-        param.set_param_int("SYS_FAILURE_EN", 0)
-        with pytest.raises(Exception, match=r"DISABLED|DENIED"):
-            failure.inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
-        param.set_param_int("SYS_FAILURE_EN", 1)
-        vehicle.take_off()
-        failure.inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
-        wait_until(lambda: vehicle.flies(FlightMode.LAND), 10, "descending")
-        assert "Failsafe activated" in vehicle.texts
-        vehicle.wait_for_landing()
-        with pytest.raises(Exception, match="UNSUPPORTED"):
-            failure.inject(FailureUnit.SENSOR_AIRSPEED, FailureType.STUCK, 0)
 
 
 def test_follow_me_keeps_its_distance_from_a_target_that_walks():

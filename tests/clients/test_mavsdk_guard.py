@@ -5,71 +5,19 @@ import math
 import re
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from mavsdk import ComponentType, Configuration, Mavsdk
+from mavsdk import ComponentType, Configuration
 from mavsdk import asyncio as asynchronous
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
-from mavsdk.plugins.action.action import Action
-from mavsdk.plugins.offboard.offboard import Offboard, VelocityNedYaw
-from mavsdk.plugins.telemetry.telemetry import Telemetry
-from simulator import ROOT, Simulator, simulator, wait_until
+from mavsdk_vehicle import flown
+from simulator import ROOT, Simulator, simulator
 
 from companion.mavsdk import CollisionGuard, GuardConfig, GuardError, State
 
 WALL = ("--mission", str(ROOT / "missions" / "wall.yaml"), "--set", "sim.walls.0.height_m=20")
-HOLD = 3
-
-
-@contextmanager
-def connected(simulated: Simulator) -> Iterator[tuple[Mavsdk, object]]:
-    mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
-    try:
-        mavsdk.add_any_connection(f"udpin://127.0.0.1:{simulated.companion_port}")
-        system = mavsdk.first_autopilot(15.0)
-        assert system is not None
-        yield mavsdk, system
-    finally:
-        mavsdk.destroy()
-
-
-def in_hold(guard: CollisionGuard, system: object) -> tuple[Action, Telemetry]:
-    """Taken off by the program, and watched."""
-    action, telemetry = Action(system), Telemetry(system)
-    wait_until(telemetry.health_all_ok, 20.0, "healthy")
-    action.arm()
-    action.takeoff()
-    assert guard.wait_for(lambda: guard.state is State.WATCHING, 20.0)
-    wait_until(lambda: int(telemetry.flight_mode()) == HOLD, 20.0, "take-off over")
-    return action, telemetry
-
-
-def test_a_program_that_goes_on_commanding_is_kept_out_while_the_guard_holds():
-    with (
-        simulator(*WALL) as simulated,
-        connected(simulated) as (mavsdk, system),
-        CollisionGuard(mavsdk, system) as guard,
-    ):
-        _, telemetry = in_hold(guard, system)
-        offboard = Offboard(system)
-        offboard.set_velocity_ned(VelocityNedYaw(1.5, 0.0, 0.0, 0.0))
-        offboard.start()
-        assert guard.wait_for(lambda: guard.holds, 20.0)
-        # Not only what MAVSDK repeats by itself
-        until_s = time.monotonic() + 0.5
-        while time.monotonic() < until_s:
-            offboard.set_velocity_ned(VelocityNedYaw(3.0, 0.0, 0.0, 0.0))
-            time.sleep(0.02)
-        assert guard.wait_for(lambda: not guard.holds, 20.0)
-        wait_until(lambda: int(telemetry.flight_mode()) == HOLD, 5.0, "given back to hold")
-        place = telemetry.position_velocity_ned().position
-        assert guard.kept_out > 10 and place.north_m < 3.75
-        assert guard.collisions[0].impact_speed_m_s == pytest.approx(1.5, abs=0.2)
 
 
 def test_from_a_mode_of_px4s_own_offboard_is_confirmed_and_given_back_and_asyncio_hears_of_it():
@@ -116,14 +64,14 @@ def test_the_three_lines_of_the_document_are_enough():
     text = (ROOT / "docs" / "tutorials" / "mavsdk.md").read_text()
     lines = re.search(r"<!-- three lines -->\n```python\n(.*?)```", text, re.DOTALL)[1]
     assert len([line for line in lines.splitlines() if line]) == 3
-    with simulator(*WALL) as simulated, connected(simulated) as (mavsdk, system):
-        names = {"mavsdk": mavsdk, "system": system}
+    with flown(3) as vehicle:
+        names = {"mavsdk": vehicle.mavsdk, "system": vehicle.system}
         exec(lines, names)
         guard = names["guard"]
-        in_hold(guard, system)
+        vehicle.take_off()
         assert guard.state is State.WATCHING
         # Whichever end comes first.
-        mavsdk.destroy()
+        vehicle.mavsdk.destroy()
         guard.stop()
 
 

@@ -1,4 +1,4 @@
-"""MAVSDK's plugins for raw missions, fences and sticks, in flight.
+"""MAVSDK's plugins for raw missions and fences, in flight.
 
 Real time, three times as fast: every flight is short.
 """
@@ -8,7 +8,6 @@ import time
 
 import pytest
 from mavsdk.plugins import geofence, mission_raw
-from mavsdk.plugins.manual_control import ManualControl
 from mavsdk.plugins.telemetry import FlightMode
 from mavsdk_vehicle import METRE_DEG, flown
 from simulator import wait_until
@@ -24,16 +23,18 @@ def test_a_mission_is_uploaded_flown_paused_resumed_and_ends_on_the_ground(vehic
     north, east = vehicle.place
     raw = mission_raw.MissionRaw(vehicle.system)
 
-    def item(number, command, north_m, height_m, hold_s=0.0):
+    def item(number, command, north_m, height_m, hold_s=0.0, kind=0):
         place = round((north + north_m * METRE_DEG) * 1e7), round(east * 1e7)
         first = 1 if number == 0 else 0
-        return mission_raw.MissionItem(number, 6, command, first, 1, hold_s, 0, 0, math.nan, *place, height_m, 0)
+        return mission_raw.MissionItem(number, 6, command, first, 1, hold_s, 0, 0, math.nan, *place, height_m, kind)
 
     items = [item(0, 22, 0, 4), item(1, 16, 12, 4, 1.0), item(2, 16, 6, 4), item(3, 21, 6, 0)]
     raw.upload_mission(items)
     assert [(there.command, there.x, there.z) for there in raw.download_mission()] == [
         (there.command, there.x, there.z) for there in items
     ]
+    raw.upload_rally_points([item(0, 5100, 0, 0, kind=2)])
+    assert [item.command for item in raw.download_rallypoints()] == [5100]
     vehicle.action.arm()
     raw.start_mission()
     wait_until(lambda: raw.mission_progress().current >= 1, 30, "the first place")
@@ -61,24 +62,3 @@ def test_a_fence_is_kept_and_places_beyond_it_are_refused(vehicle):
     fence.clear_geofence()
     vehicle.action.goto_location(north + 5 * METRE_DEG, east, height_m, math.nan)
     wait_until(lambda: vehicle.ned[0] > 4.0, 20, "a place that no fence forbids")
-
-
-def test_sticks_fly_it_in_position_mode(vehicle):
-    vehicle.take_off()
-    sticks = ManualControl(vehicle.system)
-
-    def hold(seconds, pitch=0.0, climb=0.5):
-        until_s = time.monotonic() + seconds
-        while time.monotonic() < until_s:
-            sticks.set_manual_control_input(pitch, 0.0, climb, 0.0)
-            time.sleep(0.02)
-
-    hold(0.5)
-    sticks.start_position_control()
-    hold(1.0)
-    assert vehicle.flies(FlightMode.POSCTL)
-    before = vehicle.ned
-    hold(1.5, pitch=0.6)
-    assert vehicle.ned[0] > before[0] + 2.0
-    hold(1.0, climb=0.9)
-    assert vehicle.ned[2] < before[2] - 0.5

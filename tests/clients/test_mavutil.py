@@ -7,10 +7,11 @@ import pytest
 
 os.environ["MAVLINK20"] = "1"
 from pymavlink import mavutil
-from simulator import ROOT, guarded_simulator, simulator, wait_until
+from simulator import guarded_simulator, simulator, wait_until
 
 
-@pytest.fixture(params=["udp", "tcp", "guarded udp", "guarded tcp"])
+# Plain TCP is what MAVProxy flies by, UDP through the guard what MAVSDK 3 does.
+@pytest.fixture(params=["udp", "guarded tcp"])
 def vehicle(request):
     guarded, _, kind = request.param.rpartition(" ")
     with (guarded_simulator if guarded else simulator)() as simulated:
@@ -61,48 +62,3 @@ def test_parameters(vehicle):
         vehicle.param_set_send("MIS_TAKEOFF_ALT", 4.0, mavutil.mavlink.MAV_PARAM_TYPE_REAL32)
         vehicle.recv_match(type="PARAM_VALUE", blocking=True, timeout=2)
     assert vehicle.params["MIS_TAKEOFF_ALT"] == 4.0
-
-
-# mavutil logs nothing of what comes over UDP.
-@pytest.mark.parametrize("vehicle", ["tcp"], indirect=True)
-def test_a_log_of_it_is_read_back(vehicle, tmp_path):
-    path = tmp_path / "flight.tlog"
-    vehicle.setup_logfile(str(path))
-    vehicle.wait_heartbeat(timeout=5)
-    for _ in range(200):
-        vehicle.recv_match(blocking=True, timeout=1)
-    vehicle.logfile.close()
-    vehicle.logfile = None
-    log = mavutil.mavlink_connection(str(path))
-    kinds = set()
-    while (message := log.recv_match()) is not None:
-        kinds.add(message.get_type())
-    assert {"ATTITUDE", "LOCAL_POSITION_NED"} <= kinds and "BAD_DATA" not in kinds
-
-
-def test_a_program_that_flies_offboard_into_a_wall_through_the_guard_waits_until_it_has_recovered():
-    wall = ("--mission", str(ROOT / "missions" / "wall.yaml"), "--set", "sim.walls.0.height_m=20")
-    with guarded_simulator(*wall) as simulated:
-        vehicle = mavutil.mavlink_connection(f"udpin:127.0.0.1:{simulated.companion_port}", source_system=255)
-        vehicle.wait_heartbeat(timeout=10)
-        vehicle.arducopter_arm()
-        vehicle.motors_armed_wait()
-        vehicle.set_mode("TAKEOFF")
-        heartbeats(vehicle, 12.0)
-        began_s, told, is_asked = time.monotonic(), [], False
-        # A place that moves north at 1 m/s and waits for nobody
-        while not any(text.startswith("Given back") for text in told):
-            flown_s = time.monotonic() - began_s
-            assert flown_s < 60.0, told
-            place = (min(flown_s, 7.0), 0.0, -2.5)
-            vehicle.mav.set_position_target_local_ned_send(0, 1, 1, 1, 0xDF8, *place, *[0.0] * 8)
-            if flown_s > 0.5 and not is_asked:
-                is_asked = True
-                vehicle.set_mode("OFFBOARD")
-            text = vehicle.recv_match(type="STATUSTEXT", blocking=True, timeout=0.05)
-            told += [] if text is None else [text.text]
-        heartbeats(vehicle, 2.0)
-        assert [text for text in told if text.startswith("Taking over")] == ["Taking over from OFFBOARD"]
-        assert vehicle.recv_match(type="LOCAL_POSITION_NED", blocking=True, timeout=2).x < 3.7
-        assert vehicle.flightmode == "LOITER"
-        vehicle.close()

@@ -1,8 +1,6 @@
 """Sentences of Markdown and how long they are."""
 
 import re
-import statistics
-from dataclasses import dataclass
 
 # What is no prose: code, comments, pictures, marks of tables and lists, addresses of links.
 _LEFT_OUT = (
@@ -18,13 +16,6 @@ _ITEM = re.compile(r"^ *(?:[-*]|\d+\.) ", re.MULTILINE)
 # A full stop that ends a sentence is followed by a space and a capital, a digit or a quotation.
 _END = re.compile(r"(?<=[.!?])\**\s+(?=[\"'(*`]*[A-Z0-9`])|(?<=:)\s*\n\s*\n|\n\s*\n")
 LONG = 30
-
-
-@dataclass(frozen=True)
-class Figures:
-    sentences: int
-    mean: float
-    long_share: float
 
 
 def plain(text):
@@ -49,9 +40,9 @@ def words(sentence):
     return re.findall(r"\w[\w'’.,/%-]*", sentence)
 
 
-def figures(texts):
-    lengths = [len(words(sentence)) for text in texts for sentence in sentences(without_tables(text))]
-    return Figures(len(lengths), statistics.mean(lengths), sum(length > LONG for length in lengths) / len(lengths))
+def lengths(text):
+    """Of its sentences, in words."""
+    return [len(words(sentence)) for sentence in sentences(without_tables(text))]
 
 
 def without_tables(text):

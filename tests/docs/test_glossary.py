@@ -1,11 +1,10 @@
 """The glossary's names are where it says."""
 
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.docs.pages import ROOT
 
 
 def rows():

@@ -62,15 +62,3 @@ def test_every_page_that_the_code_names_exists():
         if not (ROOT / named).exists() or (anchor and anchor not in anchors((ROOT / named).read_text(encoding="utf-8")))
     }
     assert found == set()
-
-
-def test_pages_of_the_site_link_to_no_file_outside_it():
-    # What MkDocs cannot serve is named as a path: README and CONTRIBUTING alone are read on GitHub only.
-    outside = [
-        f"{name_of(path)}: {target}"
-        for path in manual()
-        if "docs" in path.relative_to(ROOT).parts
-        for target, _ in _LINK.findall(path.read_text(encoding="utf-8"))
-        if target and (ROOT / "docs") not in (path.parent / target).resolve().parents
-    ]
-    assert outside == []

@@ -37,21 +37,6 @@ def start(*arguments, stdin=subprocess.DEVNULL):
     )
 
 
-# Only a command that hangs is waited for so long: on a busy machine one that compiles takes minutes.
-HANGS_S = 600
-
-
-def run(*arguments, timeout_s=HANGS_S):
-    with start(*arguments) as process:
-        try:
-            stdout, stderr = process.communicate(timeout=timeout_s)
-        except subprocess.TimeoutExpired:
-            # Nothing goes on flying behind a test that has failed.
-            process.kill()
-            raise
-    return subprocess.CompletedProcess(arguments, process.returncode, stdout, stderr)
-
-
 def run_here(*arguments):
     """The same without a second of start-up, for what is no matter of processes, signals or pipes."""
     stdout, stderr = io.StringIO(), io.StringIO()
@@ -134,8 +119,8 @@ def processes_naming(text):
     return found
 
 
-def wait_until_gone(text, timeout_s=5.0):
-    end_s = time.monotonic() + timeout_s
+def wait_until_gone(text):
+    end_s = time.monotonic() + 5.0
     while processes_naming(text):
         assert time.monotonic() < end_s, f"still running: {processes_naming(text)}"
         time.sleep(0.05)

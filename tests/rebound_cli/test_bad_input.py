@@ -9,12 +9,7 @@ from rebound_cli import exit_codes
 from rebound_cli.main import main
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.hil.parameters import px4_parameters
-from tests.rebound_cli.command import (
-    SQUARE,
-    WALL,
-    assert_one_clear_sentence,
-    run_here,
-)
+from tests.rebound_cli.command import SQUARE, WALL, assert_one_clear_sentence, run_here
 
 
 def test_a_port_in_use(tmp_path):

@@ -21,11 +21,11 @@ DT_S = 0.004
 SIDES = ("cw", "cw", "ccw", "ccw")
 
 
-def ring(count: int, radius_m: float, stretch: float = 1.0) -> list[dict[str, Any]]:
+def ring(count: int, radius_m: float) -> list[dict[str, Any]]:
     """Evenly around the centre, turning one way and the other; half a step off the nose."""
     angles = [2.0 * math.pi * (number + 0.5) / count for number in range(count)]
     return [
-        {"place_frd_m": (radius_m * math.cos(angle), stretch * radius_m * math.sin(angle)), "direction": turns}
+        {"place_frd_m": (radius_m * math.cos(angle), radius_m * math.sin(angle)), "direction": turns}
         for angle, turns in zip(angles, ("ccw", "cw") * (count // 2), strict=True)
     ]
 

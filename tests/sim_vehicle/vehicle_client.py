@@ -30,7 +30,7 @@ def heard_until(connection: socket.socket, wanted: set[str]) -> set[str]:
 class End:
     """The other end of a link: sends packets, and keeps what came back and when."""
 
-    def __init__(self, push: Callable[[bytes], None], system: int = 255, component: int = 190) -> None:
+    def __init__(self, push: Callable[[bytes], object], system: int = 255, component: int = 190) -> None:
         self.push = push
         self.mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
         self.packets: list[bytes] = []

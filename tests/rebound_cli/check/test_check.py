@@ -11,7 +11,7 @@ import yaml
 from rebound_cli.check.legs import flown_legs
 from rebound_cli.check.page import planned_flight
 from rebound_cli.check.schema import mission_schema
-from rebound_cli.documents import parse_document
+from rebound_cli.documents import Document
 from rebound_cli.inputs import mission_from, world_from
 from rebound_cli.report.content import content
 from tests.rebound_cli.command import ROOT, WALL, run_here
@@ -29,22 +29,21 @@ def validator():
     return kind(schema)
 
 
-def planned(text: str):
-    document = parse_document(text, "t.yaml")
+def go_to(*place_ned_m, **more):
+    return {"go_to": {"position_ned_m": list(place_ned_m), **more}}
+
+
+def planned(*items, **keys):
+    """A mission that takes off to 2 m, does this and lands; its world; its legs."""
+    data = {"name": "t", "items": [{"takeoff": {"height_m": 2}}, *items, {"land": {}}], **keys}
+    document = Document("t.yaml", data)
     world = world_from(document)
-    return flown_legs(mission_from(document, world), world)
+    mission = mission_from(document, world)
+    return mission, world, flown_legs(mission, world)
 
 
 def test_each_step_has_its_place_in_time():
-    legs = planned("""
-name: t
-items:
-  - takeoff: {height_m: 2}
-  - go_to: {position_ned_m: [4, 0, -2], speed_m_s: 2}
-  - hold: {duration_s: 5}
-  - wait_for: {file: go}
-  - land:
-""")
+    *_, legs = planned(go_to(4, 0, -2, speed_m_s=2), {"hold": {"duration_s": 5}}, {"wait_for": {"file": "go"}})
     # up at 1 m/s and 1 m/s^2; then 4 m at 2 m/s, speeding up with 1 m/s^2 and braking with 2
     assert [flown.begins_s for flown in legs[:-1]] == pytest.approx([0.0, 3.0, 6.5, 11.5])
     assert [flown.length_m for flown in legs] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
@@ -52,17 +51,9 @@ items:
 
 
 def test_what_stands_in_the_way_is_named_with_the_place():
-    legs = planned("""
-name: t
-items:
-  - takeoff: {height_m: 2}
-  - go_to: {position_ned_m: [6, 0, -2]}
-  - go_to: {position_ned_m: [6, 0, -5]}
-  - land:
-sim:
-  walls: [{name: far wall, point_ned_m: [4, 0, -2], normal_ned: [-1, 0, 0], width_m: 4, height_m: 2}]
-  poles: [{name: mast, point_ned_m: [6, 0, -4]}]
-""")
+    wall = {"name": "far wall", "point_ned_m": [4, 0, -2], "normal_ned": [-1, 0, 0], "width_m": 4, "height_m": 2}
+    pole = {"name": "mast", "point_ned_m": [6, 0, -4]}
+    *_, legs = planned(go_to(6, 0, -2), go_to(6, 0, -5), sim={"walls": [wall], "poles": [pole]})
     assert [flown.meets.name if flown.meets else None for flown in legs] == [None, "far wall", "mast", "mast"]
     # a reach before the wall
     assert legs[1].points_ned_m[legs[1].meets.index][0] == pytest.approx(3.8, abs=0.15)
@@ -70,27 +61,11 @@ sim:
 
 def test_what_moves_is_in_the_way_wherever_it_comes_by():
     # Given a cart that comes 10 m north, stops, and goes 6 m east; a way across its own, one behind it, one before it
-    legs = planned("""
-name: t
-items:
-  - takeoff: {height_m: 2}
-  - go_to: {position_ned_m: [0, 8, -2]}
-  - go_to: {position_ned_m: [-14, 8, -2]}
-  - go_to: {position_ned_m: [-14, 2, -2]}
-  - go_to: {position_ned_m: [0, 2, -2]}
-  - land:
-fence: {radius_m: 20}
-sim:
-  boxes:
-    - name: cart
-      centre_ned_m: [-10, 2, -2]
-      size_m: [1, 1, 1]
-      motion:
-        path:
-          - {at_s: 5, offset_ned_m: [0, 0, 0]}
-          - {at_s: 15, offset_ned_m: [10, 0, 0]}
-          - {at_s: 30, offset_ned_m: [10, 6, 0]}
-""")
+    stops = ((5, [0, 0, 0]), (15, [10, 0, 0]), (30, [10, 6, 0]))
+    path = [{"at_s": at_s, "offset_ned_m": offset_m} for at_s, offset_m in stops]
+    cart = {"name": "cart", "centre_ned_m": [-10, 2, -2], "size_m": [1, 1, 1], "motion": {"path": path}}
+    ways = [go_to(0, 8, -2), go_to(-14, 8, -2), go_to(-14, 2, -2), go_to(0, 2, -2)]
+    *_, legs = planned(*ways, fence={"radius_m": 20}, sim={"boxes": [cart]})
     met = [flown.meets and flown.meets.moves and flown.points_ned_m[flown.meets.index] for flown in legs]
     assert met[0] is None and met[3] is None
     # its western side is met on the way east, the end of its way, and its southern side where it stands at first
@@ -100,28 +75,16 @@ sim:
 
 def test_a_page_shows_the_way_in_the_world_and_what_moves_in_it_from_arming_on():
     # Given a start beside the world's origin, an obstacle that moves, and a patch that an earlier flight has found
-    document = parse_document(
-        """
-name: t
-items:
-  - takeoff: {height_m: 2}
-  - go_to: {position_ned_m: [4, 0, -2], speed_m_s: 2}
-  - wait_for: {file: go}
-  - land:
-obstacles: {known: [{touches_ned_m: [[3, 1, -1]], normal_ned: [0, -1, 0], found_at_us: 9000000000}]}
-sim:
-  start: {position_ned_m: [1, 2, 0]}
-  boxes:
-    - name: cart
-      centre_ned_m: [-5, 0, -2]
-      size_m: [0.6, 1, 1]
-      motion: {velocity_ned_m_s: [1.5, 0.5, 0], from_s: 12, until_s: 14}
-""",
-        "t.yaml",
+    patch = {"touches_ned_m": [[3, 1, -1]], "normal_ned": [0, -1, 0], "found_at_us": 9_000_000_000}
+    motion = {"velocity_ned_m_s": [1.5, 0.5, 0], "from_s": 12, "until_s": 14}
+    cart = {"name": "cart", "centre_ned_m": [-5, 0, -2], "size_m": [0.6, 1, 1], "motion": motion}
+    mission, world, legs = planned(
+        go_to(4, 0, -2, speed_m_s=2),
+        {"wait_for": {"file": "go"}},
+        obstacles={"known": [patch]},
+        sim={"start": {"position_ned_m": [1, 2, 0]}, "boxes": [cart]},
     )
-    world = world_from(document)
-    mission = mission_from(document, world)
-    flight = planned_flight(mission, world, flown_legs(mission, world))
+    flight = planned_flight(mission, world, legs)
     shown, log, stands_m = content(flight), flight.log, world.airframe.geometry.foot_depth_m
     seconds = flight.seconds(log.position_at_us)
     # up in 3 s, 3.5 s there, a wait that is drawn for 5 s, and down where it is

@@ -9,13 +9,13 @@ from rebound_cli.arguments import speeds_m_s
 from rebound_cli.compare.cases import Case
 from rebound_cli.compare.rows import lines_of, notes, row_of
 from rebound_cli.main import main
-from tests.rebound_cli.command import assert_one_clear_sentence, run, run_here
+from tests.rebound_cli.command import assert_one_clear_sentence, run_here
 
 
 @pytest.mark.flight
 def test_two_laws_are_flown_told_of_and_kept(tmp_path):
     out = tmp_path / "compared"
-    done = run("compare", "wall", "--laws", "paper,adaptive", "--speeds", "1.5", "--seeds", "1", "--out", out)
+    done = run_here("compare", "wall", "--laws", "paper,adaptive", "--speeds", "1.5", "--seeds", "1", "--out", out)
     assert done.returncode == 0, done.stderr
     # Then there was progress, in a pipe as on a terminal
     assert "1 of 2," in done.stdout and "2 of 2,    0 s to go:" in done.stdout
@@ -69,29 +69,25 @@ def hit(speed_m_s, rest_s):
     return {"settled_after_s": rest_s, "truth": truth}
 
 
+def row(asked_m_s, collision, outcome="completed", recontacts=0):
+    summary = {"outcome": outcome, "reason": "", "recontacts": recontacts, "collisions": [collision]}
+    return row_of(Case("paper", asked_m_s, 1, ()), summary)
+
+
 def test_a_speed_that_the_way_to_the_wall_was_too_short_for_is_told():
     # Given hits at the 2 m/s that were asked for, and at 2.8 and 2.7 where 4 were
-    asked = ((2.0, 1.95), (4.0, 2.8), (4.0, 2.7))
-    summaries = [
-        {"outcome": "completed", "reason": "", "recontacts": 0, "collisions": [hit(speed_m_s, 1.0)]}
-        for _, speed_m_s in asked
-    ]
-    rows = [
-        row_of(Case("paper", speed_m_s, seed, ()), summary)
-        for seed, ((speed_m_s, _), summary) in enumerate(zip(asked, summaries, strict=True))
-    ]
+    rows = [row(2.0, hit(1.95, 1.0)), row(4.0, hit(2.8, 1.0)), row(4.0, hit(2.7, 1.0))]
     # Then the second speed is told as what it was
     assert notes(rows)[1:] == ["Not reached before the hit: 4 m/s, but 2.80. Begin further away from it."]
     assert len(notes(rows[:1])) == 1
 
 
 def test_the_table_has_medians_of_what_is_known_and_the_worst():
-    summaries = [
-        {"outcome": "completed", "reason": "", "recontacts": 1, "collisions": [hit(2.0, 1.0)]},
-        {"outcome": "aborted", "reason": "", "recontacts": 0, "collisions": [hit(3.0, None)]},
-        {"outcome": "completed", "reason": "", "recontacts": 0, "collisions": [{"truth": None}]},
-        None,
+    rows = [
+        row(2.0, hit(2.0, 1.0), recontacts=1),
+        row(2.0, hit(3.0, None), "aborted"),
+        row(2.0, {"truth": None}),
+        row_of(Case("paper", 2.0, 1, ()), None),
     ]
-    rows = [row_of(Case("paper", 2.0, seed, ()), summary) for seed, summary in enumerate(summaries)]
     _, line = lines_of(rows)
     assert line == ("paper-2-m-s", "2 of 4", "2.50 (3.00)", "1.00 (1.00)", "0.10 (0.10)", "1", "0.50 (0.50)")

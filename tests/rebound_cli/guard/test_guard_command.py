@@ -21,7 +21,7 @@ from tests.rebound_cli.command import (
     assert_comes_again,
     events_of,
     guarding,
-    run,
+    run_here,
     taken_off,
     vehicle_on_air,
     wait_for_event,
@@ -34,7 +34,7 @@ PATIENT = ("--set", "companion.link.heartbeat_wait_s=30")
 
 def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
     quick = ("--set", "companion.link.heartbeat_wait_s=0.3")
-    done = run("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path, *quick)
+    done = run_here("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path, *quick)
     assert done.returncode == 1
     assert "No HEARTBEAT from an autopilot within 0.3 s" in done.stderr
     assert json.loads((tmp_path / "summary.json").read_text())["collisions"] == []

@@ -26,7 +26,7 @@ class World:
     def __init__(self, scene):
         self.vehicle = SimulatedVehicle(scene.airframe, scene.scene, scene.seed)
         self.sent, self.custom_mode, self.is_deaf = [], None, False
-        self.is_cut, self.told = False, []  # by the connection
+        self.cut_until_us, self.told = 0, []  # by the connection
         self._pending, self._readings = b"", 0
 
     def now_us(self):
@@ -44,12 +44,17 @@ class World:
             raise OSError("the driver is gone")
         return self._pass() if timeout_s > 0.0 else b""
 
+    def unplug(self):
+        """Pull the plug, and put it in again 0.6 s later."""
+        self.cut_until_us = self.vehicle.time_boot_us + 600_000
+        self.told.append("connection to /dev/ttyACM0 lost, reconnecting")
+
     def news(self):
         return self.told.pop(0) if self.told else None
 
     def send(self, frame):
         self.sent.append(frame)
-        self._pending += b"" if self.is_cut else frame
+        self._pending += b"" if self.cut_until_us else frame
 
     def _pass(self):
         frames = self.vehicle.step(self._pending)
@@ -57,26 +62,19 @@ class World:
         for frame in frames:
             if frame[7:10] == bytes([HEARTBEAT, 0, 0]):
                 self.custom_mode = int.from_bytes(frame[10:14], "little")
-        return b"" if self.is_cut else b"".join(frames)
+        if 0 < self.cut_until_us <= self.vehicle.time_boot_us:
+            self.cut_until_us = 0
+            self.told.append("connected again: /dev/ttyACM1")
+        return b"" if self.cut_until_us else b"".join(frames)
 
 
-def fly(
-    folder,
-    stream=sys.stderr,
-    confirm=None,
-    computer=None,
-    followed=None,
-    mission_file=SQUARE,
-    world_of=World,
-    over=None,
-):
-    """A hop in virtual time through the loop of real flights; `over`: the connection that its world is flown over."""
+def fly(folder, stream=sys.stderr, confirm=None, computer=None, followed=None, mission_file=SQUARE):
+    """A hop in virtual time through the loop of real flights."""
     document = load_mission_document(mission_file, HOP_SETS if mission_file == SQUARE else ())
     scene = world_from(document)
     mission = mission_from(document, scene)
     companion = Companion(mission)
-    world: Any = world_of(scene)
-    connection = world if over is None else over(world)
+    world: Any = World(scene)
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, {})
     run_folder.write_json(folder / run_folder.SUMMARY_NAME, {})
@@ -84,7 +82,7 @@ def fly(
     confirmation = ConfirmAtOnce() if confirm is None else confirm(world)
     problem = None
     try:
-        loop = Loop(companion, connection, world, recorder, console, Interrupts(), None, computer)
+        loop = Loop(companion, world, world, recorder, console, Interrupts(), None, computer)
         loop.step = None if followed is None else partial(followed.step, companion)
         fly_realtime(companion, loop, confirmation)
     except FlightFaultError as error:

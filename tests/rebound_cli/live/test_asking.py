@@ -2,7 +2,7 @@
 
 import io
 import os
-from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -10,23 +10,9 @@ from rebound_cli.live.console import Console
 from rebound_cli.live.realtime import AskPerson
 
 
-class Planned:
-    """A companion with a plan that is ready, or not, and what it was told."""
-
-    def __init__(self):
-        self.is_ready, self.told = True, []
-
-    def plan_is_ready(self):
-        return self.is_ready
-
-    def plan_text(self):
-        return "the plan"
-
-    def confirm_plan(self):
-        self.told.append("yes")
-
-    def stop(self, reason):
-        self.told.append(reason)
+def planned():
+    """A companion with a plan that is ready."""
+    return Mock(plan_is_ready=Mock(return_value=True), plan_text=lambda: "the plan")
 
 
 @pytest.fixture
@@ -39,7 +25,7 @@ def typed():
 
 def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile(typed):
     reads, types = typed
-    companion: Any = Planned()
+    companion = planned()
     shown = io.StringIO()
     console = Console(shown)
     person = AskPerson(console, reads)
@@ -47,26 +33,26 @@ def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile
     person.poll(companion)
     assert shown.getvalue().count("Fly this plan?") == 1 and console.live_is_held
     # When the vehicle is away, and yes is typed
-    companion.is_ready = False
+    companion.plan_is_ready.return_value = False
     types(b"y\n")
     person.poll(companion)
     assert not console.live_is_held
     # Then the next plan is asked for, and that yes says nothing of it
-    companion.is_ready = True
+    companion.plan_is_ready.return_value = True
     for _ in range(3):
         person.poll(companion)
-    assert shown.getvalue().count("the plan") == 2 and companion.told == []
+    assert shown.getvalue().count("the plan") == 2 and not companion.confirm_plan.called
     # And a yes to that one does
     types(b"yes\n")
     person.poll(companion)
-    assert companion.told == ["yes"]
+    assert companion.confirm_plan.called and not companion.stop.called
 
 
 # The last one is the end of input.
 @pytest.mark.parametrize("line", [b"n\n", b"\n", b"yessir\n", None])
 def test_all_but_a_yes_is_a_no(line):
     reads, writes = os.pipe()
-    companion: Any = Planned()
+    companion = planned()
     person = AskPerson(Console(io.StringIO()), reads)
     if line is not None:
         os.write(writes, line)
@@ -74,4 +60,5 @@ def test_all_but_a_yes_is_a_no(line):
     for _ in range(2):
         person.poll(companion)
     os.close(reads)
-    assert companion.told == ["the plan was not confirmed"]
+    companion.stop.assert_called_once_with("the plan was not confirmed")
+    assert not companion.confirm_plan.called

@@ -119,11 +119,7 @@ def test_what_the_position_control_was_asked_for(log, tmp_path, mask, expected):
     log.heartbeat()
     log.imu()
     log.imu()
-    log.send(
-        dialect.MAVLink_position_target_local_ned_message(
-            7, 1, mask, 1.0, 2.0, -3.0, 0.5, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0
-        )
-    )
-    assert [heard.sample for heard in log.read(tmp_path).heard if isinstance(heard.sample, PositionTarget)] == [
-        expected
-    ]
+    place, velocity, others = (1.0, 2.0, -3.0), (0.5, 0.0, 0.25), [0.0] * 5
+    log.send(dialect.MAVLink_position_target_local_ned_message(7, 1, mask, *place, *velocity, *others))
+    samples = [heard.sample for heard in log.read(tmp_path).heard]
+    assert [sample for sample in samples if isinstance(sample, PositionTarget)] == [expected]

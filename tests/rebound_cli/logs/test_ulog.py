@@ -28,9 +28,9 @@ RESETS = "xy_reset_counter z_reset_counter vxy_reset_counter vz_reset_counter"
 POSITION = f"{PATH} v_xy_valid v_z_valid {RESETS}"
 
 
-def read(tmp_path, topics, **more):
+def read(tmp_path, imu=IMU, info=None, parameters=(), **topics):
     path = tmp_path / "flight.ulg"
-    path.write_bytes(ulog(topics, started_us=START, **more))
+    path.write_bytes(ulog({**imu, **topics}, START, info, parameters))
     return read_log(path)
 
 
@@ -66,14 +66,14 @@ def test_vehicle_imu_is_increments_over_the_time_they_took(tmp_path):
 def test_the_estimators_bias_is_taken_off_as_highres_imu_does(tmp_path):
     # Given a bias of 0.5 m/s^2 that the estimator finds at 0.1 s
     bias = ("accel_device_id accel_bias gyro_bias", [(START + 100_000, 7, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1))])
-    log = read(tmp_path, {**IMU, "estimator_sensor_bias": bias})
+    log = read(tmp_path, estimator_sensor_bias=bias)
     forces = [sample.specific_force_frd_m_s2[0] for sample in of(log, ImuSample)]
     assert forces[19:21] == pytest.approx([0.0, -0.5], abs=1e-6)
 
 
 def test_a_position_is_both_messages_of_the_wire_with_the_jumps_counted(tmp_path):
     row = (START + 123_456, 1.0, 2.0, -3.0, 0.1, 0.2, 0.3, True, True, 1, 2, 3, 255)
-    log = read(tmp_path, {**IMU, "vehicle_local_position": (POSITION, [row])})
+    log = read(tmp_path, vehicle_local_position=(POSITION, [row]))
     (position,) = of(log, LocalPosition)
     # LOCAL_POSITION_NED's stamp is cut to milliseconds, ODOMETRY's is not
     assert position.time_boot_us == START + 123_000
@@ -84,23 +84,16 @@ def test_a_position_is_both_messages_of_the_wire_with_the_jumps_counted(tmp_path
 
 
 def test_attitude_thrust_and_vibration(tmp_path):
-    topics = {
-        **IMU,
-        "vehicle_attitude": ("q", [(START + 10, (1.0, 0.0, 0.0, 0.0))]),
-        "vehicle_attitude_setpoint": (
-            "q_d thrust_body",
-            [
-                (START + 20, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -0.6)),
-                (START + 30, (float("nan"),) * 4, (0.3, 0.0, -0.4)),
-            ],
-        ),
-        "vehicle_imu_status": (
-            "accel_clipping gyro_vibration_metric accel_vibration_metric",
-            [(START + 40, (1, 2, 3), 0.25, 4.5)],
-        ),
-    }
-    log = read(tmp_path, topics)
-    assert of(log, Attitude)[0].attitude_wxyz == (1.0, 0.0, 0.0, 0.0)
+    level, unknown = (1.0, 0.0, 0.0, 0.0), (float("nan"),) * 4
+    asked = [(START + 20, level, (0.0, 0.0, -0.6)), (START + 30, unknown, (0.3, 0.0, -0.4))]
+    vibration = "accel_clipping gyro_vibration_metric accel_vibration_metric"
+    log = read(
+        tmp_path,
+        vehicle_attitude=("q", [(START + 10, level)]),
+        vehicle_attitude_setpoint=("q_d thrust_body", asked),
+        vehicle_imu_status=(vibration, [(START + 40, (1, 2, 3), 0.25, 4.5)]),
+    )
+    assert of(log, Attitude)[0].attitude_wxyz == level
     whole, without_attitude = of(log, AttitudeTarget)
     assert (whole.thrust_fraction, without_attitude.thrust_fraction) == pytest.approx((0.6, 0.5))
     assert whole.attitude_wxyz is not None and without_attitude.attitude_wxyz is None
@@ -110,7 +103,7 @@ def test_attitude_thrust_and_vibration(tmp_path):
 def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
     fields = "nav_state arming_state failsafe"
     rows = [(START, 14, 1, False), (START + 10, 14, 2, False), (START + 20, 18, 2, True)]
-    beats = of(read(tmp_path, {**IMU, "vehicle_status": (fields, rows)}), Heartbeat)
+    beats = of(read(tmp_path, vehicle_status=(fields, rows)), Heartbeat)
     seen = [(beat.custom_mode, beat.armed, beat.system_status) for beat in beats]
     assert seen == [(OFFBOARD, False, 3), (OFFBOARD, True, 4), (AUTO_LAND, True, 5)]
 
@@ -130,23 +123,17 @@ def test_a_log_of_no_multicopter_is_refused_by_name(tmp_path, status, parameters
     # vehicle_status.vehicle_type: 1 rotary wing, 2 fixed wing, 3 rover
     topic = (" ".join(status), [(START, *status.values())])
     with pytest.raises(LogError, match=f"is not a multicopter but: {words}"):
-        read(tmp_path, {**IMU, "vehicle_status": topic}, parameters=parameters)
+        read(tmp_path, vehicle_status=topic, parameters=parameters)
 
 
 def test_landed_state_is_what_px4_would_send(tmp_path):
-    topics = {
-        **IMU,
-        "vehicle_land_detected": ("landed", [(START, True), (START + 10, False), (START + 90, True)]),
-        "vehicle_control_mode": (
-            "flag_control_auto_enabled",
-            [(START, False), (START + 30, True), (START + 70, False)],
-        ),
-        "position_setpoint_triplet": (
-            "current.valid current.type",
-            [(START + 20, True, 3), (START + 50, True, 4)],
-        ),
-    }
-    log = read(tmp_path, topics)
+    automatic = [(START, False), (START + 30, True), (START + 70, False)]
+    log = read(
+        tmp_path,
+        vehicle_land_detected=("landed", [(START, True), (START + 10, False), (START + 90, True)]),
+        vehicle_control_mode=("flag_control_auto_enabled", automatic),
+        position_setpoint_triplet=("current.valid current.type", [(START + 20, True, 3), (START + 50, True, 4)]),
+    )
     # A take-off or landing setpoint counts only while an automatic mode flies
     heard = [heard for heard in log.heard if isinstance(heard.sample, ExtendedState)]
     states = {one.at_us - START: one.sample.landed_state for one in heard}
@@ -171,18 +158,18 @@ def test_landed_state_is_what_px4_would_send(tmp_path):
     ],
 )
 def test_what_was_asked_for_in_the_words_of_two_versions(tmp_path, fields, row):
-    log = read(tmp_path, {**IMU, "trajectory_setpoint": (fields, [(START + 5, *row)])})
+    log = read(tmp_path, trajectory_setpoint=(fields, [(START + 5, *row)]))
     assert of(log, PositionTarget) == [PositionTarget((1.0, 2.0, 3.0), 0.5)]
 
 
 def test_the_vehicle_is_named(tmp_path):
     info = {"uint32_t ver_sw_release": struct.pack("<I", 0x010C03FF), "char[12] ver_hw": b"PX4_FMU_V5XX"}
-    assert read(tmp_path, IMU, info=info).vehicle == "PX4 1.12.3 on PX4_FMU_V5XX"
+    assert read(tmp_path, info=info).vehicle == "PX4 1.12.3 on PX4_FMU_V5XX"
 
 
 def test_what_is_missing_is_said_with_its_cost(tmp_path):
     late = ("q", [(START + 2_000_000, (1.0, 0.0, 0.0, 0.0))])
-    log = read(tmp_path, {**IMU, "vehicle_attitude": late})
+    log = read(tmp_path, vehicle_attitude=late)
     said = "\n".join(log.losses)
     assert "no vehicle_local_position: height and velocity are not known" in said
     assert "no vehicle_attitude before 2.0 s" in said

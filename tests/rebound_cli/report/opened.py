@@ -50,7 +50,3 @@ class Opened(HTMLParser):
     def attributes(self, name):
         """Every value that any element has for it."""
         return [attributes[name] for _, attributes in self.tags if name in attributes]
-
-
-def rows(*columns):
-    return np.column_stack(columns)

@@ -20,7 +20,7 @@ from rebound_cli.report.page import SCRIPTS, file_text, page
 from rebound_cli.report.shown_flight import recorded_flight
 from rebound_cli.results.flight_log import read_flight_log
 from sim_vehicle.obstacles import WallSpec
-from tests.rebound_cli.report.opened import Opened, rows
+from tests.rebound_cli.report.opened import Opened
 
 PACKAGE = Path(rebound_cli.report.__file__).parent / "web"
 HOSTILE = "</script><img src=x onerror=alert(1)><script>alert(2)</script><!-- &amp;"
@@ -77,11 +77,11 @@ def test_what_is_in_it_is_what_was_recorded(wall_folder, opened):
     imu, path, setpoint = (opened.table(name) for name in ("imu", "path", "setpoint"))
     started_us = log.imu_at_us[0] - round(imu["t"][0] * 1e6)
     assert np.allclose(imu["t"], (log.imu_at_us - started_us) * 1e-6, atol=1e-5)
-    assert np.allclose(rows(imu["fx"], imu["fy"], imu["fz"]), log.specific_force_frd_m_s2, atol=0.0051)
-    assert np.allclose(rows(imu["p"], imu["q"], imu["r"]), log.angular_velocity_frd_rad_s, atol=0.00051)
-    assert np.allclose(rows(path["n"], path["e"], path["d"]), log.position_ned_m, atol=0.00051)
-    assert np.allclose(rows(path["vn"], path["ve"], path["vd"]), log.velocity_ned_m_s, atol=0.00051)
-    places = rows(setpoint["n"], setpoint["e"], setpoint["d"])
+    assert np.allclose(np.column_stack([imu["fx"], imu["fy"], imu["fz"]]), log.specific_force_frd_m_s2, atol=0.0051)
+    assert np.allclose(np.column_stack([imu["p"], imu["q"], imu["r"]]), log.angular_velocity_frd_rad_s, atol=0.00051)
+    assert np.allclose(np.column_stack([path["n"], path["e"], path["d"]]), log.position_ned_m, atol=0.00051)
+    assert np.allclose(np.column_stack([path["vn"], path["ve"], path["vd"]]), log.velocity_ned_m_s, atol=0.00051)
+    places = np.column_stack([setpoint["n"], setpoint["e"], setpoint["d"]])
     assert np.allclose(places, log.setpoint_ned_m, atol=0.00051, equal_nan=True)
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import shutil
 import subprocess
 import sys
 import sysconfig
@@ -54,29 +53,6 @@ pivot_root . before
 umount -l /before
 exec env -i container=rebound PATH=/usr/sbin:/usr/bin:/sbin:/bin """
 _BOOT += f"""{_SYSTEMD} --system --log-target=journal --show-status=no' $R"""
-
-
-# What the unit hides from the service: neither a checkout nor an environment there can be its program.
-_HIDDEN = ("/tmp", "/var/tmp", "/home", "/root", "/run")
-
-
-def why_not() -> str | None:
-    """Why there is no sandbox on this machine; None where there is."""
-    if not os.environ.get("REBOUND_SANDBOX"):
-        return "`make sandbox` boots a systemd, as root, in namespaces of its own; nobody gets that unasked"
-    if any(Path(place).is_relative_to(hidden) for place in (ROOT, sys.prefix) for hidden in _HIDDEN):
-        return f"a service does not see {ROOT} or {sys.prefix}"
-    if os.geteuid() != 0:
-        return "a sandbox with a systemd needs root"
-    if not Path(_SYSTEMD).exists() or shutil.which("unshare") is None:
-        return "there is no systemd, or no unshare"
-    version = "import sys; print(sys.version_info[:2])"
-    found = subprocess.run(["/usr/bin/python3", "-c", version], capture_output=True, text=True, check=False).stdout
-    if found.strip() != str(sys.version_info[:2]):
-        return "the system's Python cannot load what is installed for this one"
-    tried = "mount -t cgroup2 cgroup2 /mnt && mkdir -p /mnt/rebound-try && rmdir /mnt/rebound-try"
-    done = subprocess.run(["unshare", "--mount", "sh", "-c", tried], capture_output=True, text=True, check=False)
-    return None if done.returncode == 0 else f"no cgroups of one's own: {done.stderr.strip()}"
 
 
 class Sandbox:

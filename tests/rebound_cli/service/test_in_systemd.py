@@ -10,9 +10,11 @@ import pytest
 
 from tests.rebound_cli.command import taken_off
 from tests.rebound_cli.live.cable import Cable
-from tests.rebound_cli.service.sandbox import ROOT, Sandbox, why_not
+from tests.rebound_cli.service.sandbox import ROOT, Sandbox
 
-pytestmark = [pytest.mark.realtime, pytest.mark.skipif(why_not() is not None, reason=str(why_not()))]
+# What the unit hides from the service, such as /tmp and /home, can hold neither the checkout nor its environment.
+WHY_NOT = "`make sandbox` boots a systemd, as root, in namespaces of its own; nobody gets that unasked"
+pytestmark = [pytest.mark.realtime, pytest.mark.skipif(not os.environ.get("REBOUND_SANDBOX"), reason=WHY_NOT)]
 
 
 def events(sandbox):

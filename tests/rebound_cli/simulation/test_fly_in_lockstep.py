@@ -5,14 +5,10 @@ import json
 import pytest
 import yaml
 
-from companion.companion import Companion
-from rebound_cli.documents import load_document
-from rebound_cli.inputs import mission_from, world_from
-from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.results.flight_log import read_flight_log
-from rebound_cli.results.run_folder import FlightRecorder
-from rebound_cli.simulation.lockstep import run_lockstep, virtual_time_limit_s
-from sim_vehicle.vehicle import SimulatedVehicle
+from rebound_cli.simulation import lockstep
+from rebound_cli.simulation.lockstep import virtual_time_limit_s
 from tests.rebound_cli.command import HOP, SQUARE, WALL, assert_comes_again, events_of, run_here
 
 pytestmark = pytest.mark.flight
@@ -75,15 +71,11 @@ def test_a_mission_is_flown_over_a_line_that_loses_every_seventh_packet(tmp_path
     assert_comes_again(tmp_path / "run")
 
 
-def test_a_flight_that_hangs_is_ended(tmp_path):
+def test_a_flight_that_hangs_is_ended(tmp_path, monkeypatch):
     # Given a flight and less virtual time than it needs; the square takes about 35 s
-    document = load_document(SQUARE)
-    world = world_from(document)
-    mission = mission_from(document, world)
-    assert 100 < virtual_time_limit_s(mission) < 300
-    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
-    recorder = FlightRecorder(tmp_path)
+    assert 100 < virtual_time_limit_s(mission_from(load_mission_document(SQUARE, ()))) < 300
+    monkeypatch.setattr(lockstep, "virtual_time_limit_s", lambda _: 3.0)
     # When it runs, then it is given up
-    assert not run_lockstep(Companion(mission), vehicle, recorder, Interrupts(), 3.0, lambda _: None)
-    recorder.close()
-    assert 3e6 < vehicle.time_boot_us < 5e6
+    given_up = run_here("fly", SQUARE, "--lockstep", "--out", tmp_path / "run")
+    assert given_up.returncode == 1
+    assert "the flight was not over after 3 s of virtual time" in given_up.stdout + given_up.stderr

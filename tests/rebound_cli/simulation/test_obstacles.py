@@ -8,7 +8,7 @@ import yaml
 
 from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.main import main
-from tests.rebound_cli.command import QUICK, WALL, assert_comes_again, events_of
+from tests.rebound_cli.command import QUICK, WALL, assert_comes_again
 
 pytestmark = pytest.mark.flight
 
@@ -21,38 +21,24 @@ def fly(*arguments):
     return main(["fly", str(WALL), "--lockstep", "--set", TO_WALL, "--set", NARROW, *QUICK, *map(str, arguments)])
 
 
-@pytest.mark.slow
-def test_what_one_flight_finds_the_next_one_flies_round(tmp_path, capsys):
-    # Given a flight that goes home after its hit
-    first, second = tmp_path / "first", tmp_path / "second"
-    assert fly("--set", "on_collision.then=return", "--out", first) == 0
-    (patch,) = json.loads((first / "obstacles.json").read_text())["patches"]
-    assert patch["normal_ned"][0] < -0.9 and patch["touches_ned_m"][0][0] == pytest.approx(4.0, abs=0.2)
-    assert "remembered: surface facing" in capsys.readouterr().out
-    # When it is flown again with what it has found
-    code = fly("--obstacles", first / "obstacles.json", "--out", second)
-    # Then nothing is hit, the folder holds all that a replay needs, and the memory goes on
-    assert code == 0
-    summary = json.loads((second / "summary.json").read_text())
-    assert summary["collisions"] == [] and summary["unreachable"] == []
-    assert "detour" in [event["kind"] for event in events_of(second)]
-    resolved = yaml.safe_load((second / "resolved.yaml").read_text())["obstacles"]
-    assert "file" not in resolved and len(resolved["known"]) == 1
-    assert json.loads((second / "obstacles.json").read_text()) == json.loads((first / "obstacles.json").read_text())
-    assert_comes_again(first)
-    assert_comes_again(second)
-
-
 def test_a_flight_that_is_resumed_still_knows(tmp_path):
     # Given a flight that its time limit ends after the hit
     first, second = tmp_path / "first", tmp_path / "second"
     limit = ("--set", "abort_when.flight_time_above_s=8", "--set", "on_collision.then=detour")
     assert fly(*limit, "--out", first) == 1
-    assert len(json.loads((first / "obstacles.json").read_text())["patches"]) == 1
+    found = json.loads((first / "obstacles.json").read_text())
+    (patch,) = found["patches"]
+    assert patch["normal_ned"][0] < -0.9 and patch["touches_ned_m"][0][0] == pytest.approx(4.0, abs=0.2)
     # When it goes on, then round what it has found
     assert fly("--set", "on_collision.then=detour", "--resume", first, "--out", second) == 0
-    assert json.loads((second / "summary.json").read_text())["collisions"] == []
-    assert yaml.safe_load((second / "resolved.yaml").read_text())["resume"]["hits"] == 1
+    summary = json.loads((second / "summary.json").read_text())
+    assert summary["collisions"] == [] and summary["unreachable"] == []
+    resolved = yaml.safe_load((second / "resolved.yaml").read_text())
+    assert resolved["resume"]["hits"] == 1
+    # And its folder holds all that a replay needs, and the memory goes on
+    assert "file" not in resolved["obstacles"] and len(resolved["obstacles"]["known"]) == 1
+    assert json.loads((second / "obstacles.json").read_text()) == found
+    assert_comes_again(second)
 
 
 def test_the_file_in_a_mission_lies_beside_it(tmp_path):

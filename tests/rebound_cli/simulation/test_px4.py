@@ -5,13 +5,7 @@ import socket
 
 import pytest
 
-from tests.rebound_cli.command import (
-    WALL,
-    processes_naming,
-    run,
-    start,
-    wait_until_gone,
-)
+from tests.rebound_cli.command import WALL, processes_naming, run_here, start, wait_until_gone
 from tests.sim_vehicle.hil.px4_client import Px4Client
 
 pytestmark = pytest.mark.realtime
@@ -63,7 +57,7 @@ def test_a_port_that_is_taken_is_one_sentence(tmp_path, kind, port):
         other.bind(("0.0.0.0", port))
         if kind == socket.SOCK_STREAM:
             other.listen(1)
-        result = run("fly", WALL, "--sim", "px4", "--instance", INSTANCE, "--out", tmp_path / "run")
+        result = run_here("fly", WALL, "--sim", "px4", "--instance", INSTANCE, "--out", tmp_path / "run")
     sentence = result.stderr.strip().splitlines()[-1]
     assert result.returncode == 1 and sentence.startswith("rebound: ") and str(port) in sentence
     # Tried before anything is written

@@ -83,7 +83,4 @@ def sticks(
     flight: Flight, seconds: float, roll: float = 0, pitch: float = 0, throttle: float = 0, yaw: float = 0
 ) -> None:
     """Hold the sticks, sent at 50 Hz."""
-    for number in range(round(seconds * 250)):
-        if number % 5 == 0:
-            flight.autopilot.receive(StickInput(roll, pitch, throttle, yaw, LINK))
-        flight.step()
+    flight.fly(seconds, StickInput(roll, pitch, throttle, yaw, LINK), rate_hz=50.0)

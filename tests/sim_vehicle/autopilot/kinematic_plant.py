@@ -3,7 +3,7 @@
 import math
 
 from sim_vehicle.autopilot.autopilot import Autopilot
-from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result
+from sim_vehicle.autopilot.messages import Command, CommandAck, FlightInput, PositionTarget, Result
 from sim_vehicle.control.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.parameters.store import Parameters
@@ -95,21 +95,21 @@ class Flight:
         self.state = moved(self.state, setpoint, self.autopilot.motors_run)
         self.autopilot.observe(self.state)
 
-    def fly(self, seconds: float, target: PositionTarget | None = None, rate_hz: float = 20.0) -> None:
-        """Let time pass, with ``target`` as a stream if it is given."""
+    def fly(self, seconds: float, message: FlightInput | None = None, rate_hz: float = 20.0) -> None:
+        """Let time pass, with ``message`` as a stream if it is given."""
         period = round(250 / rate_hz)
         for number in range(round(seconds * 250)):
-            if target is not None and number % period == 0:
-                self.autopilot.receive(target)
+            if message is not None and number % period == 0:
+                self.autopilot.receive(message)
             self.step()
 
-    def fly_until(self, condition: object, at_most_s: float, target: PositionTarget | None = None) -> float:
+    def fly_until(self, condition: object, at_most_s: float, message: FlightInput | None = None) -> float:
         """Seconds until ``condition()`` is true."""
         assert callable(condition)
         start_s = self.time_s
         while not condition():
             assert self.time_s - start_s < at_most_s, f"not within {at_most_s} s"
-            self.fly(0.004, target)
+            self.fly(0.004, message)
         return self.time_s - start_s
 
     def ask(self, command: int, *params: float) -> Result | None:

@@ -54,9 +54,6 @@ def flown(flight: Flight) -> Mode:
     return flight.autopilot.modes.flown
 
 
-# --- the table ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("mode", "mask"), [(Mode.MISSION, 1), (Mode.LOITER, 2), (Mode.TAKEOFF, 2), (Mode.OFFBOARD, 4)])
 def test_a_lost_link_can_be_excepted_in_a_mode(mode, mask):
     lost = situation(intended=mode, sticks_lost=True, ground_station_lost=True)
@@ -80,9 +77,6 @@ def test_of_two_failsafes_the_later_in_the_order_wins():
     assert Failsafe().update(0, returning, Parameters({**parameters, "NAV_DLL_ACT": 2})).action is Action.WARN
 
 
-# --- flown ---------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("value", OFFBOARD_LOSS)
 def test_lost_setpoints_do_what_com_obl_rc_act_says(value):
     flight = in_offboard(UP, COM_OBL_RC_ACT=value)
@@ -93,24 +87,24 @@ def test_lost_setpoints_do_what_com_obl_rc_act_says(value):
     assert "Failsafe activated" in flight.texts()
 
 
-@pytest.mark.parametrize(("value", "mode"), [(0, None), (1, Mode.LOITER), (2, Mode.RETURN), (3, Mode.LAND), (5, None)])
-def test_a_lost_ground_station(value, mode):
-    flight = with_ground_station(NAV_DLL_ACT=value, COM_DL_LOSS_T=5.0)
+def test_a_lost_ground_station_is_waited_for_in_hold():
+    flight = with_ground_station(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0)
+    # COM_DL_LOSS_T counts from when the link calls it gone, 2.5 s after its last heartbeat
     flight.fly(7.3)
     assert not flight.autopilot.commander.failsafe.acts
-    if mode is None:
-        flight.fly(3.0)
-        assert flown(flight) is Mode.LOITER
-        return
-    # COM_DL_LOSS_T counts from when the link calls it gone, 2.5 s after its last heartbeat
     until_it_acts(flight, 0.5)
     assert "Connection to ground station lost" in flight.texts()
     # And most actions wait for COM_FAIL_ACT_T in hold
-    if mode in (Mode.RETURN, Mode.LAND):
-        assert "Failsafe activated: entering Hold for 5 seconds" in flight.texts()
-        assert flown(flight) is Mode.LOITER
-        flight.fly(5.1)
-    assert flown(flight) is mode
+    assert "Failsafe activated: entering Hold for 5 seconds" in flight.texts()
+    assert flown(flight) is Mode.LOITER
+    flight.fly(5.1)
+    assert flown(flight) is Mode.RETURN
+
+
+def test_a_ground_station_that_was_never_to_be_missed_is_not_missed():
+    flight = with_ground_station(NAV_DLL_ACT=0, COM_DL_LOSS_T=5.0)
+    flight.fly(10.3)
+    assert flown(flight) is Mode.LOITER and not flight.autopilot.commander.failsafe.acts
 
 
 def test_a_ground_station_that_comes_back_does_not_end_the_return_but_a_mode_does():

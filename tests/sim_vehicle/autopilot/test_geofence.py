@@ -10,7 +10,7 @@ from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.autopilot.modes import Mode
-from sim_vehicle.autopilot.navigator.geofence import CHECK_PERIOD_US, shapes_of
+from sim_vehicle.autopilot.navigator.geofence import shapes_of
 from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, item, place, set_mode, upload
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target
 
@@ -57,37 +57,15 @@ def test_what_shapes_allow(shape, inside, outside):
     assert not found.allows(*outside)
 
 
-@pytest.mark.parametrize(
-    ("action", "mode"),
-    [
-        (0, Mode.OFFBOARD),
-        (1, Mode.OFFBOARD),
-        (2, Mode.LOITER),
-        (3, Mode.RETURN),
-        (5, Mode.LAND),
-    ],
-)
-def test_a_breach_does_what_gf_action_says(action, mode):
-    flight = hovering(5.0, GF_ACTION=action, COM_FAIL_ACT_T=0.0)
-    upload(flight, *KEEP_IN, kind=MissionType.FENCE)
-    outward(flight, 5.0, 6.0)
-    assert flight.autopilot.modes.flown is mode
-    assert flight.autopilot.modes.intended is Mode.OFFBOARD
-
-
 def test_a_breach_is_found_within_a_fifth_of_a_second_and_held_where_it_was_found():
     flight = hovering(5.0)
     upload(flight, *KEEP_IN, kind=MissionType.FENCE)
     outward(flight, 2.0, 5.0)
-    crossing_s = None
     away = target(velocity=(2.0, 0.0, 0.0))
-    while flight.autopilot.modes.flown is Mode.OFFBOARD:
-        flight.fly(0.04, away)
-        if crossing_s is None and flight.state.position_ned_m[0] > 20.0:
-            crossing_s = flight.time_s
-    assert flight.time_s - crossing_s < 1e-6 * CHECK_PERIOD_US + 0.1
-    assert flight.texts()[-1] == "Failsafe activated"
+    flight.fly_until(lambda: flight.autopilot.modes.flown is not Mode.OFFBOARD, 10.0, away)
     found_at = flight.state.position_ned_m[0]
+    assert 0.0 < found_at - 20.0 < 2.0 * (0.2 + 0.1)
+    assert flight.texts()[-1] == "Failsafe activated"
     flight.fly(10.0)
     assert flight.state.position_ned_m[0] == pytest.approx(found_at, abs=0.3)
     # And the pilot can leave the hold by a mode

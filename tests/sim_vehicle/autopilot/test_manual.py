@@ -35,9 +35,6 @@ def flying(mode: Mode, **parameters: float) -> Flight:
     return flight
 
 
-# --- whose sticks ------------------------------------------------------------------------------------------------
-
-
 def test_the_first_that_comes_counts_until_it_is_lost():
     manual = ManualInput(Parameters({"COM_RC_LOSS_T": 0.5}))
     manual.heard(StickInput(0, 0, 0, 0, FIRST), 0)
@@ -58,9 +55,6 @@ def test_only_a_stick_that_is_moved_fast_enough_counts_as_moved():
         for number in range(50):
             manual.heard(StickInput(0.02 * speed * number, 0, 0, 0, FIRST), 20_000 * number)
         assert manual.moving is moved
-
-
-# --- flown -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Offboard by attitude and by rates."""
 
 import math
-from typing import Any
 
 import pytest
 
@@ -25,16 +24,6 @@ def leaning(roll_deg: float) -> tuple[float, float, float, float]:
     return math.cos(half), math.sin(half), 0.0, 0.0
 
 
-def stream(flight: Flight, message: Any, seconds: float) -> None:
-    for number in range(round(seconds * 250)):
-        if number % 12 == 0:
-            flight.autopilot.receive(message)
-        flight.step()
-
-
-# --- what they mean ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("message", "flown"),
     [
@@ -54,16 +43,13 @@ def test_what_an_attitude_target_asks_for(message, flown):
     assert offboard.attitude_setpoint(message) == flown
 
 
-# --- flown -------------------------------------------------------------------------------------------------------
-
-
 def test_an_attitude_alone_arms_and_takes_off_without_the_ramp():
     flight = Flight()
     up = AttitudeTarget(LEVEL, NO_RATES, 1.2 * HOVER)
-    stream(flight, up, 0.2)
+    flight.fly(0.2, up)
     set_mode(flight, Mode.OFFBOARD)
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
-    stream(flight, up, 1.0)
+    flight.fly(1.0, up)
     assert flight.height_m == pytest.approx(0.5 * 0.2 * 9.81, abs=0.1)
     assert not flight.autopilot.detector.landed
 
@@ -72,9 +58,9 @@ def test_an_attitude_alone_arms_and_takes_off_without_the_ramp():
 def test_from_an_attitude_to_a_position_it_changes_with_the_commanders_status(command):
     # Given a vehicle that is flown by attitude
     flight = hovering(5.0)
-    stream(flight, AttitudeTarget(LEVEL, NO_RATES, HOVER), 0.2)
+    flight.fly(0.2, AttitudeTarget(LEVEL, NO_RATES, HOVER))
     set_mode(flight, Mode.OFFBOARD)
-    stream(flight, AttitudeTarget(LEVEL, NO_RATES, HOVER), 1.0)
+    flight.fly(1.0, AttitudeTarget(LEVEL, NO_RATES, HOVER))
     # When a position is asked for, alone or with any command
     flight.autopilot.receive(target(position_m=(1.0, 0.0, -5.0)))
     if command is not None:
@@ -85,9 +71,6 @@ def test_from_an_attitude_to_a_position_it_changes_with_the_commanders_status(co
         steps += 1
     # Then it is flown with the commander's status, which comes twice a second, or at once
     assert (steps * 0.004 <= 0.012) if command is not None else (0.1 < steps * 0.004 <= 0.51)
-
-
-# --- by the real loops ---------------------------------------------------------------------------------------------
 
 
 def thrown_up() -> tuple[Plant, float]:

@@ -6,11 +6,10 @@ import time
 from collections.abc import Callable
 
 import pytest
-from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.errors import ConditionNotMet, SceneError, SimulationError, VehicleEnded
 from sim_vehicle.testing import RunningVehicle, Truth, Wall, faults, start_vehicle
-from tests.sim_vehicle.vehicle_client import heard_until
+from tests.sim_vehicle.vehicle_client import End, heard_until
 
 TIMEOUT_S = 10.0
 HERE = "127.0.0.1"
@@ -22,22 +21,8 @@ def connected(vehicle: RunningVehicle) -> socket.socket:
     return client
 
 
-def command(number: int, *params: float) -> bytes:
-    message = dialect.MAVLink_command_long_message(1, 1, number, 0, *params, *[float("nan")] * (7 - len(params)))
-    return message.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
-
-
 def vehicle_threads() -> int:
     return sum(thread.name.startswith("simulated vehicle") for thread in threading.enumerate())
-
-
-def is_free(kind: int, port: int) -> bool:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        try:
-            probe.bind((HERE, port))
-        except OSError:
-            return False
-        return True
 
 
 def test_it_is_there_at_its_addresses_and_gone_afterwards() -> None:
@@ -47,10 +32,11 @@ def test_it_is_there_at_its_addresses_and_gone_afterwards() -> None:
         heard_until(client, {"HEARTBEAT", "HIGHRES_IMU"})
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
             second.settimeout(TIMEOUT_S)
-            second.sendto(command(512, 148), (HERE, vehicle.udp_port))
+            End(lambda raw: second.sendto(raw, (HERE, vehicle.udp_port))).command(512, 148)
             heard_until(second, {"AUTOPILOT_VERSION", "HEARTBEAT"})
     assert vehicle_threads() == 0
-    assert is_free(socket.SOCK_DGRAM, vehicle.udp_port)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((HERE, vehicle.udp_port))
     with pytest.raises(VehicleEnded, match="has been stopped"):
         vehicle.hit(1.0)
     # What happened may be read afterwards, too
@@ -69,7 +55,9 @@ def test_a_setup_that_cannot_be_leaves_nothing_behind() -> None:
 
 def test_walls_strikes_faults_and_truth_while_it_flies() -> None:
     with start_vehicle(speed=20.0, seed=3) as vehicle, connected(vehicle) as client:
-        client.sendall(command(400, 1) + command(22))
+        pilot = End(client.sendall)
+        pilot.command(400, 1)
+        pilot.command(22)
         vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2.2, within_s=30)
         wall = vehicle.place(Wall(point_ned_m=(2, 0, -2), normal_ned=(-1, 0, 0), name="gate"))
         with pytest.raises(SceneError, match="would pass through the vehicle"):

@@ -5,10 +5,11 @@ import tomllib
 from importlib import import_module
 from pathlib import Path
 
+import numba
 import pytest
 
+from sim_vehicle.physics import jit
 from sim_vehicle.truth import Hit
-from tests.sim_vehicle.bench.kept_kernels import keep_kernels
 
 pytest_plugins = "pytester"
 
@@ -20,7 +21,9 @@ def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.
     """Without whatever plugins are installed here, so that it does not matter whether this package is."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    keep_kernels(monkeypatch)
+    # pytester has taken the user's cache folder, with its compiled kernels, from these programs.
+    if jit.NOT_KEPT is None:
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(Path(numba.config.CACHE_DIR).parent))
     return pytester
 
 
@@ -138,3 +141,15 @@ def test_a_wrong_mark_is_an_error_that_says_what_to_do(suite: pytest.Pytester) -
     result.assert_outcomes(errors=2)
     result.stdout.fnmatch_lines(["*the mark rebound takes settings by name*"])
     result.stdout.fnmatch_lines(["*the mark rebound has no setting 'airfram': did you mean airframe?*"])
+
+
+@pytest.mark.slow
+def test_every_example_for_test_authors_passes(suite: pytest.Pytester) -> None:
+    texts = [(ROOT / "docs" / page).read_text() for page in ("how-to/testing.md", "tutorials/test-your-program.md")]
+    tests, scripts = [], []
+    for example in re.findall(r"^```python\n(.*?)^```$", "\n".join(texts), re.DOTALL | re.MULTILINE):
+        (tests if "def test_" in example else scripts).append(example)
+    assert (len(tests), len(scripts)) == (6, 1)
+    assert suite.runpython(suite.makepyfile(script=scripts[0])).ret == 0
+    suite.makepyfile(**{f"test_example_{number}": example for number, example in enumerate(tests)})
+    run(suite, "--strict-markers").assert_outcomes(passed=len(tests))

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -92,39 +91,28 @@ def circle(radius_m: float, speed_m_s: float) -> Callable[[float], TrajectorySet
     return setpoint_at
 
 
-@dataclass(frozen=True)
-class HitErrors:
-    """Length of the velocity error, m/s, at the end of the interval of the first touch and so many ms after it."""
+def hit_wall(airframe: Airframe, speed_m_s: float, seed: int, after_ms: tuple[int, ...]) -> tuple[Flight, list[float]]:
+    """Fly head-on at a wall and, from the touch on, to half a second's way behind it, as the paper's eq. 3.
 
-    before: float
-    after: dict[int, float]
-    flight: Flight
-
-
-def hit_wall(airframe: Airframe, speed_m_s: float, seed: int, after_ms: tuple[int, ...]) -> HitErrors:
-    """Fly head-on at a wall and, from the touch on, to half a second's way behind it, as the paper's eq. 3."""
+    And the length of the velocity error, m/s, before the touch and at these times after it.
+    """
     distance_m = 2 + 0.75 * speed_m_s**2
     scene = Scene.model_validate({"walls": [{"point_ned_m": [distance_m, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]}]})
     flight = Flight(airframe, seed, scene)
     flight.climb()
     way = cruise(speed_m_s)
-    time_s, before = 0.0, math.nan
+    time_s, now_ms, errors_m_s = 0.0, 0, [math.nan]
     reach_m = distance_m - airframe.geometry.reach_m * math.cos(math.pi / 4) - 1.0
-    while not _touches(flight):
-        before = float(np.linalg.norm(flight.velocity_error_m_s))
+    while flight.plant.state.peak_force_n == 0.0:
+        errors_m_s = [float(np.linalg.norm(flight.velocity_error_m_s))]
         last = flight.output
         flight.fly(way(time_s), STEP_S)
         time_s += STEP_S
         assert flight.plant.state.body[0] < reach_m + 2.0, "the wall was passed"
     v_c, x_c = last.velocity_ned_m_s[0], last.position_ned_m[0]
     back = TrajectorySetpoint(position_ned_m=(x_c - 0.5 * v_c, 0.0, -HEIGHT_M), yaw_rad=0.0)
-    after, now_ms = {}, 0
-    for moment in sorted(after_ms):
+    for moment in after_ms:
         flight.fly(back, 1e-3 * (moment - now_ms))
         now_ms = moment
-        after[moment] = float(np.linalg.norm(flight.velocity_error_m_s))
-    return HitErrors(before, after, flight)
-
-
-def _touches(flight: Flight) -> bool:
-    return bool(flight.plant.state.peak_force_n > 0.0)
+        errors_m_s.append(float(np.linalg.norm(flight.velocity_error_m_s)))
+    return flight, errors_m_s

@@ -20,21 +20,14 @@ NOISE = np.array([1e-5, 1e-3, 1e-6, 1e-6, 0.1])
 
 def tilted() -> np.ndarray:
     """Some state in flight, none of whose entries is special."""
-    nominal = np.zeros(NOMINAL_ROWS)
-    nominal[0:3] = [1.0, -2.0, -1.7]
-    nominal[3:6] = [1.5, -0.7, 0.3]
+    place, velocity, biases = [1.0, -2.0, -1.7], [1.5, -0.7, 0.3], [0.002, -0.001, 0.003, 0.05, -0.03, 0.02]
     attitude = np.array([0.95, 0.12, -0.17, 0.21])
-    nominal[6:10] = attitude / np.linalg.norm(attitude)
-    nominal[10:13] = [0.002, -0.001, 0.003]
-    nominal[13:16] = [0.05, -0.03, 0.02]
-    nominal[16:18] = [0.01, -0.02]
-    return nominal
+    return np.concatenate([place, velocity, attitude / np.linalg.norm(attitude), biases, [0.01, -0.02]])
 
 
 def some_sample() -> np.ndarray:
     sample = np.zeros(SAMPLE_COLUMNS)
-    sample[0:3] = [1.2, -0.8, -11.0]
-    sample[3:6] = [0.6, -0.9, 0.4]
+    sample[0:6] = [1.2, -0.8, -11.0, 0.6, -0.9, 0.4]
     return sample
 
 

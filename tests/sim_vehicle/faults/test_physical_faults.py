@@ -34,9 +34,6 @@ def velocity(plant: Plant) -> np.ndarray:
     return np.array(plant.state.body[3:6])
 
 
-# --- air -------------------------------------------------------------------------------------------------
-
-
 def test_a_gust_pushes_by_the_drag_of_its_air() -> None:
     """Without control: m dv = c V (length - rise), as long as the vehicle is slow against the gust."""
     airframe = quiet(FOLDABLE, drag_n_s_m=0.05)
@@ -58,9 +55,6 @@ def test_turbulence_has_the_strength_and_the_memory_that_the_model_asks_for() ->
     # Along the wind a first-order process: after L / V its correlation is 1 / e.
     lag = round(level_m / 15.0 / 0.02)
     assert np.corrcoef(air[:-lag, 0], air[lag:, 0])[0, 1] == pytest.approx(math.exp(-1), abs=0.08)
-
-
-# --- motors, supply, load ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("motor", "roll", "pitch"), [(0, 1, -1), (1, -1, 1), (2, -1, -1), (3, 1, 1)])
@@ -101,17 +95,11 @@ def test_a_payload_that_drops_lets_the_vehicle_jump_by_its_weight() -> None:
     assert first == pytest.approx(-held_n / QUIET.mass_kg, rel=0.01)
 
 
-# --- pushes ------------------------------------------------------------------------------------------------
-
-
 def test_a_push_gives_its_impulse_and_no_moment_through_the_centre() -> None:
     push = {"kind": "push", "between_s": [0.1, 0.5], "force_ned_n": [2, 0, 0], "rise_s": 0.1}
     plant = released(QUIET, 0.8, faults=[push])
     assert plant.state.body[3] == pytest.approx(2 * 0.3 / QUIET.mass_kg, rel=0.01)
     assert np.abs(plant.state.body[10:13]).max() == 0.0
-
-
-# --- inertial sensor ---------------------------------------------------------------------------------------
 
 
 def raw_rms(plant: Plant) -> np.ndarray:
@@ -152,9 +140,6 @@ def test_a_bias_and_a_stuck_axis_show_in_the_mean_sample() -> None:
     assert rates[76:, 1] == pytest.approx(2.0, abs=1e-9)
 
 
-# --- estimate ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("name", "disturbed"), [("rigid", True), ("foldable", False)])
 def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: str, disturbed: bool) -> None:
     """The rigid vehicle's hit at 2 m/s hides most of its 3.8 m/s from the sensor; the foldable's at 1 m/s nothing."""
@@ -174,9 +159,6 @@ def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: st
         errors.append(np.linalg.norm(np.array(output.velocity_ned_m_s) - velocity(plant)))
     assert output.reset_counter == (4 if disturbed else 0)
     assert bool(max(errors) > 0.2) is disturbed
-
-
-# --- all of them -------------------------------------------------------------------------------------------
 
 
 def test_faults_repeat_for_a_seed_and_leave_the_rest_of_the_noise_alone() -> None:

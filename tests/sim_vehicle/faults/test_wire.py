@@ -16,8 +16,8 @@ from tests.sim_vehicle.vehicle_client import Client
 STEP_US = 4000
 
 
-def frame(number: int, message: int = 105) -> bytes:
-    return bytes([0xFD, 2, 0, 0, number & 0xFF, 1, 1, message, 0, 0]) + number.to_bytes(2, "little") + b"\0\0"
+def frame(number: int) -> bytes:
+    return bytes([0xFD, 2, 0, 0, number & 0xFF, 1, 1, 105, 0, 0]) + number.to_bytes(2, "little") + b"\0\0"
 
 
 def number_in(raw: bytes) -> int:
@@ -64,9 +64,6 @@ def test_bytes_are_split_where_frames_begin() -> None:
     assert split(b"".join(frames)) == frames
     assert split(b"".join(frames) + b"\x01\x02") == [*frames, b"\x01\x02"]
     assert split(b"".join(frames)[:-1])[-1] == frames[-1][:-1]
-
-
-# --- on a vehicle ------------------------------------------------------------------------------------------
 
 
 def flown(*faults: dict[str, Any], seconds: float = 3.0) -> Client:

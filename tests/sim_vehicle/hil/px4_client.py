@@ -46,16 +46,5 @@ class Px4Client:
             self.answer(controls)
             yield step
 
-    def hears_nothing_for(self, seconds: float) -> bool:
-        if self._waiting:
-            return False
-        self._socket.settimeout(seconds)
-        try:
-            return not self._socket.recv(1)
-        except TimeoutError:
-            return True
-        finally:
-            self._socket.settimeout(TIMEOUT_S)
-
     def close(self) -> None:
         self._socket.close()

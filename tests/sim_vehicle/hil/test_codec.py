@@ -19,10 +19,10 @@ def on_the_wire(message) -> dialect.MAVLink_message:
     return dialect.MAVLink(None).decode(bytearray(Encoder(SIMULATOR).packet(filled(message))))
 
 
-def controls_packet(controls: list[float], mode: int, flags: int, time_us: int = 4_000) -> bytes:
+def controls_packet(controls: list[float], mode: int, flags: int) -> bytes:
     link = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     return dialect.MAVLink_hil_actuator_controls_message(
-        time_us, controls + [0.0] * (16 - len(controls)), mode, flags
+        4_000, controls + [0.0] * (16 - len(controls)), mode, flags
     ).pack(link)
 
 

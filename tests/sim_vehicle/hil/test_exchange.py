@@ -3,12 +3,7 @@
 import pytest
 
 from sim_vehicle.errors import NotInLockstep
-from sim_vehicle.hil.exchange import (
-    ANSWER_TIMEOUT_US,
-    STARTING_TIMEOUT_US,
-    Exchange,
-    ExchangePhase,
-)
+from sim_vehicle.hil.exchange import ANSWER_TIMEOUT_US, STARTING_TIMEOUT_US, Exchange, ExchangePhase
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls
 
 HALF_THRUST = (0.5, 0.5, 0.5, 0.5)

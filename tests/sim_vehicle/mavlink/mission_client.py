@@ -46,28 +46,9 @@ def sent(message, peer=CLIENT):
     return message
 
 
-def request_list(kind, peer=CLIENT):
-    return sent(dialect.MAVLink_mission_request_list_message(1, 1, kind), peer)
-
-
-def request_item(number, kind, peer=CLIENT):
-    return sent(dialect.MAVLink_mission_request_int_message(1, 1, number, kind), peer)
-
-
-def count(items, kind, peer=CLIENT):
-    return sent(dialect.MAVLink_mission_count_message(1, 1, items, kind), peer)
-
-
-def ack(result, kind, peer=CLIENT):
-    return sent(dialect.MAVLink_mission_ack_message(1, 1, result, kind), peer)
-
-
-def clear_all(kind):
-    return sent(dialect.MAVLink_mission_clear_all_message(1, 1, kind))
-
-
-def set_current(number, peer=CLIENT):
-    return sent(dialect.MAVLink_mission_set_current_message(1, 1, number), peer)
+def said(name, *fields, peer=CLIENT):
+    """A message of the protocol, MISSION_..., to the vehicle."""
+    return sent(getattr(dialect, f"MAVLink_mission_{name}_message")(1, 1, *fields), peer)
 
 
 def of_type(answers, *types):
@@ -116,28 +97,27 @@ class Exchange:
 
     def upload(self, items, kind=MissionType.MISSION, within_s: float = 60.0) -> int:
         """The result that the client gets in the end."""
-        said = count(len(items), kind)
-        self.asked.append(said)
-        said_us = end_us = self.now_us
+        asked = said("count", len(items), kind)
+        self.asked.append(asked)
+        asked_us = end_us = self.now_us
         end_us += round(1e6 * within_s)
         while self.now_us < end_us:
             for answer in self.step():
                 if answer.get_type() == "MISSION_ACK" and answer.target_system == CLIENT[0]:
                     return answer.type
                 if answer.get_type().startswith("MISSION_REQUEST") and answer.seq < len(items):
-                    said, said_us = items[answer.seq], self.now_us
-                    said.mission_type = kind
-                    self.asked.append(said)
-            if self.now_us - said_us > CLIENT_RETRY_US:
-                said_us = self.now_us
-                self.asked.append(said)
+                    asked, asked_us = items[answer.seq], self.now_us
+                    asked.mission_type = kind
+                    self.asked.append(asked)
+            if self.now_us - asked_us > CLIENT_RETRY_US:
+                asked_us = self.now_us
+                self.asked.append(asked)
         raise AssertionError("no acknowledgement came")
 
     def download(self):
         """The items that the client gets, in their order."""
-        (said,) = of_type(self.ask(request_list(MissionType.MISSION)), "MISSION_COUNT")
-        items = [
-            of_type(self.ask(request_item(n, MissionType.MISSION)), "MISSION_ITEM_INT")[0] for n in range(said.count)
-        ]
-        self.ask(ack(MissionResult.ACCEPTED, MissionType.MISSION))
+        (told,) = of_type(self.ask(said("request_list", MissionType.MISSION)), "MISSION_COUNT")
+        asked = (said("request_int", number, MissionType.MISSION) for number in range(told.count))
+        items = [of_type(self.ask(each), "MISSION_ITEM_INT")[0] for each in asked]
+        self.ask(said("ack", MissionResult.ACCEPTED, MissionType.MISSION))
         return items

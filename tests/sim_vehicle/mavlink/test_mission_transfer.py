@@ -8,8 +8,7 @@ from sim_vehicle.autopilot.mission_protocol import mission_items as commands
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType
 from sim_vehicle.mavlink.services.mission_transfer import RETRY_US, TIMEOUT_US, TransferState
 from sim_vehicle.mavlink.services.mission_wire import MissionResult
-from tests.sim_vehicle.mavlink import mission_client as client
-from tests.sim_vehicle.mavlink.mission_client import CLIENT, STEP_US, STRANGER, Exchange, of_type, sent, wire_item
+from tests.sim_vehicle.mavlink.mission_client import CLIENT, STEP_US, STRANGER, Exchange, of_type, said, sent, wire_item
 
 MISSION = MissionType.MISSION
 SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(3, commands.LAND)]
@@ -17,7 +16,7 @@ SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(
 
 def receiving() -> Exchange:
     exchange = Exchange()
-    exchange.ask(client.count(3, MISSION))
+    exchange.ask(said("count", 3, MISSION))
     assert exchange.transfer.state is TransferState.RECEIVING
     return exchange
 
@@ -25,7 +24,7 @@ def receiving() -> Exchange:
 def sending() -> Exchange:
     exchange = Exchange()
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
-    exchange.ask(client.request_list(MISSION))
+    exchange.ask(said("request_list", MISSION))
     assert exchange.transfer.state is TransferState.SENDING
     return exchange
 
@@ -76,18 +75,18 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
         message = data.draw(
             st.sampled_from(
                 [
-                    client.request_list(kind, peer),
-                    client.request_item(number, kind, peer),
-                    client.count(number + 1, kind, peer),
+                    said("request_list", kind, peer=peer),
+                    said("request_int", number, kind, peer=peer),
+                    said("count", number + 1, kind, peer=peer),
                     sent(wire_item(number, kind=kind), peer),
-                    client.ack(number, kind, peer),
-                    client.set_current(number, peer),
+                    said("ack", number, kind, peer=peer),
+                    said("set_current", number, peer=peer),
                 ]
             )
         )
         exchange.ask(message)
     plan = exchange.store.mission
-    assert plan == before or len(plan.items) == len({item.place.latitude_deg for item in plan.items})
+    assert plan == before or len(plan) == len({item.place.latitude_deg for item in plan})
     # And once everybody is silent, it is free again
     exchange.link.now_us += TIMEOUT_US + RETRY_US
     exchange.step()
@@ -131,7 +130,7 @@ def test_what_px4_keeps_of_an_items_parameters(sent, stored):
 
 
 def test_a_count_of_nothing_clears_and_so_does_clear_all():
-    for message in (client.count(0, MISSION), client.clear_all(MISSION), client.clear_all(255)):
+    for message in (said("count", 0, MISSION), said("clear_all", MISSION), said("clear_all", 255)):
         exchange = Exchange()
         exchange.upload(SQUARE)
         changes = exchange.store.mission_changes
@@ -144,7 +143,7 @@ def test_a_count_of_nothing_clears_and_so_does_clear_all():
 def test_silence_ends_a_transfer_after_five_seconds(begin):
     exchange = begin()
     if begin is sending:
-        exchange.ask(client.request_item(0, MISSION))
+        exchange.ask(said("request_int", 0, MISSION))
     start_us = exchange.now_us
     while exchange.transfer.state is not TransferState.IDLE:
         exchange.step()
@@ -164,8 +163,8 @@ def test_the_last_acknowledgement_is_given_again():
 def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
     exchange = Exchange()
     exchange.upload(SQUARE)
-    exchange.ask(client.count(2, MISSION))
-    exchange.ask(client.ack(MissionResult.CANCELLED, MISSION))
+    exchange.ask(said("count", 2, MISSION))
+    exchange.ask(said("ack", MissionResult.CANCELLED, MISSION))
     assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
     assert len(exchange.store.mission) == 4
 
@@ -173,14 +172,14 @@ def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
 @pytest.mark.parametrize(
     ("begin", "message"),
     [
-        (receiving, client.clear_all(MISSION)),
+        (receiving, said("clear_all", MISSION)),
         (receiving, sent(wire_item(0), STRANGER)),
-        (receiving, client.ack(MissionResult.CANCELLED, MISSION, STRANGER)),
-        (sending, client.count(2, MISSION)),
-        (sending, client.request_list(MISSION, STRANGER)),
-        (sending, client.request_item(0, MISSION, STRANGER)),
-        (sending, client.ack(0, MISSION, STRANGER)),
-        (sending, client.clear_all(MISSION)),
+        (receiving, said("ack", MissionResult.CANCELLED, MISSION, peer=STRANGER)),
+        (sending, said("count", 2, MISSION)),
+        (sending, said("request_list", MISSION, peer=STRANGER)),
+        (sending, said("request_int", 0, MISSION, peer=STRANGER)),
+        (sending, said("ack", 0, MISSION, peer=STRANGER)),
+        (sending, said("clear_all", MISSION)),
     ],
 )
 def test_a_transfer_is_not_disturbed(begin, message):
@@ -194,7 +193,7 @@ def test_a_transfer_is_not_disturbed(begin, message):
 def test_only_one_link_receives_at_a_time():
     first = receiving()
     second = Exchange(first.store)
-    ack = second.ask(client.count(2, MISSION, STRANGER))[0]
+    ack = second.ask(said("count", 2, MISSION, peer=STRANGER))[0]
     assert ack.type == MissionResult.ERROR
     # And the other link still gets its list
     assert first.upload([wire_item(0), wire_item(1), wire_item(2)]) == MissionResult.ACCEPTED

@@ -13,8 +13,6 @@ def read_back(message):
     return dialect.MAVLink(None).decode(bytearray(Encoder(Identity()).packet(message)))
 
 
-# --- STATUSTEXT -------------------------------------------------------------------------------------------
-
 ARMED = StatusText(Severity.INFO, "Armed by external command")
 
 

@@ -7,19 +7,13 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.physics.inertia import ZZ, inertia_of
-from sim_vehicle.physics.layout import (
-    POINTS,
-    Scratch,
-    calm,
-    constants_from,
-    initial_state,
-)
+from sim_vehicle.physics.layout import POINTS, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.record import new_record
 from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.world import build_world
-from tests.sim_vehicle.physics.throwing import motors_off, quiet, throw
+from tests.sim_vehicle.physics.throwing import first_hit, motors_off, quiet
 
 
 @pytest.mark.parametrize("name", ["foldable", "rigid"])
@@ -27,7 +21,7 @@ from tests.sim_vehicle.physics.throwing import motors_off, quiet, throw
 @pytest.mark.parametrize("yaw_deg", [0, 20])
 def test_the_walls_impulse_is_the_change_of_momentum(name: str, speed_m_s: float, yaw_deg: float) -> None:
     airframe = quiet(load_built_in(name))
-    hit = throw(airframe, speed_m_s, yaw_rad=math.radians(yaw_deg)).hit
+    hit = first_hit(airframe, speed_m_s, yaw_rad=math.radians(yaw_deg))
     change = airframe.mass_kg * (np.array(hit.rebound_velocity_ned_m_s) - np.array(hit.impact_velocity_ned_m_s))
     assert hit.impulse_ned_n_s[0] == pytest.approx(change[0], rel=0.01)
     assert hit.impulse_ned_n_s[1] == pytest.approx(change[1], abs=0.01 * abs(change[0]))

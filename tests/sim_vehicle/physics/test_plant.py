@@ -10,10 +10,7 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
-from sim_vehicle.physics.layout import (
-    constants_from,
-    initial_state,
-)
+from sim_vehicle.physics.layout import constants_from, initial_state
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.estimator.flying import filtered
@@ -22,8 +19,8 @@ from tests.sim_vehicle.physics.throwing import quiet
 NONE = (None, None, None)
 
 
-def at(north: float, east: float, down: float, yaw_rad: float = 0.0) -> TrajectorySetpoint:
-    return TrajectorySetpoint((north, east, down), NONE, NONE, yaw_rad, None)
+def at(north: float, east: float, down: float) -> TrajectorySetpoint:
+    return TrajectorySetpoint((north, east, down), NONE, NONE, 0.0, None)
 
 
 def flown(plant: Plant, setpoint: TrajectorySetpoint | None, seconds: float) -> list[Estimate]:
@@ -90,19 +87,6 @@ def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
 
     expected = np.cross(rates, full(state.inertia) @ rates) + full(state.inertia_rate) @ rates
     assert state.moment_frd_n_m == pytest.approx(expected)
-
-
-def test_driven_motors_do_as_they_are_told() -> None:
-    """With an autopilot from outside, 10 % above hover on every motor climbs at a tenth of gravity."""
-    airframe = quiet(load_built_in("foldable"))
-    plant = Plant(airframe, Scene(), seed=1)
-    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
-    share = 1.1 * airframe.hover_fraction
-    for _ in range(250):
-        output = plant.drive((share, share, share, share))
-    assert output.specific_force_frd_m_s2[2] == pytest.approx(-1.1 * 9.81, rel=1e-3)
-    # The motors reach their thrust with a lag of 20 ms, which costs that much of the first free fall.
-    assert plant.state.body[5] == pytest.approx(-0.981 + 1.1 * 9.81 * 0.02, rel=0.02)
 
 
 def test_raw_samples_are_clipped_before_the_mean() -> None:

@@ -1,7 +1,7 @@
 """A vehicle flown straight at a wall, with nothing between the setpoint and the physics."""
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.plant.interval import FINE_STEPS
@@ -10,18 +10,6 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
 
 HEIGHT_M = 2.0
-
-
-@dataclass(frozen=True)
-class Thrown:
-    """A vehicle after its hit or hits."""
-
-    plant: Plant
-
-    @property
-    def hit(self) -> Hit:
-        """The first hit, once it is over."""
-        return self.plant.truth.hits[0]
 
 
 def quiet(airframe: Airframe, **changes: object) -> Airframe:
@@ -61,35 +49,30 @@ def released(airframe: Airframe, seconds: float, **scene: object) -> Plant:
 def throw(
     airframe: Airframe,
     speed_m_s: float,
-    heading_rad: float = 0.0,
-    yaw_rad: float | None = None,
+    yaw_rad: float = 0.0,
     fine_steps: int = FINE_STEPS,
     gap_m: float = 0.05,
     rates_frd_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
     duration_s: float = 0.4,
-) -> Thrown:
-    """Throw a level vehicle, motors off, at a wall facing it across ``heading_rad``.
+) -> Plant:
+    """Throw a level vehicle, motors off, north at a wall; the plant after its hit.
 
     Motors off leave eq. 2 alone (thrust level would only cancel gravity): the vehicle falls as it hits,
     along the frictionless face.
     """
-    north, east = math.cos(heading_rad), math.sin(heading_rad)
-    yaw_rad = heading_rad if yaw_rad is None else yaw_rad
     free = airframe.model_copy(update={"surface": airframe.surface.model_copy(update={"guard_friction": 0.0})})
-    distance = airframe.geometry.reach_m + gap_m
-    scene = Scene.model_validate(
-        {
-            "walls": [{"point_ned_m": [10 * north, 10 * east, -HEIGHT_M], "normal_ned": [-north, -east, 0.0],
-                       "width_m": 20, "height_m": 20}],
-            "start": {"yaw_deg": math.degrees(yaw_rad)},
-        }
-    )  # fmt: skip
+    wall = {"point_ned_m": [10, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0], "width_m": 20, "height_m": 20}
+    scene = Scene.model_validate({"walls": [wall], "start": {"yaw_deg": math.degrees(yaw_rad)}})
     plant = Plant(free, scene, seed=1, fine_steps=fine_steps)
-    body = plant.state.body
-    body[0:3] = [(10 - distance) * north, (10 - distance) * east, -HEIGHT_M]
-    body[3:6] = [speed_m_s * north, speed_m_s * east, 0.0]
-    body[10:13] = rates_frd_rad_s
-    return Thrown(motors_off(plant, duration_s))
+    plant.state.body[0:3] = [10 - airframe.geometry.reach_m - gap_m, 0.0, -HEIGHT_M]
+    plant.state.body[3:6] = [speed_m_s, 0.0, 0.0]
+    plant.state.body[10:13] = rates_frd_rad_s
+    return motors_off(plant, duration_s)
+
+
+def first_hit(airframe: Airframe, speed_m_s: float, **more: Any) -> Hit:
+    """The same; of its hits the first."""
+    return throw(airframe, speed_m_s, **more).truth.hits[0]
 
 
 def closed_form_of_eq_2(airframe: Airframe, speed_m_s: float) -> tuple[float, float, float]:
