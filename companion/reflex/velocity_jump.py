@@ -107,8 +107,8 @@ class VelocityJump:
         1 / degrees of freedom): a standard deviation from few steps is uncertain. Each has three axes, and shares
         velocities with those around it: four are worth as much as one. It is larger by `caution` where the estimate may
         jump without a hit, by vibration between the samples (standard deviation `shaking_m_s2`), and by the velocity's
-        lag where the thrust changes, as in free fall. Beside a rate jump less is enough: test ratios of one impulse add up,
-        that of the rates to three quarters at most. So half is enough beside one that no motor makes.
+        lag where the thrust changes, as in free fall. Beside a rate jump less is enough: the test ratios of one impulse
+        add up, that of the rates to three quarters at most. So half is enough beside one that no motor makes.
         """
         if not self.known:
             return math.inf

@@ -108,8 +108,8 @@ def test_what_is_out_of_range_is_stored_but_does_not_count(value, counts):
 @pytest.mark.parametrize("name", built_in_airframes())
 def test_the_loops_begin_with_the_gains_that_the_parameters_tell(name):
     airframe = load_built_in(name)
-    constants, told = constants_from(airframe, np.random.default_rng(1)), position_gains(Parameters(defaults_from(airframe)))
-    for gain, value in told.items():
+    constants, parameters = constants_from(airframe, np.random.default_rng(1)), Parameters(defaults_from(airframe))
+    for gain, value in position_gains(parameters).items():
         assert np.broadcast_to(constants[gain], np.shape(value)) == pytest.approx(value), gain
 
 
