@@ -8,7 +8,7 @@ from companion.flight.plan import mission_lines
 from companion.motion.motors import Damage, MotorWatch
 from tests.companion.fake_vehicle import FakeVehicle, flight, mission
 from tests.flying import Flight
-from tests.simulated import simulated, wall
+from tests.simulated import flown, wall
 
 SAMPLE_US = 100_000
 HOVER, NOISE = 500.0, 0.01
@@ -96,20 +96,11 @@ def test_a_mission_says_what_follows(policy, state):
     assert len(lines) == (policy != "tell")
 
 
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"hold": {"duration_s": 3}},
-    {"go_to": {"position_ned_m": [7, 0, -1.5], "speed_m_s": 2.0}},
-    {"hold": {"duration_s": 6}},
-    {"land": {}},
-]
-
-
 def flown_into_a_wall(*faults, airframe, **keys) -> Flight:
     sim = {"walls": [wall(4.0)], "faults": faults, "airframe": airframe}
-    flight = simulated(INTO_WALL, companion={"streams": {"window_s": 0.5}}, sim=sim, **keys)
-    flight.run_to_end()
-    return flight
+    north = {"go_to": {"position_ned_m": [7, 0, -1.5], "speed_m_s": 2.0}}
+    before, after = ({"hold": {"duration_s": duration_s}} for duration_s in (3, 6))
+    return flown(before, north, after, companion={"streams": {"window_s": 0.5}}, sim=sim, **keys)
 
 
 @pytest.mark.slow
