@@ -2,11 +2,14 @@
 
 import math
 import random
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import pytest
 
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
 from companion.motion.strapdown import Strapdown
+from companion.motion.vector import plus
 from companion.reflex.config import FusedConfig
 from companion.reflex.detector import Evidence, ImpactKind, Phase, Situation
 from companion.reflex.fused import FusedDetector
@@ -27,36 +30,34 @@ def pulse(force_frd, start_us=HIT_US, length_us=1_000):
     return lambda t_us: force_frd if start_us <= t_us < start_us + length_us else (0.0, 0.0, 0.0)
 
 
+@dataclass
 class Flight:
-    """Level at `velocity`, pushed by `push(t)` (m/s^2, body); everything else is the scene's."""
+    """Level at `velocity`, pushed by `push(t)` (m/s^2, body)."""
 
-    def __init__(self, push=nothing, imu_every_us=4_000, velocity=(2.0, 0.0, 0.0), noise=0.25, seed=1, **scene):
-        self.push, self.imu_every_us, self.noise = push, imu_every_us, noise
-        self.velocity = list(velocity)
-        self.lift = scene.pop("lift", lambda t: GRAVITY)  # what the propellers push up, m/s^2
-        self.rates = scene.pop("rates", lambda t: (0.0, 0.0, 0.0))
-        self.jump = scene.pop("jump", None)  # (time, velocity step, counted): the estimator's own
-        self.heard = scene.pop("heard", (LocalPosition, Odometry, Attitude, AttitudeTarget))
-        self.situation = scene.pop("situation", lambda t: IN_FLIGHT)
-        self.slower = scene.pop("slower", 1)  # velocities come so much more seldom
-        self.late_us = scene.pop("late_us", 0)  # the velocities are those of so long ago
-        assert not scene
-        self.rng = random.Random(seed)
+    push: Callable = nothing
+    imu_every_us: int = 4_000
+    velocity: tuple = (2.0, 0.0, 0.0)
+    noise: float = 0.25
+    lift: Callable = lambda t: GRAVITY  # what the propellers push up, m/s^2
+    rates: Callable = nothing
+    jump: tuple | None = None  # (time, velocity step, counted): the estimator's own
+    heard: tuple = (LocalPosition, Odometry, Attitude, AttitudeTarget)
+    situation: Callable = lambda t: IN_FLIGHT
+    slower: int = 1  # velocities come so much more seldom
+
+    def __post_init__(self):
+        self.rng = random.Random(1)
 
     def samples(self, until_us):
-        window, resets, offset, flown = [], 0, (0.0, 0.0, 0.0), []
+        window, resets, offset = [], 0, (0.0, 0.0, 0.0)
         for t in range(TICK_US, until_us, TICK_US):
             push, lift = self.push(t), self.lift(t)
             force = (push[0], push[1], push[2] - lift)
-            self.velocity = [
-                v + a * TICK_US * 1e-6
-                for v, a in zip(self.velocity, (force[0], force[1], force[2] + GRAVITY), strict=True)
-            ]
+            self.velocity = plus(self.velocity, 1e-6 * TICK_US, (force[0], force[1], force[2] + GRAVITY))
             window = [*window[-(WINDOW_US // TICK_US - 1) :], force]
             if self.jump is not None and t == self.jump[0]:
                 offset, resets = self.jump[1], resets + self.jump[2]
-            flown = [*flown[-(self.late_us // TICK_US) :], self.velocity] if self.late_us else [self.velocity]
-            seen = tuple(v + o + self.rng.gauss(0.0, 0.01) for v, o in zip(flown[0], offset, strict=True))
+            seen = tuple(v + o + self.rng.gauss(0.0, 0.01) for v, o in zip(self.velocity, offset, strict=True))
             if t % self.imu_every_us == 0:
                 mean = [
                     sum(f[axis] for f in window) / len(window) + self.rng.gauss(0.0, self.noise) for axis in (0, 1, 2)

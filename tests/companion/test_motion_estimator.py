@@ -21,9 +21,9 @@ PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)
 WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 
-def reckoned(velocity=(2.0, 0.0, 0.0), normal=SOUTH, restitution=0.2, is_second=False, hit_us=HIT_US, fits=True):
-    contact = Contact(hit_us, AT, velocity, normal, 0.2)
-    return MotionEstimator(contact, hit_us, contact.rebound(restitution), EstimateConfig(), is_second, fits)
+def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True):
+    contact = Contact(HIT_US, AT, velocity, SOUTH, 0.2)
+    return MotionEstimator(contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits)
 
 
 def said(north_m_s, since_us=60_000, position=AT):
@@ -43,9 +43,9 @@ def missing(since_s, late_s, rad_s, damping):
     return velocity, place
 
 
-def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1, fits=True):
+def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, fits=True):
     """Since the hit, s; true velocity; told velocity; reckoning: after each that a vehicle tells, noise included."""
-    draw = random.Random(seed)
+    draw = random.Random(1)
     after_m_s = -restitution * speed_m_s
     hidden_m_s = hides * (speed_m_s - after_m_s)
     found = reckoned((speed_m_s, 0.0, 0.0), restitution=0.45, fits=fits)
@@ -243,8 +243,8 @@ def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(a
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(-0.4, abs=0.15)
 
 
-def recovering(**hit):
-    flight = flight_with(estimator=reckoned(**hit))
+def recovering():
+    flight = flight_with(estimator=reckoned())
     return flight, flight.collisions[0], recover_in(flight)
 
 

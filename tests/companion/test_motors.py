@@ -20,20 +20,18 @@ HURT = (0.0, 0.0, 0.16, 0.0)
 class Flown:
     """A vehicle's outputs ten times a second."""
 
-    def __init__(self, zero=1000.0, most=2000.0, seed=1):
+    def __init__(self, most=2000.0):
         self.monitor, self.now_us = MotorWatch(), 0
-        self._zero, self._most, self._random = zero, most, random.Random(seed)
+        self._most, self._random = most, random.Random(1)
 
-    def fly(self, seconds, was_hit, change=(0.0,) * 4, hover=HOVER, manoeuvre=0.0):
+    def fly(self, seconds, was_hit, change=(0.0,) * 4, hover=HOVER):
         told = []
-        for number in range(round(seconds * 1e6 / SAMPLE_US)):
+        for _ in range(round(seconds * 1e6 / SAMPLE_US)):
             self.now_us += SAMPLE_US
-            turn = manoeuvre * (1 if number // 10 % 2 else -1)
             shares = [
-                1.0 + trim + more + sign * turn + self._random.gauss(0.0, NOISE)
-                for trim, more, sign in zip(TRIM, change, (1, -1, 1, -1), strict=True)
+                1.0 + trim + more + self._random.gauss(0.0, NOISE) for trim, more in zip(TRIM, change, strict=True)
             ]
-            outputs = [min(self._zero + hover * share, self._most) for share in shares]
+            outputs = [min(1000.0 + hover * share, self._most) for share in shares]
             damage = self.monitor.take(tuple(outputs), was_hit, self.now_us)
             told += [] if damage is None else [damage]
         return told

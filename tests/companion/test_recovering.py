@@ -29,13 +29,10 @@ MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
 def flight_with(
-    loss_s: float | None = 0.3,
-    learnt_s: float = 2.0,
-    law: str = "adaptive",
-    estimator: MotionEstimator | None = None,
+    loss_s: float | None = 0.3, learnt_s: float = 2.0, estimator: MotionEstimator | None = None
 ) -> FlightContext:
     """A flight that has just hit a wall in the north, at 2 m/s and measured whole unless told otherwise."""
-    mission = Mission.model_validate({**MISSION, "recovery": {"law": law}})
+    mission = Mission.model_validate(MISSION)
     config = mission.companion
     reflex = start_reflex(config, mission.recovery, config.settled, 0)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams), reflex)
