@@ -5,17 +5,7 @@ import pytest
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
 from companion.reflex.config import EstimateConfig
-from tests.companion.fake_vehicle import (
-    INTO_WALL,
-    LAND,
-    LANDING,
-    LOITER,
-    TAKEOFF,
-    FakeVehicle,
-    at_wall,
-    flight,
-    strike,
-)
+from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, strike
 from tests.flying import Flight
 
 ASIDE = {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0}}

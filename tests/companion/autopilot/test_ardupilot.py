@@ -30,15 +30,7 @@ from companion.messages import (
     Refused,
     SetParameter,
 )
-from tests.companion.autopilot.fake_copter import (
-    ARM,
-    AUX_FUNCTION,
-    COPTER_LAND,
-    GUIDED,
-    SET_MODE,
-    TAKE_OFF,
-    FakeCopter,
-)
+from tests.companion.autopilot.fake_copter import ARM, AUX_FUNCTION, COPTER_LAND, GUIDED, SET_MODE, TAKE_OFF, FakeCopter
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, FakeVehicle, flight
 
 COPTER_MODES = ardupilotmega.enums["COPTER_MODE"]
