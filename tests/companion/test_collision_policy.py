@@ -4,8 +4,20 @@ import pytest
 
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
+from companion.motion.motors import Damage
 from companion.reflex.config import EstimateConfig
-from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, strike
+from tests.companion.fake_vehicle import (
+    INTO_WALL,
+    LAND,
+    LANDING,
+    LOITER,
+    TAKEOFF,
+    FakeVehicle,
+    at_wall,
+    flight,
+    flying_in,
+    strike,
+)
 from tests.flying import Flight
 
 ASIDE = {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0}}
@@ -70,6 +82,13 @@ def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
     f.run_to("landing")
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.6)
     assert f.run_to_end().outcome == "completed"
+
+
+def test_a_motor_that_is_found_hurt_on_the_way_home_ends_it_there_where_the_mission_says_so():
+    f = flying_in("returning", on_damage="land")
+    assert f.state == "returning", "a whole vehicle flies on"
+    f.companion.core.flight.motors.damage = Damage(3, 0.16, 0.995, False)
+    f.run_to("landing", 0.1)
 
 
 @pytest.mark.parametrize(

@@ -97,6 +97,15 @@ def test_ctrl_c_at_a_wall_waits_until_the_vehicle_is_clear_and_once_more_does_no
     assert insisting.report.reason == "Ctrl-C, and once more"
 
 
+def test_a_vehicle_that_does_not_answer_the_hand_over_is_left_to_its_own_failsafe():
+    f = flying_in("mission")
+    f.vehicle.deaf = True
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(5.0)
+    assert [e for e in f.events if e.kind == "command" and "no answer" in e.text]
+    assert_silent_from_now(f)
+
+
 def test_a_vehicle_that_refuses_to_hold_is_asked_to_land():
     """As PX4 does without a global position: ACCEPTED by the receiver, then the commander's refusal."""
     f = flying_in("mission")
@@ -136,3 +145,12 @@ def test_ctrl_c_while_arming_on_the_ground_disarms():
     assert not f.vehicle.armed
     assert f.vehicle.mode == LOITER
     assert f.report.outcome == "aborted"
+
+
+@pytest.mark.parametrize("state", ["connect", "ready"])
+def test_ctrl_c_before_the_flight_asks_nothing_of_the_vehicle(state):
+    f = flight(confirmed=False)
+    f.run_to(state)
+    f.companion.stop("Ctrl-C")
+    assert f.run_to_end(0.1).outcome == "aborted"
+    assert not [m for _, m in f.vehicle.commands if m.command in (176, 400)]

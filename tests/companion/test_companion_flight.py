@@ -117,6 +117,16 @@ def test_a_fall_to_the_ground_is_told_as_a_crash():
     assert crash.data["down_m_s"] > 3.5 and "tilted by 0 degrees" in crash.text
 
 
+def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
+    f = at_wall(INTO_WALL, companion={"settled": {"speed_m_s": 1e-6, "timeout_s": 2.0}})
+    f.run_to("recovering")
+    f.run_to("holding", 3.0)
+    assert "not settled" in f.event("recovered").text
+    report = f.run_to_end()
+    assert report.outcome == "completed"
+    assert report.collisions[0].settled_after_s is None
+
+
 def test_headings_turn_the_shorter_way_at_a_limited_rate():
     items = [TAKEOFF, LANDING]
     turn = {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}

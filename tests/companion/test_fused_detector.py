@@ -210,19 +210,6 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert to_and_fro.fly() == []
 
 
-@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
-def test_landing_and_strike_are_told_apart_by_what_was_asked_for_not_by_their_force(scale):
-    touch = pulse((0.0, 5.0 * scale, -60.0 * scale), length_us=20_000)
-    down = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=0.3, descent_commanded=True)
-    hop = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=0.3)
-
-    landing = Flight(touch, velocity=(0.0, 0.0, 0.7), situation=lambda t: down).fly()
-    strike = Flight(touch, velocity=(0.0, 0.0, 0.7), situation=lambda t: hop).fly()
-
-    assert [(i.kind, i.is_collision) for i in landing] == [(ImpactKind.LANDING, False)]
-    assert [(i.kind, i.is_collision) for i in strike] == [(ImpactKind.FLOOR, True)]
-
-
 def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
     def grip(t):
         return (6.0 * min(1.0, (t - HIT_US) / 150_000), 0.0, 0.0) if HIT_US < t < HIT_US + 400_000 else (0.0, 0.0, 0.0)

@@ -1,5 +1,8 @@
 """Where a setpoint leads that nothing follows, and what the envelope makes of one that leads into something."""
 
+import re
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,6 +21,7 @@ from companion.reflex.config import HELD_S, MOST_HELD_S, NOTICED_S
 from companion.reflex.laws import MotionState
 from tests.companion.fake_vehicle import flying_in
 
+DOCS = Path(__file__).parents[2] / "bench" / "notes" / "px4.md"
 ORIGIN = (0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)
 FENCE, LIMITS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), SetpointLimits()
@@ -113,3 +117,9 @@ def test_what_a_longer_loss_costs_is_told_in_metres():
     ]
     lines = mission_lines(Mission.model_validate({"name": "fast", "items": items}))
     assert f"Unattended {text}" in lines
+
+
+def test_a_setpoint_is_safe_for_as_long_as_a_real_px4_was_seen_to_hold_one():
+    (row,) = [line for line in DOCS.read_text(encoding="utf-8").splitlines() if "last setpoint → hold" in line]
+    longest_s = max(float(number) for number in re.findall(r"\d+\.\d+", row))
+    assert HELD_S < longest_s <= HELD_S + NOTICED_S
