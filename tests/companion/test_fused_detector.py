@@ -4,6 +4,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
@@ -57,7 +58,7 @@ class Flight:
             window = [*window[-(WINDOW_US // TICK_US - 1) :], force]
             if self.jump is not None and t == self.jump[0]:
                 offset, resets = self.jump[1], resets + self.jump[2]
-            seen = tuple(v + o + self.rng.gauss(0.0, 0.01) for v, o in zip(self.velocity, offset, strict=True))
+            seen: Any = tuple(v + o + self.rng.gauss(0.0, 0.01) for v, o in zip(self.velocity, offset, strict=True))
             if t % self.imu_every_us == 0:
                 mean = [
                     sum(f[axis] for f in window) / len(window) + self.rng.gauss(0.0, self.noise) for axis in (0, 1, 2)
@@ -132,8 +133,8 @@ def test_a_hit_between_the_samples_is_found_from_the_velocity_it_leaves(push, im
 
 def stepped(change_m_s, at_us=3_002_000, turn_frd_rad_s=(0.0, 0.0, 0.0), **scene):
     """Hits told at 50 Hz of a velocity that changes at once, between the samples, while the vehicle begins to turn."""
-    rates = {"rates": lambda t: turn_frd_rad_s if t > at_us else (0.0, 0.0, 0.0)}
-    flight = Flight(imu_every_us=20_000, jump=(at_us, change_m_s, 0), **rates, **scene)
+    flight = Flight(imu_every_us=20_000, jump=(at_us, change_m_s, 0), **scene)
+    flight.rates = lambda t: turn_frd_rad_s if t > at_us else (0.0, 0.0, 0.0)
     return [impact.evidence for impact in flight.fly(until_us=at_us + 35_000 * scene.get("slower", 1) ** 2)]
 
 
