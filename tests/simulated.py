@@ -51,6 +51,13 @@ def simulated(mission: str | list[Any], *sets: str, **keys: Any) -> SimulatedFli
     return SimulatedFlight(companion, SimulatedVehicle(world.airframe, world.scene, world.seed))
 
 
+def flown(*items: Any, height_m: float = 1.5, **keys: Any) -> SimulatedFlight:
+    """Up, through the items, and down; over."""
+    flight = simulated([{"takeoff": {"height_m": height_m}}, *items, {"land": {}}], **keys)
+    flight.run_to_end(300.0)
+    return flight
+
+
 def wall(north_m: float, **more: Any) -> dict[str, Any]:
     """Across the way north, as wide and high as anything flown here."""
     return {"point_ned_m": [north_m, 0, -2], "normal_ned": [-1, 0, 0], "width_m": 8, "height_m": 8, **more}

@@ -249,16 +249,15 @@ class FakeVehicle:
             self.landed = 2
 
 
-def flying_in(state: str, no_current_mode: bool = False, **changes: Any) -> Flight:
+def flying_in(state: str, **changes: Any) -> Flight:
     """A flight in the middle of the given state; of a mission that meets a wall 3 m north, and goes home."""
-    return _flying_in(state, no_current_mode, **changes).copy()
+    return _flying_in(state, **changes).copy()
 
 
 @cache
-def _flying_in(state: str, no_current_mode: bool, **changes: Any) -> Flight:
+def _flying_in(state: str, **changes: Any) -> Flight:
     vehicle = FakeVehicle(wall_north_m=3.0, battery_percent=80)
     f = flight(vehicle, items=[TAKEOFF, INTO_WALL, {"return": {}}], **changes)
-    f.vehicle.no_current_mode = no_current_mode
     if state == "takeoff":
         f.run_until(lambda: f.vehicle.landed == 2)
     elif state == "landing":

@@ -29,14 +29,12 @@ class Attacker:
         self._random = random.Random(seed)
         self._tx = mav.MAVLink(None, vehicle.system_id, 1)
 
-    def packet(self, message_id: int | None = None, field: str | None = None, value: object = None) -> bytes:
-        """One message, true but for some fields; which one, which field and which value by chance unless given."""
-        chosen = self._random.choice(HEARD) if message_id is None else message_id
-        message = self._true(chosen)
+    def packet(self, message_id: int) -> bytes:
+        """One message, true but for some fields; which of them, and their values, by chance."""
+        message = self._true(message_id)
         names = list(message.fieldnames)
-        fields = [field] if field else self._random.sample(names, self._random.randint(1, min(3, len(names))))
-        for name in fields:
-            self._spoil(message, name, value)
+        for name in self._random.sample(names, self._random.randint(1, min(3, len(names)))):
+            self._spoil(message, name)
         return bytes(message.pack(self._tx))
 
     def _true(self, message_id: int) -> mav.MAVLink_message:
@@ -50,19 +48,17 @@ class Attacker:
         now["system_status"] = 4 if v.armed else 3
         return decoded(made(kind.msgname, {name: now[name] for name in kind.fieldnames if name in now}))
 
-    def _spoil(self, message: mav.MAVLink_message, name: str, value: object) -> None:
+    def _spoil(self, message: mav.MAVLink_message, name: str) -> None:
         kind = message.fieldtypes[message.fieldnames.index(name)]
         if kind == "char":
             return
         now = getattr(message, name)
         if isinstance(now, list):
-            now[self._random.randrange(len(now))] = self._value(kind, value, 0)
+            now[self._random.randrange(len(now))] = self._value(kind, 0)
         else:
-            setattr(message, name, self._value(kind, value, now))
+            setattr(message, name, self._value(kind, now))
 
-    def _value(self, kind: str, value: object, now: float) -> object:
-        if value is not None:
-            return value
+    def _value(self, kind: str, now: float) -> object:
         r = self._random
         if kind in ("float", "double"):
             return r.choice((r.choice(FLOATS), r.choice(MILD), now + r.choice(MILD), r.uniform(-20.0, 20.0)))

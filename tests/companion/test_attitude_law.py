@@ -59,13 +59,6 @@ def test_a_vehicle_that_leaves_a_wall_is_at_rest_within_a_second_and_clear(speed
     assert min(WALL.off_m(place) for place, _ in path) > -0.02, "never back into the wall"
 
 
-@pytest.mark.parametrize("share", [0.9, 1.1])
-def test_a_thrust_gain_that_is_wrong_by_a_tenth_costs_a_quarter_of_a_metre_of_height_at_most(share):
-    path = flown((-2.0, 0.0, 0.0), [WALL], believed_full_m_s2=share * FULL_M_S2)
-    assert max(abs(place[2] - HERE[2]) for place, _ in path) < 0.28
-    assert math.hypot(*path[-1][1]) < 0.1
-
-
 def test_near_a_surface_only_what_is_certain_of_the_speed_away_from_it_is_braked():
     off = Belief(HERE, (-2.0, 0.0, 0.0))
     certain, doubtful, unknown = (wanted(replace(off, spread_m_s=s), [WALL], HERE[2])[0] for s in (0.0, 0.6, 5.0))

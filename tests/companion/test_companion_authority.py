@@ -46,16 +46,6 @@ def test_whoever_takes_the_vehicle_ends_the_flight_and_is_named(state, takes, se
     assert_silent_from_now(f)
 
 
-def test_without_current_mode_the_heartbeat_tells_the_pilot():
-    f = flying_in("mission", no_current_mode=True)
-    f.vehicle.pilot_takes(POSCTL)
-    f.run_for(1.1)
-    since = f.now_us
-    f.run_to("aborted", 1.1)
-    assert f.setpoints_since(since) == [], "none from the first report on"
-    assert "pilot" in f.report.reason
-
-
 def test_a_warning_status_while_still_in_offboard_is_not_a_loss_of_control():
     f = flying_in("mission")
     f.vehicle.failsafe = True

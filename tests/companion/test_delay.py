@@ -10,9 +10,9 @@ from companion.motion.delay import Delay
 NOISE_M_S = 0.05
 
 
-def learnt(late_s, changes, seed=1):
+def learnt(late_s, changes):
     """After steps of velocity less sum of a vehicle whose acceleration changes so."""
-    rng, delay = random.Random(seed), Delay()
+    rng, delay = random.Random(1), Delay()
     for change in changes:
         step = tuple(-late_s * part + rng.gauss(0.0, NOISE_M_S) for part in change)
         delay.learn(step, change)

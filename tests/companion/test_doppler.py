@@ -87,14 +87,6 @@ def test_a_receiver_that_gets_worse_is_known_for_worse():
     assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.8, rel=0.4)
 
 
-def test_nothing_is_learnt_while_the_vehicles_own_velocity_is_not_valid():
-    air = Air(0.11)
-    air.reported_off_m_s = 3.0
-    for _ in range(1_000):
-        air.step(is_free=False)
-    assert air.doppler.variance_m2_s2 == Doppler().variance_m2_s2
-
-
 def clipped(off_m_s=6.0, rebound_m_s=-3.0):
     """A vehicle just after a hit of which its estimate knows nothing, and its belief."""
     air = Air(0.112, noise_m_s=0.02, began_us=HIT_US)
@@ -234,12 +226,6 @@ def test_one_velocity_beyond_belief_does_not_count_and_two_do():
         assert shown_m_s == pytest.approx(expected_m_s, abs=0.1) if expected_m_s < 0.0 else shown_m_s > expected_m_s / 4
 
 
-def test_a_velocity_measured_before_the_hit_does_not_count():
-    air, found = clipped()
-    go_on(air, found, 0.12)  # the newest one received is from before it
-    assert not found.is_measured_apart
-
-
 def test_a_receiver_that_falls_silent_leaves_the_belief_to_the_reports():
     air, found = clipped()
     go_on(air, found, 1.0)
@@ -257,10 +243,3 @@ def test_gps_raw_int_is_read_as_a_velocity():
     for unknown in ({"fix_type": 2}, {"vel": 0xFFFF}, {"cog": 0xFFFF}):
         assert gps(**unknown) is None
     assert isinstance(gps(vel=10_100), Refused)
-
-
-def test_imu_samples_are_not_needed_to_read_a_velocity():
-    """Before the first sample there is nothing that it could be carried on by."""
-    doppler = Doppler()
-    doppler.take(GpsVelocity((1.0, 0.0)), Strapdown(), is_free=True)
-    assert doppler.taken_boot_us < 0

@@ -14,13 +14,6 @@ COORDINATE = st.floats(-12, 12)
 
 
 @pytest.mark.parametrize(
-    ("place", "inside"), [((5, 0), True), ((0, 5), True), ((5, 5), False), ((7, 0), False), ((2.1, 1.1), False)]
-)
-def test_a_room_that_is_no_circle(place, inside):
-    assert ROOM.contains(*place) is inside
-
-
-@pytest.mark.parametrize(
     ("polygon", "words"),
     [
         ([[1, 1], [2, 1], [2, 2]], "does not contain the arming position"),

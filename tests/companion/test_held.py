@@ -11,13 +11,7 @@ from companion.autopilot.px4.firmware import PX4
 from companion.core import Limiter
 from companion.fence import Fence
 from companion.flight.context import Target
-from companion.flight.envelope import (
-    KnownSurface,
-    Surroundings,
-    bounded,
-    touched,
-    unattended_text,
-)
+from companion.flight.envelope import KnownSurface, Surroundings, bounded, touched, unattended_text
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.plan import mission_lines
 from companion.mission.model import Mission

@@ -61,28 +61,21 @@ def test_what_is_told_after_the_contact_or_in_its_millisecond_changes_nothing(la
     assert begun(estimator).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0))
 
 
-def imu(t_us, contact, yaw_rate=0.0):
-    return ImuSample(t_us, (contact, 0.0, -9.81), (0.0, 0.0, yaw_rate))
-
-
-def pushed(pushes, every_us=4_000, yaw_rate=0.0):
+def pushed(pushes, every_us=4_000):
     contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
-    for number, (force, loud) in enumerate(pushes, start=1):
-        turned_rad = 0.5e-6 * (number - 1) * every_us * yaw_rate
-        attitude = (math.cos(turned_rad), 0.0, 0.0, math.sin(turned_rad))
-        if loud:
-            contact.add(imu(1_000_000 + number * every_us, force, yaw_rate), every_us, attitude)
+    for number, force in enumerate(pushes, start=1):
+        contact.add(ImuSample(1_000_000 + number * every_us, (force, 0.0, -9.81), STILL), every_us, LEVEL)
     return contact
 
 
 @pytest.mark.parametrize(
     ("pushes", "every_us"),
     [
-        ([(-60.0, True)] * 5, 4_000),
-        ([(-20.0, True)] * 2, 4_000),
-        ([(-20.0, True)] * 5, 20_000),
-        ([(-3.0, True), (-30.0, True), (-4.0, True), (-3.0, True)], 4_000),
-        ([(-19.0, True), (23.6, True), (-13.1, True), (-4.7, True)], 4_000),
+        ([-60.0] * 5, 4_000),
+        ([-20.0] * 2, 4_000),
+        ([-20.0] * 5, 20_000),
+        ([-3.0, -30.0, -4.0, -3.0], 4_000),
+        ([-19.0, 23.6, -13.1, -4.7], 4_000),
     ],
     ids=["may have clipped", "too short to tell", "gaps", "over in one window", "guards that clatter"],
 )

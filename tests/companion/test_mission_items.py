@@ -82,16 +82,6 @@ def test_turning_on_the_spot():
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.01)
 
 
-def test_what_is_repeated_is_flown_as_often_as_asked_and_told_by_lap():
-    lap = [{"go_to": {"position_ned_m": [1, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 0, -1.5]}}]
-    f = flown({"repeat": {"times": 2, "items": lap}})
-    labels = [event.text.split(":")[0] for event in f.events if event.kind == "item"]
-    assert labels == [
-        *("item 2.1 (1 of 2) of 3", "item 2.2 (1 of 2) of 3", "item 2.1 (2 of 2) of 3", "item 2.2 (2 of 2) of 3"),
-        "item 3 of 3",
-    ]
-
-
 def test_waiting_for_a_file():
     f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LANDING])
     f.run_to("mission")

@@ -21,9 +21,9 @@ PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)
 WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 
-def reckoned(velocity=(2.0, 0.0, 0.0), normal=SOUTH, restitution=0.2, is_second=False, hit_us=HIT_US, fits=True):
-    contact = Contact(hit_us, AT, velocity, normal, 0.2)
-    return MotionEstimator(contact, hit_us, contact.rebound(restitution), EstimateConfig(), is_second, fits)
+def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True):
+    contact = Contact(HIT_US, AT, velocity, SOUTH, 0.2)
+    return MotionEstimator(contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits)
 
 
 def said(north_m_s, since_us=60_000, position=AT):
@@ -43,24 +43,28 @@ def missing(since_s, late_s, rad_s, damping):
     return velocity, place
 
 
-def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1, fits=True):
-    """Since the hit, s; true velocity; told velocity; reckoning: after each that a vehicle tells, noise included."""
-    draw = random.Random(seed)
-    after_m_s = -restitution * speed_m_s
-    hidden_m_s = hides * (speed_m_s - after_m_s)
-    found = reckoned((speed_m_s, 0.0, 0.0), restitution=0.45, fits=fits)
-    strapdown, noise = Strapdown(), [0.0, 0.0]
+def reports(found, strapdown, until_s, way=PX4):
+    """When the vehicle reports: since the hit, s; and of what was hidden, what is missing in velocity and place."""
     for tick in range(1, round(until_s / 0.004)):
         strapdown.time_boot_us = HIT_US + 4_000 * tick
         found.imu(strapdown)
         if tick % 5 == 0:
-            since_s = 0.004 * tick
-            noise = [0.935 * each + 0.354 * draw.gauss(0.0, 0.03) for each in noise]
-            lacks_m_s, lacks_m = missing(since_s, *way)
-            velocity = (after_m_s + hidden_m_s * lacks_m_s + noise[0], noise[1], 0.0)
-            place = (AT[0] + after_m_s * since_s + hidden_m_s * lacks_m + draw.gauss(0.0, 0.01), 0.0, AT[2])
-            found.update(LocalPosition(strapdown.time_boot_us, place, velocity))
-            yield since_s, after_m_s, velocity[0], found
+            yield 0.004 * tick, *missing(0.004 * tick, *way)
+
+
+def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, fits=True):
+    """Since the hit, s; true velocity; told velocity; reckoning: after each that a vehicle tells, noise included."""
+    draw = random.Random(1)
+    after_m_s = -restitution * speed_m_s
+    hidden_m_s = hides * (speed_m_s - after_m_s)
+    found = reckoned((speed_m_s, 0.0, 0.0), restitution=0.45, fits=fits)
+    strapdown, noise = Strapdown(), [0.0, 0.0]
+    for since_s, lacks_m_s, lacks_m in reports(found, strapdown, until_s, way):
+        noise = [0.935 * each + 0.354 * draw.gauss(0.0, 0.03) for each in noise]
+        velocity = (after_m_s + hidden_m_s * lacks_m_s + noise[0], noise[1], 0.0)
+        place = (AT[0] + after_m_s * since_s + hidden_m_s * lacks_m + draw.gauss(0.0, 0.01), 0.0, AT[2])
+        found.update(LocalPosition(strapdown.time_boot_us, place, velocity))
+        yield since_s, after_m_s, velocity[0], found
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -120,15 +124,10 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
 def test_the_height_is_the_reported_one_while_a_hit_is_corrected_and_after_it():
     # Given a vehicle whose velocity is wrong downwards, too, and whose heights stand
     found, strapdown = reckoned((3.0, 0.0, 1.0)), Strapdown()
-    for tick in range(1, 750):
-        since_s = 0.004 * tick
-        strapdown.time_boot_us = HIT_US + 4_000 * tick
-        found.imu(strapdown)
-        if tick % 5 == 0:
-            lacks_m_s, lacks_m = missing(since_s, *PX4)
-            place = (AT[0] - 0.6 * since_s + 3.6 * lacks_m, 0.0, AT[2])
-            found.update(LocalPosition(strapdown.time_boot_us, place, (-0.6 + 3.6 * lacks_m_s, 0.0, 1.5 * lacks_m_s)))
-            assert found.motion.position_ned_m[2] == pytest.approx(AT[2], abs=0.02)
+    for since_s, lacks_m_s, lacks_m in reports(found, strapdown, 3.0):
+        place = (AT[0] - 0.6 * since_s + 3.6 * lacks_m, 0.0, AT[2])
+        found.update(LocalPosition(strapdown.time_boot_us, place, (-0.6 + 3.6 * lacks_m_s, 0.0, 1.5 * lacks_m_s)))
+        assert found.motion.position_ned_m[2] == pytest.approx(AT[2], abs=0.02)
     assert found.has_converged and found.position_error_m[0] != 0.0 and found.position_error_m[2] == 0.0
 
 
@@ -228,23 +227,18 @@ def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(is_ful
 def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(ahead_us, hides):
     # Given a hit, and now and then in the second after it a place that is stamped ahead of its time, or behind
     found, strapdown = reckoned(), Strapdown()
-    for tick in range(1, 600):
-        since_us = 4_000 * tick
-        strapdown.time_boot_us = HIT_US + since_us
-        found.imu(strapdown)
-        if tick % 5 == 0:
-            lacks_m_s, lacks_m = missing(1e-6 * since_us, *PX4)
-            place = (3.0 - 0.4e-6 * since_us + 2.4 * hides * lacks_m, 0.0, -2.0)
-            at_us = since_us + (ahead_us if tick % 25 == 0 and tick < 250 else 0)
-            found.update(said(-0.4 + 2.4 * hides * lacks_m_s, at_us, place))
+    for number, (since_s, lacks_m_s, lacks_m) in enumerate(reports(found, strapdown, 2.4), start=1):
+        place = (3.0 - 0.4 * since_s + 2.4 * hides * lacks_m, 0.0, -2.0)
+        at_us = round(1e6 * since_s) + (ahead_us if number % 5 == 0 and number < 50 else 0)
+        found.update(said(-0.4 + 2.4 * hides * lacks_m_s, at_us, place))
         # Then the motion stays one that a vehicle can have
         assert math.isfinite(found.spread_m_s)
         assert -2.5 < found.motion.velocity_ned_m_s[0] < 2.5
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(-0.4, abs=0.15)
 
 
-def recovering(**hit):
-    flight = flight_with(estimator=reckoned(**hit))
+def recovering():
+    flight = flight_with(estimator=reckoned())
     return flight, flight.collisions[0], recover_in(flight)
 
 

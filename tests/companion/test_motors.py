@@ -8,7 +8,7 @@ from companion.flight.plan import mission_lines
 from companion.motion.motors import Damage, MotorWatch
 from tests.companion.fake_vehicle import FakeVehicle, flight, mission
 from tests.flying import Flight
-from tests.simulated import simulated, wall
+from tests.simulated import flown, wall
 
 SAMPLE_US = 100_000
 HOVER, NOISE = 500.0, 0.01
@@ -20,20 +20,18 @@ HURT = (0.0, 0.0, 0.16, 0.0)
 class Flown:
     """A vehicle's outputs ten times a second."""
 
-    def __init__(self, zero=1000.0, most=2000.0, seed=1):
+    def __init__(self, most=2000.0):
         self.monitor, self.now_us = MotorWatch(), 0
-        self._zero, self._most, self._random = zero, most, random.Random(seed)
+        self._most, self._random = most, random.Random(1)
 
-    def fly(self, seconds, was_hit, change=(0.0,) * 4, hover=HOVER, manoeuvre=0.0):
+    def fly(self, seconds, was_hit, change=(0.0,) * 4, hover=HOVER):
         told = []
-        for number in range(round(seconds * 1e6 / SAMPLE_US)):
+        for _ in range(round(seconds * 1e6 / SAMPLE_US)):
             self.now_us += SAMPLE_US
-            turn = manoeuvre * (1 if number // 10 % 2 else -1)
             shares = [
-                1.0 + trim + more + sign * turn + self._random.gauss(0.0, NOISE)
-                for trim, more, sign in zip(TRIM, change, (1, -1, 1, -1), strict=True)
+                1.0 + trim + more + self._random.gauss(0.0, NOISE) for trim, more in zip(TRIM, change, strict=True)
             ]
-            outputs = [min(self._zero + hover * share, self._most) for share in shares]
+            outputs = [min(1000.0 + hover * share, self._most) for share in shares]
             damage = self.monitor.take(tuple(outputs), was_hit, self.now_us)
             told += [] if damage is None else [damage]
         return told
@@ -96,20 +94,11 @@ def test_a_mission_says_what_follows(policy, state):
     assert len(lines) == (policy != "tell")
 
 
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"hold": {"duration_s": 3}},
-    {"go_to": {"position_ned_m": [7, 0, -1.5], "speed_m_s": 2.0}},
-    {"hold": {"duration_s": 6}},
-    {"land": {}},
-]
-
-
 def flown_into_a_wall(*faults, airframe, **keys) -> Flight:
     sim = {"walls": [wall(4.0)], "faults": faults, "airframe": airframe}
-    flight = simulated(INTO_WALL, companion={"streams": {"window_s": 0.5}}, sim=sim, **keys)
-    flight.run_to_end()
-    return flight
+    north = {"go_to": {"position_ned_m": [7, 0, -1.5], "speed_m_s": 2.0}}
+    before, after = ({"hold": {"duration_s": duration_s}} for duration_s in (3, 6))
+    return flown(before, north, after, companion={"streams": {"window_s": 0.5}}, sim=sim, **keys)
 
 
 @pytest.mark.slow

@@ -4,13 +4,7 @@ import math
 
 import pytest
 
-from companion.memory.patch import (
-    REACHES_M,
-    Patch,
-    is_same,
-    remembered,
-    touch_of,
-)
+from companion.memory.patch import REACHES_M, Patch, is_same, remembered, touch_of
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
 from companion.reflex.surface import Normal
 

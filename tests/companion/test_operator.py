@@ -7,6 +7,7 @@ import pytest
 from bench.fly.packets import decoded
 from bench.fly.virtual_time import EPOCH_US
 from companion.flight.operator import Texts, status_text
+from companion.flight.states import State
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
 from companion.report import Event
@@ -52,6 +53,8 @@ def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_t
     gaps = [b - a for (a, _), (b, _) in itertools.pairwise(phases)]
     assert min(gaps) >= 500_000 and max(gaps) <= 560_000
     assert {value for _, value in phases} >= {0.0, 2.0}
+    states = [list(State)[round(m.value)] for _, m in f.messages("NAMED_VALUE_FLOAT") if m.name == "rb_state"]
+    assert State.RECOVERING in states
     hits = [m.value for _, m in f.messages("NAMED_VALUE_FLOAT") if m.name == "rb_hits"]
     assert hits == sorted(hits) and hits[-1] == 1.0
     v_c = [m for _, m in f.messages("DEBUG_VECT") if m.name == "rb_v_c"]

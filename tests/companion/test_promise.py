@@ -12,12 +12,12 @@ FIXES = [VelocityFix(time_us, ZERO, ZERO) for time_us in range(0, 1_000_001, 20_
 CONFIG = FusedConfig()
 
 
-def promise(side_m_s2=0.2, step_m_s=0.0, steps=100, counted=True, imu_hz=250):
+def promise(side_m_s2, imu_hz=250):
     state = FusedState()
     state.floor.side_m_s2 = EXCESS * side_m_s2
     state.threshold_m_s2 = max(CONFIG.side_threshold_m_s2, CONFIG.noise_factor * EXCESS * side_m_s2)
-    state.jump.known, state.jump.variance_m2_s2 = steps, step_m_s**2
-    return promise_of(state, CONFIG, FIXES, imu_hz, counted)
+    state.jump.known = 100
+    return promise_of(state, CONFIG, FIXES, imu_hz, True)
 
 
 def test_noise_at_the_bound_exceeds_it_once_in_half_a_thousand_hours():

@@ -115,17 +115,3 @@ def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
     low = Contact(0, (0.0, 0.0, -0.6), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
     goal = goal_of("adaptive", low)
     assert in_room((), low.position_ned_m, goal) == pytest.approx((0.0, 0.0, -0.4))
-
-
-NORTH_WALL = Surface((3.0, 2.0, -1.5), SOUTH, 0.5)
-
-
-def test_out_of_a_corner_the_goal_is_clear_of_both_walls():
-    """Leaving the north wall when the east wall is hit: eq. 3 alone leads back into the first."""
-    east_wall = Contact(0, (2.7, 2.8, -1.5), (-0.4, 1.4, 0.0), (0.0, -1.0, 0.0))
-    alone = goal_of("paper", east_wall)
-    assert alone[0] > 2.7
-    goal = in_room((NORTH_WALL,), east_wall.position_ned_m, alone)
-    assert goal == pytest.approx((2.5, alone[1], -1.5))
-    further = (1.0, 2.0, -1.5)
-    assert in_room((NORTH_WALL,), east_wall.position_ned_m, further) == further

@@ -115,15 +115,6 @@ def test_the_stream_is_held_back_and_it_is_told():
     assert f.vehicle.setpoints[-1][1].x == pytest.approx(6.0), "it arrives all the same"
 
 
-def test_an_estimate_that_jumps_does_not_send_the_vehicle_flying():
-    f = hovering(abort_when={"outside_fence_by_m": None}, fence={"radius_m": 30})
-    f.vehicle.position[0] += 12.0
-    sent = len(f.vehicle.setpoints)
-    f.run_until(lambda: len(f.vehicle.setpoints) > sent + 1)
-    last = f.vehicle.setpoints[-1][1]
-    assert f.vehicle.position[0] - last.x == pytest.approx(5.0, abs=0.1), "limits.max_step_m"
-
-
 CONDITIONS = [
     ({"outside_fence_by_m": 0.5}, lambda v: v.position.__setitem__(0, 16.0), "1.00 m outside the fence"),
     ({"setpoint_missed_by_m": 2.0}, lambda v: v.position.__setitem__(1, -3.0), "from its setpoint"),

@@ -123,17 +123,6 @@ def test_a_forged_packet_from_the_future_locks_nobody_out(signing):
     assert signing.stamp == NOW + 1
 
 
-def test_a_vehicle_whose_stamp_is_old_learns_it_from_what_it_is_sent(signing):
-    # Given a vehicle that was switched off for an hour, and keeps its stamp as PX4 does
-    end = vehicle(stamp=NOW - 60 * MINUTE)
-    assert not signing.opened(packed(end=end), NOW_US)
-    # When it hears the companion, and goes on after that stamp
-    sent = signing.signed(plain(component=191), NOW_US)
-    end.signing.timestamp = int.from_bytes(sent[-12:-6], "little") + 1
-    # Then it is heard
-    assert signing.opened(packed(end=end), NOW_US) == plain()
-
-
 def test_what_is_sent_is_later_than_all_sent_and_heard_whatever_the_clock_says(signing):
     stamps = []
     for now_us in (NOW_US, NOW_US, NOW_US + 500, 0, NOW_US + 100):

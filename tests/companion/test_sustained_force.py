@@ -10,7 +10,7 @@ import pytest
 from companion.messages import LocalPosition
 from companion.reflex.config import HELD_M_S2
 from companion.reflex.sustained_force import SustainedForceMonitor
-from tests.simulated import SimulatedFlight, simulated, wall
+from tests.simulated import SimulatedFlight, flown, wall
 
 EVERY_S = 0.02
 
@@ -99,23 +99,17 @@ def test_a_lean_that_something_else_explains_is_no_wall(seconds, velocity_m_s, t
 # --- in flight
 
 
-def flown(*items, height_m=1.5, hz=200, **sim) -> SimulatedFlight:
-    """Up, through the items, and down; over."""
-    flight = simulated(
-        [{"takeoff": {"height_m": height_m}}, *items, {"land": {}}],
-        companion={"streams": {"highres_imu_hz": hz}},
-        on_collision={"then": "hold", "hold_s": 1},
-        fence={"radius_m": 10, "max_height_m": 6},
-        sim=sim,
-    )
-    flight.run_to_end(300.0)
+def in_room(*items, height_m=1.5, hz=200, **sim) -> SimulatedFlight:
+    fence, then = {"radius_m": 10, "max_height_m": 6}, {"then": "hold", "hold_s": 1}
+    streams = {"streams": {"highres_imu_hz": hz}}
+    flight = flown(*items, height_m=height_m, companion=streams, on_collision=then, fence=fence, sim=sim)
     assert flight.report.outcome == "completed"
     return flight
 
 
 def test_a_wall_met_at_a_crawl_is_backed_away_from():
     # Given a goal 1 m behind a wall, when the vehicle comes with 0.06 m/s, which no detector takes for a hit
-    flight = flown({"go_to": {"position_ned_m": [1.5, 0, -1.5], "speed_m_s": 0.06}}, walls=[wall(0.5)])
+    flight = in_room({"go_to": {"position_ned_m": [1.5, 0, -1.5], "speed_m_s": 0.06}}, walls=[wall(0.5)])
     # Then it leans on it for no longer than it takes to be sure, backs away, and the policy follows
     (collision,) = flight.report.collisions
     assert flight.kinds().count("in_the_way") == 1 and flight.tilt_deg.max() < 45.0
@@ -129,7 +123,7 @@ def test_a_beam_met_at_a_crawl_is_moved_away_from():
     # Given a goal a metre above a beam, when the vehicle comes with 0.1 m/s
     beam = {"name": "beam", "point_ned_m": [0.15, 0, -2], "normal_ned": [0, 0, 1], "width_m": 0.2, "height_m": 6}
     up = {"go_to": {"position_ned_m": [0, 0, -3], "speed_m_s": 0.1}}
-    flight = flown(up, height_m=1.3, hz=50, walls=[beam])
+    flight = in_room(up, height_m=1.3, hz=50, walls=[beam])
     # Then it presses for two seconds and not until the item's time is over, and comes down again
     assert flight.kinds().count("in_the_way") == 1
     hit = flight.report.collisions[-1]
@@ -142,7 +136,7 @@ def test_a_beam_met_at_a_crawl_is_moved_away_from():
 def test_a_door_that_comes_after_the_hovering_vehicle_is_moved_away_from(speed_m_s):
     # Given a hovering vehicle, and a door that pushes it, or strikes it and goes on for two metres more
     comes = {"velocity_ned_m_s": [-speed_m_s, 0, 0], "from_s": 9.5, "until_s": 20.5 if speed_m_s < 0.1 else 12.5}
-    flight = flown({"hold": {"duration_s": 14}}, walls=[wall(0.6 if speed_m_s < 0.1 else 1.0, motion=comes)])
+    flight = in_room({"hold": {"duration_s": 14}}, walls=[wall(0.6 if speed_m_s < 0.1 else 1.0, motion=comes)])
     # Then the vehicle gives way, never leans on it, and takes the end of the long push for no hit from the other side
     assert flight.report.collisions and flight.tilt_deg.max() < 45.0
     assert all(collision.normal_ned[0] < -0.5 for collision in flight.report.collisions)
@@ -178,5 +172,5 @@ GUSTS = [
 def test_what_keeps_a_vehicle_off_its_setpoint_is_not_always_in_the_way(fault):
     slow = {"go_to": {"position_ned_m": [1, 0, -2], "speed_m_s": 0.2}}
     fast = {"go_to": {"position_ned_m": [1, 0, -4], "speed_m_s": 1.0}}
-    flight = flown({"hold": {"duration_s": 3}}, slow, fast, height_m=1.3, wind_ned_m_s=[2, 1, 0], faults=fault)
+    flight = in_room({"hold": {"duration_s": 3}}, slow, fast, height_m=1.3, wind_ned_m_s=[2, 1, 0], faults=fault)
     assert flight.told("in_the_way") == [] and flight.report.collisions == ()

@@ -6,7 +6,7 @@ import time
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.errors import AddressError, ConnectionSetupError
+from companion.errors import AddressError
 from companion.guard.between import Between
 from companion.shell.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
 from companion.shell.connection import bound_socket, udp_out
@@ -174,17 +174,6 @@ def test_an_address_that_is_none_for_clients_is_one_sentence(url, says):
     vehicle = udp_out(LOOPBACK, 1)
     with pytest.raises(AddressError, match=says.replace("?", "[?]")):
         SharedConnection(vehicle, [url], Between(1.0, signs=False))
-
-
-@pytest.mark.parametrize(("scheme", "kind"), [("udpin", socket.SOCK_DGRAM), ("tcpin", socket.SOCK_STREAM)])
-def test_a_port_that_another_has_is_one_sentence(scheme, kind):
-    with socket.socket(socket.AF_INET, kind) as other:
-        other.bind((LOOPBACK, 0))
-        if kind is socket.SOCK_STREAM:
-            other.listen()
-        port = other.getsockname()[1]
-        with pytest.raises(ConnectionSetupError, match=f"port {port} is already in use"):
-            SharedConnection(udp_out(LOOPBACK, 1), [f"{scheme}://{LOOPBACK}:{port}"], Between(1.0, signs=False))
 
 
 def test_what_a_serial_line_carries_follows_from_its_baud_rate():

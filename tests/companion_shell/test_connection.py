@@ -99,38 +99,6 @@ def test_udpout_sends_first_and_hears_only_the_address_it_speaks_to(peer, scheme
     connection.close()
 
 
-def test_tcpout_and_tcpin_meet_and_fall_silent_when_the_other_end_goes():
-    # Given a server and a client
-    server = open_connection(f"tcpin://{LOCAL}:0")
-    client = open_connection(f"tcpout://{LOCAL}:{server.local_port}")
-    server.receive(2.0)  # takes the client
-    # When both send
-    client.send(b"from client")
-    server.send(b"from server")
-    # Then both receive
-    assert server.receive(2.0) == b"from client"
-    assert client.receive(2.0) == b"from server"
-    # And when the server goes, the client hears nothing and may still send
-    server.close()
-    assert client.receive(0.1) == b""
-    assert client.receive(0.01) == b""
-    assert "lost" in client.news()
-    client.send(b"gone?")
-    client.close()
-
-
-def test_serial_port_carries_bytes_both_ways():
-    controller, device = pty.openpty()
-    connection = open_connection(f"serial://{os.ttyname(device)}:115200")
-    os.write(controller, b"\xfd\x00\x11\x13")  # 0x11 and 0x13 would be eaten by software flow control
-    assert connection.receive(2.0) == b"\xfd\x00\x11\x13"
-    connection.send(b"\x0a\xfd")
-    assert os.read(controller, 100) == b"\x0a\xfd"
-    connection.close()
-    os.close(controller)
-    os.close(device)
-
-
 def test_the_beginning_of_a_packet_is_kept_until_the_rest_has_come():
     # Given a line whose driver hands on what it has
     far, near = pty.openpty()
@@ -188,9 +156,3 @@ def test_a_bad_address_is_one_sentence_that_names_the_fault(url, named):
     text = str(caught.value)
     assert named in text
     assert "\n" not in text and text.endswith((".", "?"))
-
-
-def test_a_port_in_use_is_said_so(peer):
-    port = peer.getsockname()[1]
-    with pytest.raises(ConnectionSetupError, match=f"{port} is already in use"):
-        open_connection(f"udpin://{LOCAL}:{port}")

@@ -86,10 +86,8 @@ class Watched(Told, Commanded):
 class BetweenFlight(Watched, commanded.BetweenFlight):
     """The guard is the link."""
 
-    def __init__(
-        self, config: GuardConfig | None = None, parameters: dict[str, float] | None = None, **scene: Any
-    ) -> None:
-        super().__init__(config, parameters, **scene)
+    def __init__(self, *arguments: Any, **scene: Any) -> None:
+        super().__init__(*arguments, **scene)
         self.texts_heard: list[tuple[float, str]] = []
         self.on_heard: Callable[[Any], None] = lambda message: None
 

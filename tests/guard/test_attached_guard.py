@@ -17,7 +17,7 @@ from companion.guard.holding import is_foreign
 from companion.guard.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.readers import GUARD_READERS, sample_from
-from companion.messages import LocalPosition, PositionTarget, Refused
+from companion.messages import PositionTarget, Refused
 from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
 from sim_vehicle.airframe import load_built_in
@@ -124,14 +124,6 @@ def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
     assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]
     # Nor does it have places of the guard's while the guard flies it by attitude
     assert is_foreign(guard, there, 1_600_000)
-
-
-def test_heights_count_from_the_ground_that_was_met_until_the_vehicle_has_climbed_again():
-    guard = AttachedFlight().guard.core.flight
-    guard.origin_ned_m, guard.has_climbed = (3.0, 4.0, 0.0), True
-    guard.vehicle.history.add(LocalPosition(1_000_000, (9.0, 8.0, -0.6), (0.0, 0.0, 0.5)))
-    guard.note_touchdown()
-    assert guard.origin_ned_m == (3.0, 4.0, -0.6) and not guard.has_climbed
 
 
 # --- names and fields

@@ -47,17 +47,6 @@ def test_a_hit_flown_by_sticks_is_recovered_from_and_the_sticks_are_given_back(h
     assert air.event("recovered").data["settled_after_s"] <= 4.0
 
 
-def test_the_guards_state_and_its_detectors_are_there_to_plot_twice_a_second(hit_in_posctl):
-    air, hit_s = hit_in_posctl, hit_in_posctl.event_s("detection")
-    before = [m for m in air.sent_by("guard", "NAMED_VALUE", hit_s - 1.999, hit_s + 0.001) if m.name == "rb_state"]
-    assert len(before) == pytest.approx(4, abs=1)
-    values = [(m.name, m.value) for m in air.sent_by("guard", "NAMED_VALUE")]
-    assert {("rb_state", float(list(State).index(s))) for s in (State.WATCHING, State.RECOVERING)} <= set(values)
-    assert [value for name, value in values if name == "rb_hits"][-1] == 1.0
-    (v_c, *_) = [m for m in air.sent_by("guard", "DEBUG_VECT") if m.name == "rb_v_c"]
-    assert v_c.x == pytest.approx(air.event("detection").data["impact_velocity_ned_m_s"][0], abs=1e-3)
-
-
 def test_the_first_recovery_setpoint_and_the_mode_leave_with_the_datagram_that_shows_the_hit(hit_in_posctl):
     hit_s = hit_in_posctl.event_s("detection")
     # the vehicle's next interval is the first that can hear them
@@ -160,19 +149,11 @@ def test_the_next_flight_is_guarded_again_and_its_hits_are_counted_anew():
 
 
 def test_a_mode_that_is_not_allowed_is_left_alone_and_nothing_is_streamed_in_it():
-    air = Air(GuardConfig(modes=("AUTO.MISSION",)))
-    air.has_pilot()
-    air.run_to(State.STANDING_BY, 10.0)
-    air.run_for(2.0)
-    air.command(400, 1)
-    air.run_for(0.5)
-    air.command(22)
-    air.run_for(5.0)
-    air.set_mode(MANUAL_POSITION)
-    air.run_for(0.2)
-    air.forward = 0.3
+    air = Air(GuardConfig(modes=("AUTO.TAKEOFF", "AUTO.LOITER")))
+    air.flown_by_sticks(0.3)
+    since_s = air.time_s
     air.run_for(8.0)
-    assert air.state is State.STANDING_BY and air.told("detection") == [] and air.setpoints("guard") == []
+    assert air.state is State.STANDING_BY and air.told("detection") == [] and air.setpoints("guard", since_s) == []
 
 
 # --- when it does not go as asked
@@ -238,17 +219,6 @@ def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back():
     assert air.run_to(State.WATCHING, 3.0) < 1.0
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
     assert air.kinds().count("unconfirmed") == 1 and air.guard.core.flight.hits == 0
-
-
-@pytest.mark.parametrize(("armed", "main_mode"), [(0, 6), (0x80, 3)])
-def test_one_forged_heartbeat_does_not_end_a_recovery(armed, main_mode):
-    air = recovering()
-    forged = {"type": 2, "autopilot": 12, "base_mode": armed | 1, "custom_mode": main_mode << 16, "system_status": 4}
-    air.guard_hears(made("HEARTBEAT", forged))
-    # PX4 repeats CURRENT_MODE twice a second, whatever it is asked for
-    air.run_for(0.6)
-    assert air.state in (State.RECOVERING, State.GIVING_BACK)
-    assert len([text for text in air.told("implausible") if "conflicting" in text]) == 1
 
 
 # --- a program on another link
@@ -321,39 +291,18 @@ def test_a_report_of_the_ground_moves_heights_and_fence_only_while_somebody_else
     assert guard.origin_ned_m == here
 
 
-def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told():
-    air = Air(parameters={"COM_OF_LOSS_T": 3.0})
-    air.run_for(5.0)
-    assert any("COM_OF_LOSS_T is 3 s" in text for text in air.told("unattended"))
-
-
 # --- a slow link: 200 ms each way
 
 
-def far(**when) -> dict:
-    return {"kind": "wire", "delay_s": 0.2, **when}
-
-
 def test_a_guard_does_not_begin_at_the_end_of_a_slow_link():
-    air = Air(faults=[far(at_s=0)])
+    air = Air(faults=[{"kind": "wire", "delay_s": 0.2, "at_s": 0}])
     air.run_until(lambda: air.guard.finished, 30.0)
     assert air.guard.outcome.startswith("the round trip to the vehicle takes 404 ms and at most 100 ms are allowed")
 
 
-def test_a_guard_tells_of_a_link_that_became_slow_and_watches_on():
-    air = Air(faults=[far(at_s=18)])
-    air.take_off()
-    assert air.time_s < 18.0 and air.told("round_trip") == []
-    air.run_until(lambda: air.told("round_trip") != [], 25.0)
-    air.run_for(3.0)
-    assert air.state is State.WATCHING
-    assert air.told("round_trip") == ["round trip 404 ms: hits are answered late"]
-    assert air.guard.round_trip().summary()["worst"] == pytest.approx(404.0)
-
-
 def test_a_guard_on_the_ground_does_not_go_in_while_the_link_is_slow():
     # Given a guard that stands by, and a link that became slow
-    air = Air(faults=[far(between_s=[8, 26])])
+    air = Air(faults=[{"kind": "wire", "delay_s": 0.2, "between_s": [8, 26]}])
     air.run_to(State.STANDING_BY, 8.0)
     air.run_until(lambda: air.time_s > 14.0, 20.0)
     # When the vehicle takes off

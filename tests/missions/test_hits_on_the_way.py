@@ -3,23 +3,16 @@
 import numpy as np
 import pytest
 
-from tests.simulated import SimulatedFlight, simulated, wall
+from tests.simulated import SimulatedFlight, flown, simulated, wall
 
 pytestmark = pytest.mark.flight
 
 FAST = {"go_to": {"position_ned_m": [9, 0, -3], "speed_m_s": 4.0, "acceleration_m_s2": 3.0, "yaw_deg": 0}}
 
 
-def flown(*items, height_m=3.0, then="land", **sim) -> SimulatedFlight:
-    """Up, through the items, and down; over."""
-    flight = simulated(
-        [{"takeoff": {"height_m": height_m}}, *items, {"land": {}}],
-        on_collision={"then": then},
-        fence={"radius_m": 12, "max_height_m": 6},
-        sim=sim,
-    )
-    flight.run_to_end(300.0)
-    return flight
+def in_room(*items, then="land", height_m=3.0, **sim) -> SimulatedFlight:
+    fence = {"radius_m": 12, "max_height_m": 6}
+    return flown(*items, height_m=height_m, on_collision={"then": then}, fence=fence, sim=sim)
 
 
 def at_the_hit(flight) -> int:
@@ -35,7 +28,7 @@ def sunk_m(flight) -> float:
 
 def test_a_wall_met_while_speeding_up_does_not_tip_the_vehicle_over():
     # Given a wall a metre ahead, and an item that allows for 3 m/s^2, with which the vehicle would lean by 21 degrees
-    flight = flown(FAST, walls=[wall(1.18)])
+    flight = in_room(FAST, walls=[wall(1.18)])
     # Then it meets the wall while it speeds up, nearly level, and stays so
     assert flight.hits[0].impact_velocity_ned_m_s[0] > 1.0
     assert flight.tilt_deg[at_the_hit(flight)] < 11.0 and flight.tilt_deg.max() < 35.0
@@ -48,7 +41,7 @@ def test_a_vehicle_that_hangs_on_a_wall_is_let_go_of():
     slanted = {"name": "wall", "point_ned_m": [-2.716, -1.101, -3], "normal_ned": [0.959, 0.283, 0], "width_m": 5}
     start = {"go_to": {"position_ned_m": [0.524, -0.208, -1.433], "speed_m_s": 2}}
     into = {"go_to": {"position_ned_m": [-4.661, 0.131, -2.515], "speed_m_s": 2.777, "acceleration_m_s2": 2.266}}
-    flight = flown(start, into, walls=[slanted], wind_ned_m_s=[1.439, -0.038, 0], start={"yaw_deg": 98})
+    flight = in_room(start, into, walls=[slanted], wind_ned_m_s=[1.439, -0.038, 0], start={"yaw_deg": 98})
     hit, at, tilt_deg = flight.hits[0], at_the_hit(flight), flight.tilt_deg
     assert hit.impact_velocity_ned_m_s[0] < -2.3 and tilt_deg[at : at + 50].max() > 20.0
     # Then it is off it before its own thrust tips it over, with next to no height lost
@@ -59,7 +52,7 @@ def test_a_vehicle_that_hangs_on_a_wall_is_let_go_of():
 def test_against_a_wind_it_speeds_up_by_what_that_leaves_of_the_lean():
     # Given a wind of 4 m/s from the north, and a way north at 3 m/s
     ahead = {"go_to": {"position_ned_m": [9, 0, -3], "speed_m_s": 3.0, "yaw_deg": 0}}
-    flight = flown(ahead, wind_ned_m_s=[-4, 0, 0])
+    flight = in_room(ahead, wind_ned_m_s=[-4, 0, 0])
     north_m_s = flight.series["velocity_ned_m_s"][:, 0]
     begun = int(np.flatnonzero(flight.series["position_ned_m"][:, 0] > 0.3)[0])
     fast = begun + int(np.flatnonzero(north_m_s[begun:] > 1.8)[0])
@@ -72,7 +65,7 @@ def test_against_a_wind_it_speeds_up_by_what_that_leaves_of_the_lean():
 def test_a_hit_in_the_descent_is_recovered_from_and_the_landing_goes_on(policy):
     # Given a landing from 2.5 m, when a wall that comes from the north strikes the vehicle, and stops where it did
     comes = {"velocity_ned_m_s": [-1.2, 0, 0], "from_s": 9.5, "until_s": 11.1}
-    flight = flown(height_m=2.5, then=policy, walls=[wall(2.0, motion=comes)])
+    flight = in_room(height_m=2.5, then=policy, walls=[wall(2.0, motion=comes)])
     hit, collision = flight.hits[0], flight.report.collisions[0]
     assert 0.8 < -hit.contact_position_ned_m[2] < 2.4, "on the way down"
     # Then it is answered at once, away from the gate, and the vehicle lands clear of it, whatever the policy
