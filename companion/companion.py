@@ -73,13 +73,8 @@ class Stepped(ABC, Generic[CoreT]):
         sent = self._encoder.all_packets(outputs.messages, lambda error: core.fault(error, now_us))
         return StepResult(tuple(frames), sent, outputs.events)
 
-    @property
-    def leaves_word(self) -> bool:
-        """Whether the vehicle has to be told something if this program dies while it flies by attitude."""
-        return self._core is not None and self._core.flight.vehicle.autopilot.last_words is not None
-
     def last_words(self) -> list[tuple[float, bytes]]:
-        """What that is now, each so many seconds later."""
+        """What the vehicle has to be told if this program dies now, each so many seconds later."""
         words = () if self._core is None else self._core.last_words
         packets = {word: self._encoder.unsent(word) for word in {word for _, word in words}}
         return [(later_s, packets[word]) for later_s, word in words]

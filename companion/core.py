@@ -33,8 +33,8 @@ from companion.messages import (
 )
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
-from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO, plus
+from companion.reflex.attitude_law import braked
 from companion.reflex.collision import CollisionReport
 from companion.reflex.config import HELD_S, LEAD_S, NOTICED_S
 from companion.reflex.detector import Situation
@@ -255,33 +255,37 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     @property
     def last_words(self) -> tuple[tuple[float, Outgoing], ...]:
-        """For a vehicle that would drift if this program died now, each so many seconds later: an attitude that tilts
-        it off what it has hit, again and again, and at last a place off it.
+        """For a vehicle that would go astray if this program died now, each so many seconds later: an attitude, again
+        and again, and for one that does not brake by itself at last a place off what it has hit.
 
-        It flies to a place, and holds its height without a thrust that is asked for, by the velocity that it believes,
-        and takes its attitude for what a level flight takes. So until the first is right it is told a thrust, and a
-        tilt that makes the second right.
+        By itself it flies by the velocity that it believes. So until that is right it is told a tilt and its thrust.
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest(), self.flight.target
         words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
-        if not self._leans or words is None or latest is None or recovery is None or held_s is None:
+        if not self._leans or latest is None or recovery is None or held_s is None:
             return ()
         if target is None or target.lean is None:
             return ()  # it goes by a position from the next setpoint on
-        normal, now_us = target.lean.surfaces[0].normal_ned, self.now_us - self.started_at_us
-        n, e, _ = plus(latest.position_ned_m, words.away_m, normal)
-        place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
-        kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
         since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.sample_time_boot_us)
-        until_s = max(0.0, words.misled_s - since_s) + LEAD_S
-        # Its thrust is that of the tilt that is asked for, not of the present one.
-        lean = replace(target.lean, belief=replace(target.lean.belief, attitude_wxyz=LEVEL))
-        tilt = self.resets.sent(lean.setpoint(now_us, plus(ZERO, words.away_m_s2, (normal[0], normal[1], 0.0))))
+        left_s, lean, now_us = words.misled_s - since_s, target.lean, self.now_us - self.started_at_us
+        # It brakes by itself when it has noticed the silence; another place takes a new tilt.
+        until_s = left_s - held_s - NOTICED_S if words.away_m is None else max(0.0, left_s) + LEAD_S
+        if until_s <= 0.0:
+            return ()
+        north, east, _ = lean.surfaces[0].normal_ned
+        brakes = braked(lean.belief, (north, east, 0.0), left_s) if words.away_m is None else ZERO
+        asked = plus(brakes, words.away_m_s2, (north, east, 0.0))
+        tilt = self.resets.sent(lean.tilted_by(asked).setpoint(now_us, asked))
         # Twice as often as it has to be: a lost word ends nothing.
         every_s = max(0.5 * held_s, 1.0 / self._setpoint_hz)
         times = [every_s * count for count in range(math.ceil(until_s / every_s))]
-        last = self.resets.sent(PositionSetpoint(now_us, kept.position_ned_m, None))
-        return (*((at_s, tilt) for at_s in times), (until_s, last))
+        tilts = [(at_s, tilt) for at_s in times]
+        if words.away_m is None:
+            return tuple(tilts)
+        n, e, _ = plus(latest.position_ned_m, words.away_m, (north, east, 0.0))
+        place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
+        kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
+        return (*tilts, (until_s, self.resets.sent(PositionSetpoint(now_us, kept.position_ned_m, None))))
 
     @property
     def finished(self) -> bool:

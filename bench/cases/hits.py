@@ -70,12 +70,7 @@ def velocity_towards(case: HitCase, airframe: Airframe, rng: np.random.Generator
 
 
 def obstacle_before(
-    case: HitCase,
-    airframe: Airframe,
-    at_ned_m: Floats,
-    velocity: Floats,
-    rng: np.random.Generator,
-    offset_share: float,
+    case: HitCase, airframe: Airframe, at_ned_m: Floats, velocity: Floats, rng: np.random.Generator, offset_share: float
 ) -> Mapping[str, Any]:
     """The scene with the obstacle where the vehicle's centre then is at about `at_ned_m` when it touches."""
     heading = math.atan2(velocity[1], velocity[0])

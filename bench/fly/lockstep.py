@@ -115,7 +115,8 @@ class Stepped(VirtualTime):
                 results.append(result)
         return results
 
-    def step_alone(self) -> bytes:
-        """One interval in which nobody answers; what the vehicle said to the first."""
+    def step_alone(self, told: bytes = b"") -> bytes:
+        """One interval in which nobody answers; what the vehicle, told no more than this, said to the first."""
+        self.links[0].push(told)
         self.vehicle.advance()
         return b"".join(self.links[0].take())

@@ -160,10 +160,7 @@ def verdict(flight: JudgedFlight) -> Json:
     contacts = contacts_of(flight)
     hits = [contact for contact in contacts if contact.role is Role.HIT]
     found = zip(recoveries(flight, contacts), hits, strict=True)
-    return {
-        "ends": not failures(flight),
-        "hits": [_of_one(flight, figures, contact) for figures, contact in found],
-    }
+    return {"ends": not failures(flight), "hits": [_of_one(flight, figures, contact) for figures, contact in found]}
 
 
 def _of_one(flight: JudgedFlight, figures: Json, contact: JudgedContact) -> Json:

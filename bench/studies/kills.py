@@ -3,7 +3,7 @@
 import math
 import random
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,7 +136,7 @@ def fly_on(flight: Flight, touch: Hit, since_s: float) -> None:
 
 
 def killed(flight: Flight, touch: Hit) -> Json:
-    """It dies now. Nobody answers the vehicle any more; the guard's link dies with it, and another one begins."""
+    """It dies now. A guard's link dies with it, and another one begins."""
     vehicle, killed_us, mode = flight.vehicle, flight.vehicle.time_boot_us, ""
     step: Callable[[], object] = flight.step
     until_us = killed_us + 1e6 * LANDS_WITHIN_S
@@ -145,7 +145,7 @@ def killed(flight: Flight, touch: Hit) -> Json:
         flight.run_for(MET_S)
         mode, until_us = flight.mode, vehicle.time_boot_us + 1e6 * WATCHED_S
     else:
-        step = flight.step_alone
+        step = unattended(flight).__next__
     while not is_down(vehicle) and vehicle.time_boot_us < until_us:
         step()
     since_s = 1e-6 * (killed_us - touch.contact_at_boot_us)
@@ -154,6 +154,15 @@ def killed(flight: Flight, touch: Hit) -> Json:
     again_m_s = hardest(later[1:] if since_s < 0.0 else later)
     ground_m_s = math.hypot(*vehicle.truth.series()["velocity_ned_m_s"][-1]) if is_down(vehicle) else None
     return {"kill_s": since_s, "again_m_s": again_m_s, "ground_m_s": ground_m_s, "mode": mode}
+
+
+def unattended(flight: Stepped) -> Iterator[bytes]:
+    """Nobody answers but by the companion's last words; what the vehicle says in each interval."""
+    words, died_us = flight.programs[0].last_words(), flight.vehicle.time_boot_us
+    while True:
+        due = [word for later_s, word in words if later_s <= 1e-6 * (flight.vehicle.time_boot_us - died_us)]
+        words = words[len(due) :]
+        yield flight.step_alone(b"".join(due))
 
 
 def is_down(vehicle: SimulatedVehicle) -> bool:
@@ -169,7 +178,7 @@ def shown(results: Results) -> Shown:
     flights = results.rows()
     kills = pd.json_normalize(flights, "kills", ["touch_m_s", "program", "loss_s"])
     again = sum(flight["again_m_s"] > SECOND_M_S for flight in flights)
-    lead = "After the kill nothing is sent."
+    lead = "After the kill nothing but the last words is sent."
     if flights[0]["program"]:
         lead = f"The link dies with the guard; another one begins {RESTARTED_S:g} s later; {WATCHED_S:g} s are watched."
     lead += (

@@ -59,12 +59,14 @@ class Wire:
 
 @dataclass(frozen=True, slots=True)
 class LastWords:
-    """What is said to a vehicle whose companion has died near an obstacle: a tilt off it, then a place off it."""
+    """What is said to a vehicle whose companion has died near an obstacle, until it flies well by itself: a tilt."""
 
     misled_s: float
-    """After a hit its own velocity is too wrong for so long to fly to a place by, or to hold a height."""
+    """After a hit its own velocity is too wrong for so long to fly by."""
     away_m_s2: float
-    away_m: float
+    """Of the tilt, off the obstacle: as much as its own attitude may be wrong by."""
+    away_m: float | None = None
+    """The place that is said then, off the obstacle. None: it brakes by itself then, and is braked until then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +115,7 @@ class Autopilot:
     """Read before it is flown by attitude."""
     attitude_held_s: Callable[[Mapping[str, int | float]], float]
     """From these: for so long an attitude is flown on; infinite where no attitude with a thrust can be asked for."""
-    last_words: LastWords | None
-    """None where it brakes by itself once an attitude is followed by nothing; else it levels out and drifts."""
+    last_words: LastWords
     loss_parameter: str
     """For so many seconds the last setpoint is flown on."""
     rate_parameter: str

@@ -13,7 +13,7 @@ present tilt.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.messages import AttitudeSetpoint, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
@@ -48,6 +48,12 @@ class Lean:
     yaw_rad: float
     held_s: float  # for so long PX4 flies it on, if nothing follows
 
+    def tilted_by(self, acceleration_ned_m_s2: Vector3) -> "Lean":
+        """Of a vehicle that has the tilt of this acceleration already: its thrust is that tilt's."""
+        n, e, _ = acceleration_ned_m_s2
+        attitude_wxyz = tilted((n, e, -GRAVITY_M_S2), self.yaw_rad)
+        return replace(self, belief=replace(self.belief, attitude_wxyz=attitude_wxyz))
+
     def setpoint(self, time_us: int, acceleration_ned_m_s2: Vector3) -> AttitudeSetpoint:
         """As it is sent."""
         attitude_wxyz, thrust = attitude_and_thrust(acceleration_ned_m_s2, self)
@@ -62,9 +68,7 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
     for normal, off_m_s in sides:
         if off_m_s <= 0.0:
             continue
-        # Of the speed away from a near surface only what is certain is braked.
-        faster_m_s = max(0.0, along(velocity, normal) - off_m_s)
-        velocity = plus(velocity, -min(faster_m_s, belief.spread_m_s), normal)
+        velocity = _certain(velocity, normal, belief.spread_m_s, off_m_s)
         # What it pushes with is no wind to lean against.
         external = plus(external, -max(0.0, along(external, normal)), normal)
     off = projected(ZERO, [side for side in sides if side[1] > 0.0])
@@ -86,6 +90,18 @@ def held_off(acceleration_ned_m_s2: Vector3, belief: Belief, surfaces: Sequence[
         by_wind = along(belief.external_m_s2, surface.normal_ned)
         sides.append((surface.normal_ned, (-brakable_m_s(room_m, 0.5 * held_s) - speed_m_s) / held_s - by_wind))
     return projected(acceleration_ned_m_s2, sides)
+
+
+def braked(belief: Belief, normal_ned: Vector3, within_s: float) -> Vector3:
+    """The level acceleration that ends the speed within a time."""
+    n, e, _ = belief.velocity_ned_m_s
+    return plus(ZERO, -1.0 / within_s, _certain((n, e, 0.0), normal_ned, belief.spread_m_s))
+
+
+def _certain(velocity_m_s: Vector3, normal: Vector3, spread_m_s: float, off_m_s: float = 0.0) -> Vector3:
+    """Of the speed away from a surface, beyond the wanted one, only what is certain is braked."""
+    faster_m_s = max(0.0, along(velocity_m_s, normal) - off_m_s)
+    return plus(velocity_m_s, -min(faster_m_s, spread_m_s), normal)
 
 
 def brakable_m_s(room_m: float, later_s: float) -> float:

@@ -152,7 +152,7 @@ class Loop:
     manager: ServiceManager | None = field(default_factory=service_manager)
     now_us: int | None = None  # of the last step
     is_interrupted: bool = False
-    heir: Heir | None = None  # of a program that leaves a word
+    heir: Heir | None = None  # once there is a vehicle to be told something
     step: Callable[[bytes, int], StepResult] | None = None  # where somebody follows the steps of what is stepped
 
     def run(self, beside: Callable[[int, StepResult], None], is_over: Callable[[], bool] = lambda: False) -> None:
@@ -208,7 +208,7 @@ class Loop:
 
     def _leave_word(self) -> None:
         """After all that this step sends: what has to be said if it is the last one."""
-        if self.heir is None and self.stepped.leaves_word:
+        if self.heir is None and self.stepped.armed is not None:
             self.heir = Heir()
         if self.heir is not None:
             self.heir.hear(self.stepped.last_words(), self.connection)

@@ -35,7 +35,8 @@ def test_a_second_contact_is_the_hardest_after_the_kill_the_touch_itself_apart(k
     )
     on_the_ground = SimpleNamespace(body=[0.0, 0.0, -0.08])
     vehicle = SimpleNamespace(time_boot_us=killed_at_s * 1e6, truth=truth, state=on_the_ground)
-    flight: Any = SimpleNamespace(vehicle=vehicle, step=list, step_alone=lambda: b"")
+    programs = [SimpleNamespace(last_words=list)]
+    flight: Any = SimpleNamespace(vehicle=vehicle, programs=programs, step=list, step_alone=lambda told: told)
     kill = killed(flight, touch)
     assert kill["again_m_s"] == pytest.approx(again_m_s) and kill["ground_m_s"] == pytest.approx(0.5)
 

@@ -11,14 +11,7 @@ from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import approach
 from bench.rows.paper import BREAKING_FORCE_N, Floats, StudyFlight
 from bench.rows.tables import table
-from bench.studies.paper.figures import (
-    CONTACT,
-    add_legend,
-    draw_flight,
-    finish,
-    mark_paper,
-    new_figure,
-)
+from bench.studies.paper.figures import CONTACT, add_legend, draw_flight, finish, mark_paper, new_figure
 from bench.studies.paper.study import Findings, Study, claim
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.setpoint import TrajectorySetpoint

@@ -96,7 +96,6 @@ def test_force_flying_is_high_only_while_it_is_flown_by_attitude():
 
 def test_the_last_words_of_a_companion_are_a_lean_and_a_place_off_what_was_hit():
     f = leaning(FakeCopter(wall_north_m=3.0))
-    assert f.companion.leaves_word
     *leans, (place_s, place) = f.companion.last_words()
     # Copter's velocity is wrong for 0.8 s, of which 0.1 s have passed, and leaning takes 0.15 s. Until then a lean is
     # said twice within the 0.3 s for which it is flown on
@@ -138,12 +137,32 @@ def test_later_in_a_recovery_the_place_is_said_soon():
     assert [later_s for later_s, _ in f.companion.last_words()] == pytest.approx([0.0, 0.15])
 
 
-def test_no_word_is_left_to_a_px4_or_before_a_hit():
-    f = leaning(FakeVehicle(wall_north_m=3.0))
-    assert not f.companion.leaves_word and f.companion.last_words() == []
+def test_to_a_px4_the_last_words_are_a_lean_that_brakes_until_its_own_velocity_is_right():
+    # Given a PX4 that leaves the wall at 4 m/s when its companion dies, 0.1 s after the hit
+    f = leaning(FakeVehicle(wall_north_m=3.0, loss_s=0.3))
+    flown = f.companion.core.flight.target
+    moves = replace(flown.lean.belief, velocity_ned_m_s=(-4.0, 0.0, 0.0), spread_m_s=0.1, level_m_s2=(0.0, 0.0, 0.0))
+    f.companion.core.flight.target = replace(flown, lean=replace(flown.lean, belief=moves))
+    leans = f.companion.last_words()
+    # Then it is held until 1.4 s after the hit, the last 0.43 s of it by PX4 itself. It ends what is certain of the
+    # speed, but for 1.5 m/s^2 by which the tilt may be wrong
+    assert leans[-1][0] == pytest.approx(0.75)
+    assert {mav.MAVLink(None).decode(bytearray(lean)).get_type() for _, lean in leans} == {"SET_ATTITUDE_TARGET"}
+    w, x, y, z = mav.MAVLink(None).decode(bytearray(leans[0][1])).q
+    tilt_deg = math.degrees(math.asin(2.0 * (w * y - z * x)))
+    assert tilt_deg == pytest.approx(math.degrees(math.atan((1.5 - 3.9 / 1.3) / 9.81)), abs=0.5)
+
+
+def test_no_word_is_left_once_a_px4_flies_well_by_itself():
+    f = leaning(FakeVehicle(wall_north_m=3.0, loss_s=0.3))
+    f.companion.core.reflex.hits[-1].sample_time_boot_us -= 1_000_000
+    assert f.companion.last_words() == []
+
+
+def test_no_word_is_left_before_a_hit():
     f = flight(FakeCopter(), items=[TAKEOFF, INTO_WALL, LANDING])
     f.run_to("mission")
-    assert f.companion.leaves_word and f.companion.last_words() == []
+    assert f.companion.last_words() == []
 
 
 def test_no_word_is_left_where_the_next_setpoint_is_a_place():

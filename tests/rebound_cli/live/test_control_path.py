@@ -176,7 +176,7 @@ def test_all_that_has_arrived_is_one_step_that_nobody_keeps_from_being_taken(
 ):
     # Given a socket in which datagrams wait, and a clock that stands after a stall
     socket = Mock(receive=Mock(side_effect=[*datagrams, b""]), now_us=lambda: EPOCH_US + late_us)
-    stepped = Mock(armed=True, finished=False, leaves_word=False, next_deadline_us=lambda: EPOCH_US)
+    stepped = Mock(armed=True, finished=False, last_words=list, next_deadline_us=lambda: EPOCH_US)
     stepped.step.return_value = StepResult((), (), ())
     recorder = FlightRecorder(tmp_path)
     Loop(stepped, socket, socket, recorder, Console(sys.stderr), Interrupts()).exchange()
