@@ -1,5 +1,7 @@
-"""`rebound service` in a folder that stands for a system's root: what is written, kept, refused and taken away."""
+"""`rebound service` in a folder that stands for a system's root, and a flight under a systemd that listens."""
 
+import io
+import itertools
 import os
 import shutil
 from argparse import Namespace
@@ -7,11 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from companion.report import Status
+from companion.shell.service_manager import ServiceManager
 from rebound_cli import exit_codes
+from rebound_cli.live.console import Console
 from rebound_cli.main import main
 from rebound_cli.service import check, command
 from rebound_cli.service.files import SYSUSERS, UDEV, UNIT, UNIT_NAME, ServiceSettings, udev_text, unit_text
 from rebound_cli.service.system import ServiceError, System, answer, hidden_program
+from tests.rebound_cli.live.flying import fly
 
 ROOT = Path(__file__).parents[3]
 GUARD = ROOT / "examples" / "guard.yaml"
@@ -263,3 +269,40 @@ def test_an_installation_that_is_not_there_or_not_as_it_was_made_is_found(system
         file.write("MemoryMax=infinity\n")
     assert service(system, "check") == 1
     assert f"not as this version writes them: /{UNIT}" in capsys.readouterr().out
+
+
+def test_a_flight_tells_systemd_that_it_is_ready_alive_how_it_goes_and_when_it_ends(tmp_path, monkeypatch):
+    # Given a system that gives it the priority that it asks for, but not whoever tests
+    asked, told = [], []
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+    monkeypatch.setattr(os, "sched_setscheduler", lambda _, policy, how: asked.append(policy))
+    monkeypatch.setattr(
+        ServiceManager,
+        "stepped",
+        lambda _, is_heard, is_ending, status, now_us: told.append((now_us, is_heard, is_ending, status())),
+    )
+    companion, *_ = fly(tmp_path)
+    report = companion.report()
+    assert report.outcome == "completed" and set(asked) == {os.SCHED_FIFO}
+    # Then the vehicle is heard long before it is armed, and to the end; the end is told last
+    assert next(at_us for at_us, is_heard, *_ in told if is_heard) < report.armed_at_us
+    endings = [is_ending for *_, is_ending, _ in told]
+    assert endings == sorted(endings) and endings.count(True) == 1
+    # Each step is a sign of life
+    assert max(b - a for (a, *_), (b, *_) in itertools.pairwise(told)) < 500_000
+    # And the state and the rate of the link
+    states = [status for *_, status in told if status.startswith("state takeoff, mode OFFBOARD, ")]
+    assert states and all(status.endswith(" kB/s") for status in states)
+
+
+def test_the_present_state_is_no_line_of_a_journal(monkeypatch):
+    def told():
+        stream = io.StringIO()
+        console = Console(stream)
+        console.live(lambda: Status("watching", "", False, None, None, "off", None), 1.0)
+        console.event(1.0, "detection", "hit")
+        return stream.getvalue()
+
+    assert "watching" in told() and "hit" in told()
+    monkeypatch.setenv("NOTIFY_SOCKET", "/run/systemd/notify")
+    assert "watching" not in told() and "hit" in told()
