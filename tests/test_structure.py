@@ -1,10 +1,13 @@
-"""The rooms' rules: who may import whom, and where the world outside may be touched."""
+"""The rooms' rules: who imports whom, where the world outside is touched, where numbers live, what a drone installs."""
 
 import argparse
+import ast
 import functools
 import graphlib
 import importlib
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +16,42 @@ import pytest
 
 import bench.main
 import rebound_cli.main
-from tests.import_graph import PACKAGES, imported_names, module_imports
+
+PACKAGES = ("companion", "sim_vehicle", "rebound_cli", "bench")
+
+
+@functools.cache
+def imported_names(path: Path) -> frozenset[str]:
+    """Full names of all that a file imports; of `from a import b` both `a` and `a.b`, which may be a module."""
+    names: set[str] = set()
+    for node in _statements(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            if node.level:
+                raise ValueError(f"{path} imports relatively")
+            package = node.module or ""
+            names.update((package, *(f"{package}.{alias.name}" for alias in node.names)))
+    return frozenset(names)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All below it, however deep; an expression holds none."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.expr):
+            yield child
+            yield from _statements(child)
+
+
+def module_imports(root: Path) -> dict[str, set[str]]:
+    """Every module of the project below ``root``, and those of them that it imports."""
+    paths = {_module(path.relative_to(root)): path for name in PACKAGES for path in (root / name).rglob("*.py")}
+    return {module: {name for name in imported_names(path) if name in paths} for module, path in paths.items()}
+
+
+def _module(path: Path) -> str:
+    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+
 
 ROOT = Path(__file__).parent.parent
 
@@ -188,3 +226,116 @@ def test_every_command_runs_a_function_that_there_is(main: Any) -> None:
     assert len(runs) > 5
     for module, function in (run.args for run in runs):
         assert callable(getattr(importlib.import_module(module), function)), function
+
+
+COMPANION = Path(__file__).parent.parent / "companion"
+CONFIGS = [COMPANION / "reflex" / "config.py", COMPANION / "motion" / "config.py"]
+# Nothing, one, two, a half; microseconds and seconds, metres and centimetres; what only rounding makes.
+FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
+# Those that a derivation gives.
+DERIVED = {
+    "reflex/velocity_jump.py": {3},  # axes; Student's t by degrees of freedom
+    "reflex/filter_bank.py": {3},  # axes
+    "reflex/impact.py": {4},  # a beginning that is known by two windows: half of half a window
+    "reflex/monitor.py": {3},  # shown decimals
+    "reflex/health.py": {3, 3600},  # shown decimals; seconds an hour
+    "flight/damage.py": {3},  # shown decimals
+}
+# A damaged motor decides no hit and no recovery.
+OTHERS = {"motors.py"}
+FLIGHT = ("after_hit", "damage", "recovering")
+
+
+def sources_with_numbers() -> Iterator[Path]:
+    for room in ("motion", "reflex"):
+        yield from (path for path in sorted((COMPANION / room).glob("*.py")) if path not in CONFIGS)
+    yield from (COMPANION / "flight" / f"{name}.py" for name in FLIGHT)
+
+
+def numbers(path: Path) -> set[float]:
+    constants = (node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant))
+    return {value for value in constants if type(value) in (int, float)}
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in sources_with_numbers() if path.name not in OTHERS], ids=lambda path: path.stem
+)
+def test_a_number_outside_the_two_files_is_a_unit_or_is_derived(path: Path) -> None:
+    derived = DERIVED.get(path.relative_to(COMPANION).as_posix(), set())
+    assert numbers(path) - FREE == derived
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.parent.name)
+def test_every_number_has_its_reason(path: Path) -> None:
+    module, lines = ast.parse(path.read_text()), path.read_text().splitlines()
+    # A comment above it, or above the number that it shares one with.
+    missing = [
+        ast.unparse(node) for node in module.body if isinstance(node, ast.Assign) and not lines[node.lineno - 2].strip()
+    ]
+    for settings in (node for node in module.body if isinstance(node, ast.ClassDef)):
+        for field, text in zip(settings.body, [*settings.body[1:], None], strict=True):
+            if isinstance(field, ast.AnnAssign) and isinstance(field.value, ast.Constant):
+                is_text = isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+                missing += [] if is_text else [f"{settings.name}.{ast.unparse(field.target)}"]
+    assert missing == []
+
+
+# Everything that only an extra brings.
+LEFT_OUT = (
+    *("numba", "filterpy", "scipy", "matplotlib", "pandas", "tabulate"),
+    *("mavsdk", "pyulog", "mcap", "pygeomag", "pytest", "rich"),
+)
+WITHOUT = f"import sys\nsys.modules.update(dict.fromkeys({LEFT_OUT!r}))\n"
+# What Python tells its auditors of a process that is started.
+STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")
+QUICK = ("--set", "companion.link.heartbeat_wait_s=0.2")
+
+
+def alone(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", WITHOUT + code], cwd=ROOT, capture_output=True, text=True, timeout=120)
+
+
+def test_missions_are_checked_and_drawn(tmp_path):
+    code = f"from rebound_cli.main import main\nsys.exit(main(['check', 'wall', 'square', '--out', {str(tmp_path)!r}]))"
+    done = alone(code, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("drawn in") == 2
+
+
+def test_what_an_extra_brings_is_named_package_by_package_for_the_python_that_runs(tmp_path):
+    done = alone("from rebound_cli.main import main\nsys.exit(main(['sim']))", tmp_path)
+    assert done.returncode == 1
+    assert f"[sim]: {sys.executable} -m pip install 'numba>=" in done.stderr and "'matplotlib>=" in done.stderr
+
+
+def test_a_mission_is_flown_and_a_wall_recovered_from(tmp_path):
+    code = """
+from tests.companion.fake_vehicle import FakeVehicle, flight
+f = flight(FakeVehicle(wall_north_m=3.0), items=[
+    {"takeoff": {"height_m": 1.5}}, {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}, {"land": {}}])
+f.run_to("holding")
+f.run_to_end()
+assert len(f.report.collisions) == 1 and f.report.outcome == "completed"
+"""
+    done = alone(code, tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_help_imports_nothing_that_is_slow():
+    code = "import sys\nfrom rebound_cli.main import build_parser\nbuild_parser()\nprint(*sys.modules)"
+    imported = alone(code, ROOT).stdout.split()
+    assert not {"numpy", "pydantic", "pymavlink", "shapely", "sim_vehicle", "yaml"} & set(imported)
+
+
+def test_a_guards_start_reads_no_source_and_starts_no_process(tmp_path):
+    code = f"""
+import gc, linecache
+from rebound_cli.main import main
+sys.addaudithook(lambda event, _: event in {STARTS!r} and print("started:", event))
+main(["guard", "--connect", "udpin://127.0.0.1:0", "--out", {str(tmp_path / "guarded")!r}, *{QUICK!r}])
+print(*linecache.cache, gc.isenabled(), gc.get_freeze_count())
+"""
+    said = alone(code, tmp_path).stdout
+    assert "no HEARTBEAT" in said
+    # Then the collector is as it was, and no line tells of a file of source or of a process
+    assert said.splitlines()[-1] == "True 0" and "started:" not in said

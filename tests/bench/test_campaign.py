@@ -17,8 +17,8 @@ from bench.studies import kills
 from bench.studies.detectors import work_out_hit
 from bench.studies.faults import work_out_fault
 from bench.studies.hits import work_out_flown
-from tests.import_graph import module_imports
 from tests.rebound_cli.command import ROOT
+from tests.test_structure import module_imports
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A flight's report as a person opens it: from a file, without a network, at a desk and on a phone."""
+"""A flight's report, or a comparison's, as a person opens it: from a file, without a network, at a desk, on a phone."""
 
 import json
 import re
@@ -10,6 +10,8 @@ import pytest
 from PIL import Image
 
 from bench.pictures import FRAME_S, write_animation
+from rebound_cli.compare import page as compare_page
+from rebound_cli.compare.rows import Row
 from rebound_cli.report import content as report_content
 from rebound_cli.report.page import page, write_page
 from tests.browser.opened_page import drawn_share, line_share, pixels
@@ -189,3 +191,23 @@ def test_it_is_dark_where_that_is_wanted_and_white_on_paper(opened, file, media,
         shown.page.evaluate(f"window.dispatchEvent(new Event('{'before' if media == 'print' else 'after'}print'))")
         assert round(pixels(shown.page.locator("h1")).mean()) in lightness
         assert [title for title, chart in shown.charts() if line_share(chart) < LINE] == []
+
+
+def test_each_chart_has_its_points_and_a_point_opens_its_flights_report(opened, tmp_path):
+    # Given two laws, two flights each
+    rows = [
+        Row(law, law, 2.0, seed, f"{law}-{seed}/report.html", "completed", "", 0, 2.0, rest_s + seed, 0.1, 0.5)
+        for law, rest_s in (("paper", 5.0), ("adaptive", 1.0))
+        for seed in (1, 2)
+    ]
+    for row in rows:
+        (tmp_path / row.report).parent.mkdir()
+        (tmp_path / row.report).write_text(f"<title>{row.report}</title>")
+    compare_page.write_page(tmp_path / "compare.html", "wall & <racer>", rows)
+    with opened((tmp_path / "compare.html").as_uri()) as shown:
+        assert shown.text("h1") == "wall & <racer>" and shown.complaints == []
+        assert shown.page.locator("svg a").count() == len(rows) * len(compare_page.CHARTS)
+        assert shown.page.locator("table tr").count() == 3
+        with shown.page.expect_popup() as report:
+            shown.page.locator('svg a[*|href="adaptive-2/report.html"]').first.click()
+        assert report.value.title() == "adaptive-2/report.html"

@@ -12,8 +12,8 @@ from mavsdk import ComponentType, Configuration
 from mavsdk import asyncio as asynchronous
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
-from mavsdk_vehicle import flown
 from simulator import ROOT, Simulator, simulator
+from test_mavsdk_v4 import flown
 
 from companion.mavsdk import CollisionGuard, GuardConfig, GuardError, State
 

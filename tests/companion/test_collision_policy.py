@@ -6,18 +6,8 @@ from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
 from companion.motion.motors import Damage
 from companion.reflex.config import EstimateConfig
-from tests.companion.fake_vehicle import (
-    INTO_WALL,
-    LAND,
-    LANDING,
-    LOITER,
-    TAKEOFF,
-    FakeVehicle,
-    at_wall,
-    flight,
-    flying_in,
-    strike,
-)
+from tests.companion import fake_vehicle
+from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, strike
 from tests.flying import Flight
 
 ASIDE = {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0}}
@@ -85,7 +75,7 @@ def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
 
 
 def test_a_motor_that_is_found_hurt_on_the_way_home_ends_it_there_where_the_mission_says_so():
-    f = flying_in("returning", on_damage="land")
+    f = fake_vehicle.flying_in("returning", on_damage="land")
     assert f.state == "returning", "a whole vehicle flies on"
     f.companion.core.flight.motors.damage = Damage(3, 0.16, 0.995, False)
     f.run_to("landing", 0.1)
@@ -161,8 +151,7 @@ def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
 
 
 @pytest.mark.parametrize(
-    ("then", "ends"),
-    [("return", "completed"), ("continue", "completed"), ("abort", "aborted"), ("land", "completed")],
+    ("then", "ends"), [("return", "completed"), ("continue", "completed"), ("abort", "aborted"), ("land", "completed")]
 )
 def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
     f = in_room(INTO_WALL, ASIDE, on_collision=ROUND, obstacles={"on_unreachable": then})

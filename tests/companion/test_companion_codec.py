@@ -9,109 +9,78 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from companion import messages as ours
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.packet import payload_of
 from companion.mavlink.readers import GUARD_READERS, Reader
-from companion.messages import (
-    Attitude,
-    AttitudeSetpoint,
-    AttitudeTarget,
-    AutopilotVersion,
-    Battery,
-    CommandAck,
-    CommandResult,
-    CurrentMode,
-    DebugVector,
-    EstimatorStatus,
-    ExtendedState,
-    Heartbeat,
-    ImuSample,
-    LandedState,
-    LocalPosition,
-    NamedValue,
-    Odometry,
-    OnboardHeartbeat,
-    Parameter,
-    PositionSetpoint,
-    ReadParameter,
-    Refused,
-    RequestMessage,
-    SendCommand,
-    SetArmed,
-    SetMessageInterval,
-    SetMode,
-    SetParameter,
-    TimeSyncAnswer,
-    TimeSyncAsk,
-    TimeSyncReply,
-    TimeSyncRequest,
-    Vibration,
-)
 
 HEARTBEAT = (
     mav.MAVLink_heartbeat_message(2, 12, 0x9D, 4 << 16 | 3 << 24, 4, 3),
-    Heartbeat(1, 1, 2, 12, True, 0x03040000, 4),
+    ours.Heartbeat(1, 1, 2, 12, True, 0x03040000, 4),
 )
 CASES = [
     HEARTBEAT,
     (
         mav.MAVLink_highres_imu_message(123_456_789, 1.0, -2.0, -9.5, 0.5, 0.25, -0.5, 0, 0, 0, 0, 0, 0, 0, 0x3F),
-        ImuSample(123_456_789, (1.0, -2.0, -9.5), (0.5, 0.25, -0.5)),
+        ours.ImuSample(123_456_789, (1.0, -2.0, -9.5), (0.5, 0.25, -0.5)),
     ),
     (
         mav.MAVLink_local_position_ned_message(5000, 1.0, 2.0, -3.0, 0.5, -0.5, 0.25),
-        LocalPosition(5_000_000, (1.0, 2.0, -3.0), (0.5, -0.5, 0.25)),
+        ours.LocalPosition(5_000_000, (1.0, 2.0, -3.0), (0.5, -0.5, 0.25)),
     ),
     (
         mav.MAVLink_attitude_quaternion_message(5000, 0.5, 0.5, -0.5, 0.5, 0.25, 0.5, -1.0),
-        Attitude(5_000_000, (0.5, 0.5, -0.5, 0.5), (0.25, 0.5, -1.0)),
+        ours.Attitude(5_000_000, (0.5, 0.5, -0.5, 0.5), (0.25, 0.5, -1.0)),
     ),
     (
         # PX4's way: local NED in both frames, the resets counted
         mav.MAVLink_odometry_message(
             5_000_123, 1, 1, 1.0, 2.0, -3.0, [1, 0, 0, 0], 0.5, -0.5, 0.25, 0, 0, 0, [0] * 21, [0] * 21, 7
         ),
-        Odometry(5_000_123, (1.0, 2.0, -3.0), (0.5, -0.5, 0.25), 7),
+        ours.Odometry(5_000_123, (1.0, 2.0, -3.0), (0.5, -0.5, 0.25), 7),
     ),
     (
         mav.MAVLink_attitude_target_message(5000, 0, (0.5, 0.5, -0.5, 0.5), 0, 0, 0, 0.75),
-        AttitudeTarget(5_000_000, 0.75, (0.5, 0.5, -0.5, 0.5)),
+        ours.AttitudeTarget(5_000_000, 0.75, (0.5, 0.5, -0.5, 0.5)),
     ),
     (
         mav.MAVLink_attitude_target_message(5000, 128, (1, 0, 0, 0), 0, 0, 0, 0.75),
-        AttitudeTarget(5_000_000, 0.75, None),
+        ours.AttitudeTarget(5_000_000, 0.75, None),
     ),
     (
         mav.MAVLink_vibration_message(5_000_000, 0.0, 0.125, 2.5, 12, 0, 3),
-        Vibration(5_000_000, 0.125, 2.5, (12, 0, 3)),
+        ours.Vibration(5_000_000, 0.125, 2.5, (12, 0, 3)),
     ),
-    (mav.MAVLink_extended_sys_state_message(0, 2), ExtendedState(LandedState.IN_AIR)),
-    (mav.MAVLink_current_mode_message(0, 6 << 16, 3 << 16), CurrentMode(6 << 16, 3 << 16)),
-    (mav.MAVLink_current_mode_message(0, 6 << 16, 0), CurrentMode(6 << 16, None)),
-    (mav.MAVLink_command_ack_message(400, 1, 0, 0, 1, 191), CommandAck(400, CommandResult.TEMPORARILY_REJECTED)),
-    (mav.MAVLink_timesync_message(0, 777), TimeSyncRequest(777)),
-    (mav.MAVLink_timesync_message(5, 777), TimeSyncAnswer(777, 5)),
-    (mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", 0.5, 9, 900, 12), Parameter("COM_OF_LOSS_T", 0.5)),
+    (mav.MAVLink_extended_sys_state_message(0, 2), ours.ExtendedState(ours.LandedState.IN_AIR)),
+    (mav.MAVLink_current_mode_message(0, 6 << 16, 3 << 16), ours.CurrentMode(6 << 16, 3 << 16)),
+    (mav.MAVLink_current_mode_message(0, 6 << 16, 0), ours.CurrentMode(6 << 16, None)),
+    (
+        mav.MAVLink_command_ack_message(400, 1, 0, 0, 1, 191),
+        ours.CommandAck(400, ours.CommandResult.TEMPORARILY_REJECTED),
+    ),
+    (mav.MAVLink_timesync_message(0, 777), ours.TimeSyncRequest(777)),
+    (mav.MAVLink_timesync_message(5, 777), ours.TimeSyncAnswer(777, 5)),
+    (mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", 0.5, 9, 900, 12), ours.Parameter("COM_OF_LOSS_T", 0.5)),
     # The bytes of a whole number travel in the float's place
     (
         mav.MAVLink_param_value_message(b"IMU_INTEG_RATE", struct.unpack("<f", struct.pack("<i", 250))[0], 6, 900, 13),
-        Parameter("IMU_INTEG_RATE", 250),
+        ours.Parameter("IMU_INTEG_RATE", 250),
     ),
     (
         mav.MAVLink_estimator_status_message(0, 2, 0.25, 0.5, 0.75, 0, 0, 0, 0, 0),
-        EstimatorStatus((0.25, 0.5, 0.75), True, False),
+        ours.EstimatorStatus((0.25, 0.5, 0.75), True, False),
     ),
     # By motion capture no sensor measures the velocity, and PX4 says NaN
     (
         mav.MAVLink_estimator_status_message(0, 2, math.nan, 0.5, 0.75, 0, 0, 0, 0, 0),
-        EstimatorStatus((0.5, 0.75), True, False),
+        ours.EstimatorStatus((0.5, 0.75), True, False),
     ),
     (
         mav.MAVLink_autopilot_version_message(0, 0x010F02FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0),
-        AutopilotVersion((1, 15, 2)),
+        ours.AutopilotVersion((1, 15, 2)),
     ),
-    (mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 42, 0, 0, 0, 0, 0, 0), Battery(42)),
+    (mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 42, 0, 0, 0, 0, 0, 0), ours.Battery(42)),
 ]
 
 
@@ -154,9 +123,7 @@ def test_millisecond_stamps_go_on_where_their_32_bits_wrap():
     before = mav.MAVLink_local_position_ned_message(wrap_ms - 3, 1, 2, 3, 0, 0, 0)
     after = mav.MAVLink_local_position_ned_message(2, 1, 2, 3, 0, 0, 0)
     attitude = mav.MAVLink_attitude_quaternion_message(4, 1, 0, 0, 0, 0, 0, 0)
-
     frames = listening_decoder().feed(packed(imu) + packed(before) + packed(after) + packed(attitude))
-
     assert [sample.time_boot_us // 1000 - wrap_ms for _, sample in frames] == [5, -3, 2, 4]
 
 
@@ -164,9 +131,7 @@ def test_after_a_reboot_of_a_vehicle_that_was_up_for_a_month_stamps_are_as_they_
     """The first position comes before the first HIGHRES_IMU; it lies in no later wrap of the boot before."""
     imu = mav.MAVLink_highres_imu_message(30 * 86_400_000_000, 0, 0, -9.8, *[0] * 10, 0x3F)
     rebooted = mav.MAVLink_local_position_ned_message(2_500, 1, 2, 3, 0, 0, 0)
-
     frames = listening_decoder().feed(packed(imu) + packed(rebooted))
-
     assert frames[1][1].time_boot_us == 2_500_000
 
 
@@ -174,9 +139,7 @@ def test_after_a_reboot_of_a_vehicle_that_was_up_for_a_month_stamps_are_as_they_
 def test_every_sample_is_decoded_in_any_chunking(chunk):
     stream = b"".join(packed(message) for message, _ in CASES)
     decoder = listening_decoder()
-
     frames = [f for i in range(0, len(stream), chunk) for f in decoder.feed(stream[i : i + chunk])]
-
     assert [sample for _, sample in frames] == [sample for _, sample in CASES]
     assert b"".join(frame for frame, _ in frames) == stream
 
@@ -192,9 +155,7 @@ def test_mavlink_1_packets_are_understood():
 def test_bad_bytes_cost_no_good_packet_and_none_is_lost(junk):
     good = b"".join(packed(message) for message, _ in CASES)
     decoder = listening_decoder()
-
     frames = decoder.feed(good + junk + good)
-
     assert [s for _, s in frames if s is not None] == [s for _, s in CASES] * 2
     assert b"".join(frame for frame, _ in frames) == good + junk + good
 
@@ -237,11 +198,11 @@ def test_a_value_that_no_vehicle_can_have_is_refused_and_the_greatest_it_can_hav
     for field in fields:
         message = copy.copy(measured(name))
         setattr(message, field, 0.99 * most)
-        assert not isinstance(heard(message), Refused | None), field
+        assert not isinstance(heard(message), ours.Refused | None), field
         for value in (*BROKEN, -1.6 * most, 1.6 * most):
             setattr(message, field, value)
             refused = heard(message)
-            assert isinstance(refused, Refused) and refused.message == name, (field, value)
+            assert isinstance(refused, ours.Refused) and refused.message == name, (field, value)
 
 
 @pytest.mark.parametrize("field", ["q1", "q2", "q3", "q4"])
@@ -253,7 +214,7 @@ def test_what_is_no_rotation_is_refused_and_one_to_a_thousandth_of_its_squared_l
         message = copy.copy(measured("ATTITUDE_QUATERNION"))
         message.q1 = message.q2 = message.q3 = message.q4 = 0.0
         setattr(message, field, value)
-        assert isinstance(heard(message), Refused) is not is_believed, value
+        assert isinstance(heard(message), ours.Refused) is not is_believed, value
 
 
 @pytest.mark.parametrize(("force_m_s2", "is_off"), [(0.0, True), (0.75, True), (-0.75, True), (0.82, False)])
@@ -261,14 +222,14 @@ def test_an_accelerometer_that_shows_no_more_than_its_zero_g_offset_is_off(force
     # The widest among PX4's drivers: 80 mg, 0.785 m/s^2
     message = copy.copy(measured("HIGHRES_IMU"))
     message.xacc, message.yacc, message.zacc = force_m_s2, 0.0, 0.0
-    assert isinstance(heard(message), Refused) is is_off
+    assert isinstance(heard(message), ours.Refused) is is_off
 
 
 def test_a_stamp_that_is_not_exact_in_double_precision_is_refused():
     for name in ("HIGHRES_IMU", "ODOMETRY", "VIBRATION"):
         message = copy.copy(measured(name))
         message.time_usec = 1 << 63
-        assert isinstance(heard(message), Refused), name
+        assert isinstance(heard(message), ours.Refused), name
 
 
 def sent(outgoing):
@@ -288,8 +249,7 @@ def sent(outgoing):
     ],
 )
 def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
-    m = sent(PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), yaw, velocity, acceleration))
-
+    m = sent(ours.PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), yaw, velocity, acceleration))
     assert (m.type_mask, m.coordinate_frame, m.target_system, m.target_component) == (mask, 1, 7, 1)
     assert (m.x, m.y, m.z, m.time_boot_ms) == (1.0, 2.0, -3.0, 2000)
     assert (m.afx, m.afy, m.afz) == acceleration if acceleration else math.isnan(m.afx)
@@ -301,10 +261,10 @@ def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
 @pytest.mark.parametrize(
     ("setpoint", "sequence"),
     [
-        (PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), 1.0, (0.5, 0.0, -0.5), (0.0, 2.0, 0.0)), 0),
-        (PositionSetpoint(0, (0.0, 0.0, 0.0), None, None, None), 255),
-        (PositionSetpoint(5_000_000_000_000, (-1e4, 1e-9, 0.1), -3.0, (0.0, 0.0, 0.0), None), 1),
-        (AttitudeSetpoint(5_000_000_000_000, (1.0, 0.0, 0.0, 0.0), 0.5, 0.25), 255),
+        (ours.PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), 1.0, (0.5, 0.0, -0.5), (0.0, 2.0, 0.0)), 0),
+        (ours.PositionSetpoint(0, (0.0, 0.0, 0.0), None, None, None), 255),
+        (ours.PositionSetpoint(5_000_000_000_000, (-1e4, 1e-9, 0.1), -3.0, (0.0, 0.0, 0.0), None), 1),
+        (ours.AttitudeSetpoint(5_000_000_000_000, (1.0, 0.0, 0.0, 0.0), 0.5, 0.25), 255),
     ],
 )
 def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs_it(setpoint, sequence):
@@ -312,7 +272,7 @@ def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs
     encoder.speak_to(7, 1)
     link.seq = sequence
     for _ in range(sequence):
-        encoder.packets(OnboardHeartbeat(True))
+        encoder.packets(ours.OnboardHeartbeat(True))
     ((name, fields),) = encoder.fields(setpoint)
     kind = mav.mavlink_map[mav.__dict__[f"MAVLINK_MSG_ID_{name}"]]
     theirs = kind(**{key: math.nan if value is None else value for key, value in fields.items()})
@@ -350,7 +310,7 @@ def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
 
 
 def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
-    m = sent(AttitudeSetpoint(2_000_000, (0.5, 0.5, -0.5, 0.5), 0.625, 1.5))
+    m = sent(ours.AttitudeSetpoint(2_000_000, (0.5, 0.5, -0.5, 0.5), 0.625, 1.5))
     assert m.get_type() == "SET_ATTITUDE_TARGET"
     assert (m.type_mask, m.target_system, m.target_component, m.time_boot_ms) == (0x03, 7, 1, 2000)
     assert (m.q, m.thrust, m.body_yaw_rate) == ([0.5, 0.5, -0.5, 0.5], 0.625, 1.5)
@@ -359,16 +319,16 @@ def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
 @pytest.mark.parametrize(
     ("command", "number", "parameters"),
     [
-        (SetMode(4 << 16 | 6 << 24, "AUTO.LAND", (4, 6)), 176, (1, 4, 6)),
-        (SetArmed(True), 400, (1, 0, 0)),
-        (SetArmed(False), 400, (0, 0, 0)),
-        (SetArmed(False, True), 400, (0, 21196, 0)),
-        (SetMessageInterval(105, 4000), 511, (105, 4000, 0)),
-        (RequestMessage(148), 512, (148, 0, 0)),
+        (ours.SetMode(4 << 16 | 6 << 24, "AUTO.LAND", (4, 6)), 176, (1, 4, 6)),
+        (ours.SetArmed(True), 400, (1, 0, 0)),
+        (ours.SetArmed(False), 400, (0, 0, 0)),
+        (ours.SetArmed(False, True), 400, (0, 21196, 0)),
+        (ours.SetMessageInterval(105, 4000), 511, (105, 4000, 0)),
+        (ours.RequestMessage(148), 512, (148, 0, 0)),
     ],
 )
 def test_commands_carry_their_parameters_and_zeros(command, number, parameters):
-    m = sent(SendCommand(command, 3))
+    m = sent(ours.SendCommand(command, 3))
     assert (m.command, m.confirmation, m.target_system, m.target_component) == (number, 3, 7, 1)
     assert tuple(getattr(m, f"param{index}") for index in range(1, 8)) == (*parameters, 0, 0, 0, 0)
 
@@ -376,14 +336,14 @@ def test_commands_carry_their_parameters_and_zeros(command, number, parameters):
 @pytest.mark.parametrize(
     ("outgoing", "fields"),
     [
-        (OnboardHeartbeat(True), {"type": 18, "autopilot": 8}),
-        (TimeSyncReply(777, 12345), {"ts1": 777, "tc1": 12345}),
+        (ours.OnboardHeartbeat(True), {"type": 18, "autopilot": 8}),
+        (ours.TimeSyncReply(777, 12345), {"ts1": 777, "tc1": 12345}),
         # Our own question is told from an answer by its zero
-        (TimeSyncAsk(12345), {"ts1": 12345, "tc1": 0}),
-        (ReadParameter("COM_OF_LOSS_T"), {"target_system": 7, "param_id": "COM_OF_LOSS_T", "param_index": -1}),
-        (NamedValue(1_500_000, "rb_thresh", 4.25), {"name": "rb_thresh", "value": 4.25, "time_boot_ms": 1500}),
+        (ours.TimeSyncAsk(12345), {"ts1": 12345, "tc1": 0}),
+        (ours.ReadParameter("COM_OF_LOSS_T"), {"target_system": 7, "param_id": "COM_OF_LOSS_T", "param_index": -1}),
+        (ours.NamedValue(1_500_000, "rb_thresh", 4.25), {"name": "rb_thresh", "value": 4.25, "time_boot_ms": 1500}),
         (
-            DebugVector(1_500_000, "rb_v_c", (2.0, -1.0, 0.5)),
+            ours.DebugVector(1_500_000, "rb_v_c", (2.0, -1.0, 0.5)),
             {"name": "rb_v_c", "x": 2.0, "y": -1.0, "z": 0.5, "time_usec": 1_500_000},
         ),
     ],
@@ -397,6 +357,6 @@ def test_what_is_sent_is_an_onboard_computers_of_the_vehicles_system(outgoing, f
 
 @pytest.mark.parametrize(("value", "kind"), [(0.5, 9), (4, 6), (-1, 6)])
 def test_a_parameter_is_set_with_its_type_and_bytes(value, kind):
-    m = sent(SetParameter("COM_OBL_RC_ACT", value))
+    m = sent(ours.SetParameter("COM_OBL_RC_ACT", value))
     assert (m.target_system, m.param_id, m.param_type) == (7, "COM_OBL_RC_ACT", kind)
     assert struct.pack("<f", m.param_value) == struct.pack("<f" if kind == 9 else "<i", value)

@@ -1,4 +1,4 @@
-"""Detector `fused` on a point mass that flies by eq. 1, its messages thinned as a link thins them."""
+"""Detector `fused` on a point mass that flies by eq. 1, its messages thinned as a link thins them; what it promises."""
 
 import math
 import random
@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
-from companion.motion.strapdown import Strapdown
-from companion.motion.vector import plus
-from companion.reflex.config import FusedConfig
+from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.motion.vector import ZERO, plus
+from companion.reflex.config import EXCESS, FusedConfig
 from companion.reflex.detector import Evidence, ImpactKind, Phase, Situation
-from companion.reflex.fused import FusedDetector
+from companion.reflex.fused import FusedDetector, FusedState
+from companion.reflex.health import promise_of
 
 TICK_US = 1_000
 WINDOW_US = 4_000
@@ -108,8 +109,7 @@ def test_a_foldable_hit_shows_in_the_first_sample_that_holds_it(speed_m_s, direc
 
 
 @pytest.mark.parametrize(
-    ("push", "kind"),
-    [((0.0, 0.0, 900.0), ImpactKind.CEILING), ((0.0, 0.0, -900.0), ImpactKind.STRUCK)],
+    ("push", "kind"), [((0.0, 0.0, 900.0), ImpactKind.CEILING), ((0.0, 0.0, -900.0), ImpactKind.STRUCK)]
 )
 def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push, kind):
     velocity = (0.0, 0.0, -1.0) if kind is ImpactKind.CEILING else (0.0, 0.0, 0.0)
@@ -240,3 +240,27 @@ def test_what_thrust_there_is_is_learnt_before_the_detector_trusts_its_noise():
     flown.fly(until_us=700_000)
     assert flown.state.phase is Phase.QUIET and flown.state.thrust.known_s > 0.5
     assert flown.state.thrust.full_m_s2 == pytest.approx(GRAVITY / HOVER_FRACTION, rel=0.02)
+
+
+FIXES = [VelocityFix(time_us, ZERO, ZERO) for time_us in range(0, 1_000_001, 20_000)]
+CONFIG = FusedConfig()
+
+
+def promise(side_m_s2, imu_hz=250):
+    state = FusedState()
+    state.floor.side_m_s2 = EXCESS * side_m_s2
+    state.threshold_m_s2 = max(CONFIG.side_threshold_m_s2, CONFIG.noise_factor * EXCESS * side_m_s2)
+    state.jump.known = 100
+    return promise_of(state, CONFIG, FIXES, imu_hz, True)
+
+
+def test_noise_at_the_bound_exceeds_it_once_in_half_a_thousand_hours():
+    # 6.3 standard deviations, 250 samples a second
+    assert promise(side_m_s2=2.0).false_alarms_per_h == pytest.approx(1.0 / 460.0, rel=0.1)
+    assert promise(side_m_s2=2.0, imu_hz=50).false_alarms_per_h == pytest.approx(1.0 / 2300.0, rel=0.1)
+
+
+def test_a_quiet_vehicle_promises_less_false_alarms_and_sees_less_force():
+    quiet, loud = promise(side_m_s2=0.1), promise(side_m_s2=2.0)
+    assert quiet.false_alarms_per_h < 1e-6 * loud.false_alarms_per_h
+    assert quiet.force_m_s2 == CONFIG.side_threshold_m_s2 < loud.force_m_s2

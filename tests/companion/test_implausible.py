@@ -5,15 +5,8 @@ import math
 import pytest
 
 from bench.fly.packets import made
-from companion.messages import (
-    ImuSample,
-    LandedState,
-    LocalPosition,
-    Odometry,
-    PositionSetpoint,
-    PositionTarget,
-    Refused,
-)
+from companion import messages
+from companion.messages import ImuSample, LandedState, LocalPosition, Odometry, PositionSetpoint, PositionTarget
 from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
@@ -58,7 +51,7 @@ def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_res
     resets = Resets()
     followed(resets, [told(0, 0.0), place(0, 0.0)])
     (jumped,) = followed(resets, [place(20, 50.0)])
-    assert isinstance(jumped, Refused) and "no reset" in jumped.reason
+    assert isinstance(jumped, messages.Refused) and "no reset" in jumped.reason
     assert followed(resets, [place(40, 0.1)]) == [place(40, 0.1)]
     followed(resets, [told(60, 50.0, 1), told(70, 50.0, 1)])
     assert followed(resets, [place(80, 50.0)]) == [place(80, 50.0)]

@@ -1,4 +1,4 @@
-"""The items of a mission on the wire: what the vehicle is asked to do, and when the next item comes."""
+"""A mission on the wire: each item, when the next one comes, what was expected, and how an interrupted one goes on."""
 
 import itertools
 import math
@@ -6,8 +6,9 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from companion.mission.model import Mission
-from tests.companion.fake_vehicle import LANDING, LOITER, TAKEOFF, flight
+from bench.fly.virtual_time import EPOCH_US
+from companion.mission.model import Mission, steps_to_fly
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, mission
 from tests.flying import Flight
 
 
@@ -185,3 +186,118 @@ def test_a_way_that_leaves_a_room_on_its_way_is_refused():
     there = [{"go_to": {"position_ned_m": [5, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 5, -1.5]}}]
     with pytest.raises(ValidationError, match=r"item 3 \(go_to\) leaves fence.polygon_ne_m at \[4.00, 1.00\]"):
         Mission.model_validate({"name": "t", "items": [TAKEOFF, *there, LANDING], "fence": room})
+
+
+# Steady when it meets the wall: the accelerometer of a vehicle that stays level does not show how it speeds up.
+STEADY = {"flight": {"speeding_up_m_s2": 2.0}}
+
+
+# (expectation, whether it is met, a piece of what was found), for a flight into a wall at 2 m/s
+BEFORE_THE_HIT = [
+    ({"collision": {"within_s": 5}}, True, "2.0"),
+    ({"collision": {"within_s": 1}}, False, "no hit"),
+    ({"collision": {"within_s": 5, "min_speed_m_s": 2.5}}, False, "hit at 2.0"),
+    ({"collision": {"within_s": 5, "max_speed_m_s": 2.5}}, True, "2.0"),
+    ({"no_collision": None}, False, "hit at"),
+    ({"no_collision": {"for_s": 0.5}}, True, "none"),
+]
+AFTER_IT = [
+    ({"no_collision": {}}, True, "none until the end"),
+    ({"collision": {"within_s": 100}}, False, "none until the end"),
+    ({"collisions": {"exactly": 1}}, True, "1"),
+    ({"collisions": {"at_least": 2}}, False, "1"),
+    ({"collisions": {"at_most": 1}}, True, "1"),
+    ({"recovered": None}, True, "settled after"),
+    ({"recovered": {"within_s": 0.1}}, False, "settled after"),
+    ({"recovered": {"max_overshoot_m": 0.5}}, True, "too far"),
+    ({"position": {"ned_m": [1.95, 0, -1.5], "within_m": 0.3}}, True, ""),
+    ({"position": {"ned_m": [5, 0, -1.5], "within_m": 0.3}}, False, ""),
+    ({"height": {"min_m": 1.3, "max_m": 1.7}}, True, "1.5"),
+    ({"height": {"max_m": 1.0}}, False, "1.5"),
+    ({"speed": {"max_m_s": 0.2}}, True, "m/s"),
+    ({"flight_time": {"at_most_s": 5}}, False, " s"),
+    ({"flight_time": {"at_most_s": 60}}, True, " s"),
+]
+
+
+def test_each_expectation_is_met_or_not_and_the_flight_goes_on():
+    before, after = ([{"expect": wish} for wish, _, _ in wishes] for wishes in (BEFORE_THE_HIT, AFTER_IT))
+    f = at_wall(*before, INTO_WALL, *after, companion=STEADY)
+    report = f.run_to_end()
+    for result, (wish, met, detail) in zip(report.expectations, [*BEFORE_THE_HIT, *AFTER_IT], strict=True):
+        assert result.met is met, (wish, result)
+        assert detail in result.detail, (wish, result)
+    assert report.outcome == "failed"
+    assert report.reason.startswith("expectation of item 3 not met: a hit within 1 s (was: no hit), and ")
+    assert f.vehicle.landed == 1 and not f.vehicle.armed, "it lands as it would have"
+
+
+def test_what_was_expected_of_a_flight_that_ended_early_is_told_too():
+    f = flight(items=[TAKEOFF, {"expect": {"no_collision": {}}}, {"hold": {"duration_s": 9}}, LANDING])
+    f.run_to("mission")
+    f.run_for(1.0)
+    f.companion.stop("Ctrl-C")
+    report = f.run_to_end()
+    assert report.outcome == "aborted" and report.reason == "Ctrl-C"
+    assert [result.met for result in report.expectations] == [True]
+
+
+ITEMS = [
+    {"takeoff": {"height_m": 1.5}},
+    {"set_speed": {"speed_m_s": 2.0}},
+    {"go_to": {"position_ned_m": [3, 0, -1.5]}},
+    {"repeat": {"times": 2, "items": [{"go_to": {"position_ned_m": [3, y, -1.5]}} for y in (2, 0)]}},
+    {"land": {}},
+]
+FIRST = {"origin_ned_m": [10.0, 5.0, 0.0], "armed_at_us": EPOCH_US - 600_000_000}
+
+
+def resumed(at_step: int, boot_us: int, items=ITEMS, **changes) -> Flight:
+    """The vehicle was armed `boot_us` after its start, ten minutes ago, two metres from where it stands."""
+    resume = {"at_step": at_step, **FIRST, "armed_boot_us": boot_us}
+    vehicle = FakeVehicle(start_ned_m=(12.0, 5.0, 0.0), time_us=605_000_000)
+    return flight(vehicle, items=items, resume=resume | changes)
+
+
+def test_what_is_left_is_flown_from_where_its_step_begins():
+    steps = steps_to_fly(mission(items=ITEMS, resume={"at_step": 4, **FIRST, "armed_boot_us": 0}))
+    assert [step.name for step in steps] == ["takeoff", "set_speed", "go_to", "go_to", "go_to", "go_to", "land"]
+    assert [step.index for step in steps] == [0, 4, 4, 4, 5, 6, 7]
+    # step 4 leads from [3, 2] to [3, 0]
+    assert steps[2].action.position_ned_m == (3.0, 2.0, -1.5)
+    assert steps[3].label == "4.2 (1 of 2)"
+
+
+def test_while_the_vehicle_was_not_restarted_its_first_arming_position_counts():
+    f = resumed(4, 5_000_000)
+    f.run_to("landing")
+    assert "the first flight's arming position" in f.event("resume").text
+    assert f.report.origin_ned_m == (10.0, 5.0, 0.0)
+    climbed = next(m for _, m in f.vehicle.setpoints if m.z < -1.49)
+    assert (climbed.x, climbed.y) == pytest.approx((12.0, 5.0), abs=1e-3), "straight up from where it stands"
+    assert f.vehicle.position == pytest.approx([13.0, 5.0, -1.5], abs=0.3)
+    first = f.event("item", 1)
+    assert first.data["step"] == 4 and "go to [3.00, 2.00, -1.50]" in first.text
+
+
+def test_after_a_restart_the_new_arming_position_counts():
+    f = resumed(4, 400_000_000)
+    f.run_to("landing")
+    assert "the vehicle was restarted" in f.event("resume").text
+    assert f.vehicle.position == pytest.approx([15.0, 5.0, -1.5], abs=0.3)
+
+
+def test_an_interrupted_flight_says_where_to_go_on_and_a_resumed_one_too():
+    f = resumed(4, 5_000_000)
+    f.run_until(lambda: [e.data["step"] for e in f.events if e.kind == "item"][-1:] == [5])
+    f.companion.stop("Ctrl-C")
+    f.run_to_end()
+    assert f.event("aborted").data["next_step"] == 5
+
+
+def test_the_hits_of_before_count_for_what_the_mission_expects():
+    items = [*ITEMS[:-1], {"expect": {"collisions": {"exactly": 1}}}, ITEMS[-1]]
+    f = resumed(6, 5_000_000, items, hits=1)
+    f.run_to_end()
+    assert f.event("expect").data["met"] is True
+    assert f.report.outcome == "completed"

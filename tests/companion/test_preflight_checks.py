@@ -4,27 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from companion import messages
 from companion.autopilot.setup import SerialLine, Verdict
-from companion.messages import (
-    Attitude,
-    Battery,
-    EstimatorStatus,
-    ExtendedState,
-    Heartbeat,
-    ImuSample,
-    LandedState,
-    LocalPosition,
-    Parameter,
-    ReadParameter,
-    Sample,
-    TimeSyncAnswer,
-    TimeSyncAsk,
-    Vibration,
-)
+from companion.messages import Attitude, LocalPosition, Parameter, ReadParameter, Sample, TimeSyncAnswer, TimeSyncAsk
 from companion.mission.config import CompanionConfig
 from companion.preflight import Survey, advance, findings, start_survey
 
-PX4 = Heartbeat(1, 1, 2, 12, False, 0, 3)
+PX4 = messages.Heartbeat(1, 1, 2, 12, False, 0, 3)
 HEALTHY = {
     "COM_OF_LOSS_T": 0.3,
     "COM_OBL_RC_ACT": 4,
@@ -78,7 +64,7 @@ def surveyed(
         samples: list[Sample] = []
         if number * imu_hz // 250 != (number + 1) * imu_hz // 250:
             side_m_s2 = shakes_m_s2 * (-1) ** number
-            held.append(ImuSample(now_us, (side_m_s2, 0.0, -9.81), (0.0, 0.0, 0.0)))
+            held.append(messages.ImuSample(now_us, (side_m_s2, 0.0, -9.81), (0.0, 0.0, 0.0)))
         if not held_us or number % (held_us // step_us) == 0:
             samples += held
             held = []
@@ -86,10 +72,10 @@ def surveyed(
             north_m = wander_m if number % 2 else -wander_m
             samples += [LocalPosition(now_us, (north_m, 0.0, 0.0), (0.0, 0.0, 0.0)), Attitude(now_us, (1.0, 0, 0, 0))]
         if number % 250 == 0:
-            samples += [EstimatorStatus((ratio, ratio, ratio), velocity, False), Battery(battery)]
-            samples += [Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0))]
+            samples += [messages.EstimatorStatus((ratio, ratio, ratio), velocity, False), messages.Battery(battery)]
+            samples += [messages.Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0))]
             samples += [Parameter(name, value) for name, value in parameters.items()]
-            samples += [replace(PX4, armed=flies), ExtendedState(LandedState(2 if flies else 1))]
+            samples += [replace(PX4, armed=flies), messages.ExtendedState(messages.LandedState(2 if flies else 1))]
         if asked and now_us - asked[0] // 1000 >= trip_us:
             samples.append(TimeSyncAnswer(asked.pop(0), 1))
         sent = advance(survey, samples, now_us)

@@ -47,11 +47,7 @@ def still(t):
 
 @pytest.mark.parametrize(
     ("velocity_m_s", "goal_ahead_m"),
-    [
-        (still, (1.0, 0.0)),
-        (lambda t: (0.05, 0.4 + 0.1 * t), (0.3, 0.3)),
-        (lambda t: (0.25, 0.25), (0.3, 0.3)),
-    ],
+    [(still, (1.0, 0.0)), (lambda t: (0.05, 0.4 + 0.1 * t), (0.3, 0.3)), (lambda t: (0.25, 0.25), (0.3, 0.3))],
     ids=["stands", "slides along", "slides while friction turns the force by 45 degrees"],
 )
 def test_a_vehicle_that_leans_on_a_wall_more_and_more_is_kept_off(velocity_m_s, goal_ahead_m):
@@ -78,12 +74,7 @@ def glide(t):
         (3.0, lambda t: (t, 0.0), lambda t: min(1.0, 5.0 * t), (9.0, 0.0)),
         (2.0, lambda t: (1.0 - t, 0.0), lambda t: -1.0, (9.0, 0.0)),
         # Taken up while the vehicle speeds up away from what it hit, with a tail wind that gives it 0.7 m/s^2
-        (
-            0.7,
-            glide,
-            lambda t: 1.5 - 15.0 * min(t, 0.24) - 4.0 * max(0.0, t - 0.24),
-            (0.0, 0.0),
-        ),
+        (0.7, glide, lambda t: 1.5 - 15.0 * min(t, 0.24) - 4.0 * max(0.0, t - 0.24), (0.0, 0.0)),
         (5.0, still, lambda t: 3.0, (1.0, 0.0)),
         # The lean follows late and is what the gust is at last
         (4.0, lambda t: (gust(t), 0.0), lambda t: min(1.8, 1.2 * t), (1.0, 0.0)),

@@ -23,7 +23,7 @@ from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.scene import Scene
 from tests.docs.pages import ROOT, blocks, manual, name_of
 
-# Python on these pages is run elsewhere: by tests/sim_vehicle/bench/test_pytest_plugin.py and tests/clients.
+# Python on these pages is run elsewhere: by tests/sim_vehicle/bench/test_on_sockets.py and tests/clients.
 PYTHON_PAGES = {"docs/how-to/testing.md", "docs/tutorials/test-your-program.md", "docs/tutorials/mavsdk.md"}
 LANGUAGES = {"sh", "console", "yaml", "python", "text", "mermaid"}
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?")

@@ -22,7 +22,7 @@ from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.autopilot.commander.failsafe_table import ROWS
 from sim_vehicle.autopilot.modes import TRANSITIONS
 from tests.bench.random_missions import made_up
-from tests.rebound_cli.results.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of
+from tests.rebound_cli.results.test_results import EPOCH_US, FACTS, collision, hit, path_of
 
 # What is told under a kind that stands in no call.
 ELSEWHERE = {"late", "lost", "guard", *_KINDS.values()}

@@ -8,19 +8,8 @@ import pytest
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
-from bench.fly.commanded import (
-    ARM,
-    FACE_NORTH_M,
-    HOLD,
-    LAND,
-    MANUAL_POSITION,
-    OFFBOARD,
-    REPEATED_EVERY_S,
-    by_places,
-    by_sticks,
-    fly_a_mission,
-    sticks,
-)
+from bench.fly import commanded
+from bench.fly.commanded import ARM, FACE_NORTH_M, LAND, OFFBOARD, REPEATED_EVERY_S, by_places, fly_a_mission, sticks
 from companion.autopilot.px4.firmware import PX4
 from companion.guard.between import BURST_S, Between
 from companion.guard.config import GuardConfig
@@ -62,7 +51,7 @@ def hit(flies: Callable[[BetweenFlight], None], parameters: dict[str, float] | N
     return air
 
 
-@pytest.mark.parametrize("flies", [by_places, by_attitudes, fly_a_mission, by_sticks])
+@pytest.mark.parametrize("flies", [by_places, by_attitudes, fly_a_mission, commanded.by_sticks])
 def test_whoever_flies_into_the_wall_is_recovered_and_nothing_of_his_moves_the_vehicle_meanwhile(flies):
     air = hit(flies)
     taken_s = air.time_s
@@ -209,7 +198,7 @@ def test_in_a_recovery_a_stick_is_obeyed_at_once():
     assert air.state is State.STOOD_DOWN
 
 
-@pytest.mark.parametrize("mode", [HOLD, LAND, MANUAL_POSITION])
+@pytest.mark.parametrize("mode", [commanded.HOLD, LAND, commanded.MANUAL_POSITION])
 def test_in_a_recovery_a_mode_that_is_asked_for_is_taken_at_once_and_stays(mode):
     air = hit(by_places)
     sticks(air, 0.0)

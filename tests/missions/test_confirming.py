@@ -15,11 +15,7 @@ from tests.simulated import simulated
 
 pytestmark = pytest.mark.flight
 
-ITEMS = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [6, 0, -1.5], "speed_m_s": 2.0}},
-    {"land": {}},
-]
+ITEMS = [{"takeoff": {"height_m": 1.5}}, {"go_to": {"position_ned_m": [6, 0, -1.5], "speed_m_s": 2.0}}, {"land": {}}]
 AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro")
 
 

@@ -27,14 +27,7 @@ HOP = ("--set", "items=[{takeoff: {height_m: 0.6}}, {land: {}}]", *QUICK)
 
 def start(*arguments, stdin=subprocess.DEVNULL):
     command = [sys.executable, "-m", "rebound_cli", *map(str, arguments)]
-    return subprocess.Popen(
-        command,
-        cwd=ROOT,
-        text=True,
-        stdin=stdin,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    return subprocess.Popen(command, cwd=ROOT, text=True, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
 def run_here(*arguments):

@@ -1,11 +1,15 @@
-"""Bad input: one clear sentence, a non-zero exit, no traceback, nothing left running."""
+"""Bad input, in words, files or --set: one clear sentence with place and remedy, an exit code, nothing left running."""
 
 import json
 import socket
 
 import pytest
 
+from companion.mission.model import Mission
+from companion.reflex.config import GuardsConfig
 from rebound_cli import exit_codes
+from rebound_cli.documents import DocumentError, apply_overrides, load_document, parse_document, validated
+from rebound_cli.inputs import mission_from, world_from
 from rebound_cli.main import main
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.hil.parameters import px4_parameters
@@ -35,6 +39,13 @@ def test_an_address_that_nobody_can_answer_from(tmp_path, command, url):
 def test_an_airframe_is_printed_whole_in_every_format(format_name):
     result = run_here("airframe", "px4", "--airframe", "rigid", "--format", format_name)
     assert all(parameter.name in result.stdout for parameter in px4_parameters(load_built_in("rigid")))
+
+
+def test_parameters_for_ardupilot_have_no_other_form(tmp_path):
+    printed = run_here("airframe", "ardupilot", "--airframe", "rigid")
+    assert printed.returncode == 0 and "FRAME_TYPE 1\n" in printed.stdout
+    refused = run_here("airframe", "ardupilot", "--format", "env")
+    assert refused.returncode != 0 and "--format and --position belong to px4" in refused.stderr
 
 
 @pytest.mark.parametrize(
@@ -152,3 +163,164 @@ def test_a_command_that_moved_or_is_gone_names_what_to_use(command, words, capsy
     assert main([command, "--out", "docs"]) == 1
     complaint = capsys.readouterr().err
     assert words in complaint and complaint.count("\n") == 1
+
+
+MISSION = """\
+name: demo
+items:
+  - takeoff: {height_m: 1.5}
+  - go_to:
+      position_ned_m: [1, 0, -1.5]
+      speed_m_s: 1.0
+  - land: {}
+sim:
+  walls:
+    - {point_ned_m: [4, 0, 0], normal_ned: [-1, 0, 0]}
+"""
+
+
+def document(old="", new="", sets=()):
+    assert old in MISSION
+    parsed = parse_document(MISSION.replace(old, new) if old else MISSION, "demo.yaml")
+    apply_overrides(parsed, sets)
+    return parsed
+
+
+def complaint(action, *arguments):
+    with pytest.raises(DocumentError) as caught:
+        action(*arguments)
+    return str(caught.value)
+
+
+def test_aliases_that_multiply_are_refused_before_they_take_the_memory():
+    levels = "\n".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 10))
+    text = complaint(parse_document, f"a0: &a0 [1, 2, 3]\n{levels}\n", "bomb.yaml")
+    assert text.startswith("bomb.yaml:") and "aliases" in text
+    assert "in themselves" in complaint(parse_document, "name: &all\n  again: *all\n", "itself.yaml")
+    assert parse_document("a: &a [1, 2]\nb: *a\n", "good.yaml").data["b"] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("speed_m_s: 1.0", "speed_m_s: -1", "6: items.1.go_to.speed_m_s: must be greater than 0, not -1."),
+        (
+            "speed_m_s: 1.0",
+            "speed_m_s: 1,5",
+            "6: items.1.go_to.speed_m_s: must be a valid number, not '1,5'; write 1.5.",
+        ),
+        ("{height_m: 1.5}", "{height_m: 1,5}", "3: items.0.takeoff.5: '5' is no key; a number is written with a point"),
+        ("      position_ned_m: [1, 0, -1.5]\n", "", "4: items.1.go_to.position_ned_m: is missing; add it."),
+        ("[1, 0, -1.5]", "[99, 0, -1.5]", "4: items: the position of item 2 (go_to) lies 99.00 m out"),
+    ],
+)
+def test_what_is_wrong_names_file_line_and_path(old, new, said):
+    assert complaint(mission_from, document(old, new)).startswith(f"demo.yaml:{said}")
+
+
+def test_an_unknown_key_suggests_the_close_one_and_lists_all():
+    text = complaint(mission_from, document("speed_m_s", "sped_m_s"))
+    assert "demo.yaml:6: items.1.go_to.sped_m_s: unknown key 'sped_m_s'; did you mean 'speed_m_s'?" in text
+    assert "position_ned_m, speed_m_s, acceleration_m_s2, yaw_deg" in text
+    repeated = ["items.1={repeat: {times: 2, items: [{hodl: {duration_s: 1}}]}}"]
+    text = complaint(mission_from, document(sets=repeated))
+    assert "unknown key 'hodl'; did you mean 'hold'?" in text
+    assert "needs at least" not in text, "the list is as long as it must be"
+
+
+def test_a_key_of_an_earlier_version_is_taken_with_a_warning():
+    earlier = "companion: {fused: {kick_rad_s: 0.4, rate_step_rad_s: 3.0}}\nsim:"
+    with pytest.warns(UserWarning, match="kick_rad_s has no effect any more"):
+        mission = mission_from(document("sim:", earlier))
+    assert mission.companion.fused.rate_step_rad_s == 3.0
+
+
+def test_the_sim_part_is_checked_like_the_rest():
+    text = complaint(world_from, document("normal_ned", "nomal_ned"))
+    assert "demo.yaml:10: sim.walls.0.nomal_ned: unknown key" in text and "did you mean 'normal_ned'?" in text
+    text = complaint(world_from, document("[4, 0, 0]", "[0.1, 0, 0]"))
+    assert text.startswith("demo.yaml:9: ") and "start position" in text and "\n" not in text
+    fault = "  faults:\n    - {kind: wire, at_s: 1, loss: 1.0, messages: [ATTITUDE, ATITUDE]}\n"
+    text = complaint(world_from, parse_document(MISSION + fault, "demo.yaml"))
+    assert text == "demo.yaml:12: no MAVLink message is called 'ATITUDE'."
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("name: [", "demo.yaml:1: not valid YAML"),
+        ("name: a\n\tb: c", "demo.yaml:2: not valid YAML"),
+        ("name: a\nname: b", "demo.yaml:2: 'name' is given twice"),
+        ("- name", "demo.yaml:1: a mapping was expected"),
+        ("", "the file is empty"),
+        ("a: !!python/object:os.system {}", "demo.yaml:1: not valid YAML"),
+        ("a: \x00", "not valid YAML"),
+        ("name: demo\nitems: 2001-99-99\n", "month must be in 1..12"),
+        (f"name: demo\nsim: {{seed: 1{'0' * 5000}}}\n", "cannot be read"),
+        ("items: " + 2000 * "[" + 2000 * "]", "nested too deeply"),
+        ("a: 1\n" * 200_001, "longer than 1 MB"),
+    ],
+    ids=range(11),
+)
+def test_bad_yaml_is_one_sentence_with_the_files_name(text, said):
+    message = complaint(parse_document, text, "demo.yaml")
+    assert message.startswith("demo.yaml:") and said in message and "\n" not in message
+
+
+def test_a_folder_or_a_binary_file_cannot_be_a_mission(tmp_path):
+    (tmp_path / "picture.yaml").write_bytes(b"\xff\xfe\x00\x80")
+    assert "cannot be read" in complaint(load_document, tmp_path)
+    assert "not UTF-8" in complaint(load_document, tmp_path / "picture.yaml")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("items.1.go_to.sped_m_s=2", "did you mean 'speed_m_s'?"),
+        ("item.1=2", "did you mean 'items'?"),
+        ("items.9.go_to.speed_m_s=2", "'items' is a list of 3, counted from 0; it has no '9'"),
+        ("items.first=2", "it has no 'first'"),
+        ("name.x=2", "'name' is a single value"),
+        ("items.1.go_to.speed_m_s", "give PATH=VALUE"),
+        ("companion.detectr=fused", "did you mean 'detector'?"),
+        ("companion.detector=psychic", "there is no detector 'psychic'"),
+        ("items.1.go_to.speed_m_s=fast", "must be a valid number, not 'fast'"),
+        ("items.1.go_to.speed_m_s=2001-99-99", "is not valid YAML"),
+        ("items.1={path: {points_ned_m: []}}", "points_ned_m: needs at least 1 of them, and has 0."),
+    ],
+)
+def test_a_wrong_set_names_itself_and_the_remedy(given, said):
+    text = complaint(lambda: mission_from(document(sets=[given])))
+    assert text.startswith(f"--set {given}: ") and said in text
+
+
+def test_a_simulated_flight_takes_the_guards_of_its_airframe_where_the_mission_names_none():
+    def guards(airframe, *sets, is_simulated=True):
+        given = document(sets=[f"sim.airframe={airframe}", *sets])
+        return mission_from(given, world_from(given) if is_simulated else None).companion.estimate.guards
+
+    assert guards("foldable") == guards("rigid") == GuardsConfig(), "to the last digit, or no flight comes again"
+    # The mission's own are all that it flies with, and a real vehicle is none of `sim:`
+    assert guards("foldable", "companion.estimate.guards={centre_m: 0.2}") == GuardsConfig(centre_m=0.2)
+    assert guards("foldable", is_simulated=False) == GuardsConfig()
+    assert guards("foldable", "companion.estimate={position_noise_m: 0.05}") == GuardsConfig()
+
+
+@pytest.mark.parametrize("wrong", ["companion=3", "companion.estimate=3", "companion.estimate=null"])
+def test_a_companion_part_that_is_none_is_refused_beside_a_simulated_vehicle_too(wrong):
+    given = document(sets=[wrong])
+    assert complaint(mission_from, given, world_from(given)) == complaint(mission_from, given)
+
+
+def test_what_is_wrong_in_an_airframes_file_names_that_file(tmp_path):
+    own = tmp_path / "heavy.yaml"
+    own.write_text("based_on: foldable\nname: heavy\nmas_kg: 1.2\n")
+    text = complaint(world_from, document(sets=[f"sim.airframe={own}"]))
+    assert text.startswith(f"{own}:3: mas_kg: unknown key") and "did you mean 'mass_kg'?" in text
+
+
+def test_of_thousands_of_faults_the_first_ones_are_shown():
+    lines = "".join(f"  - wait: {{mistake{n}: 1}}\n" for n in range(200))
+    found = parse_document(f"name: demo\nitems:\n{lines}", "demo.yaml")
+    said = complaint(validated, Mission, found, found.data).splitlines()
+    assert len(said) == 6 and said[0].startswith("demo.yaml:3: items.0.wait: ") and "more" in said[-1]

@@ -15,7 +15,7 @@ from rebound_cli.documents import Document
 from rebound_cli.inputs import mission_from, world_from
 from rebound_cli.report.content import content
 from tests.rebound_cli.command import ROOT, WALL, run_here
-from tests.rebound_cli.report.opened import Opened
+from tests.rebound_cli.report.test_page import Opened
 
 SCHEMA = ROOT / "missions" / "schema.json"
 MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))

@@ -10,17 +10,9 @@ import pytest
 from companion.mission.config import DiskConfig
 from rebound_cli.background import Background
 from rebound_cli.flights import kept as ring
-from rebound_cli.flights.kept import (
-    LAST_BYTES,
-    LOOK_EVERY_US,
-    DiskLimits,
-    Ring,
-    folder_with_room,
-    kept_flights,
-    limits_of,
-)
+from rebound_cli.flights.kept import LAST_BYTES, LOOK_EVERY_US, DiskLimits, Ring, folder_with_room, kept_flights
 from rebound_cli.results.run_folder import EVENTS_NAME, TLOG_NAME
-from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
+from tests.rebound_cli.flights.test_logs import BLOCK, EPOCH_US, pretend, record
 
 GIB, MIB = 1 << 30, 1 << 20
 MB = 1_000_000
@@ -60,7 +52,7 @@ def disk(monkeypatch):
     ],
 )
 def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_others(config, disk_bytes, limits):
-    assert limits_of(DiskConfig.model_validate(config), disk_bytes) == limits
+    assert ring.limits_of(DiskConfig.model_validate(config), disk_bytes) == limits
 
 
 @pytest.mark.parametrize(("lacking_mb", "stay"), [(0, "12345"), (1, "1345"), (2, "135"), (3, "35"), (4, "5"), (5, "5")])

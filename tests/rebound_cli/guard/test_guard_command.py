@@ -1,9 +1,10 @@
-"""`rebound guard` as a person or a service runs it."""
+"""`rebound guard` as a person or a service runs it, also at the end of a serial line that is pulled out."""
 
 import json
 import os
 import signal
 import threading
+import time
 
 import pytest
 import yaml
@@ -15,17 +16,11 @@ from rebound_cli.guard import run_guard
 from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
+from sim_vehicle.testing import start_vehicle
 from tests.ports import free_port
-from tests.rebound_cli.command import (
-    QUICK,
-    assert_comes_again,
-    events_of,
-    guarding,
-    run_here,
-    taken_off,
-    vehicle_on_air,
-    wait_for_event,
-)
+from tests.rebound_cli import command
+from tests.rebound_cli.command import assert_comes_again, events_of, guarding, taken_off, vehicle_on_air, wait_for_event
+from tests.rebound_cli.live.cable import Cable
 
 pytestmark = pytest.mark.realtime
 
@@ -34,7 +29,7 @@ PATIENT = ("--set", "companion.link.heartbeat_wait_s=30")
 
 def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
     quick = ("--set", "companion.link.heartbeat_wait_s=0.3")
-    done = run_here("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path, *quick)
+    done = command.run_here("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path, *quick)
     assert done.returncode == 1
     assert "No HEARTBEAT from an autopilot within 0.3 s" in done.stderr
     assert json.loads((tmp_path / "summary.json").read_text())["collisions"] == []
@@ -99,7 +94,7 @@ def test_a_vehicle_at_rest_fills_one_record_after_the_other_and_one_that_is_arme
     monkeypatch.setattr(kept, "LAST_BYTES", 100_000)
     monkeypatch.setattr(kept, "LOOK_EVERY_US", 500_000)
     budget = ("--set", "companion.disk.max_use_mb=0.8")
-    words = ("guard", "--connect", rebound_vehicle.tcp_address, *budget, *QUICK, *PATIENT)
+    words = ("guard", "--connect", rebound_vehicle.tcp_address, *budget, *command.QUICK, *PATIENT)
     while_armed = []
 
     def pilot():
@@ -126,3 +121,39 @@ def test_a_vehicle_at_rest_fills_one_record_after_the_other_and_one_that_is_arme
     assert [event["kind"] for event in events_of(last)].count("watching") == 1
     for folder in (*earlier, last):
         assert_comes_again(folder)
+
+
+def test_a_guard_waits_for_its_cable_recovers_over_it_and_outlasts_that_it_is_unplugged(tmp_path):
+    # Given a guard that is up before its cable is plugged in
+    folder = tmp_path / "run"
+    with (
+        Cable(tmp_path / "pixhawk") as cable,
+        start_vehicle(links=(cable.vehicle_url,)) as vehicle,
+        guarding(cable.url, folder, "--wait"),
+    ):
+        wait_for_event(folder, "link", word=f"Serial port {cable.name} does not exist")
+        first = cable.plug()
+        wait_for_event(folder, "standing_by")
+        # When a pilot flies, by a radio of their own
+        pilot = taken_off(vehicle)
+        wait_for_event(folder, "watching", word="watching")
+        vehicle.hit(1.5, bearing_deg=90)
+        # Then a hit is recovered from
+        wait_for_event(folder, "given_back")
+        # And when the cable is pulled out, and put in as another device, bytes pass again within a second
+        cable.unplug()
+        wait_for_event(folder, "link", word="lost, reconnecting")
+        second, plugged_us = cable.plug(), time.time_ns() // 1000
+        assert second != first
+        assert wait_for_event(folder, "link", word="connected again")["time_us"] - plugged_us < 1_000_000
+        # And nothing was taken over for that; the next hit is recovered from as the first
+        assert [event["kind"] for event in events_of(folder)].count("take_over") == 1
+        vehicle.wait_until(lambda truth: truth.mode == "Hold", within_s=5)
+        wait_for_event(folder, "mode", word="AUTO.LOITER")
+        vehicle.hit(1.5, bearing_deg=90)
+        wait_for_event(folder, "given_back", count=2)
+        pilot.close()
+    summary = json.loads((folder / "summary.json").read_text())
+    # What struck it may touch it again before it is clear: part of the same recovery
+    assert summary["reconnects"] == 1 and len(summary["collisions"]) >= 2
+    assert_comes_again(folder)

@@ -1,13 +1,26 @@
-"""What a person sees while something flies or is compiled: on a terminal, and in a pipe."""
+"""Who watches: console, plan and yes, the signals that end it; and the status socket, which disturbs nobody."""
 
+import contextlib
 import io
+import json
+import os
+import signal
+import socket
+import stat
 import sys
+import tempfile
+import threading
+from unittest.mock import Mock
 
 import pytest
 
 from companion.report import Event, Status
+from rebound_cli.live import status as status_socket
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import AskPerson
+from rebound_cli.live.status import StatusServer, ask, served, socket_of_this_program, sockets_to_ask, text_of
+from rebound_cli.main import main
 from rebound_cli.results.timing import LinkRate
 from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
 
@@ -77,3 +90,192 @@ def test_the_link_is_a_rate_and_then_a_silence():
     assert heard.text(2_100_000) == "40.4 kB/s"
     assert heard.text(2_900_000) == "40.4 kB/s"
     assert heard.text(4_100_000) == "silent for 2.0 s"
+
+
+def planned():
+    """A companion with a plan that is ready."""
+    return Mock(plan_is_ready=Mock(return_value=True), plan_text=lambda: "the plan")
+
+
+@pytest.fixture
+def typed():
+    reads, writes = os.pipe()
+    yield reads, lambda text: os.write(writes, text)
+    for descriptor in (reads, writes):
+        os.close(descriptor)
+
+
+def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile(typed):
+    reads, types = typed
+    companion = planned()
+    shown = io.StringIO()
+    console = Console(shown)
+    person = AskPerson(console, reads)
+    # Given a question
+    person.poll(companion)
+    assert shown.getvalue().count("Fly this plan?") == 1 and console.live_is_held
+    # When the vehicle is away, and yes is typed
+    companion.plan_is_ready.return_value = False
+    types(b"y\n")
+    person.poll(companion)
+    assert not console.live_is_held
+    # Then the next plan is asked for, and that yes says nothing of it
+    companion.plan_is_ready.return_value = True
+    for _ in range(3):
+        person.poll(companion)
+    assert shown.getvalue().count("the plan") == 2 and not companion.confirm_plan.called
+    # And a yes to that one does
+    types(b"yes\n")
+    person.poll(companion)
+    assert companion.confirm_plan.called and not companion.stop.called
+
+
+# The last one is the end of input.
+@pytest.mark.parametrize("line", [b"n\n", b"\n", b"yessir\n", None])
+def test_all_but_a_yes_is_a_no(line):
+    reads, writes = os.pipe()
+    companion = planned()
+    person = AskPerson(Console(io.StringIO()), reads)
+    if line is not None:
+        os.write(writes, line)
+    os.close(writes)
+    for _ in range(2):
+        person.poll(companion)
+    os.close(reads)
+    companion.stop.assert_called_once_with("the plan was not confirmed")
+    assert not companion.confirm_plan.called
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_first_signal_is_a_reason_and_the_second_ends_the_program(number):
+    before = signal.getsignal(number)
+    with Interrupts() as interrupts:
+        os.kill(os.getpid(), number)
+        assert interrupts.reason is not None and interrupts.reason.startswith("stopped")
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), number)
+    assert signal.getsignal(number) is before
+
+
+def test_one_that_is_put_off_may_come_once_more_before_the_next_ends_the_program():
+    with Interrupts() as interrupts:
+        assert interrupts.news(is_put_off=False) is None
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts.news(is_put_off=False) == "stopped with Ctrl-C"
+        assert interrupts.news(is_put_off=True) is None
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts.news(is_put_off=True) == "stopped with Ctrl-C, and once more"
+        assert interrupts.news(is_put_off=True) is None
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+WATCHING = Status("watching", "POSCTL", True, (1.0, 2.0, -3.0), 0.5, "armed", 12_000)
+ARMED = Event(500_000, "armed", "armed", {})
+HIT = Event(1_000_000, "detection", "hit 1: 30.0 m/s^2", {})
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "status.sock"
+
+
+@pytest.fixture
+def server(path):
+    server = StatusServer(path, {"command": "guard", "folder": "/runs/now"})
+    yield server
+    server.close()
+
+
+def hand_over(server, *events, running_s=5.0):
+    server.hand_over(lambda: WATCHING, events, running_s, "90.0 kB/s")
+
+
+def test_who_asks_hears_the_latest_state_and_how_old_it_is(server, path):
+    # Its owner alone may ask, before the first step too
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert ask(path)["age_s"] is None and text_of(ask(path)).endswith("starting")
+    hand_over(server, ARMED, HIT)
+    status = ask(path)
+    assert status["command"] == "guard" and status["folder"] == "/runs/now" and status["pid"] == os.getpid()
+    assert status["state"] == "watching" and status["armed"] is True and status["position_ned_m"] == [1.0, 2.0, -3.0]
+    assert status["hits"] == 1 and status["last_event"] == "hit 1: 30.0 m/s^2" and status["running_s"] == 5.0
+    assert 0.0 <= status["age_s"] < 60.0 and status["schema"] == 1
+    standing = text_of({**status, "age_s": 3.2})
+    assert standing.endswith("The program has told nothing for 3.2 s: its loop stands still.")
+
+
+def test_a_client_that_writes_never_reads_or_has_gone_keeps_nobody_from_an_answer(server, path):
+    # Given clients that connect and do nothing, and others that go at once
+    hand_over(server)
+    silent = [socket.socket(socket.AF_UNIX) for _ in range(3)]
+    for client in silent:
+        client.connect(str(path))
+    for _ in range(2):
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(str(path))
+            # It may be answered, and done with, before it has written.
+            with contextlib.suppress(BrokenPipeError):
+                client.sendall(b"disarm\n" * 100)
+    # When another asks, then it is answered, and handing over took no waiting
+    hand_over(server)
+    assert ask(path)["state"] == "watching"
+    for client in silent:
+        client.close()
+
+
+def test_the_socket_of_a_program_that_was_killed_is_taken_over(path):
+    # Given a socket at which nobody listens any more
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(str(path))
+    # When a program begins, then it is asked there
+    server = StatusServer(path, {"command": "fly", "folder": "-"})
+    assert ask(path)["command"] == "fly"
+    # And its end takes the socket away
+    server.close()
+    assert not path.exists() and not any(thread.name == "rebound status" for thread in threading.enumerate())
+
+
+def test_the_socket_of_a_program_that_runs_is_left_to_it(server, path, monkeypatch):
+    with pytest.raises(status_socket.StatusError, match="another program answers there"):
+        StatusServer(path, {"command": "fly", "folder": "-"})
+    assert ask(path)["command"] == "guard"
+    # And a flight goes on without, and says so
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(path.parent))
+    told = []
+    with served(told.append, command="fly", folder="-") as second:
+        assert second is None
+    assert len(told) == 1 and path.exists()
+
+
+def test_systemds_folder_comes_before_the_sessions_and_without_either_it_is_a_temporary_one(tmp_path, monkeypatch):
+    both = {"RUNTIME_DIRECTORY": "/run/rebound:/run/other", "XDG_RUNTIME_DIR": "/run/user/7"}
+    assert str(socket_of_this_program(both)) == "/run/rebound/status.sock"
+    session = {"XDG_RUNTIME_DIR": "/run/user/7"}
+    asked = [str(path) for path in sockets_to_ask(session)]
+    assert (asked[0], asked[-1]) == ("/run/user/7/rebound/status.sock", "/run/rebound/status.sock")
+    # And who asks from cron, where neither is set, finds a flight of the same user's session
+    assert f"/run/user/{os.getuid()}/rebound/status.sock" in map(str, sockets_to_ask({}))
+    for name in both:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with served(pytest.fail, command="fly", folder="-"):
+        assert ask(None)["command"] == "fly"
+    assert stat.S_IMODE(socket_of_this_program({}).parent.stat().st_mode) == 0o700
+
+
+def test_in_another_users_folder_no_socket_is_made(path, monkeypatch):
+    user = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: user + 1)
+    with pytest.raises(status_socket.StatusError, match="another user's"):
+        StatusServer(path, {"command": "fly", "folder": "-"})
+
+
+def test_a_person_reads_lines_and_a_program_json(server, path, capsys):
+    hand_over(server, HIT)
+    assert main(["status", "--socket", str(path)]) == 0
+    told = capsys.readouterr().out
+    for word in ("guard, process", "watching", "POSCTL", "12 ms", "90.0 kB/s", "hit 1: 30.0 m/s^2"):
+        assert word in told
+    assert main(["status", "--socket", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["state"] == "watching"

@@ -1,25 +1,66 @@
-"""PX4's logs as the wire would have carried them: each topic of each version, and what is said of what is missing."""
+"""PX4's logs (docs.px4.io, ULog File Format), made small: each topic of each version, and what is missing."""
 
 import struct
 
 import pytest
 
+from companion import messages
 from companion.autopilot.px4.modes import AUTO_LAND, OFFBOARD
-from companion.messages import (
-    Attitude,
-    AttitudeTarget,
-    ExtendedState,
-    Heartbeat,
-    ImuSample,
-    LandedState,
-    LocalPosition,
-    Odometry,
-    PositionTarget,
-    Vibration,
-)
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, PositionTarget, Vibration
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
-from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
+
+_MAGIC = b"ULog\x01\x12\x35\x01"
+_FLAG_BITS_SIZE = 40
+# A value's type in the file, and how it is packed.
+_KINDS = {bool: ("bool", "?"), int: ("uint64_t", "Q"), float: ("float", "f")}
+
+
+def ulog(topics, started_us=0, info=None, parameters=()):
+    """Topics: name -> ("field field ...", [(timestamp_us, value, ...), ...]).
+
+    A field's type is that of its first value. Keys of `info` begin with the value's type.
+    """
+    parts = [_MAGIC, struct.pack("<Q", started_us), _message("B", bytes(_FLAG_BITS_SIZE))]
+    parts += (_keyed("I", key, value) for key, value in (info or {}).items())
+    parts += (_keyed("P", f"float {key}", struct.pack("<f", value)) for key, value in parameters)
+    added, data = [], []
+    for number, (topic, (names, rows)) in enumerate((name, rows) for name, rows in topics.items() if rows[1]):
+        firsts = [_several(value) for value in rows[0][1:]]
+        kinds = [(len(first), *_KINDS.get(type(first[0]), _KINDS[float])) for first in firsts]
+        fields = [
+            f"{kind}{f'[{n}]' if n > 1 else ''} {name};"
+            for name, (n, kind, _) in zip(names.split(), kinds, strict=True)
+        ]
+        parts.append(_message("F", f"{topic}:uint64_t timestamp;{''.join(fields)}".encode()))
+        added.append(_message("A", struct.pack("<BH", 0, number) + topic.encode()))
+        packer = struct.Struct("<HQ" + "".join(f"{n}{letter}" for n, _, letter in kinds))
+        for time_us, *values in rows:
+            flat = [one for value in values for one in _several(value)]
+            data.append((time_us, _message("D", packer.pack(number, time_us, *flat))))
+    return b"".join([*parts, *added, *(message for _, message in sorted(data, key=lambda row: row[0]))])
+
+
+def _several(value):
+    return value if isinstance(value, list | tuple) else (value,)
+
+
+def _keyed(kind, key, value):
+    return _message(kind, bytes([len(key)]) + key.encode() + value)
+
+
+def _message(kind, content):
+    return struct.pack("<HB", len(content), ord(kind)) + content
+
+
+def sensor_combined(times_us, force=lambda time_us: (0.0, 0.0, -9.8), clipped=()):
+    fields = "gyro_rad accelerometer_m_s2 accelerometer_integral_dt accelerometer_clipping"
+    return fields, [(t, (0.1, 0.2, 0.3), force(t), 5000, int(t in clipped)) for t in times_us]
+
+
+def every(interval_us, start_us, end_us):
+    return range(start_us, end_us, interval_us)
+
 
 START = 1_000_000
 IMU = {"sensor_combined": sensor_combined(every(5000, START, START + 500_000))}
@@ -94,7 +135,7 @@ def test_attitude_thrust_and_vibration(tmp_path):
         vehicle_imu_status=(vibration, [(START + 40, (1, 2, 3), 0.25, 4.5)]),
     )
     assert of(log, Attitude)[0].attitude_wxyz == level
-    whole, without_attitude = of(log, AttitudeTarget)
+    whole, without_attitude = of(log, messages.AttitudeTarget)
     assert (whole.thrust_fraction, without_attitude.thrust_fraction) == pytest.approx((0.6, 0.5))
     assert whole.attitude_wxyz is not None and without_attitude.attitude_wxyz is None
     assert of(log, Vibration) == [Vibration(START + 40, 0.25, 4.5, (6, 0, 0))]
@@ -103,7 +144,7 @@ def test_attitude_thrust_and_vibration(tmp_path):
 def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
     fields = "nav_state arming_state failsafe"
     rows = [(START, 14, 1, False), (START + 10, 14, 2, False), (START + 20, 18, 2, True)]
-    beats = of(read(tmp_path, vehicle_status=(fields, rows)), Heartbeat)
+    beats = of(read(tmp_path, vehicle_status=(fields, rows)), messages.Heartbeat)
     seen = [(beat.custom_mode, beat.armed, beat.system_status) for beat in beats]
     assert seen == [(OFFBOARD, False, 3), (OFFBOARD, True, 4), (AUTO_LAND, True, 5)]
 
@@ -135,7 +176,7 @@ def test_landed_state_is_what_px4_would_send(tmp_path):
         position_setpoint_triplet=("current.valid current.type", [(START + 20, True, 3), (START + 50, True, 4)]),
     )
     # A take-off or landing setpoint counts only while an automatic mode flies
-    heard = [heard for heard in log.heard if isinstance(heard.sample, ExtendedState)]
+    heard = [heard for heard in log.heard if isinstance(heard.sample, messages.ExtendedState)]
     states = {one.at_us - START: one.sample.landed_state for one in heard}
     assert states == {
         0: LandedState.ON_GROUND,

@@ -1,4 +1,4 @@
-"""The page of a flight: whole in one file, made of what was recorded, and safe whatever was heard."""
+"""The page of a flight: whole in one file, its numbers as they were recorded, and safe whatever was heard."""
 
 import base64
 import hashlib
@@ -6,21 +6,101 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 import rebound_cli.report
 from companion.shell.tlog import read_tlog
 from rebound_cli.main import main
-from rebound_cli.report.content import content
+from rebound_cli.report.content import NONE, content, kept_rows, packed
 from rebound_cli.report.page import SCRIPTS, file_text, page
 from rebound_cli.report.shown_flight import recorded_flight
 from rebound_cli.results.flight_log import read_flight_log
 from sim_vehicle.obstacles import WallSpec
-from tests.rebound_cli.report.opened import Opened
+
+
+def unpacked(column):
+    """The numbers of a column again, to half the resolution; NaN for none."""
+    kind = column["kind"]
+    whole = np.frombuffer(base64.b64decode(column["data"]), f"<{kind}").astype(np.float64)
+    return np.where(whole == NONE[kind], np.nan, (whole + column["offset"]) * column["resolution"])
+
+
+class Opened(HTMLParser):
+    """`scripts` are those that a browser runs; `tags` all elements in their order, with their attributes."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.scripts, self.styles, self.data = [], [], [], None
+        self._open = None
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        self._open = (tag, dict(attributes).get("type")) if tag in ("script", "style") else None
+        if tag == "script" and self._open[1] is None:
+            self.scripts.append("")
+
+    def handle_endtag(self, tag):
+        self._open = None
+
+    def handle_data(self, text):
+        if self._open == ("script", None):
+            self.scripts[-1] += text
+        elif self._open == ("script", "application/json"):
+            self.data = json.loads(text)
+        elif self._open is not None and self._open[0] == "style":
+            self.styles.append(text)
+
+    def table(self, name):
+        """Its columns as numbers."""
+        return {column: unpacked(data) for column, data in self.data["tables"][name]["columns"].items()}
+
+    def attributes(self, name):
+        """Every value that any element has for it."""
+        return [attributes[name] for _, attributes in self.tags if name in attributes]
+
+
+@given(st.lists(st.floats(-300.0, 300.0), min_size=1, max_size=50))
+def test_numbers_come_back_to_half_the_resolution(values):
+    again = unpacked(packed(np.array(values), 0.01))
+    assert np.abs(again - values).max() <= 0.005 + 1e-9
+
+
+@pytest.mark.parametrize(("most", "kind"), [(60.0, "i2"), (6000.0, "i4")])
+def test_a_column_takes_two_bytes_a_number_where_it_fits_and_four_elsewhere(most, kind):
+    column = packed(np.linspace(-most, most, 7), 0.01)
+    assert column["kind"] == kind
+    assert np.allclose(unpacked(column), np.linspace(-most, most, 7), atol=0.005)
+
+
+def test_what_is_not_finite_is_none_and_harms_no_neighbour():
+    again = unpacked(packed(np.array([1.0, np.nan, -np.inf, 2.0]), 0.001))
+    assert np.isnan(again).tolist() == [False, True, True, False] and np.allclose(again[[0, 3]], [1.0, 2.0])
+    # Nor is a number beyond four bytes another one; and a column of nothing is one
+    assert np.isnan(unpacked(packed(np.array([0.0, 1e9]), 1e-5))).any()
+    assert len(unpacked(packed(np.array([]), 0.1))) == 0
+
+
+def test_of_a_long_flight_all_round_a_hit_stay_and_the_loudest_of_everything_else():
+    # Given 1000 s at 10 Hz, a hit at 500 s, and one loud sample far from it
+    seconds, loud = np.linspace(0.0, 999.9, 10_000), np.full(10_000, np.nan)
+    loud[1234] = 0.9
+    rows = kept_rows(seconds, loud, np.array([500.0]), 1.0, 500)
+    assert set(np.flatnonzero(np.abs(seconds - 500.0) <= 1.0)) <= set(rows)
+    assert 1234 in rows and len(rows) == 500
+    assert (np.diff(rows) > 0).all()
+    # and nothing of the flight is left out for long, of a short one nothing at all
+    assert np.diff(seconds[rows]).max() < 5.0
+    assert len(kept_rows(seconds, loud, np.array([]), 1.0, 10_000)) == 10_000
+
 
 PACKAGE = Path(rebound_cli.report.__file__).parent / "web"
 HOSTILE = "</script><img src=x onerror=alert(1)><script>alert(2)</script><!-- &amp;"

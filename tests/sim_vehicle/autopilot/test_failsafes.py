@@ -2,21 +2,15 @@
 
 import pytest
 
+from sim_vehicle.autopilot.commander import failsafe_table
 from sim_vehicle.autopilot.commander.failsafe import MODE_OF, Failsafe
-from sim_vehicle.autopilot.commander.failsafe_table import (
-    OFFBOARD_LOSS,
-    Action,
-    FailsafeSituation,
-    FailsafeTrigger,
-    responses_now,
-)
+from sim_vehicle.autopilot.commander.failsafe_table import OFFBOARD_LOSS, Action, FailsafeSituation, FailsafeTrigger
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, INJECT_FAILURE
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
-from tests.sim_vehicle.autopilot.flying import hovering, in_offboard, set_mode, sticks
-from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target
+from tests.sim_vehicle.autopilot.kinematic_plant import Flight, hovering, in_offboard, set_mode, sticks, target
 
 UP = target(position=(0.0, 0.0, -5.0))
 FLYING = {"armed": True, "sticks_lost_at_arming": False}
@@ -59,7 +53,7 @@ def test_a_lost_link_can_be_excepted_in_a_mode(mode, mask):
     lost = situation(intended=mode, sticks_lost=True, ground_station_lost=True)
     for excepted in (0, mask, 7 - mask):
         parameters = Parameters({"COM_RCL_EXCEPT": excepted, "COM_DLL_EXCEPT": excepted, "NAV_DLL_ACT": 2})
-        found = {trigger for trigger, _ in responses_now(lost, parameters)}
+        found = {trigger for trigger, _ in failsafe_table.responses_now(lost, parameters)}
         assert (
             (FailsafeTrigger.STICKS_LOST in found)
             == (FailsafeTrigger.GROUND_STATION_LOST in found)

@@ -1,11 +1,168 @@
-"""The filter in flight: as good as it says, led astray by a hit that clips, and back."""
+"""The filter: its model, its aiding sensors, as good in flight as it says, and led astray by a hit that clips."""
+
+import math
+import random
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.stats import chi2
 
+from sim_vehicle.airframe import load_built_in
 from sim_vehicle.control.setpoint import TrajectorySetpoint
+from sim_vehicle.estimator import strapdown
+from sim_vehicle.estimator.optics import distance_below
+from sim_vehicle.estimator.samples import NO_QUALITY
+from sim_vehicle.estimator.sensors import FlowSensor
+from sim_vehicle.estimator.strapdown import ERROR_ROWS, SAMPLE_COLUMNS, advance, down_range, heading, predict_now
+from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.world import build_world, plate
 from tests.sim_vehicle.estimator.flying import HOVER, WITH_CAMERAS, Flight, circle, filtered, hit_wall
+
+STEP_S = 0.004
+NOISE = np.array([1e-5, 1e-3, 1e-6, 1e-6, 0.1])
+
+
+def tilted() -> np.ndarray:
+    """Some state in flight, none of whose entries is special."""
+    place, velocity, biases = [1.0, -2.0, -1.7], [1.5, -0.7, 0.3], [0.002, -0.001, 0.003, 0.05, -0.03, 0.02]
+    attitude = np.array([0.95, 0.12, -0.17, 0.21])
+    return np.concatenate([place, velocity, attitude / np.linalg.norm(attitude), biases, [0.01, -0.02]])
+
+
+def some_sample() -> np.ndarray:
+    sample = np.zeros(SAMPLE_COLUMNS)
+    sample[0:6] = [1.2, -0.8, -11.0, 0.6, -0.9, 0.4]
+    return sample
+
+
+def advanced(nominal: np.ndarray, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    after, f, q = nominal.copy(), np.eye(ERROR_ROWS), np.zeros((ERROR_ROWS, ERROR_ROWS))
+    advance(after, sample, STEP_S, NOISE, f, q)
+    return after, f, q
+
+
+def erred(nominal: np.ndarray, row: int, size: float) -> np.ndarray:
+    """The state that is ``size`` of one error away."""
+    error = np.zeros(ERROR_ROWS)
+    error[row] = size
+    moved = nominal.copy()
+    strapdown.correct(moved, error)
+    return moved
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The error that leads from ``b`` to ``a``."""
+    conjugate = b[6:10] * [1, -1, -1, -1]
+    w, x, y, z = conjugate
+    p, q, r, s = a[6:10]
+    turn = 2 * np.array([w * q + x * p + y * s - z * r, w * r - x * s + y * p + z * q, w * s + x * r - y * q + z * p])
+    return np.concatenate([turn, a[3:6] - b[3:6], a[0:3] - b[0:3], a[10:] - b[10:]])
+
+
+@pytest.mark.parametrize("row", range(ERROR_ROWS))
+def test_the_transition_is_the_derivative_of_the_motion(row: int) -> None:
+    size = 1e-5
+    plus, minus = (advanced(erred(tilted(), row, sign * size), some_sample())[0] for sign in (1, -1))
+    _, f, _ = advanced(tilted(), some_sample())
+    # F is of first order in the step of 4 ms: what it leaves out is of second order.
+    assert difference(plus, minus) / (2 * size) == pytest.approx(f[:, row], abs=2e-4)
+
+
+@pytest.mark.parametrize("measure", [down_range, heading])
+def test_each_measurements_row_is_its_derivative(measure) -> None:
+    row, unused = np.empty(ERROR_ROWS), np.empty(ERROR_ROWS)
+    measure(tilted(), row)
+    for column in range(ERROR_ROWS):
+        plus, minus = (measure(erred(tilted(), column, sign * 1e-6), unused) for sign in (1, -1))
+        assert (plus - minus) / 2e-6 == pytest.approx(row[column], abs=1e-6)
+
+
+def test_the_output_predictor_brings_the_state_through_the_samples_not_used_yet() -> None:
+    # Given a filter three samples behind, and a ring in which the oldest row is the one it used last
+    samples = np.tile(some_sample(), (4, 1))
+    samples[:, 0] = [0.5, 1.0, 1.5, 2.0]
+    now, expected = np.empty(strapdown.NOMINAL_ROWS + 3), tilted()
+    # When its state is carried to now
+    predict_now(tilted(), samples, 1, STEP_S, now)
+    # Then it is where the filter will be once it has used them, in order
+    for row in (2, 3, 0):
+        expected, _, _ = advanced(expected, samples[row])
+    assert now[:10] == pytest.approx(expected[:10], abs=1e-12)
+
+
+INTERVAL_US = 4_000
+SPECS = load_built_in("foldable").sensors
+GROUND = build_world(()).faces
+
+
+def body(north=0.0, down=-1.5, velocity=(0.0, 0.0, 0.0), attitude=(1.0, 0.0, 0.0, 0.0), rates=(0.0, 0.0, 0.0)):
+    return np.array([north, 0.0, down, *velocity, *attitude, *rates])
+
+
+def flow_samples(state, seconds=1.0, **changes):
+    spec = SPECS.optical_flow.model_copy(update=changes)
+    sensor = FlowSensor(spec, INTERVAL_US, random.Random(1))
+    times = range(INTERVAL_US, round(1e6 * seconds) + INTERVAL_US, INTERVAL_US)
+    return [sample for time_us in times if (sample := sensor.observe(time_us, state, GROUND)) is not None]
+
+
+def test_flow_is_speed_over_distance_and_turns_are_in_both_flow_and_gyroscope():
+    # Given a vehicle 1.5 m up that flies forward at 3 m/s, right at 1.5 m/s and rolls right at 0.2 rad/s
+    state = body(velocity=(3.0, 1.5, 0.0), rates=(0.2, 0.0, 0.1))
+    samples = flow_samples(state, 60.0)[1:]
+    flow = np.array([sample.flow_frd_rad for sample in samples]) / 0.1
+    turn = np.array([sample.gyroscope_frd_rad for sample in samples]) / 0.1
+    # Then the mean over a minute is v / d, with the roll on both
+    spread = 4 * SPECS.optical_flow.noise_rad_s / math.sqrt(len(samples))
+    assert flow.mean(axis=0) == pytest.approx([-1.0 + 0.2, 2.0], abs=spread)
+    assert turn.mean(axis=0) == pytest.approx([0.2, 0.0, 0.1], abs=spread)
+    # and the noise is as the file states it
+    assert flow.std(axis=0) == pytest.approx(SPECS.optical_flow.noise_rad_s, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        body(down=-0.05),
+        body(down=-31.0),
+        body(velocity=(13.0, 0.0, 0.0)),
+        body(rates=(9.0, 0.0, 0.0)),
+        body(attitude=(0.0, 1.0, 0.0, 0.0)),
+    ],
+    ids=["too near", "too far", "too fast", "turns too fast", "upside down"],
+)
+def test_flow_that_cannot_be_seen_has_no_quality(state):
+    assert {sample.quality for sample in flow_samples(state)} == {NO_QUALITY}
+    assert NO_QUALITY not in {sample.quality for sample in flow_samples(body())}
+
+
+def distance(state, faces=GROUND) -> float:
+    rotation = np.empty((3, 3))
+    matrix_from_quaternion(state, rotation)
+    return distance_below(state, rotation, faces)
+
+
+def test_the_beam_meets_what_is_nearest_along_the_bodys_down_axis():
+    # Given a roof 1 m up that reaches from 1 m north on, and a wall 3 m south of which the face looks north
+    roof = plate("roof", (2.0, 0.0, -1.0), (0.0, 0.0, -1.0), (4.0, 2.0), 0.1)
+    wall = plate("wall", (-3.0, 0.0, -1.5), (1.0, 0.0, 0.0), (4.0, 3.0), 0.1)
+    faces = build_world((roof, wall)).faces
+    # Then a level vehicle beside the roof sees the ground, above it the roof, below it the ground
+    assert distance(body(north=0.5, down=-1.5), faces) == pytest.approx(1.5)
+    assert distance(body(north=1.5, down=-1.5), faces) == pytest.approx(0.5)
+    assert distance(body(north=1.5, down=-0.5), faces) == pytest.approx(0.5)
+    # and one that lies on its back's edge, 60 degrees nose down, looks at the wall behind it
+    nose_down = (math.cos(math.pi / 6), 0.0, -math.sin(math.pi / 6), 0.0)
+    assert distance(body(north=-2.0, down=-1.5, attitude=nose_down), faces) == pytest.approx(1 / math.sin(math.pi / 3))
+    assert distance(body(attitude=(0.0, 1.0, 0.0, 0.0))) == math.inf
+
+
+@pytest.mark.parametrize("missing", ["optical_flow", "range_finder", "compass"])
+def test_a_filter_without_the_sensors_it_needs_is_refused(missing):
+    with pytest.raises(ValidationError, match="needs fitted sensors"):
+        filtered(changes={"sensors": {missing: {"fitted": False}}})
+    filtered(changes={"sensors": {missing: {"fitted": False}, "motion_capture": {"fitted": True}}})
 
 
 def rms(errors) -> float:

@@ -1,4 +1,4 @@
-"""The plant as a whole: it hovers, it senses as a Pixhawk does, it knows itself as badly as stated."""
+"""The plant as a whole: it hovers, senses as a Pixhawk does, knows itself as badly as stated, or begins in flight."""
 
 import math
 import statistics
@@ -6,6 +6,7 @@ import statistics
 import numpy as np
 import pytest
 
+from bench.cases.vehicles import vehicle_of
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
 from sim_vehicle.control.setpoint import TrajectorySetpoint
@@ -13,6 +14,7 @@ from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import constants_from, initial_state
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import quiet
 
@@ -78,7 +80,6 @@ def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
     constants.k_omega[:] = 0.0
     state.body[10:13] = rates = np.array([2.0, -3.0, 5.0])
     state.inertia[:], state.inertia_rate[:] = [0.0031, 0.0030, 0.0049, 0.0002], [-0.01, -0.02, -0.03, 0.004]
-
     attitude_control(state, constants, 0.0)
 
     def full(entries: np.ndarray) -> np.ndarray:
@@ -123,3 +124,33 @@ def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
     assert np.sqrt((error**2).mean()) >= 0.03 * 0.9
     position_error = np.array([output.position_ned_m for output in outputs]) - truth["position_ned_m"][start - 5 : -5]
     assert 0.005 < np.sqrt((position_error**2).mean()) < 0.02
+
+
+START_NED_M = (2.0, -3.0, -20.0)
+
+
+@pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (0.0, 3.0, 0.0)])
+@pytest.mark.parametrize("speed_m_s", [0.5, 5.0])
+@pytest.mark.parametrize(("kind", "seed"), [("foldable", None), ("rigid", 7)])
+def test_a_vehicle_that_begins_in_flight_goes_steadily_on(kind, seed, speed_m_s, wind):
+    # Given a vehicle that begins on its way north-east, perhaps in a wind from the west
+    velocity = (speed_m_s * 0.6, speed_m_s * 0.8, 0.0)
+    vehicle = SimulatedVehicle(vehicle_of(kind, seed).airframe, Scene(wind_ned_m_s=wind), 3)
+    vehicle.begin_in_flight(START_NED_M, velocity)
+    # When it flies for two seconds
+    began_us = vehicle.time_boot_us
+    vehicle.step(b"")
+    texts = list(vehicle.texts)
+    while vehicle.time_boot_us < began_us + 2_000_000:
+        vehicle.step(b"")
+        texts += vehicle.texts
+    # Then it has gone straight on as fast, level and nose ahead, and nothing was told: no arming, no take-off
+    body = vehicle.state.body
+    flown_s = 1e-6 * vehicle.time_boot_us - 0.004
+    expected = [at + flown_s * v for at, v in zip(START_NED_M, velocity, strict=True)]
+    assert body[0:3] == pytest.approx(expected, abs=0.25)
+    path = vehicle.truth.series()["velocity_ned_m_s"][1:]
+    assert abs(path - velocity).max() < 0.3
+    w, _, _, z = body[6:10]
+    assert 2.0 * math.atan2(z, w) == pytest.approx(math.atan2(0.8, 0.6), abs=0.1)
+    assert texts == []

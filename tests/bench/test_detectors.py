@@ -1,0 +1,291 @@
+"""Detectors at the bench: what `fused` is compared with, verdicts on hits, and recorded flights against labels."""
+
+import math
+import random
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from bench.cases.hits import draw_case, vehicle_of_hit
+from bench.detectors.config import BaselineConfig
+from bench.fly.wire import ASKED_HZ, VehicleRecording, fly_hit, heard, streams_asked_hz
+from bench.main import main
+from bench.studies.detectors import first_possible, samples_late, work_out_hit
+from bench.studies.flights import Event, events, mistakes
+from companion.mavlink.decode import Decoder
+from companion.messages import Attitude, AttitudeTarget, ExtendedState, ImuSample, LandedState, LocalPosition, Sample
+from companion.mission.config import CompanionConfig
+from companion.motion.vector import plus
+from companion.reflex.detector import ImpactKind, Situation
+from companion.reflex.monitor import advance, start_monitor
+from rebound_cli.replay.report import replay_log
+from sim_vehicle.plant.plant import Plant
+from tests.rebound_cli.replay.flying import HIT_US, flight
+from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
+
+TICK_US = 4_000
+PUSHED_US = 4_000_000
+HOVER = 0.7
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+
+def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=6_000_000, off=None):
+    """North at 2 m/s behind a setpoint that goes on; pushed by `push(t)`, m/s^2."""
+    monitor = start_monitor(BaselineConfig(detector=detector), 0)
+    velocity, position, impacts = (2.0, 0.0, 0.0), (0.0, 0.0, -3.0), []
+    for t in range(TICK_US, until_us, TICK_US):
+        p, thrust = push(t), lift(t)
+        force = (p[0], p[1], p[2] - thrust)
+        acceleration = (force[0], force[1], force[2] + 9.81)
+        velocity = plus(velocity, TICK_US * 1e-6, acceleration)
+        position = plus(position, TICK_US * 1e-6, velocity)
+        wobble = 0.1 * math.sin(t)
+        samples: list[Sample] = [ImuSample(t, (force[0] + wobble, force[1], force[2]), (0.0, 0.0, 0.0))]
+        if t % 20_000 == 0:
+            samples.append(LocalPosition(t, position, velocity))
+            samples.append(Attitude(t, LEVEL))
+            samples.append(AttitudeTarget(t, HOVER * thrust / 9.81))
+        situation = Situation(
+            off_reason=off,
+            armed=True,
+            landed_state=LandedState.IN_AIR,
+            height_m=3.0,
+            setpoint_position_ned_m=(2.0 * t * 1e-6, 0.0, -3.0),
+        )
+        impacts += advance(monitor, samples, situation, t).impacts
+    return impacts
+
+
+def pushed(push, length_us=60_000):
+    return lambda t: push if PUSHED_US <= t < PUSHED_US + length_us else (0.0, 0.0, 0.0)
+
+
+def wall(strength, length_us=60_000):
+    return pushed((-strength, 0.0, 0.0), length_us)
+
+
+# Least and most that follow from what each looks at.
+LATE_MS = {"fused": (0, 0), "lateral": (0, 0), "fuzzy": (0, 0), "hybrid": (0, 4)}
+LATE_MS |= {"threshold": (18, 88), "momentum": (12, 60), "tracking": (80, 400)}
+
+
+@pytest.mark.parametrize("detector", sorted(BaselineConfig.detectors))
+def test_every_detector_sees_a_hard_hit_once_and_is_silent_before_it_and_when_it_is_off(detector):
+    """Twice what the published threshold asks for, for sixty milliseconds; the vehicle is thrown back at 0.4 m/s."""
+    (impact,) = fly(detector, wall(40.0))
+    assert impact.impact.contact_free_until_boot_us < PUSHED_US
+    assert fly(detector, wall(40.0), off="landing") == []
+    least_ms, most_ms = LATE_MS[detector]
+    assert least_ms <= 1e-3 * (impact.impact.sample_time_boot_us - PUSHED_US) <= most_ms
+
+
+# The setpoint of `tracking` does not climb.
+@pytest.mark.parametrize("detector", sorted({*BaselineConfig.detectors} - {"tracking"}))
+def test_a_climb_with_its_thrust_told_is_no_hit(detector):
+    def climb(t):
+        return 9.81 + 3.0 * max(0.0, math.sin((t - PUSHED_US) * 4e-6)) if PUSHED_US < t < PUSHED_US + 785_000 else 9.81
+
+    assert fly(detector, lift=climb) == []
+
+
+def test_the_fixed_threshold_takes_gravity_off_the_body_z_axis():
+    (impact,) = fly("threshold", pushed((0.0, 0.0, 25.0), 8_000))
+    assert impact.impact.specific_force_frd_m_s2[2] == pytest.approx(25.0, abs=0.01)
+
+
+def test_the_fixed_threshold_tells_its_windows_largest_push_eleven_samples_after_the_first():
+    """Five samples from 25 to 60 and back to 30 m/s^2."""
+    pushes = (25.0, 40.0, 60.0, 45.0, 30.0)
+
+    def growing(t):
+        index = (t - PUSHED_US) // TICK_US
+        return (-pushes[index], 0.0, 0.0) if 0 <= index < len(pushes) else (0.0, 0.0, 0.0)
+
+    (impact,) = fly("threshold", growing)
+    assert impact.impact.sample_time_boot_us == PUSHED_US + 11 * TICK_US
+    assert impact.impact.specific_force_frd_m_s2[0] == pytest.approx(-60.0, abs=0.2)
+    assert impact.impact.contact_free_until_boot_us == PUSHED_US - 5_000  # the first sample's averaging
+
+
+def twice(gap_us):
+    return lambda t: wall(10.0, 20_000)(t) if t < PUSHED_US + 20_000 else wall(10.0, 20_000)(t - 20_000 - gap_us)
+
+
+@pytest.mark.parametrize(
+    ("detector", "push", "seen"),
+    [
+        # The fixed threshold is for each axis and not for the magnitude
+        ("threshold", pushed((-18.0, 18.0, 0.0)), 0),
+        ("threshold", wall(21.0), 1),
+        # The horizontal one looks sideways alone
+        ("fuzzy", pushed((0.0, 0.0, -12.0)), 0),
+        ("fuzzy", wall(9.6), 0),
+        ("fuzzy", wall(10.0), 1),
+        ("fuzzy", pushed((0.0, -10.0, 0.0)), 1),
+        ("lateral", wall(3.6), 0),
+        ("lateral", wall(4.4), 1),
+        # 20 ms of quiet is still the same contact
+        ("lateral", twice(20_000), 1),
+        ("lateral", twice(80_000), 2),
+    ],
+)
+def test_a_force_is_a_hit_from_its_threshold_on_once_a_contact(detector, push, seen):
+    assert len(fly(detector, push)) == seen
+
+
+@pytest.mark.parametrize("spread_m_s2", [1.0, 3.0])
+def test_a_shaking_vehicle_raises_its_own_threshold_and_sees_nothing(spread_m_s2):
+    chance = random.Random(7)
+    assert fly("lateral", lambda t: (chance.gauss(0.0, spread_m_s2), chance.gauss(0.0, spread_m_s2), 0.0)) == []
+
+
+@pytest.mark.parametrize("rate", ASKED_HZ)
+def test_the_samples_of_a_recording_are_those_of_the_whole_vehicle(rate, monkeypatch):
+    # Given a vehicle that takes off, whose link was asked for the bench's rates before anything else
+    recording, seed = VehicleRecording(), 11 + rate
+    step = Plant.step
+
+    def recorded_step(plant, setpoint, armed):
+        output = step(plant, setpoint, armed)
+        recording.add(plant, output, Situation(), 1.0)
+        return output
+
+    monkeypatch.setattr(Plant, "step", recorded_step)
+    # Another plant stands on the ground before there is a vehicle.
+    monkeypatch.setattr("sim_vehicle.vehicle.check_start", lambda *_: None)
+    client = Client(seed)
+    asked_hz = streams_asked_hz(rate)
+    for message, hz in asked_hz.items():
+        client.command(SET_INTERVAL, message, 1e6 / hz)
+    client.run(0.2)
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(6.0)
+    assert client.position()[2] < -1.5
+    # When its packets are decoded as the companion does it
+    decoder = Decoder()
+    decoder.listen_to(1, 1)
+    made = [sample for step in heard(recording, asked_hz, seed) for sample in step.samples]
+    kinds = {type(sample) for sample in made}
+    decoded = [sample for raw in client.packets for _, sample in decoder.feed(raw) if type(sample) in kinds]
+    # Then they are, bit by bit and in this order, what the bench makes of the recording
+    # A receiver shows no hit: no detector hears it.
+    assert len(made) > 6 * rate and len(kinds) == len(asked_hz) - 1
+    assert without_landed_state(decoded) == without_landed_state(made)
+
+
+def without_landed_state(samples):
+    """The bench's flights know their own landed state; here it is only when it comes that counts."""
+    return [ExtendedState if isinstance(sample, ExtendedState) else sample for sample in samples]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_hit_is_the_one_that_was_asked_for(seed):
+    # Given any approach
+    case = draw_case(seed, False)
+    airframe = vehicle_of_hit(case).airframe
+    # When it is flown
+    recording, hit = fly_hit(case, airframe)
+    # Then the vehicle touches at the speed asked for, moving towards the obstacle
+    speed_m_s = sum(v * v for v in hit.impact_velocity_ned_m_s) ** 0.5
+    assert speed_m_s == pytest.approx(case.speed_m_s, rel=0.1, abs=0.1)
+    # And the recorded contact force adds up to the hit's impulse, and there is none before it
+    before = [
+        force
+        for sample, force in zip(recording.samples, recording.contact_m_s2, strict=True)
+        if sample.time_boot_us < hit.contact_at_boot_us
+    ]
+    assert before and not any(before)
+    total_m_s = sum(recording.contact_m_s2) * 1e-6 * airframe.imu.integration_interval_us
+    assert total_m_s >= 0.95 * sum(j * j for j in hit.impulse_ned_n_s) ** 0.5 / airframe.mass_kg
+
+
+def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
+    # Given a hit, heard at every rate
+    case = draw_case(0, False)
+    recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
+    first_us = {}
+    for rate in ASKED_HZ:
+        arrived = heard(recording, streams_asked_hz(rate), case.seed)
+        first_us[rate], times_us = first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1.5)
+        # Then the report that came with it was not late, and one with the next sample was late by one
+        after_us = next(time_us for time_us in times_us if time_us > first_us[rate])
+        late = [samples_late(at_us, first_us[rate], times_us) for at_us in (first_us[rate], after_us)]
+        assert late == [0, 1] and first_us[rate] > hit.contact_at_boot_us
+    # And slower streams show it later or at the same time, up to an interval of the stream
+    assert first_us[246] - hit.contact_at_boot_us <= 8_000
+    assert first_us[50] - hit.contact_at_boot_us <= 24_000
+    # And where no force reaches the floor, the hit fell between the samples
+    assert first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1e6)[0] is None
+
+
+def test_the_default_detector_finds_a_hit_at_every_rate_with_no_alarm_before_it():
+    rows = [row for row in work_out_hit(draw_case(1, False))["rows"] if row["detector"] == "fused"]
+    assert len(rows) == len(ASKED_HZ)
+    for row in rows:
+        assert row["latency_ms"] is not None and row["false"] == 0
+
+
+@pytest.mark.slow
+def test_the_command_writes_tables_and_rows(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["detectors", "--hits", "4", "--jobs", "1", "--out", "page"]) == 0
+    text = (tmp_path / "page" / "detectors.md").read_text()
+    assert "`python -m bench detectors --hits 4 --jobs 1 --out page`" in text
+    assert "## Every detector on simulated hits" in text and "bars are met" in capsys.readouterr().out
+    table = pd.read_json(tmp_path / "page" / "detectors.jsonl", lines=True)
+    assert {*table["detector"]} >= {"fused", "threshold"} and {*table["rate"]} == {*ASKED_HZ}
+
+
+def event(at_s, told, late_s=None):
+    return Event(at_s, told, [SimpleNamespace(at_us=at_s * 1e6)], late_s)
+
+
+def test_a_label_is_met_by_an_event_of_its_class_near_it():
+    found = [event(10.0, "touchdown"), event(20.0, "crash")]
+    assert list(mistakes(found, {10.4: "touchdown", 20.9: "crash"})) == []
+    assert list(mistakes(found[:1], {10.0: "crash"})) == ["crash at 10.0 s told as touchdown"]
+    assert list(mistakes(found[:1], {40.0: "crash"})) == ["crash at 40.0 s told as nothing"]
+
+
+@pytest.mark.parametrize("told", ["collision", "crash"])
+def test_a_collision_or_a_crash_without_a_label_is_one_where_nothing_was(told):
+    assert list(mistakes([event(10.0, told)], {})) == [f"{told} at 10.0 s, where nothing was"]
+    assert list(mistakes([event(10.0, told)], {10.2: "nothing"})) == [f"{told} at 10.0 s, where nothing was"]
+    assert list(mistakes([event(10.0, told)], {10.2: told})) == []
+    # Landings are many, and nobody labels them all
+    assert list(mistakes([event(10.0, "touchdown")], {})) == []
+
+
+def test_a_crash_that_is_told_long_after_its_hardest_moment_is_told_late():
+    labels = {10.0: "crash"}
+    assert list(mistakes([event(10.0, "crash", late_s=0.1)], labels)) == []
+    assert list(mistakes([event(10.0, "crash", late_s=-0.6)], labels)) == []
+    assert list(mistakes([event(10.0, "crash", late_s=0.6)], labels)) == ["crash at 10.0 s told 0.60 s late"]
+
+
+def test_how_late_a_crash_is_told_counts_from_its_hardest_sample():
+    replay = replay_log(flight(), CompanionConfig())
+    (hit,) = replay.findings.impacts
+    assert not hit.is_crash and next(events(replay)).late_s is None
+    crash = replace(hit.first, impact=replace(hit.first.impact, kind=ImpactKind.CRASH))
+    hardest_us, _ = max(replay.log.imu(), key=lambda item: math.hypot(*item[1].specific_force_frd_m_s2))
+    replay.findings.impacts[:] = [replace(hit, at_us=hardest_us + 300_000, first=crash)]
+    assert next(events(replay)).late_s == pytest.approx(0.3)
+
+
+def test_what_follows_within_two_seconds_is_one_event():
+    replay = replay_log(flight(), CompanionConfig())
+    (hit,) = replay.findings.impacts
+    replay.findings.impacts += [replace(hit, at_us=hit.at_us + 1_500_000), replace(hit, at_us=hit.at_us + 4_000_000)]
+    first, second = events(replay)
+    assert first.at_s == pytest.approx(HIT_US * 1e-6, abs=0.01)
+    assert (len(first.findings), len(second.findings)) == (2, 1)
+
+
+def test_a_log_that_cannot_be_read_is_named_and_a_folder_without_logs_is_an_error(tmp_path, capsys):
+    (tmp_path / "empty.bin").write_bytes(b"")
+    assert main(["flights", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
+    assert "the file is empty" in (tmp_path / "out" / "flights.md").read_text()

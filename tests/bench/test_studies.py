@@ -1,0 +1,281 @@
+"""Studies, each flown and judged as stated: the table of faults, ablations, flights by hand and to the ground."""
+
+import importlib
+import math
+import random
+import re
+from dataclasses import replace
+
+import pytest
+
+from bench.faults.catalogue import FLOWN, GROUPS
+from bench.faults.injectors import simulated, taken
+from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
+from bench.fly.by_hand.ways_down import FALLS, FALLS_FROM_M, LANDINGS, GroundCase
+from bench.fly.packets import ARM, SET_MODE, made, outside
+from bench.studies.ablation import RULES, Rule, flights_table, switched
+from bench.studies.faults import FaultCase, flown_with, work_out_fault
+from bench.studies.hand import HandCase, fly_by_hand, text_of
+from bench.studies.landings import fly_to_the_ground, judged
+from companion.mavlink.encode import COMPONENT_ID
+from companion.reflex import attitude_law, surface
+from rebound_cli.live.interrupts import Interrupts
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.bench.faults import motor_failure, other
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+from tests.companion.fake_vehicle import flying_in
+from tests.rebound_cli.command import ROOT
+
+SETPOINT = {"x": 1.0, "z": -1.5, "type_mask": 0xDF8}
+
+
+def test_every_group_has_rows_and_there_are_as_many_as_promised() -> None:
+    promised = re.search(r"each of (\d+) faults", (ROOT / "docs/reference/faults.md").read_text())
+    assert promised is not None and len(FLOWN) == int(promised[1]) and all(GROUPS.values())
+
+
+@pytest.mark.parametrize(
+    ("fields", "wrong"),
+    [
+        ({}, None),
+        ({"x": math.nan}, "not finite"),
+        ({"x": 40.0}, "outside the fence"),
+        ({"z": 0.5}, "-0.5 m high"),
+        ({"type_mask": 0xDC0, "vx": 30.0}, "30.0 m/s"),
+        ({"type_mask": 0xC38, "afx": 20.0}, "20.0 m/s2 sideways"),
+        ({"type_mask": 0xC38, "afz": 12.0}, "12.0 m/s2 up or down"),
+        ({"type_mask": 0x9F8, "yaw": 4.0}, "yaw 4 rad"),
+    ],
+)
+def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong: str | None) -> None:
+    core = flying_in("mission").companion.core
+    assert core is not None
+    assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
+
+
+@pytest.fixture
+def air() -> Air:
+    """Around a companion that flies a mission, and a vehicle with a pilot."""
+    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, links_may_fail=True)
+    companion = flying_in("mission").companion
+    air = Air(vehicle, companion, Interrupts(), Injector(), random.Random(1), 60.0)
+    air.add_pilot()
+    return air
+
+
+def test_what_the_companion_sends_once_it_has_heard_of_the_pilot_counts(air: Air) -> None:
+    setpoint = made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT)
+    # Given a pilot who has taken over, of which the companion has not heard
+    air.take_over()
+    air.send(setpoint)
+    assert air.after_told == 0
+    # When it has been handed the packet that says so
+    air._waiting.append(made("CURRENT_MODE", {"custom_mode": POSCTL}))
+    air.receive(0.0)
+    # Then setpoints, modes and arming count, and nothing else does
+    for frame in (setpoint, made("COMMAND_LONG", {"command": SET_MODE}), made("COMMAND_LONG", {"command": ARM})):
+        air.send(frame)
+    air.send(made("HEARTBEAT", {}))
+    air.send(made("COMMAND_LONG", {"command": 511}))
+    assert air.after_told == 3
+
+
+def sending() -> Injector:
+    """One setpoint far outside, as if the companion had sent it."""
+    frame = made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0})
+    return Injector(When("mission"), lambda air: air.send(frame))
+
+
+def overruling() -> Injector:
+    """Soon after the pilot has taken over, somebody asks for OFFBOARD in the companion's name."""
+
+    def to_vehicle(air: Air, frames: list[bytes]) -> list[bytes]:
+        if not air.has_pilot:
+            return frames
+        fields = {"command": SET_MODE, "param1": 1.0, "param2": 6.0, "target_system": 1, "target_component": 1}
+        setpoint = SETPOINT | {"target_system": 1, "target_component": 1, "coordinate_frame": 1}
+        ours = (1, COMPONENT_ID)
+        return [made("SET_POSITION_TARGET_LOCAL_NED", setpoint, ours), made("COMMAND_LONG", fields, ours)]
+
+    return replace(taken(When("mission", 0.3)), to_vehicle=to_vehicle)
+
+
+@pytest.mark.slow
+def test_a_judge_names_each_kind_of_loss() -> None:
+    no_wall = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
+    bad = {
+        "setpoint outside: outside the fence": lambda _: sending(),
+        "the pilot was overruled": lambda _: overruling(),
+        "tumbled: ": lambda _: simulated(motor_failure(0), When("mission", 0.3)),
+        "1 false hits counted": lambda _: simulated(
+            other("push", force_ned_n=(0.0, 12.0, 0.0), rise_s=0.01), When("mission", 0.3, 0.1)
+        ),
+    }
+    for words, inject in bad.items():
+        result = flown_with(Fault(words, "", inject, no_wall), 7)
+        assert any(text.startswith(words) for text in result["complaints"]), (words, result)
+        assert not result["hit"], "there is no wall"
+
+
+@pytest.mark.slow
+def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_says_that_something_can() -> None:
+    # Given an accelerometer that is off in the second of a hit
+    hidden = FLOWN["accelerometer zero"]
+    shown = replace(hidden, expected=replace(hidden.expected, blinds=False))
+    told, untold = (flown_with(fault, 42) for fault in (hidden, shown))
+    assert told["unseen"] and told["complaints"] == []
+    assert not untold["unseen"] and any(text.startswith(("fell: ", "tumbled: ")) for text in untold["complaints"])
+
+
+@pytest.mark.slow
+def test_a_killed_companion_leaves_a_vehicle_that_lands_and_a_log() -> None:
+    result = work_out_fault(FaultCase(8, "SIGKILL in a recovery"))
+    assert result["outcome"] == "killed" and result["complaints"] == [] and result["ground_m_s"] < 1.2
+
+
+def test_a_pilot_who_takes_over_in_the_climb_is_left_alone() -> None:
+    result = work_out_fault(FaultCase(9, "takes over in take-off"))
+    assert result["outcome"] == "aborted" and result["complaints"] == [] and result["after_told"] == 0
+
+
+RULE = Rule("away", "away from what was hit", "reflex.surface:plus", says=[9, 9, 9])
+NOT_RECOVERED = {"recovered": False}
+RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "rest_s": 1.2, "normal_deg": 5.0, "recovered": True}
+
+
+def flown(copies):
+    """Three steps, of which the second is the rule's."""
+    steps = [("first",), surface.plus((0, 0, 0), 1.0, (1, 0, 0)), attitude_law.plus((1, 0, 0), 1.0, (1, 0, 0))]
+    copies.leave(lambda: {"steps": steps})
+    return steps
+
+
+def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
+    with switched([RULE]) as copies:
+        steps = flown(copies)
+    assert steps == [("first",), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
+    # In the copy the rule is off from its first answer on, in every module that asks it.
+    assert copies.found == {"away": {"steps": [["first"], [9, 9, 9], [9, 9, 9]]}}
+
+
+def test_where_a_rule_changes_nothing_there_is_no_copy():
+    same = Rule("same", "", "reflex.surface:plus", says=[1.0, 0.0, 0.0])
+    with switched([same]) as copies:
+        assert surface.plus((0, 0, 0), 1.0, (1, 0, 0)) == (1.0, 0.0, 0.0)
+    assert copies.found == {}
+
+
+def test_a_copy_that_fails_is_told():
+    def failing():
+        raise ValueError
+
+    with switched([RULE]) as copies:
+        surface.plus((0, 0, 0), 1.0, (1, 0, 0))
+        copies.leave(failing)
+    assert "ValueError" in copies.found["away"]["error"]
+
+
+@pytest.mark.parametrize("rule", RULES, ids=[rule.name for rule in RULES])
+def test_every_rule_is_a_function_of_the_companion(rule):
+    module, _, path = rule.place.partition(":")
+    found = importlib.import_module(f"companion.{module}")
+    for name in path.split("."):
+        found = getattr(found, name)
+    assert callable(found) or isinstance(found, property)
+
+
+def test_the_table_counts_what_is_lost_without_a_rule():
+    well = {"ends": True, "hits": [RECOVERED]}
+    lost = [{"ends": ends, "hits": [RECOVERED | NOT_RECOVERED]} for ends in (False, True)]
+    flights = [{"with": well, "without": {"trust": without}} for without in lost]
+    lines = flights_table(flights).splitlines()
+    trust = next(line for line in lines if line.startswith("| trust"))
+    assert [cell.strip() for cell in trust.split("|")][3:6] == ["2", "+1", "+2"]
+    hand = next(line for line in lines if line.startswith("| hand "))
+    assert [cell.strip() for cell in hand.split("|")][3:] == ["0", "+0", "+0", *["–"] * 5, ""]
+
+
+def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():
+    # Given an hour at each rate, with one report in the air at 50 Hz and one after a touch at 100 Hz
+    def row(imu_hz, reported):
+        vehicle = {"imu_hz": imu_hz, "mode": "STABILIZED", "seed": 1, "air": "calm"}
+        return {**vehicle, "watched_s": 3600.0, "tilt_deg": [20.0, 35.0, 50.0], "touched": False, "reported": reported}
+
+    in_the_air, after = {"kind": "wall", "since_touch_s": None}, {"kind": "floor", "since_touch_s": 0.1}
+    lines = text_of([row(50, [in_the_air]), row(100, [after]), row(250, [])]).splitlines()
+    # Then the rates' lines show one, none and none
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[2:5]]
+    assert [(row[0], row[3], row[6]) for row in cells] == [("50", "1", "wall 1"), ("100", "0", ""), ("250", "0", "")]
+    assert sum("seed 1" in line for line in lines) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["POSCTL", "ALTCTL", "STABILIZED"])
+def test_a_flight_by_hand_is_vigorous_and_is_watched_in_every_mode(mode, monkeypatch):
+    # Given ten seconds in place of a minute
+    monkeypatch.setattr("bench.fly.by_hand.hand_pilot.FLOWN_S", 10.0)
+    # When a drawn vehicle is flown by drawn sticks
+    row = fly_by_hand(HandCase(7, mode))
+    # Then it leant by 20 degrees and more, met nothing, and was watched all the time
+    assert row["flown_s"] == pytest.approx(10.0, abs=0.1)
+    assert row["tilt_deg"][1] > 20.0
+    assert not row["touched"]
+    assert all(watched["watched_s"] >= 10.0 for watched in row["watched"])
+
+
+TOUCHED_S = 5.0
+LANDED, FALLEN = False, True
+
+
+def verdict_on(is_fall, reported):
+    """On impacts of these kinds, so many seconds after the touch; the hardest moment is 0.05 s after it."""
+    rows = [{"kind": kind, "sample_s": TOUCHED_S + after_s} for kind, after_s in reported]
+    return judged(is_fall, round(1e6 * TOUCHED_S), round(1e6 * TOUCHED_S) + 50_000, rows)
+
+
+@pytest.mark.parametrize(
+    ("is_fall", "reported", "outcome", "wrong"),
+    [
+        (LANDED, [], "nothing", ""),
+        (LANDED, [("landing", 0.01)], "landing", ""),
+        (LANDED, [("landing", 0.01), ("floor", 0.5)], "landing", "floor in a landing"),
+        (LANDED, [("crash", 0.01)], "crash", "crash in a landing"),
+        (LANDED, [("wall", -1.0)], "nothing", "wall before the touch"),
+        (FALLEN, [], "nothing", "nothing in a crash"),
+        (FALLEN, [("landing", 0.01)], "landing", "landing in a crash"),
+        (FALLEN, [("crash", 0.01), ("crash", 0.5), ("landing", 0.9)], "crash", ""),
+        (FALLEN, [("crash", 0.01), ("wall", 0.5)], "crash", "wall after the crash"),
+        (FALLEN, [("crash", 0.3)], "crash", "0.25 s late"),
+        (FALLEN, [("ceiling", -0.2), ("crash", 0.01)], "crash", "ceiling before the touch"),
+    ],
+)
+def test_a_way_to_the_ground_is_judged_by_all_that_was_reported(is_fall, reported, outcome, wrong):
+    assert verdict_on(is_fall, reported) == (outcome, wrong)
+
+
+def test_a_flight_that_never_touches_the_ground_shows_nothing():
+    assert judged(False, None, None, []) == ("not there", "the ground was not reached")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", LANDINGS)
+def test_a_landing_meets_the_ground_level_at_the_speed_that_was_asked_for(way):
+    # When a drawn vehicle lands
+    row = fly_to_the_ground(GroundCase(8, 250, way, "hard"))
+    # Then it is there, level, about as fast as asked for
+    assert row["touched_s"] is not None
+    assert row["tilt_deg"] < 5.0
+    assert row["sink_m_s"] == pytest.approx(row["asked_m_s"], abs=0.25)
+
+
+@pytest.mark.slow
+def test_falls_meet_the_ground_as_fast_as_their_height_says_and_at_any_tilt():
+    # When vehicles fall whose motors stop, some of them after one alone
+    rows = [fly_to_the_ground(GroundCase(seed, 250, way, "soft")) for seed in (3, 6, 9) for way in FALLS[:2]]
+    # Then none is faster than a fall from the highest height, and none slower than from the lowest
+    low_m_s, high_m_s = (math.sqrt(2.0 * 9.81 * height_m) for height_m in FALLS_FROM_M)
+    assert all(0.8 * low_m_s < row["sink_m_s"] < 1.05 * high_m_s for row in rows)
+    # and what loses one motor first is tipped, by up to more than a right angle
+    assert max(row["tilt_deg"] for row in rows if row["way"] == FALLS[0]) < 20.0
+    assert max(row["tilt_deg"] for row in rows if row["way"] == FALLS[1]) > 60.0

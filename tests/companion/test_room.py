@@ -1,0 +1,275 @@
+"""A flight's room: its fence, the patches that touches leave, and ways round them: the shortest, or none."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from shapely import LineString, Point
+
+from companion.fence import Fence
+from companion.memory.patch import REACHES_M, Patch, is_same, remembered, touch_of
+from companion.memory.route import route
+from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
+from companion.mission.item_trajectory import SpeedLimits, passed, trajectory_around
+from companion.mission.items import OrbitItem, PathItem
+from companion.mission.trajectory import CurveProfile
+from companion.reflex.surface import Normal
+
+# An L: the room to the north-east is not ours.
+ROOM = Fence(polygon_ne_m=[[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]], max_height_m=3)
+ROUND = Fence(radius_m=5)
+COORDINATE = st.floats(-12, 12)
+
+
+@pytest.mark.parametrize(
+    ("polygon", "words"),
+    [
+        ([[1, 1], [2, 1], [2, 2]], "does not contain the arming position"),
+        ([[-1, -1], [1, 1], [1, -1], [-1, 1]], "crosses another"),
+        ([[-1, -1], [-1, -1], [1, -1], [1, 1]], "the same as the next"),
+        ([[-1, -1], [1, 1]], "at least 3"),
+    ],
+)
+def test_fences_that_make_no_sense(polygon, words):
+    with pytest.raises(ValidationError, match=words):
+        Fence(polygon_ne_m=polygon)
+
+
+@given(COORDINATE, COORDINATE, st.sampled_from([ROOM, ROUND, Fence(radius_m=4, polygon_ne_m=ROOM.polygon_ne_m)]))
+def test_ways_from_home_end_inside(north_m, east_m, fence):
+    """And what was inside already is left alone."""
+    end = fence.shortened((0.0, 0.0), (north_m, east_m))
+    assert fence.contains(end[0] * (1 - 1e-9), end[1] * (1 - 1e-9))
+    if fence.contains(north_m, east_m) and fence is ROUND:
+        assert end == (north_m, east_m)
+    nearest = fence.nearest_inside(north_m, east_m)
+    towards = tuple(0.999999 * value for value in nearest)
+    assert fence.contains(*towards) or fence.outside_by_m((*nearest, -1.0)) < 1e-6
+
+
+CLEARANCE_M = 0.55
+SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+
+ERROR_RAD = math.radians(15.0)
+
+
+def wall(*easts_m: float, height_m: float = 1.5, normal=SOUTH, north_m: float = 4.0) -> Patch:
+    """A wall as it is remembered, touched at these places."""
+    places = tuple((north_m, east_m, -height_m) for east_m in easts_m)
+    return Patch(places, normal, ERROR_RAD, REACHES_M, found_at_us=1)
+
+
+def turned(deg: float):
+    return (-math.cos(math.radians(deg)), -math.sin(math.radians(deg)), 0.0)
+
+
+def deg(rad: float) -> float:
+    return math.degrees(rad)
+
+
+# --- from a hit to a touch
+
+
+def test_the_surface_is_a_guards_reach_ahead_of_the_centre():
+    touch = touch_of((3.8, 1.0, -1.5), (2.0, 0.0, 0.0), Normal(SOUTH, ERROR_RAD), 0.2, 7)
+    assert touch.centre_ned_m == pytest.approx((4.0, 1.0, -1.5))
+    assert (touch.normal_ned, touch.normal_error_rad) == (SOUTH, ERROR_RAD)
+    assert touch.reaches_m == REACHES_M and touch.found_at_us == 7
+
+
+def test_what_pushes_a_vehicle_on_came_after_it_and_is_no_wall():
+    """A screen that overtakes is behind the vehicle, where it comes from, and not in its way."""
+    touch = touch_of((3.0, 1.0, -1.5), (1.0, 0.0, 0.0), Normal(NORTH, ERROR_RAD), 0.2, 0)
+    assert touch.centre_ned_m == pytest.approx((2.8, 1.0, -1.5))
+    assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
+
+
+# --- patches of the same surface
+
+
+def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
+    (patch,) = remembered((), [wall(0.0), wall(1.05)], CLEARANCE_M)
+    low_m, high_m = patch.assumed_along_m()
+    assert patch.hits == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
+
+
+def test_the_places_give_a_better_normal_than_the_pushes():
+    """Two touches 2 m apart on a wall turned by 10 degrees, each with a normal 20 degrees off."""
+    slope = math.tan(math.radians(10.0))
+    touches = [wall(east_m, normal=turned(30.0), north_m=4.0 - slope * east_m) for east_m in (0.0, 1.0, 2.0)]
+    (patch,) = remembered((), touches, CLEARANCE_M)
+    assert patch.normal_ned == pytest.approx(turned(10.0), abs=0.02)
+    assert deg(patch.normal_error_rad) < 6.0
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        wall(0.3, normal=turned(90.0)),  # the other wall of a corner
+        wall(0.0, normal=(1.0, 0.0, 0.0), north_m=4.2),  # its other face
+        wall(4.0),  # far off: a vehicle fits between
+        wall(0.2, north_m=5.0),  # a parallel wall a metre behind
+        wall(0.0, height_m=4.0),  # high above
+    ],
+)
+def test_another_surface_is_another_patch(other):
+    assert len(remembered((), [wall(0.0), other], CLEARANCE_M)) == 2
+    assert not is_same(wall(0.0), other, CLEARANCE_M)
+
+
+# --- files
+
+
+def test_a_patch_comes_back_from_a_file_as_it_was():
+    known = remembered((), [wall(0.0), wall(1.05), wall(0.0, normal=turned(90.0))], CLEARANCE_M)
+    stored = ObstacleFile.model_validate(file_data(known))
+    for before, after in zip(known, stored.patches, strict=True):
+        patch = after.patch()
+        assert patch.hits == before.hits and patch.found_at_us == before.found_at_us
+        assert patch.normal_ned == pytest.approx(before.normal_ned, abs=1e-3)
+        assert patch.assumed_along_m() == pytest.approx(before.assumed_along_m(), abs=1e-3)
+        # and a second time to the last digit
+        assert as_data(KnownPatch.model_validate(as_data(patch)).patch()) == as_data(patch)
+
+
+REACH_M, MARGIN_M = 0.2, 0.35
+PACE = SpeedLimits(1.5, 2.0)
+START, GOAL = (0.0, 0.0, -1.5), (7.0, 0.0, -1.5)
+
+
+def ceiling(height_m: float, north_m: float = 0.0) -> Patch:
+    return Patch(((north_m, 0.0, -height_m),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
+
+
+def around(*patches: Patch, fence: Fence | None = None) -> ObstacleMap:
+    return ObstacleMap(patches, fence or Fence(radius_m=9, max_height_m=2.4), REACH_M, MARGIN_M)
+
+
+def length_m(start, places) -> float:
+    return sum(math.dist(a, b) for a, b in pairwise([start, *places]))
+
+
+def test_the_way_round_a_touch_keeps_the_clearance_and_is_the_shortest():
+    known = around(wall(0.2))
+    assert known.block((START, GOAL))
+    places = route(known, START, GOAL)
+    trajectory = LineString([START[:2], *[place[:2] for place in places]])
+    assert trajectory.distance(assumed_area(known.patches[0])) >= CLEARANCE_M - SLACK_M
+    # round the nearer end, which is the western one
+    assert all(place[1] < 0.0 for place in places[:-1])
+    least_m = math.hypot(4.0, 0.3 + CLEARANCE_M) + math.hypot(3.0, 0.3 + CLEARANCE_M)
+    assert least_m < length_m(START, places) < least_m + 0.3
+
+
+def test_a_vehicle_inside_what_is_remembered_knows_that_it_is_not_there():
+    """A door that was opened, or a place estimate that has drifted."""
+    known = around(wall(0.0))
+    assert route(known, (4.05, 0.0, -1.5), GOAL) == (GOAL,)
+    beside = (3.85, 0.0, -1.5)
+    assert route(known, (4.05, 0.0, -1.5), beside) == (beside,)
+
+
+def test_a_goal_in_the_wall_cannot_be_reached_one_beside_it_can():
+    known = around(wall(0.0))
+    assert route(known, START, (3.85, 0.0, -1.5)) is None
+    assert route(known, START, (4.0 - REACH_M - LEAST_FREE_M - 0.05, 0.0, -1.5)) is not None
+
+
+def test_where_the_fence_is_high_enough_the_way_leads_over_it():
+    room = Fence(polygon_ne_m=((-2, -2), (8, -2), (8, 2), (-2, 2)), max_height_m=6)
+    known = around(wall(-1.0, 0.0, 1.0), fence=room)
+    places = route(known, START, GOAL)
+    over_m = -places[0][2]
+    assert over_m == pytest.approx(known.patches[0].assumed_heights_m()[1] + CLEARANCE_M)
+    assert places[0][:2] == START[:2] and places[-2][:2] == GOAL[:2] and places[-1] == GOAL
+    # and not through a ceiling above the start
+    assert route(around(wall(-1.0, 0.0, 1.0), ceiling(2.2), fence=room), START, GOAL) is None
+
+
+def test_ways_stay_inside_a_fence_with_a_bend():
+    """An L-shaped room with a pillar in its bend."""
+    room = Fence(polygon_ne_m=((-1, -1), (5, -1), (5, 5), (3, 5), (3, 1), (-1, 1)), max_height_m=3)
+    goal = (4.0, 4.5, -1.5)
+    places = route(around(fence=room), START, goal)
+    assert places == ((3.0, 1.0, -1.5), goal)
+    assert length_m(START, places) < length_m(START, [(4.0, 0.0, -1.5), goal])
+
+
+# --- items
+
+
+def test_a_paths_point_in_a_wall_is_left_out_but_not_its_last():
+    through = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5), (6.0, 0.0, -1.5)))
+    planned = trajectory_around(through, START, PACE, around(wall(0.0)))
+    assert planned.left_out == 1 and planned.trajectory.target_m == (6.0, 0.0, -1.5)
+    into = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5)))
+    assert trajectory_around(into, START, PACE, around(wall(0.0))).trajectory is None
+
+
+def test_an_orbit_is_flown_round_what_stands_in_it():
+    item = OrbitItem(centre_ned_m=(4.0, 3.0, -1.5), radius_m=3.0)
+    known = around(wall(0.0, north_m=4.0), fence=Fence(radius_m=12))
+    planned = trajectory_around(item, START, PACE, known)
+    assert planned.is_detour and planned.left_out >= 1
+    places = [planned.trajectory.at(planned.trajectory.duration_s * n / 400)[0] for n in range(401)]
+    assert min(Point(place[:2]).distance(core(known.patches[0])) for place in places) > REACH_M + LEAST_FREE_M
+    assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
+
+
+def test_what_has_been_flown_of_a_path_is_not_flown_again():
+    path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), (6.0, 0.0, -1.5)))
+    trajectory = CurveProfile((START, *path.points_ned_m), 1.5, 2.0)
+    assert [passed(path, trajectory, trajectory.duration_s * part) for part in (0.1, 0.5, 1.0)] == [0, 1, 3]
+
+
+# --- touch after touch
+
+
+def explore(width_m: float, offset_m: float, error_deg: float, limit: int = 12) -> tuple[list[Patch], bool]:
+    """A point with the vehicle's reach, a wall 4 m north, and a memory; touches until it is through or gives up."""
+    fence, touches, start = Fence(radius_m=11, max_height_m=2.4), [], START
+    while len(touches) < limit:
+        known = around(*remembered((), touches, CLEARANCE_M), fence=fence)
+        places = route(known, start, GOAL)
+        if places is None:
+            return touches, False
+        hit = next((hit for a, b in pairwise([start, *places]) if (hit := first_hit(a, b, width_m, offset_m))), None)
+        if hit is None:
+            return touches, True
+        place, velocity, normal = hit
+        lean = math.radians(error_deg) * (-1) ** len(touches)
+        n, e, _ = normal
+        seen = (n * math.cos(lean) - e * math.sin(lean), n * math.sin(lean) + e * math.cos(lean), 0.0)
+        touch = touch_of(place, velocity, Normal(seen, math.radians(max(error_deg, 10.0))), REACH_M, 0)
+        # Then no touch is made where a wall is remembered
+        for patch in known.patches:
+            assert core(patch).distance(Point(touch.centre_ned_m[:2])) > 0.1
+        touches.append(touch)
+        start = tuple(p + 0.4 * x for p, x in zip(place, normal, strict=True))
+    return touches, False
+
+
+def first_hit(a, b, width_m, offset_m):
+    steps = max(2, math.ceil(math.dist(a, b) / 0.01))
+    velocity = tuple(y - x for x, y in zip(a, b, strict=True))
+    for step in range(steps + 1):
+        place = tuple(x + v * step / steps for x, v in zip(a, velocity, strict=True))
+        beside_m = abs(place[1] - offset_m) - 0.5 * width_m
+        if 4.0 - REACH_M <= place[0] <= 4.1 + REACH_M and beside_m < REACH_M:
+            normal = SOUTH if place[0] < 3.85 else (0.0, math.copysign(1.0, place[1] - offset_m), 0.0)
+            return place, tuple(v / math.dist(a, b) for v in velocity), normal
+    return None
+
+
+@pytest.mark.parametrize("error_deg", [0.0, 15.0, 35.0])
+@pytest.mark.parametrize("offset_m", [0.0, 0.4, -0.9])
+@pytest.mark.parametrize(("width_m", "most"), [(0.3, 2), (1.0, 3), (3.0, 4), (6.0, 6), (10.0, 8)])
+def test_a_wall_of_any_width_is_passed_after_a_few_touches_none_where_it_is_remembered(
+    width_m, most, offset_m, error_deg
+):
+    touches, is_through = explore(width_m, offset_m, error_deg)
+    assert is_through and len(touches) <= most
