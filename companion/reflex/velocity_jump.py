@@ -25,6 +25,7 @@ from companion.reflex.config import (
     RISE,
     SHAKEN_S,
     STAMP_S,
+    TURNED_SHARE,
     FusedConfig,
 )
 
@@ -108,7 +109,7 @@ class VelocityJump:
         velocities with those around it: four are worth as much as one. It is larger by `caution` where the estimate may
         jump without a hit, by vibration between the samples (standard deviation `shaking_m_s2`), and by the velocity's
         lag where the thrust changes, as in free fall. Beside a rate jump less is enough: the test ratios of one impulse
-        add up, that of the rates to three quarters at most. So half is enough beside one that no motor makes.
+        add up.
         """
         if not self.known:
             return math.inf
@@ -120,7 +121,7 @@ class VelocityJump:
         (p, q, r), since_us = self.rate_step_frd_rad_s, time_us - self.rate_step_until_us
         most_rad_s = config.rate_step_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
         turned = math.hypot(p, q, r / YAW_SHARE) / most_rad_s if since_us < LONGEST_SLOW_STEP_US else 0.0
-        return least_m_s * math.sqrt(1.0 - 0.75 * min(turned, 1.0) ** 2)
+        return least_m_s * math.sqrt(1.0 - TURNED_SHARE * min(turned, 1.0) ** 2)
 
 
 def _rate(a: Vector3, b: Vector3, seconds: float) -> Vector3:

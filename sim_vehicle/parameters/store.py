@@ -27,6 +27,10 @@ class Definition:
     least: float | None
     most: float | None
 
+    def typed(self, value: float) -> float:
+        """Of a whole number an int, which the wire takes alone."""
+        return int(value) if self.is_whole else value
+
     def limited(self, value: float) -> float:
         """``value`` within the range that PX4 states for it; NaN and what has no end become the default."""
         if value != value:
@@ -83,7 +87,7 @@ class Parameters(dict[str, float]):
         """What each is; their order is that of their indices."""
         self.names = tuple(self.definitions)
         own = own_defaults or {}
-        self.defaults = {name: own.get(name, row.default) for name, row in self.definitions.items()}
+        self.defaults = {name: row.typed(own.get(name, row.default)) for name, row in self.definitions.items()}
         self._stored = dict(self.defaults)
         self.changes = 0
         """Grows with every change of a value that counts."""
@@ -99,7 +103,7 @@ class Parameters(dict[str, float]):
     def set(self, name: str, value: float) -> None:
         """Store ``value``; it counts at once."""
         row = self.definitions[name]
-        stored = int(value) if row.is_whole else value
+        stored = row.typed(value)
         if stored != self._stored[name]:
             self.sets += 1
             self._last_set[name] = self.sets

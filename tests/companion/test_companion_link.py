@@ -75,6 +75,21 @@ def test_a_flight_that_waits_outlasts_a_vehicle_that_is_missing_restarts_and_has
     assert f.run_to_end().outcome == "completed"
 
 
+def test_a_flight_that_waits_does_not_take_a_vehicle_back_after_a_silence_in_the_air():
+    f = flight(companion=WAITS)
+    f.run_to("mission")
+    # When the link falls silent in flight, and is there again
+    f.vehicle.silent = True
+    f.run_for(6.0)
+    assert f.companion.finished
+    f.vehicle.silent = False
+    before = len(f.vehicle.commands)
+    f.run_for(5.0)
+    # Then the flight has ended, as without --wait, and nothing is commanded any more
+    assert f.report.outcome == "aborted"
+    assert len(f.vehicle.commands) == before
+
+
 def test_a_vehicle_armed_by_someone_else_while_the_plan_is_read_is_not_taken():
     f = flight(confirmed=False)
     f.run_to("ready")
