@@ -26,6 +26,7 @@ from companion.reflex.config import (
     SHAKEN_S,
     STAMP_S,
     TURNED_SHARE,
+    TURNED_US,
     FusedConfig,
 )
 
@@ -57,7 +58,7 @@ class VelocityJump:
         if 0 < elapsed_us < LONGEST_GAP_US:
             self.unseen_share = max(0.0, 1.0 - self.averaging_us / elapsed_us)
             step = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
-            if step > math.hypot(*self.rate_step_frd_rad_s) or time_us - self.rate_step_until_us > LONGEST_SLOW_STEP_US:
+            if step > math.hypot(*self.rate_step_frd_rad_s) or time_us - self.rate_step_until_us > TURNED_US:
                 self.rate_step_frd_rad_s = minus(rates_frd_rad_s, self.rates_frd_rad_s)
                 self.rate_step_over_us, self.rate_step_until_us = elapsed_us, time_us
         self.rates_frd_rad_s = rates_frd_rad_s
@@ -120,7 +121,7 @@ class VelocityJump:
         least_m_s = caution * max(step_m_s, noise_m_s) + unseen_m_s
         (p, q, r), since_us = self.rate_step_frd_rad_s, time_us - self.rate_step_until_us
         most_rad_s = config.rate_step_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
-        turned = math.hypot(p, q, r / YAW_SHARE) / most_rad_s if since_us < LONGEST_SLOW_STEP_US else 0.0
+        turned = math.hypot(p, q, r / YAW_SHARE) / most_rad_s if since_us < TURNED_US else 0.0
         return least_m_s * math.sqrt(1.0 - TURNED_SHARE * min(turned, 1.0) ** 2)
 
 
