@@ -68,8 +68,8 @@ MEMORY, RISE = 100, 10
 SHAKEN_S, STAMP_S = 0.15, 0.008
 # An output predictor's lag.
 LAG_S = 0.02
-# Share of a rate jump's test ratio that adds to a velocity jump's: half a step is enough beside one that no motor makes.
-# By itself it is no evidence, as a failed motor turns a vehicle, too.
+# Share of a rate jump's test ratio that adds to a velocity jump's: beside one that no motor makes half a step is then
+# enough. Alone it is no evidence, as a failed motor turns a vehicle, too.
 TURNED_SHARE = 0.75
 # Four times what motors do, with room for a nimbler vehicle's flips. A rigid vehicle that hits an inclined wall at 2
 # m/s has a rate jump of 15 rad/s and more.
