@@ -1,6 +1,7 @@
 """The law of the first second: attitude and collective thrust, for each IMU sample, from the companion's own belief.
 
-With position x, velocity v and the accelerations e by wind, drag and contact and b by the thrust, horizontally
+With position x, velocity v and the acceleration e by wind, drag and contact, and b the acceleration by the thrust at
+the tilt of TILT_AHEAD_S later, horizontally
 
     a = k (v_o - v) - (b + e) - e,        k = BRAKING_PER_S
 
@@ -30,7 +31,7 @@ class Belief:
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
     spread_m_s: float = 0.0  # standard deviation of the velocity
-    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust
+    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
     external_m_s2: Vector3 = ZERO  # horizontal acceleration by wind and drag
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0

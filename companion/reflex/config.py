@@ -147,6 +147,8 @@ LEAD_S = 0.15
 BRAKING_PER_S = 7.0
 # The way of that to rest over the speed at its beginning: the law's integral from there to rest.
 WAY_S = 2.0 / BRAKING_PER_S
+# The present tilt is that of so much later: a setpoint's way to the vehicle, and its motors.
+TILT_AHEAD_S = 0.05
 # Back off a surface, m/s for each metre of the clearance that is missing: a third as fast as the speed is braked.
 RETURN_PER_S = 2.5
 # Height and climb: critically damped at 4 rad/s, below what thrust and tilt share.

@@ -28,7 +28,7 @@ from companion.motion.config import (
     STAMP_RESOLUTION_US,
 )
 from companion.motion.doppler import Doppler, MeasuredVelocity
-from companion.motion.rotation import body_to_ned
+from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, along, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
@@ -55,7 +55,7 @@ class MotionEstimator:
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
-    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust
+    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
@@ -119,7 +119,7 @@ class MotionEstimator:
         if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
             # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
             self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
-        self.tilt_m_s2 = tilt_m_s2(strapdown.valid_wxyz)
+        self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
         if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
             n, e, _ = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
@@ -342,8 +342,9 @@ def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition
     return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
 
 
-def tilt_m_s2(attitude_wxyz: Quaternion) -> Vector3:
-    """Horizontal acceleration, NED, of a thrust that carries the vehicle at this attitude."""
-    n, e, d = body_to_ned(attitude_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
+def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
+    """Horizontal acceleration, NED, of a thrust that carries the vehicle, at the tilt in `lead_s`."""
+    ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, lead_s)
+    n, e, d = body_to_ned(ahead_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
     upright = max(-d / GRAVITY_M_S2, reflex.LEAST_UPRIGHT_COSINE)
     return (n / upright, e / upright, 0.0)
