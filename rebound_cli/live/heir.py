@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # A link that loses a packet in ten loses one word in a thousand.
 TIMES, APART_S = 3, 0.02
-_MOST_BYTES = 4096
+_MOST_BYTES = 65_536
 
 
 class Heir:

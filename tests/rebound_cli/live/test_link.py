@@ -125,7 +125,7 @@ def heard(end, wait_s):
 
 def test_a_companion_that_is_killed_says_its_last_words_each_at_its_time(vehicle):
     address, end = vehicle
-    companion = begun(address, [[(0.0, b"an earlier one")], [(0.0, WORD), (0.3, b"\xfdanother")]])
+    companion = begun(address, [[(0.0, b"an earlier one")] * 100, [(0.0, WORD), (0.3, b"\xfdanother")]])
     end, _ = end(), companion.stdout.readline()
     began_s = time.monotonic()
     os.kill(companion.pid, signal.SIGKILL)
