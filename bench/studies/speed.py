@@ -195,11 +195,12 @@ def exchanged(flight: Recorded, start: int, ours: socket.socket, theirs: tuple[s
         while (left_s := due_s - time.monotonic()) > 0.0:
             ours.settimeout(left_s)
             try:
-                frame = ours.recv(65_536)
+                frame, sender = ours.recvfrom(65_536)
             except TimeoutError:
                 break
             at_s = time.monotonic()
-            if len(frame) > 12 and message_id_of(frame) == SET_ATTITUDE_TARGET:
+            # Not the last words of the one before.
+            if sender == theirs and len(frame) > 12 and message_id_of(frame) == SET_ATTITUDE_TARGET:
                 return at_s - hit_s
         if interval == flight.hit:
             hit_s = time.monotonic()

@@ -42,13 +42,15 @@ class Link:
         self._encoder = Encoder(board.identity)
         self.streams = Streams(board.telemetry, board.topics, self._encoder, self.kind, seed)
         self._texts = TextLink()
-        self._services = tuple(service(self, board) for service in SERVICES)
+        services = tuple(service(self, board) for service in SERVICES)
+        # Those that have nothing to do with time are not called in every interval.
+        self._services = [service for service in services if type(service).update is not Service.update]
         self.handlers: dict[int, Handler] = {
             HEARTBEAT_ID: self._hear_heartbeat,
             4: self._answer_ping,
             111: self._answer_timesync,
         }
-        for service in self._services:
+        for service in services:
             self.handlers.update(service.handlers)
         self._decoder = Decoder(board.identity, self.handlers, self._signing)
 

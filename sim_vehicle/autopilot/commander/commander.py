@@ -225,7 +225,7 @@ class Commander:
             Need.SETPOINTS: self._flies_setpoints,
             Need.MISSION: self.navigator.missions.progress.valid,
         }
-        return frozenset(need for need, is_there in there.items() if is_there)
+        return frozenset([need for need, is_there in there.items() if is_there])
 
     @property
     def checks_pass(self) -> bool:
