@@ -185,7 +185,7 @@ def _location(at_us: float, sample: GlobalPosition) -> Json:
 def _pose(position_ned_m: Vector3, attitude_wxyz: Quaternion) -> Json:
     """Of the vehicle. From NED to ENU is half a turn about north-east, from FRD to FLU one about forward."""
     w, x, y, z = (math.sqrt(0.5) * part for part in attitude_wxyz)
-    return {"position": _enu(position_ned_m), "orientation": _wxyz(w + z, x + y, x - y, w - z)}
+    return {"position": _enu(position_ned_m), "orientation": {**_xyz(x + y, x - y, w - z), "w": w + z}}
 
 
 def _enu(ned: Sequence[float]) -> Json:
@@ -195,7 +195,3 @@ def _enu(ned: Sequence[float]) -> Json:
 
 def _xyz(x: float, y: float, z: float) -> Json:
     return {"x": float(x), "y": float(y), "z": float(z)}
-
-
-def _wxyz(w: float, x: float, y: float, z: float) -> Json:
-    return {**_xyz(x, y, z), "w": float(w)}

@@ -6,6 +6,7 @@ channel between the two closes when the companion ends, however it ends.
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -30,7 +31,10 @@ class Heir:
         self._channel.setblocking(False)
         # This file is all that it needs. In a session of its own it hears no Ctrl-C.
         command = [sys.executable, "-I", "-S", __file__, str(its.fileno())]
+        # Nor what systemd, or its watchdog, ends the rest of a service with (systemd.kill(5)): a mask is inherited.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGTERM, signal.SIGABRT))
         self._process = subprocess.Popen(command, pass_fds=[its.fileno()], start_new_session=True)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         its.close()
         self._has_words = False
 
