@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.damage import note_motors
 from companion.flight.envelope import Surroundings, bounded
+from companion.flight.handlers.connecting import Connect
 from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
@@ -34,11 +34,11 @@ from companion.messages import (
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
 from companion.motion.vector import ZERO, plus
-from companion.reflex.attitude_law import braked
-from companion.reflex.collision import CollisionReport
 from companion.reflex.config import HELD_S, LEAD_S, NOTICED_S
-from companion.reflex.detector import Situation
-from companion.reflex.impact import ImpactEstimate
+from companion.reflex.detection.detector import Situation
+from companion.reflex.detection.impact import ImpactEstimate
+from companion.reflex.recovery.attitude_law import braked
+from companion.reflex.recovery.collision import CollisionReport
 from companion.reflex.reflex import start_reflex
 from companion.report import Event, Status
 

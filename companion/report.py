@@ -6,8 +6,8 @@ from typing import Literal, TypeAlias
 
 from companion.memory.patch import Patch
 from companion.messages import Vector3
-from companion.reflex.collision import CollisionReport
-from companion.reflex.health import Promise
+from companion.reflex.detection.health import Promise
+from companion.reflex.recovery.collision import CollisionReport
 
 JsonValue: TypeAlias = "bool | int | float | str | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from rebound_cli.exit_codes import USAGE
-from rebound_cli.shipped import shipped_missions
+from rebound_cli.inputs.shipped import shipped_missions
 
 Run: TypeAlias = Callable[[argparse.Namespace], int]
 Table: TypeAlias = Mapping[str, Any]

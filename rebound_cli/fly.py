@@ -12,11 +12,11 @@ from companion.companion import Companion
 from companion.errors import ConfigurationError, ReboundError
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection, udp_in
+from companion.shell.connections.connection import Connection, udp_in
 from companion.shell.files import write_whole
-from rebound_cli import inputs
 from rebound_cli.background import Background
 from rebound_cli.flights.kept import folder_with_room
+from rebound_cli.inputs import inputs
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched

@@ -10,13 +10,13 @@ from companion.errors import ReboundError
 from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
-from companion.shell.clients import SharedConnection, carried_bytes_s
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection, Selectable
+from companion.shell.connections.clients import SharedConnection, carried_bytes_s
+from companion.shell.connections.connection import Connection, Selectable
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
-from rebound_cli.documents import Document, apply_overrides, load_document, validated
 from rebound_cli.flights.kept import folder_with_room
+from rebound_cli.inputs.documents import Document, apply_overrides, load_document, validated
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop, watched

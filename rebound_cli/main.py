@@ -15,7 +15,7 @@ from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import __version__, exit_codes
 from rebound_cli.arguments import add_commands
 from rebound_cli.extras import needed_text
-from rebound_cli.shipped import shipped_examples, shipped_missions
+from rebound_cli.inputs.shipped import shipped_examples, shipped_missions
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
@@ -34,7 +34,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         given = re.search(r"(?:invalid choice|unrecognized arguments): '?([^' ]+)", message)
         if given is not None:
-            from rebound_cli.documents import nearest
+            from rebound_cli.inputs.documents import nearest
 
             _, _, allowed = message.partition("(choose from ")
             near = nearest(given[1], re.findall(r"'([^']+)'", allowed) or list(_options_of(self)))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from companion.guard.config import GuardConfig
-from rebound_cli.inputs import companion_settings
+from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.recording import is_run_folder, log_file, read_recording, settings_file

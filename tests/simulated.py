@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from companion.companion import Companion
-from rebound_cli.documents import Document, apply_overrides, load_document
-from rebound_cli.inputs import mission_from, world_from
+from rebound_cli.inputs.documents import Document, apply_overrides, load_document
+from rebound_cli.inputs.inputs import mission_from, world_from
 from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.flying import Flight

@@ -2,9 +2,11 @@
 
 import argparse
 import ast
+import collections
 import functools
 import graphlib
 import importlib
+import itertools
 import re
 import subprocess
 import sys
@@ -101,8 +103,9 @@ def test_companion_and_vehicle_never_import_each_other_nor_the_command_line() ->
 
 def test_how_the_reflex_decides_and_believes_stays_behind_its_door() -> None:
     # Values go through the door, and settings; to compare with other detectors the laboratory looks behind it.
-    behind = ("classify", "confirmation", "correction", "crash", "free_flight", "fused", "motion_estimator")
-    hidden = {f"companion.reflex.{name}" for name in (*behind, "sustained_force", "velocity_jump")}
+    behind = ("classify", "confirmation", "crash", "free_flight", "fused", "sustained_force", "velocity_jump")
+    hidden = {f"companion.reflex.detection.{name}" for name in behind}
+    hidden |= {"companion.reflex.correction", "companion.reflex.recovery.motion_estimator"}
     found = [
         f"{module} imports {name}"
         for module, names in imports_of_all().items()
@@ -140,19 +143,28 @@ def test_no_module_needs_itself_by_way_of_others() -> None:
         pytest.fail(" is imported by ".join(cycle.args[1]))
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_no_folder_needs_itself_by_way_of_others(package: str) -> None:
+def test_no_folder_needs_itself_by_way_of_others() -> None:
     # The way of the data is the way of the files. A file beside the folders counts as one of them.
     arrows: dict[str, set[str]] = {}
     for module, names in imports_of_all().items():
-        room, *inside = module.split(".")
-        if room == package and inside:
-            below = {name.split(".")[1] for name in names if name.startswith(f"{package}.")}
-            arrows.setdefault(inside[0], set()).update(below - {inside[0]})
+        for name in names:
+            # The two that stand in one folder: of a.b.c and a.d they are a.b and a.d.
+            ways = (itertools.accumulate(each.split("."), "{}.{}".format) for each in (module, name))
+            apart = [pair for pair in zip(*ways, strict=False) if pair[0] != pair[1]]
+            if apart:
+                arrows.setdefault(apart[0][0], set()).add(apart[0][1])
     try:
         graphlib.TopologicalSorter(arrows).prepare()
     except graphlib.CycleError as cycle:
-        pytest.fail(f"in {package}, " + " is imported by ".join(cycle.args[1]))
+        pytest.fail(" is imported by ".join(cycle.args[1]))
+
+
+def test_no_folder_of_code_has_more_than_twelve_files() -> None:
+    # A folder is held in the head. Its data count.
+    folders = {path.parent for package in (*PACKAGES, "tests") for path in sources(package)}
+    files = [path for folder in folders for path in folder.iterdir() if path.is_file() and path.name != "__init__.py"]
+    counts = collections.Counter(name(path.parent) for path in files)
+    assert {folder: count for folder, count in counts.items() if count > 12} == {}
 
 
 def test_what_a_text_in_the_code_refers_to_is_there() -> None:
@@ -234,21 +246,21 @@ CONFIGS = [COMPANION / "reflex" / "config.py", COMPANION / "motion" / "config.py
 FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
 # Those that a derivation gives.
 DERIVED = {
-    "reflex/velocity_jump.py": {3},  # axes; Student's t by degrees of freedom
-    "reflex/filter_bank.py": {3},  # axes
-    "reflex/impact.py": {4},  # a beginning that is known by two windows: half of half a window
-    "reflex/monitor.py": {3},  # shown decimals
-    "reflex/health.py": {3, 3600},  # shown decimals; seconds an hour
+    "reflex/detection/velocity_jump.py": {3},  # axes; Student's t by degrees of freedom
+    "reflex/recovery/filter_bank.py": {3},  # axes
+    "reflex/detection/impact.py": {4},  # a beginning that is known by two windows: half of half a window
+    "reflex/detection/monitor.py": {3},  # shown decimals
+    "reflex/detection/health.py": {3, 3600},  # shown decimals; seconds an hour
     "flight/damage.py": {3},  # shown decimals
 }
 # A damaged motor decides no hit and no recovery.
 OTHERS = {"motors.py"}
-FLIGHT = ("after_hit", "damage", "recovering")
+FLIGHT = ("after_hit", "damage", "handlers/recovering")
 
 
 def sources_with_numbers() -> Iterator[Path]:
     for room in ("motion", "reflex"):
-        yield from (path for path in sorted((COMPANION / room).glob("*.py")) if path not in CONFIGS)
+        yield from (path for path in sorted((COMPANION / room).rglob("*.py")) if path not in CONFIGS)
     yield from (COMPANION / "flight" / f"{name}.py" for name in FLIGHT)
 
 

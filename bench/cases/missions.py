@@ -12,8 +12,8 @@ from bench.cases.rooms import MAX_HEIGHT_M, DrawnRoom, draw_room
 from bench.cases.vehicles import companion_settings, drawn_vehicle
 from companion.errors import ReboundError
 from companion.mission.model import Mission
-from rebound_cli.documents import load_document
-from rebound_cli.inputs import with_guards
+from rebound_cli.inputs.documents import load_document
+from rebound_cli.inputs.inputs import with_guards
 from sim_vehicle.airframe import Airframe, built_in_airframes, with_base
 from sim_vehicle.errors import SceneError
 from sim_vehicle.scene import Scene, check_start_is_free

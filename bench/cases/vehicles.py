@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from bench.cases.draw import Draw
-from rebound_cli.inputs import guards_of, load_world
+from rebound_cli.inputs.inputs import guards_of, load_world
 from sim_vehicle.airframe import Airframe, with_base
 
 Part = dict[str, Any]

@@ -8,7 +8,7 @@ from bench.detectors.force import FuzzyDetector, LateralDetector, ThresholdDetec
 from bench.detectors.observers import HybridDetector, MomentumDetector, TrackingDetector
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from companion.reflex.detector import Detector
+from companion.reflex.detection.detector import Detector
 
 BASELINES = (FuzzyDetector, HybridDetector, LateralDetector, MomentumDetector, ThresholdDetector, TrackingDetector)
 

@@ -16,7 +16,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.motion.strapdown import LEVEL
-from companion.reflex.detector import DetectorState, Impact, Phase, Situation
+from companion.reflex.detection.detector import DetectorState, Impact, Phase, Situation
 from companion.strict_model import Positive, StrictModel
 
 # A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.

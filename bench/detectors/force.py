@@ -8,7 +8,7 @@ from companion.messages import ImuSample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO
-from companion.reflex.detector import Phase, Situation
+from companion.reflex.detection.detector import Phase, Situation
 
 # Samples, as in its authors' program.
 WINDOW = 10

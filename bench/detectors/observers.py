@@ -10,7 +10,7 @@ from companion.messages import ImuSample, LocalPosition, MessageId, Sample, Vect
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.vector import ZERO, along, minus, plus, towards
-from companion.reflex.detector import Impact, Phase, Situation
+from companion.reflex.detection.detector import Impact, Phase, Situation
 
 # Drag changes within a second; the model's error in seconds. So does the lag behind a setpoint, with the speed.
 MEAN_MEMORY_S = 1.0

@@ -14,7 +14,7 @@ from bench.fly.packets import ARM, COMMAND, SET_MODE, SETPOINT, custom_mode, dec
 from bench.fly.station import GroundStation
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
-from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
+from companion.shell.connections.connection import MOST_DATAGRAMS, LinkCounts
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.bench.faults import FaultRequest

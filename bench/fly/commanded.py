@@ -28,7 +28,7 @@ PLACE_ONLY = 0xDF8
 MANUAL_POSITION, OFFBOARD, HOLD, MISSION, LAND = (3, 0), (6, 0), (4, 3), (4, 4), (4, 6)
 # MAVSDK's Offboard repeats its last setpoint every 50 ms, for ever; in whole intervals of 4 ms.
 REPEATED_EVERY_S = 0.052
-# Datagrams, with Linux's default buffer (see companion.shell.connection.MOST_DATAGRAMS); later ones are lost.
+# Datagrams, with Linux's default buffer (see connection.MOST_DATAGRAMS of the companion's); later ones are lost.
 SOCKET_HOLDS = 277
 
 

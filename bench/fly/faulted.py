@@ -14,7 +14,7 @@ from bench.fly.air import KILLED, Air, Fault, Hung, Injector, Killed
 from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.shell.tlog import may_be_logged
-from rebound_cli.inputs import resolved, with_guards
+from rebound_cli.inputs.inputs import resolved, with_guards
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime

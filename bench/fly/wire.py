@@ -17,9 +17,9 @@ from companion.link.streams import wanted_streams
 from companion.mavlink.decode import Decoder
 from companion.messages import LandedState, MessageId, Sample
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import Situation
-from companion.reflex.impact import ImpactEstimate
-from companion.reflex.monitor import advance, start_monitor
+from companion.reflex.detection.detector import Situation
+from companion.reflex.detection.impact import ImpactEstimate
+from companion.reflex.detection.monitor import advance, start_monitor
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
 from sim_vehicle.autopilot.messages import Identity

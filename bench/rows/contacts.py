@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.fly.lockstep import JudgedFlight
-from companion.reflex.collision import CollisionReport
+from companion.reflex.recovery.collision import CollisionReport
 from companion.report import Event
 from rebound_cli.results.truth_match import LATE_SAMPLE_US, Vector3
 from sim_vehicle.truth import Hit

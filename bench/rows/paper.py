@@ -13,7 +13,7 @@ from bench.detectors.config import BaselineMission
 from bench.fly.campaign import Json
 from bench.fly.lockstep import flown_in
 from companion.report import FlightReport
-from rebound_cli.inputs import with_guards
+from rebound_cli.inputs.inputs import with_guards
 from rebound_cli.results.flight_log import FlightLog, read_flight_log
 from rebound_cli.results.run_folder import TLOG_NAME
 from rebound_cli.results.summary import FlightFacts, build_summary

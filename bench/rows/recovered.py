@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bench.fly.campaign import Json
 from bench.fly.lockstep import JudgedFlight
 from bench.rows.contacts import JudgedContact, Role, phases_of
-from companion.reflex.collision import CollisionReport
+from companion.reflex.recovery.collision import CollisionReport
 from companion.reflex.surface import away_from
 from rebound_cli.results.summary import LONGEST_RECOVERY_S
 from rebound_cli.results.truth_match import Vector3

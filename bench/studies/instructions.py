@@ -23,7 +23,7 @@ from companion.errors import ReboundError
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of
 from companion.messages import MessageId
-from rebound_cli.inputs import load_mission_document, mission_from, world_from
+from rebound_cli.inputs.inputs import load_mission_document, mission_from, world_from
 
 ROOT = Path(__file__).parents[2]
 # Intervals before the hit: a second of them whole, then so many in which each packet comes by itself, as a UART has it.

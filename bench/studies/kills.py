@@ -20,7 +20,7 @@ from bench.rows.tables import table
 from bench.studies.study import Shown, run_study
 from companion.companion import Companion
 from companion.mission.model import Mission
-from rebound_cli.inputs import with_guards
+from rebound_cli.inputs.inputs import with_guards
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit

@@ -30,9 +30,9 @@ from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
-from companion.shell.connection import udp_out
+from companion.shell.connections.connection import udp_out
 from rebound_cli.background import Background
-from rebound_cli.inputs import load_mission_document, mission_from, world_from
+from rebound_cli.inputs.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop

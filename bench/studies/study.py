@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from bench.fly.campaign import Json, Results, run_campaign
 from companion.errors import ConfigurationError
 from rebound_cli import __version__
-from rebound_cli.inputs import load_world
+from rebound_cli.inputs.inputs import load_world
 from rebound_cli.results.run_folder import RunFolderError
 
 

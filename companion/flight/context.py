@@ -26,9 +26,9 @@ from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
 from companion.motion.vector import ZERO, minus, plus
-from companion.reflex.attitude_law import Lean
-from companion.reflex.collision import CollisionRecord
-from companion.reflex.impact import ImpactEstimate
+from companion.reflex.detection.impact import ImpactEstimate
+from companion.reflex.recovery.attitude_law import Lean
+from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.reflex import Reflex
 from companion.report import Event, JsonValue, Outcome
 

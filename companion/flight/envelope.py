@@ -18,8 +18,8 @@ from companion.messages import Vector3
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.vector import ZERO, along, minus, plus, towards
-from companion.reflex.attitude_law import brakable_m_s, held_off
 from companion.reflex.config import BEHIND_M, BRAKES_M_S2, HELD_S, NOTICED_S
+from companion.reflex.recovery.attitude_law import brakable_m_s, held_off
 from companion.reflex.surface import Surface, projected
 
 

@@ -4,7 +4,7 @@ import math
 
 from companion.flight.context import Expectation, FlightContext, as_text
 from companion.mission import items
-from companion.reflex.collision import CollisionReport
+from companion.reflex.recovery.collision import CollisionReport
 
 
 def describe(item: items.ExpectItem) -> str:

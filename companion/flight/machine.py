@@ -8,15 +8,15 @@ from typing import Any, ClassVar
 
 from companion.flight import expectations
 from companion.flight.after_hit import decide, lands_anyway, note_before
-from companion.flight.connecting import Connect, Ready
 from companion.flight.context import FlightContext, Inputs, StateHandler, Transition
-from companion.flight.crash import Crashed, crashed
-from companion.flight.ending import ON_THE_GROUND, HandOver, Released, early_end
+from companion.flight.handlers.connecting import Connect, Ready
+from companion.flight.handlers.crash import Crashed, crashed
+from companion.flight.handlers.ending import ON_THE_GROUND, HandOver, Released, early_end
+from companion.flight.handlers.progress import FlyHome, FlyItems, HoldAfterRecovery
+from companion.flight.handlers.recovering import Recover, record_collision
+from companion.flight.handlers.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.flight.obstacle_map import remember
-from companion.flight.progress import FlyHome, FlyItems, HoldAfterRecovery
-from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import FINAL_STATES, MAY_CRASH, TABLE, State, Trigger
-from companion.flight.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.mission.items import TakeoffItem
 
 

@@ -11,8 +11,8 @@ from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.motion.vector import minus, plus
-from companion.reflex.collision import CollisionRecord
-from companion.reflex.laws import Contact
+from companion.reflex.recovery.collision import CollisionRecord
+from companion.reflex.recovery.laws import Contact
 from companion.reflex.surface import Normal, Surface
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
-from companion.reflex.collision import CollisionRecord
-from companion.reflex.detector import Phase
-from companion.reflex.monitor import CollisionMonitor
+from companion.reflex.detection.detector import Phase
+from companion.reflex.detection.monitor import CollisionMonitor
+from companion.reflex.recovery.collision import CollisionRecord
 from companion.report import Event, JsonValue
 
 # Numbers for plots.

@@ -10,7 +10,7 @@ from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
 from companion.messages import MessageId, Sample, Vector3
 from companion.reflex.config import HELD_S
-from companion.reflex.detector import NO_POSITION, Situation
+from companion.reflex.detection.detector import NO_POSITION, Situation
 
 
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:

@@ -12,7 +12,7 @@ from companion.guard.states import State
 from companion.guard.watching import GuardConnect, own_streams
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
-from companion.reflex.collision import CollisionReport
+from companion.reflex.recovery.collision import CollisionReport
 from companion.report import RoundTripReport
 
 

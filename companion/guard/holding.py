@@ -4,9 +4,9 @@ import math
 
 from companion.autopilot.interface import Pilot
 from companion.flight.context import Inputs, NoSetpoint, Target
-from companion.flight.crash import Crashed
-from companion.flight.ending import silent_position
-from companion.flight.recovering import Recover
+from companion.flight.handlers.crash import Crashed
+from companion.flight.handlers.ending import silent_position
+from companion.flight.handlers.recovering import Recover
 from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.onward import leads_into
 from companion.guard.states import Trigger

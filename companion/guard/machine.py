@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
-from companion.flight.crash import crashed
-from companion.flight.ending import LINK_RESTORED, Holder, Released, silent_link, silent_position, who_decided
+from companion.flight.handlers.crash import crashed
+from companion.flight.handlers.ending import LINK_RESTORED, Holder, Released, silent_link, silent_position, who_decided
+from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.machine import StateMachine
-from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
 from companion.guard.descent import THROTTLE
@@ -18,7 +18,7 @@ from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
 from companion.guard.watching import GuardConnect, StandBy, Watching
 from companion.messages import Asked, Sticks
 from companion.motion.rotation import yaw_rad
-from companion.reflex.detector import ImpactKind
+from companion.reflex.detection.detector import ImpactKind
 
 # What is told of a move that has a story.
 _KINDS = {

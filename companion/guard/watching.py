@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 
 from companion.autopilot.interface import Autopilot
-from companion.flight.connecting import Meet
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target
 from companion.flight.envelope import unattended_text
+from companion.flight.handlers.connecting import Meet
 from companion.flight.vehicle_update import update_vehicle
 from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, Sample, SetMessageInterval, VehicleCommand
-from companion.reflex.detector import NO_POSITION, ON_THE_GROUND
+from companion.reflex.detection.detector import NO_POSITION, ON_THE_GROUND
 
 # Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
 ECHO_HZ = 50.0

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from companion.motion.config import SettledConfig
-from companion.reflex.monitor import CollisionMonitorConfig
+from companion.reflex.detection.monitor import CollisionMonitorConfig
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.0)]
@@ -18,13 +18,13 @@ class StreamsConfig(StrictModel):
     highres_imu_hz: Rate = 250.0
     """PX4 rounds the interval to whole IMU samples: 200 gives 124, 250 gives all of them (measured on SITL)."""
     local_position_hz: Rate = 50.0
-    """A velocity at most 20 ms before a contact: v_c is the last one (see reflex.impact)."""
+    """A velocity at most 20 ms before a contact: v_c is the last one (see detection.impact)."""
     attitude_hz: Rate = 50.0
     """Which way the thrust points, and how the vehicle turns."""
     extended_sys_state_hz: Rate = 5.0
     """Take-off and touchdown last longer than a second."""
     attitude_target_hz: Rate = 30.0
-    """The thrust asked for changes by less than a third of the greatest within 33 ms (see reflex.free_flight).
+    """The thrust asked for changes by less than a third of the greatest within 33 ms (see detection.free_flight).
     Asked for only by a detector that uses it."""
     odometry_hz: Rate = 30.0
     """PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of."""

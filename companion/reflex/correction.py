@@ -5,7 +5,7 @@ like another hit. On a real PX4 the velocity was wrong by up to 7.8 m/s. It stay
 after 0.7 s, and the tilt was wrong for seconds.
 
 The detector uses the validity: it must not take that swing for a second hit. A second hit jumps further than the swing
-of the first one's speed. A recovery knows the normal and the expected rebound, too: it uses `reflex.motion_estimator`.
+of the first one's speed. A recovery knows the normal and the expected rebound, too: it uses `motion_estimator`.
 """
 
 import math

@@ -15,20 +15,20 @@ from companion.motion.config import KEPT_US, SettledConfig
 from companion.motion.rotation import body_to_ned, tilt_rad
 from companion.motion.vector import plus
 from companion.reflex import config as numbers
-from companion.reflex.attitude_law import Lean
-from companion.reflex.collision import CollisionRecord
 from companion.reflex.config import RecoveryConfig
-from companion.reflex.confirmation import hypothesis_of
-from companion.reflex.crash import CrashWatch
-from companion.reflex.detector import ImpactKind, Situation
-from companion.reflex.free_flight import ThrustGain
-from companion.reflex.impact import ImpactEstimate
-from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
-from companion.reflex.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
-from companion.reflex.motion_estimator import MotionEstimator
-from companion.reflex.recovery import Recovery, Room
+from companion.reflex.detection.confirmation import hypothesis_of
+from companion.reflex.detection.crash import CrashWatch
+from companion.reflex.detection.detector import ImpactKind, Situation
+from companion.reflex.detection.free_flight import ThrustGain
+from companion.reflex.detection.impact import ImpactEstimate
+from companion.reflex.detection.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
+from companion.reflex.detection.sustained_force import SustainedForceMonitor
+from companion.reflex.recovery.attitude_law import Lean
+from companion.reflex.recovery.collision import CollisionRecord
+from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact, Law
+from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.recovery.recovery import Recovery, Room
 from companion.reflex.surface import Surface, level
-from companion.reflex.sustained_force import SustainedForceMonitor
 
 
 class Reaction(NamedTuple):

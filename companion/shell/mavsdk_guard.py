@@ -17,7 +17,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINTS
 from companion.mavlink.readers import HEARD
-from companion.reflex.collision import CollisionReport
+from companion.reflex.recovery.collision import CollisionReport
 from companion.report import Event
 from companion.shell.clock import Clock
 from companion.shell.mavsdk_link import GuardError, MavsdkLink

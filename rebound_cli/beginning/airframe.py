@@ -3,7 +3,7 @@
 from argparse import Namespace
 
 from companion.errors import ConfigurationError
-from rebound_cli.inputs import load_world
+from rebound_cli.inputs.inputs import load_world
 from rebound_cli.simulation.compiling import stand_own
 from sim_vehicle.hil.parameters import as_airframe_file, as_environment, as_params_file
 from sim_vehicle.json.parameters import as_parameter_file

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from companion.errors import ConfigurationError
-from rebound_cli.documents import suggestion, write_text
-from rebound_cli.shipped import shipped_examples, shipped_missions
+from rebound_cli.inputs.documents import suggestion, write_text
+from rebound_cli.inputs.shipped import shipped_examples, shipped_missions
 
 
 def run_init(options: Namespace) -> int:

@@ -11,7 +11,7 @@ from companion.flight.plan import describe_item, describe_modifiers, mission_lin
 from companion.mission.model import Mission
 from rebound_cli.check.legs import FlownLeg, flown_legs
 from rebound_cli.check.schema import mission_schema
-from rebound_cli.inputs import load_mission_document, mission_from, world_from
+from rebound_cli.inputs.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.simulation.compiling import stand_own
 from sim_vehicle.errors import SimulationError
 

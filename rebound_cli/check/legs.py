@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.mission.model import Leg, Mission, itinerary
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs.inputs import SimulatedWorld
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.quantities import Vector3
 from sim_vehicle.scene import Scene

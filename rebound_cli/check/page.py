@@ -9,7 +9,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.mission.model import Mission
 from companion.shell.files import write_whole
 from rebound_cli.check.legs import FlownLeg
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs.inputs import SimulatedWorld
 from rebound_cli.replay.watching import Findings
 from rebound_cli.report.content import UNFLOWN, content
 from rebound_cli.report.page import SCRIPTS, assembled

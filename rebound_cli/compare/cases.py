@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from companion.errors import ConfigurationError
-from rebound_cli import inputs
+from rebound_cli.inputs import inputs
 
 
 @dataclass(frozen=True, slots=True)

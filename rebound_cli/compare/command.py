@@ -14,11 +14,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from companion.errors import ConfigurationError, ReboundError
-from rebound_cli import inputs
 from rebound_cli.compare.cases import Case, cases_of
 from rebound_cli.compare.page import write_page
 from rebound_cli.compare.rows import Row, row_of, table, write_csv
-from rebound_cli.documents import refuse_existing
+from rebound_cli.inputs import inputs
+from rebound_cli.inputs.documents import refuse_existing
 from rebound_cli.live.console import console_for
 from rebound_cli.results.run_folder import RUNS_FOLDER, read_summary
 from rebound_cli.simulation.compiling import prepare_vehicle

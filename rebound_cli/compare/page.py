@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from rebound_cli.compare.rows import Row, lines_of, notes
-from rebound_cli.documents import write_text
+from rebound_cli.inputs.documents import write_text
 
 CHARTS = {
     "at_rest_after_s": "at rest after the hit [s]",

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from companion.errors import ReboundError
 from companion.mission.config import DiskConfig
-from rebound_cli.documents import nearest
+from rebound_cli.inputs.documents import nearest
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_text, whole_lines
 

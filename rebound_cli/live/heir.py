@@ -16,7 +16,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from companion.shell.connection import Connection
+    from companion.shell.connections.connection import Connection
 
 # A link that loses a packet in ten loses one word in a thousand.
 TIMES, APART_S = 3, 0.02

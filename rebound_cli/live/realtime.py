@@ -14,7 +14,7 @@ from companion.errors import ReboundError
 from companion.messages import ComputerStatus
 from companion.shell.clock import Clock
 from companion.shell.computer import ComputerReader
-from companion.shell.connection import MOST_DATAGRAMS, Connection
+from companion.shell.connections.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.live.console import Console, state_fields

@@ -4,9 +4,9 @@ from argparse import Namespace
 from collections.abc import Callable
 
 from companion.mavlink.signing import MINUTE, Signing
-from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import MOST_DATAGRAMS, Connection, LinkCounts, Selectable, Way
+from companion.shell.connections.addresses import open_connection
+from companion.shell.connections.connection import MOST_DATAGRAMS, Connection, LinkCounts, Selectable, Way
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 

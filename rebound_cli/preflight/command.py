@@ -11,10 +11,10 @@ from pathlib import Path
 from companion.autopilot.setup import PreflightItem, SerialLine, Verdict
 from companion.errors import ConfigurationError
 from companion.preflight import Preflight, findings
-from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection
-from rebound_cli.inputs import companion_settings
+from companion.shell.connections.addresses import serial_device
+from companion.shell.connections.connection import Connection
+from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.signed_connection import open_signed
 

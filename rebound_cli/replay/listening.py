@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.messages import ImuSample, LocalPosition, MessageId, Odometry, Sample
-from companion.reflex.detector import Detector, DetectorState, Evidence, Impact, Phase, Situation
-from companion.reflex.fused import FusedState
-from companion.reflex.monitor import CollisionMonitor
+from companion.reflex.detection.detector import Detector, DetectorState, Evidence, Impact, Phase, Situation
+from companion.reflex.detection.fused import FusedState
+from companion.reflex.detection.monitor import CollisionMonitor
 
 # Of one sample, or of many.
 Numbers: TypeAlias = float | npt.NDArray[np.float64]

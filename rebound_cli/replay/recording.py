@@ -19,11 +19,11 @@ from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.messages import Asked, ComputerStatus, SetMessageInterval, Vector3
 from companion.mission.model import Mission
-from companion.reflex.detector import Situation
-from companion.reflex.monitor import CollisionMonitor
+from companion.reflex.detection.detector import Situation
+from companion.reflex.detection.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
-from rebound_cli.documents import load_document, validated
-from rebound_cli.inputs import mission_from
+from rebound_cli.inputs.documents import load_document, validated
+from rebound_cli.inputs.inputs import mission_from
 from rebound_cli.logs.log import LogError
 from rebound_cli.replay.watching import Findings
 from rebound_cli.results import run_folder

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import ImpactKind
+from companion.reflex.detection.detector import ImpactKind
 from companion.reflex.surface import Normal
 from rebound_cli.logs.log import WANTED, Log, clipped
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce

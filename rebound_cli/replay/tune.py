@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from companion.mission.config import CompanionConfig
-from rebound_cli.documents import parse_document, refuse_existing, validated, write_text
-from rebound_cli.inputs import companion_settings
+from rebound_cli.inputs.documents import parse_document, refuse_existing, validated, write_text
+from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.logs.log import Log, LogError, clipped
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.recording import log_file

@@ -13,10 +13,10 @@ from companion.guard.watching import not_flying, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import ImpactKind, Situation
-from companion.reflex.health import Promise
-from companion.reflex.impact import ImpactEstimate
-from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
+from companion.reflex.detection.detector import ImpactKind, Situation
+from companion.reflex.detection.health import Promise
+from companion.reflex.detection.impact import ImpactEstimate
+from companion.reflex.detection.monitor import CollisionMonitor, advance, start_monitor
 from companion.reflex.reflex import start_reflex
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.listening import Listener

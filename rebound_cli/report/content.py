@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.reflex.config import LONGEST_SLOW_STEP_US
-from companion.reflex.detector import Phase
+from companion.reflex.detection.detector import Phase
 from rebound_cli.replay.listening import PHASES, Numbers
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from companion.messages import Vector3
 from companion.motion.config import SHOWN_US
-from companion.reflex.detector import ImpactKind, Phase
+from companion.reflex.detection.detector import ImpactKind, Phase
 from companion.reflex.surface import Normal
 from rebound_cli.replay.listening import PHASES, Shown, Tested
 from rebound_cli.replay.report import bearing, impact_facts, kind_text, speed_text

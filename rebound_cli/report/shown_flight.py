@@ -13,7 +13,7 @@ from companion.memory.patch import Patch
 from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from rebound_cli.documents import load_document, validated
+from rebound_cli.inputs.documents import load_document, validated
 from rebound_cli.replay.recording import (
     Followed,
     Recording,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from companion.reflex.detector import ImpactKind
+from companion.reflex.detection.detector import ImpactKind
 from rebound_cli.replay.report import speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight

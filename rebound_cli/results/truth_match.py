@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from companion.reflex.collision import CollisionReport
+from companion.reflex.recovery.collision import CollisionReport
 
 if TYPE_CHECKING:  # a flight with a real vehicle must not wait for the simulator's compiled kernels
     from sim_vehicle.truth import FaultSpan, Hit

@@ -6,9 +6,9 @@ from argparse import Namespace
 from pathlib import Path
 
 from companion.guard.config import GuardConfig
-from rebound_cli import documents
-from rebound_cli.documents import DocumentError, load_document, parse_document, validated
-from rebound_cli.inputs import mission_from
+from rebound_cli.inputs import documents
+from rebound_cli.inputs.documents import DocumentError, load_document, parse_document, validated
+from rebound_cli.inputs.inputs import mission_from
 from rebound_cli.preflight.command import show_findings
 from rebound_cli.results.run_folder import read_text
 from rebound_cli.service import files

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from companion.errors import AddressError
-from companion.shell.addresses import serial_device
+from companion.shell.connections.addresses import serial_device
 from companion.strict_model import StrictModel
 from rebound_cli import exit_codes
 from rebound_cli.flights.kept import SERVICE_RUNS

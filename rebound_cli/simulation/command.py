@@ -11,7 +11,7 @@ from pathlib import Path
 from companion.errors import ConfigurationError
 from companion.shell.signing_files import read_key
 from rebound_cli.background import Background
-from rebound_cli.inputs import SimulatedWorld, load_world
+from rebound_cli.inputs.inputs import SimulatedWorld, load_world
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.results.ending import impact_text
 from rebound_cli.simulation.compiling import prepare_vehicle

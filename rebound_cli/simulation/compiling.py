@@ -10,7 +10,7 @@ from rebound_cli.live.console import Console, console_for
 from sim_vehicle.airframe import built_in_airframes
 
 if TYPE_CHECKING:
-    from rebound_cli.inputs import SimulatedWorld
+    from rebound_cli.inputs.inputs import SimulatedWorld
 
 # How what a person is told of it begins.
 COMPILING, COMPILED = "Compiling", "Compiled code"

@@ -14,9 +14,9 @@ from bench.fly import campaign as running
 from bench.fly.campaign import CODE, CampaignError, record_path, run_campaign
 from bench.rows.judge import work_out_mission
 from bench.studies import kills
-from bench.studies.detectors import work_out_hit
+from bench.studies.detection.detectors import work_out_hit
+from bench.studies.detection.hits import work_out_flown
 from bench.studies.faults import work_out_fault
-from bench.studies.hits import work_out_flown
 from tests.rebound_cli.command import ROOT
 from tests.test_structure import module_imports
 

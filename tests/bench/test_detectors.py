@@ -12,14 +12,14 @@ from bench.cases.hits import draw_case, vehicle_of_hit
 from bench.detectors.config import BaselineConfig
 from bench.fly.wire import ASKED_HZ, VehicleRecording, fly_hit, heard, streams_asked_hz
 from bench.main import main
-from bench.studies.detectors import first_possible, samples_late, work_out_hit
-from bench.studies.flights import Event, events, mistakes
+from bench.studies.detection.detectors import first_possible, samples_late, work_out_hit
+from bench.studies.detection.flights import Event, events, mistakes
 from companion.mavlink.decode import Decoder
 from companion.messages import Attitude, AttitudeTarget, ExtendedState, ImuSample, LandedState, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
 from companion.motion.vector import plus
-from companion.reflex.detector import ImpactKind, Situation
-from companion.reflex.monitor import advance, start_monitor
+from companion.reflex.detection.detector import ImpactKind, Situation
+from companion.reflex.detection.monitor import advance, start_monitor
 from rebound_cli.replay.report import replay_log
 from sim_vehicle.plant.plant import Plant
 from tests.rebound_cli.replay.flying import HIT_US, flight

@@ -9,9 +9,9 @@ from bench.fly.lockstep import fly
 from bench.rows.contacts import contacts_of
 from bench.rows.recovered import recoveries
 from bench.rows.tables import at_most, at_most_of_groups
-from bench.studies.hits import work_out_flown
+from bench.studies.detection.hits import work_out_flown
 from companion.mission.model import Mission
-from rebound_cli.inputs import with_guards
+from rebound_cli.inputs.inputs import with_guards
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 

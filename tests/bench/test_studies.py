@@ -14,11 +14,12 @@ from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, 
 from bench.fly.by_hand.ways_down import FALLS, FALLS_FROM_M, LANDINGS, GroundCase
 from bench.fly.packets import ARM, SET_MODE, made, outside
 from bench.studies.ablation import RULES, Rule, flights_table, switched
+from bench.studies.detection.hand import HandCase, fly_by_hand, text_of
+from bench.studies.detection.landings import fly_to_the_ground, judged
 from bench.studies.faults import FaultCase, flown_with, work_out_fault
-from bench.studies.hand import HandCase, fly_by_hand, text_of
-from bench.studies.landings import fly_to_the_ground, judged
 from companion.mavlink.encode import COMPONENT_ID
-from companion.reflex import attitude_law, surface
+from companion.reflex import surface
+from companion.reflex.recovery import attitude_law
 from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.bench.faults import motor_failure, other

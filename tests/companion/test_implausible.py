@@ -10,7 +10,7 @@ from companion.messages import ImuSample, LandedState, LocalPosition, Odometry, 
 from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
-from companion.reflex.confirmation import Hypothesis
+from companion.reflex.detection.confirmation import Hypothesis
 from tests.companion.fake_vehicle import LOITER, flying_in, hovering
 from tests.companion.hostile import attacked
 

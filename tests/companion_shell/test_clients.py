@@ -8,8 +8,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.errors import AddressError
 from companion.guard.between import Between
-from companion.shell.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
-from companion.shell.connection import bound_socket, udp_out
+from companion.shell.connections.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
+from companion.shell.connections.connection import bound_socket, udp_out
 from tests.ports import free_port
 
 HEARTBEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)

@@ -9,11 +9,11 @@ import pytest
 
 from bench.fly.packets import made
 from companion.errors import ConnectionSetupError
-from companion.shell import addresses
-from companion.shell.addresses import open_connection
-from companion.shell.connection import udp_in
-from companion.shell.peer import RELEASED_US, Peer
-from companion.shell.streams import Stream
+from companion.shell.connections import addresses
+from companion.shell.connections.addresses import open_connection
+from companion.shell.connections.connection import udp_in
+from companion.shell.connections.peer import RELEASED_US, Peer
+from companion.shell.connections.streams import Stream
 
 VEHICLE, STRANGER = ("192.168.4.1", 14580), ("10.0.0.66", 4444)
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from companion.errors import ConnectionSetupError
-from companion.shell import streams
-from companion.shell.addresses import open_connection
-from companion.shell.streams import RETRY_S
+from companion.shell.connections import streams
+from companion.shell.connections.addresses import open_connection
+from companion.shell.connections.streams import RETRY_S
 
 LOCAL = "127.0.0.1"
 # A test that fails waits so long; one that passes takes an attempt or two. A busy machine keeps a thread for seconds.

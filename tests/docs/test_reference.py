@@ -15,7 +15,7 @@ from bench.reference.command import FOLDER, PAGES, ROOT, mermaid_diagram, page_t
 from companion.flight import states as flight_states
 from companion.guard import states as guard_states
 from companion.guard.machine import _KINDS
-from companion.reflex.classify import TABLE as IMPACTS
+from companion.reflex.detection.classify import TABLE as IMPACTS
 from rebound_cli import exit_codes
 from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth

@@ -14,7 +14,7 @@ from companion.guard.watching import observe
 from companion.link.streams import StreamMonitor
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import Phase
+from companion.reflex.detection.detector import Phase
 from tests.guard.flying import AttachedFlight
 from tests.guard.flying import GuardedFlight as Air
 

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from rebound_cli.documents import load_document
-from rebound_cli.inputs import mission_from, world_from
+from rebound_cli.inputs.documents import load_document
+from rebound_cli.inputs.inputs import mission_from, world_from
 from tests.simulated import MISSIONS
 
 DOCUMENT = MISSIONS.parent / "docs" / "reference" / "mission.md"

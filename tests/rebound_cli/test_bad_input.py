@@ -8,8 +8,8 @@ import pytest
 from companion.mission.model import Mission
 from companion.reflex.config import GuardsConfig
 from rebound_cli import exit_codes
-from rebound_cli.documents import DocumentError, apply_overrides, load_document, parse_document, validated
-from rebound_cli.inputs import mission_from, world_from
+from rebound_cli.inputs.documents import DocumentError, apply_overrides, load_document, parse_document, validated
+from rebound_cli.inputs.inputs import mission_from, world_from
 from rebound_cli.main import main
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.hil.parameters import px4_parameters

@@ -12,7 +12,7 @@ from bench.fly.station import GroundStation
 from companion.companion import Companion, StepResult
 from companion.guard.guard import Guard
 from companion.motion.config import GRAVITY_M_S2
-from companion.reflex.detector import Impact, Phase
+from companion.reflex.detection.detector import Impact, Phase
 from companion.report import Status
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.vehicle import SimulatedVehicle

@@ -25,7 +25,7 @@ from bench.studies.paper.figures import (
 )
 from bench.studies.paper.single import FOLD_MAX_M
 from bench.studies.paper.study import Findings, Study, claim, flown_table, number
-from rebound_cli.inputs import load_mission_document
+from rebound_cli.inputs.inputs import load_mission_document
 
 MISSION_FILE = Path("missions/paper.yaml")
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from bench.fly.lockstep import JudgedFlight
 from companion.mission.model import Mission
-from companion.reflex.collision import CollisionReport
+from companion.reflex.recovery.collision import CollisionReport
 from companion.report import Event, FlightReport
 from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.airframe import load_built_in

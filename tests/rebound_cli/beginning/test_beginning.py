@@ -13,8 +13,8 @@ import pytest
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.mission.config import CompanionConfig
 from companion.preflight import Preflight, findings
-from rebound_cli.documents import load_document
-from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.inputs.documents import load_document
+from rebound_cli.inputs.inputs import load_mission_document, mission_from
 from rebound_cli.main import main
 from rebound_cli.preflight.command import serial_line
 from sim_vehicle.airframe import load_built_in

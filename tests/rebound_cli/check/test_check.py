@@ -11,8 +11,8 @@ import yaml
 from rebound_cli.check.legs import flown_legs
 from rebound_cli.check.page import planned_flight
 from rebound_cli.check.schema import mission_schema
-from rebound_cli.documents import Document
-from rebound_cli.inputs import mission_from, world_from
+from rebound_cli.inputs.documents import Document
+from rebound_cli.inputs.inputs import mission_from, world_from
 from rebound_cli.report.content import content
 from tests.rebound_cli.command import ROOT, WALL, run_here
 from tests.rebound_cli.report.test_page import Opened

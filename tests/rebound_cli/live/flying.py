@@ -6,7 +6,7 @@ from typing import Any
 
 from companion.companion import Companion
 from rebound_cli.background import Background
-from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
+from rebound_cli.inputs.inputs import load_mission_document, mission_from, resolved, world_from
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime

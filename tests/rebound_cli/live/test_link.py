@@ -84,7 +84,7 @@ WORD = b"\xfdlast word"
 # A companion with a link and a word, which ends as it is told.
 COMPANION = """
 import sys, time
-from companion.shell.addresses import open_connection
+from companion.shell.connections.addresses import open_connection
 from rebound_cli.live.heir import Heir
 heir, link = Heir(), open_connection(sys.argv[1])
 until = time.monotonic() + 5.0

@@ -11,9 +11,9 @@ import yaml
 from companion.mavlink.packet import message_id_of
 from companion.messages import ExtendedState, LandedState, LocalPosition, MessageId, PositionTarget
 from companion.mission.config import CompanionConfig
-from companion.reflex.detector import ImpactKind, Situation
+from companion.reflex.detection.detector import ImpactKind, Situation
 from companion.shell.tlog import read_tlog
-from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.inputs.inputs import load_mission_document, mission_from
 from rebound_cli.logs.log import LoggedSample
 from rebound_cli.main import main
 from rebound_cli.replay import tune as tuning

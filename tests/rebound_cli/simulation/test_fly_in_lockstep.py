@@ -6,7 +6,7 @@ import re
 import pytest
 import yaml
 
-from rebound_cli.inputs import load_mission_document, mission_from, resume_of
+from rebound_cli.inputs.inputs import load_mission_document, mission_from, resume_of
 from rebound_cli.main import main
 from rebound_cli.results.flight_log import read_flight_log
 from rebound_cli.results.run_folder import EVENTS_NAME

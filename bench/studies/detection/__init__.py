@@ -1,0 +1,1 @@
+"""What is reported of hits, and where nothing was hit."""

@@ -1,0 +1,143 @@
+"""States connect and ready: who is there, are its streams fast enough, does the person agree."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from itertools import chain
+from typing import Generic, TypeVar
+
+from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
+from companion.flight.handlers.ending import battery_complaint
+from companion.flight.plan import plan_text
+from companion.flight.states import Trigger
+from companion.messages import LandedState, MessageId, RequestMessage, SetMessageInterval, VehicleCommand
+
+MoveT = TypeVar("MoveT")
+
+
+class Meet(NoSetpoint, ABC, Generic[MoveT]):
+    """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
+
+    def __init__(self, now_us: int) -> None:
+        self._started_us = now_us
+        self._requests: Iterator[VehicleCommand] | None = None
+        self._asked: VehicleCommand | None = None  # last
+        self._measuring_since_us: int | None = None
+        self._is_told = False  # what is waited for
+
+    @abstractmethod
+    def _refused(self, text: str) -> MoveT:
+        """The vehicle, or nobody, is there."""
+
+    @abstractmethod
+    def _judge(self, flight: FlightContext, now_us: int) -> MoveT | None:
+        """Once the streams have been measured."""
+
+    def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
+        """What is asked of a vehicle that has just been met."""
+        requested = [stream.request() for stream in flight.streams.streams]
+        return [RequestMessage(MessageId.AUTOPILOT_VERSION), *requested, *flight.vehicle.autopilot.streams]
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> MoveT | None:
+        identity, companion = flight.vehicle.identity, flight.mission.companion
+        if identity is None:
+            wait_s = companion.link.heartbeat_wait_s
+            if self._is_told or now_us - self._started_us < wait_s * 1e6:
+                return None
+            text = f"no HEARTBEAT from an autopilot within {wait_s:g} s"
+            if not companion.link.wait:
+                return self._refused(f"{text}; is the address right?")
+            self._is_told = True
+            flight.report(now_us, "link", f"{text}: waiting for it")
+            return None
+        if self._requests is None:
+            self._requests, flight.was_silent, self._is_told = iter(self._commands(flight)), False, False
+            name = identity.autopilot.name
+            article = "an" if name[0] in "AEIOU" else "a"
+            text = f"connected to {article} {name} {identity.vehicle_type}, system {identity.system_id}"
+            flight.report(now_us, "connected", text, system_id=identity.system_id)
+        if self._measuring_since_us is None:
+            self._ask(flight, self._requests, inputs, now_us)
+            return None
+        is_measured = now_us - self._measuring_since_us >= companion.streams.window_s * 1e6
+        return self._judge(flight, now_us) if is_measured and not flight.is_silent(now_us) else None
+
+    def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
+        """A refused request is no reason to stop: what counts is what then arrives."""
+        if flight.command_client.busy:
+            outcome = flight.command_outcome(inputs, False, now_us)
+            if outcome is not None and outcome.refused:
+                requests = self._requests = chain(self._in_its_place(flight), requests)
+        if flight.command_client.busy:
+            return
+        self._asked = request = next(requests, None)
+        if request is not None:
+            flight.command_client.begin(request)
+            flight.command_outcome(Inputs(), False, now_us)
+        else:
+            self._measuring_since_us = now_us
+            flight.streams.start(now_us)
+
+    def _in_its_place(self, flight: FlightContext) -> Iterator[VehicleCommand]:
+        """Of a stream that the vehicle does not have."""
+        asked, imu = self._asked, flight.vehicle.autopilot.lesser_imu
+        if isinstance(asked, SetMessageInterval) and asked.message_id == MessageId.HIGHRES_IMU and imu is not None:
+            yield SetMessageInterval(imu, asked.interval_us)
+
+    def _ask_again(self, flight: FlightContext, text: str, now_us: int) -> None:
+        """What is missing may come: a vehicle that has just started has no position."""
+        if not self._is_told:
+            self._is_told = True
+            flight.report(now_us, "link", text)
+        self._requests, self._measuring_since_us = iter(self._commands(flight)), None
+
+    def _report_streams(self, flight: FlightContext, now_us: int) -> None:
+        rates = flight.streams.rates_hz()
+        text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
+        window_s = flight.mission.companion.streams.window_s
+        flight.report(now_us, "streams", f"streams in Hz over {window_s:g} s: {text}", **rates)
+
+
+class Connect(Meet[Transition]):
+    """On the ground, with a vehicle that nobody flies."""
+
+    def _refused(self, text: str) -> Transition:
+        return Transition(Trigger.REFUSED, text)
+
+    def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
+        too_old, too_slow = flight.vehicle.version_complaint(), flight.streams.too_slow(flight.vehicle.autopilot)
+        if too_old is not None:
+            return self._refused(too_old)
+        if too_slow is not None and flight.mission.companion.link.wait:
+            self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
+            return None
+        self._report_streams(flight, now_us)
+        complaint = too_slow or ground_check(flight)
+        return Transition(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
+
+
+class Ready(NoSetpoint):
+    """Show the plan; nothing happens until it is confirmed."""
+
+    def __init__(self) -> None:
+        self._shown = False
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        if not self._shown:
+            self._shown = True
+            flight.report(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
+        if flight.is_silent(now_us) or not flight.plan_confirmed:
+            return None
+        complaint = ground_check(flight)
+        return Transition(Trigger.REFUSED, complaint) if complaint is not None else Transition(Trigger.PLAN_CONFIRMED)
+
+
+def ground_check(flight: FlightContext) -> str | None:
+    """What stands against a start from here, or None."""
+    vehicle = flight.vehicle
+    if vehicle.armed:
+        return "the vehicle is armed already; land and disarm it first"
+    if vehicle.landed in (LandedState.IN_AIR, LandedState.TAKEOFF, LandedState.LANDING):
+        return "the vehicle says it is not on the ground"
+    if flight.mission.abort_when.battery_below_percent is not None and vehicle.battery_percent is None:
+        return "the mission ends below a battery level, and the vehicle says none (SYS_STATUS.battery_remaining)"
+    return battery_complaint(flight) or flight.round_trip.complaint()

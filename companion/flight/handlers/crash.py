@@ -1,0 +1,96 @@
+"""Whether the vehicle has crashed: tipped over, on the floor after a hit, or pressed to something for good."""
+
+import math
+
+from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
+from companion.flight.handlers.ending import DISARM_NEWS_US
+from companion.flight.states import Trigger
+from companion.messages import SetArmed
+from companion.motion.rotation import tilt_rad
+from companion.motion.vector import along, minus
+
+
+def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
+    """How, told with what is known; None of a vehicle that flies."""
+    watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest(), flight.vehicle.attitude
+    if latest is None or attitude is None or not flight.vehicle.armed:
+        return None
+    hits = flight.reflex.hits[flight.motors.earlier_hits :]
+    has_unsettled = bool(hits) and hits[-1].settled_after_s is None
+    if watch.is_tipped:
+        how = "tipped over"
+    elif has_unsettled and not goes_down and watch.is_low:
+        how = "on the floor after a hit"
+    elif has_unsettled and _is_pressed(flight, now_us):
+        how = "pressed to what was hit"
+    else:
+        return None
+    tilt_deg = math.degrees(tilt_rad(attitude.attitude_wxyz))
+    speed_m_s = hits[-1].report().impact_speed_m_s if hits else math.hypot(*latest.velocity_ned_m_s)
+    damage, height_m = flight.motors.damage, -flight.mission_ned_m(latest.position_ned_m)[2]
+    flight.crashed = f"crashed: {how}, tilted by {tilt_deg:.0f} degrees"
+    text = f"{flight.crashed}, {height_m:.1f} m up, last hit at {speed_m_s:.1f} m/s"
+    text += "" if damage is None else f"; {damage.text}"
+    flight.report(
+        now_us,
+        "crashed",
+        text,
+        how=how,
+        tilt_deg=tilt_deg,
+        position_ned_m=latest.position_ned_m,
+        speed_m_s=speed_m_s,
+        motor=None if damage is None else damage.motor,
+    )
+    return flight.crashed
+
+
+def _is_pressed(flight: FlightContext, now_us: int) -> bool:
+    """Whether the time for the recovery is over, and the vehicle is still where it touches."""
+    recovery, settled = flight.reflex.in_one_recovery(), flight.mission.companion.settled
+    if not recovery or now_us - recovery[-1].detected_at_us <= settled.timeout_s * 1e6:
+        return False
+    # Not where the vehicle reports to be: a hit may have put that off by more than a metre.
+    newest, place = recovery[0], recovery[0].estimator.motion.position_ned_m
+    off_m = along(minus(place, newest.contact.position_ned_m), newest.normal.direction_ned)
+    return off_m < settled.distance_m
+
+
+class Crashed(NoSetpoint):
+    """Until it is disarmed, or flies again in other hands. No setpoint is sent to a vehicle that lies or tumbles.
+
+    One that lies is asked to disarm where `on_crash` says so, never one that may fly. PX4 refuses where it does not
+    know that it has landed. Force is used only where something else than its thrust carries the vehicle: it lies on its
+    side or on its back.
+    """
+
+    def __init__(self, flight: FlightContext) -> None:
+        flight.command_client.cancel()
+        flight.expected_mode, flight.is_wreck = None, True
+        latest = flight.vehicle.history.latest()
+        self._place_ned_m = None if latest is None else latest.position_ned_m
+        self._ask_us, self._is_forced = 0, False
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        flight.is_wreck = flight.vehicle.armed is not False and not self._flies_again(flight)
+        if flight.vehicle.armed is False:
+            return Transition(Trigger.DISARMED, flight.crashed)
+        if not flight.is_wreck:
+            return Transition(Trigger.FLIES_AGAIN, f"{flight.crashed}; it flies again, in other hands")
+        watch, client = flight.reflex.crash, flight.command_client
+        if not watch.lies:
+            client.cancel()
+        elif flight.mission.on_crash == "disarm" and not client.busy and now_us >= self._ask_us:
+            client.begin(SetArmed(False, self._is_forced))
+        outcome = flight.command_outcome(inputs, False, now_us)
+        if outcome is not None:
+            self._ask_us, self._is_forced = now_us + DISARM_NEWS_US, watch.is_carried and not outcome.succeeded
+        return None
+
+    def _flies_again(self, flight: FlightContext) -> bool:
+        """Whether it is upright, above the ground, and somewhere else."""
+        latest, height_m = flight.vehicle.history.latest(), flight.height_m
+        tips = flight.reflex.crash.tipped.since_us is not None
+        if latest is None or height_m is None or self._place_ned_m is None or tips:
+            return False
+        away_m = math.dist(latest.position_ned_m, self._place_ned_m)
+        return min(away_m, height_m) > flight.mission.companion.min_detection_height_m

@@ -1,0 +1,114 @@
+"""State recovering: asks the reflex for the way to rest, and tells how it goes."""
+
+import math
+
+from companion.flight.after_hit import afterwards, take_back
+from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
+from companion.flight.obstacle_map import FlightRoom
+from companion.motion.rotation import yaw_rad
+from companion.reflex.config import YAW_LEAD_RAD
+from companion.reflex.detection.impact import ImpactEstimate
+from companion.reflex.recovery.collision import CollisionReport
+from companion.reflex.recovery.recovery import Progress, Recovery
+
+
+def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
+    """Have the reflex recover from a collision, and tell of it."""
+    record, reason = flight.reflex.begin(estimate, FlightRoom(flight), now_us), flight.reflex.why_by_position
+    if reason is not None and not flight.told_by_position:
+        flight.told_by_position = True
+        flight.report(now_us, "by_position", f"recovery by position, as law paper has it: {reason}", reason=reason)
+    _report_detection(flight, record.report())
+
+
+def _report_detection(flight: FlightContext, hit: CollisionReport) -> None:
+    force_m_s2, v_c, speed_m_s = hit.peak_specific_force_m_s2, hit.impact_velocity_ned_m_s, hit.impact_speed_m_s
+    place, setpoint = (
+        as_text(flight.mission_ned_m(each)) for each in (hit.position_ned_m, hit.recovery_setpoint_ned_m)
+    )
+    flight.report(
+        hit.detected_at_us,
+        "detection",
+        f"hit {len(flight.collisions)}: {force_m_s2:.1f} m/s^2, v_c {as_text(v_c)} ({speed_m_s:.2f} m/s) at {place}; "
+        f"recovery setpoint {setpoint}",
+        detector=hit.detector,
+        sample_time_boot_us=hit.sample_time_boot_us,
+        impact_velocity_ned_m_s=v_c,
+        impact_speed_m_s=speed_m_s,
+        normal_ned=hit.normal_ned,
+        specific_force_m_s2=force_m_s2,
+        position_ned_m=hit.position_ned_m,
+        recovery_setpoint_ned_m=hit.recovery_setpoint_ned_m,
+    )
+
+
+class Recover:
+    """Fly to rest after the newest collision, and wait until the vehicle has settled."""
+
+    def __init__(self, flight: FlightContext, recovery: Recovery) -> None:
+        self._flight, self._recovery = flight, recovery
+        *_, first = flight.reflex.in_one_recovery()
+        self._first_hit_us = first.detected_at_us
+        if flight.target is not None and first is recovery.record:
+            flight.yaw_rad = flight.target.yaw_rad
+
+    def target(self, now_us: int) -> Target | None:
+        """Attitude and thrust until it rests; then its place."""
+        place = self._recovery.record.setpoint_ned_m
+        if not self._recovery.leans:
+            return Target(place, self._yaw_rad)
+        acceleration, lean = self._flight.reflex.lean(self._yaw_rad or 0.0)
+        return Target(place, self._yaw_rad, None, acceleration, lean)
+
+    @property
+    def _yaw_rad(self) -> float | None:
+        """The heading to ask for on the way back to the wanted one: it leads the vehicle's own by YAW_LEAD_RAD at most.
+
+        Motors that turn a vehicle as fast as they can have no thrust left to climb with.
+        """
+        attitude, wanted_rad = self._flight.vehicle.attitude, self._flight.yaw_rad
+        if attitude is None:
+            return wanted_rad
+        heading_rad = yaw_rad(attitude.attitude_wxyz)
+        if wanted_rad is None:
+            return heading_rad if self._recovery.leans else None
+        short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
+        return wanted_rad if abs(short_rad) <= YAW_LEAD_RAD else heading_rad + math.copysign(YAW_LEAD_RAD, short_rad)
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        for sample in inputs.positions:
+            shown = self._recovery.take(sample)
+            transition = take_back(flight, now_us) if shown.is_rejected else None
+            if transition is not None:
+                return transition
+            self._tell(flight, shown, now_us)
+            if shown.settled_s is not None:
+                return self._leave(flight)
+        timeout_s = flight.mission.companion.settled.timeout_s
+        if now_us - self._first_hit_us > timeout_s * 1e6:
+            text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
+            flight.report(now_us, "recovered", text, settled_after_s=None)
+            return self._leave(flight)
+        return None
+
+    def _tell(self, flight: FlightContext, shown: Progress, now_us: int) -> None:
+        record, place = self._recovery.record, self._recovery.record.setpoint_ned_m
+        if shown.rested_s is not None:
+            text = f"at rest {shown.rested_s:.2f} s after the hit; from here on by position"
+            flight.report(now_us, "hand_over", text, after_s=shown.rested_s, recovery_setpoint_ned_m=place)
+        if shown.rebound_m_s is not None:
+            goal, off_m_s = as_text(flight.mission_ned_m(place)), shown.rebound_m_s
+            way = "away from" if off_m_s >= 0.0 else "towards"
+            text = f"{way} the obstacle at {abs(off_m_s):.2f} m/s; recovery setpoint {goal}"
+            flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+        if shown.settled_s is not None:
+            past_m, speed_m_s = record.overshoot_m, record.rebound_speed_m_s
+            text = f"recovered: settled {shown.settled_s:.2f} s after the hit, overshoot {past_m * 100:.1f} cm"
+            text += "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
+            flight.report(now_us, "recovered", text, settled_after_s=shown.settled_s, overshoot_m=past_m)
+
+    def _leave(self, flight: FlightContext) -> Transition:
+        """What follows begins at rest at the setpoint."""
+        self._recovery.record.is_over = True
+        flight.target = Target(self._recovery.record.setpoint_ned_m, flight.yaw_rad)
+        return afterwards(flight)

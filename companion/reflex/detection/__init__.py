@@ -1,0 +1,1 @@
+"""Whether something was hit, what kind of hit, and what it did."""

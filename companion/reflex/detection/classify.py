@@ -1,0 +1,175 @@
+"""The kind of an impact: by what the vehicle did, then by what was asked of it. One table, read from above."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from companion.messages import Quaternion, Vector3
+from companion.motion.config import GRAVITY_M_S2, SAME_M_S, SHOWN_US
+from companion.motion.history import MotionHistory
+from companion.motion.rotation import body_to_ned, tilt_rad
+from companion.motion.strapdown import LEVEL
+from companion.motion.vector import ZERO
+from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
+from companion.reflex.detection.detector import Impact, ImpactKind, Situation
+
+# The speed of a fall from half of the height in which the ground may be: 3.1 m/s. PX4 lands at up to 1.5 m/s
+# (MPC_Z_V_AUTO_DN) and ArduPilot, too (WPNAV_SPEED_DN).
+FASTEST_LANDING_M_S = math.sqrt(GRAVITY_M_S2 * GROUND_M)
+
+
+def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
+    """Whether the velocity is known, and too small to have run into anything: the obstacle came to the vehicle."""
+    return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < SAME_M_S
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """What is known of a contact when it is noticed. Local NED, SI.
+
+    `upward` is the sine of the force's elevation; `sinking_m_s` is by the reported heights.
+    """
+
+    upward: float
+    velocity_ned_m_s: Vector3 | None
+    attitude_wxyz: Quaternion
+    situation: Situation
+    sinking_m_s: float | None = None
+
+    @property
+    def near_ground(self) -> bool:
+        height_m = self.situation.height_m
+        return height_m is None or height_m < GROUND_M
+
+    @property
+    def comes_down(self) -> bool:
+        """Whether the ground is what the vehicle moves towards, rather than something beside it."""
+        north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s or ZERO
+        return down_m_s > math.hypot(north_m_s, east_m_s)
+
+    @property
+    def is_let_down(self) -> bool:
+        return self.situation.flown_by_hand and self.situation.descent_commanded
+
+    @property
+    def meets_ground(self) -> bool:
+        """The place of arming may lie higher or lower than the ground here: what comes down meets it at any height."""
+        return self.near_ground or (self.comes_down and (self.is_pushed_up or self.is_let_down))
+
+    @property
+    def is_pushed_up(self) -> bool:
+        return self.upward > STEEP
+
+    @property
+    def is_upright(self) -> bool:
+        return math.cos(tilt_rad(self.attitude_wxyz)) > STEEP
+
+    @property
+    def is_slow(self) -> bool:
+        """What has not climbed since it stood on the ground cannot have fallen, whatever its climb rate says; and what
+        falls loses height.
+        """
+        rates_m_s = [] if self.velocity_ned_m_s is None else [self.velocity_ned_m_s[2]]
+        rates_m_s += [] if self.sinking_m_s is None else [self.sinking_m_s]
+        is_fast = min(rates_m_s, default=0.0) >= FASTEST_LANDING_M_S
+        return not (is_fast and self.situation.has_climbed)
+
+    @property
+    def has_landed(self) -> bool:
+        """A vehicle on its way down meets the ground; one that is as low as its feet stands on it or scrapes along."""
+        height_m = self.situation.height_m
+        is_as_low_as_feet = height_m is not None and height_m < SCRAPING_M
+        return is_as_low_as_feet or (self.situation.descent_commanded and (self.meets_ground or self.is_pushed_up))
+
+    @property
+    def is_struck(self) -> bool:
+        return hovers(self.velocity_ned_m_s) and not self.near_ground
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One kind with its criterion, in words and as code."""
+
+    kind: ImpactKind
+    criterion: str
+    applies: Callable[[Touch], bool]
+
+
+# The first row that applies counts. A hand (`contact`) is told by how its force begins, before this table.
+TABLE = (
+    Row(
+        ImpactKind.CRASH,
+        "near the ground, or coming down and pushed from below or flown down by hand; "
+        "tilted by over 45 degrees, or sinking at over 3.1 m/s, by velocity and by height, after a climb",
+        lambda touch: touch.meets_ground and not (touch.is_upright and touch.is_slow),
+    ),
+    Row(
+        ImpactKind.LANDING,
+        "sent down, near the ground or pushed from below; flown down by hand; as low as the feet",
+        lambda touch: touch.has_landed,
+    ),
+    Row(
+        ImpactKind.STRUCK,
+        "hovering, away from the ground",
+        lambda touch: touch.is_struck,
+    ),
+    Row(
+        ImpactKind.FLOOR,
+        "pushed from below",
+        lambda touch: touch.is_pushed_up,
+    ),
+    Row(
+        ImpactKind.CEILING,
+        "pushed from above",
+        lambda touch: touch.upward < -STEEP,
+    ),
+    Row(
+        ImpactKind.WALL,
+        "pushed from the side",
+        lambda touch: True,
+    ),
+)
+
+
+def kind_of(
+    force_ned: Vector3,
+    velocity_ned_m_s: Vector3 | None,
+    attitude_wxyz: Quaternion,
+    situation: Situation,
+    sinking_m_s: float | None = None,
+) -> ImpactKind:
+    """The kind by direction, motion and situation; the size of the force has no influence."""
+    size = math.hypot(*force_ned)
+    upward = -force_ned[2] / size if size > 0.0 else 0.0
+    touch = Touch(upward, velocity_ned_m_s, attitude_wxyz, situation, sinking_m_s)
+    return next(row.kind for row in TABLE if row.applies(touch))
+
+
+def classified(impact: Impact, velocity_ned_m_s: Vector3 | None, situation: Situation) -> Impact:
+    """The impact with its kind where that is unknown. `velocity_ned_m_s` is the newest."""
+    if impact.kind is not ImpactKind.UNKNOWN:
+        return impact
+    strapdown, free_us = situation.strapdown, impact.contact_free_until_boot_us
+    attitude, fixes = (LEVEL, ()) if strapdown is None else (strapdown.valid_wxyz, strapdown.fixes)
+    # The newest velocity may contain a part of the contact already.
+    before = next((fix for fix in reversed(fixes) if fix.time_boot_us <= free_us), None)
+    velocity, until_us = velocity_ned_m_s, impact.sample_time_boot_us
+    if before is not None:
+        velocity, until_us = before.velocity_ned_m_s, before.time_boot_us
+    force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
+    kind = kind_of(force_ned, velocity, attitude, situation, _sinking_m_s(situation.history, until_us))
+    return replace(impact, kind=kind)
+
+
+def _sinking_m_s(history: MotionHistory | None, time_boot_us: int) -> float | None:
+    """By the reported heights of SHOWN_US until a time; None without two of them.
+
+    They give the mean of that time. A vehicle that falls is faster at its end, by half of what its reported velocity
+    has gained.
+    """
+    last = None if history is None else history.before(time_boot_us + 1)
+    first = None if history is None or last is None else history.before(last.time_boot_us - SHOWN_US)
+    if last is None or first is None:
+        return None
+    mean_m_s = (last.position_ned_m[2] - first.position_ned_m[2]) * 1e6 / (last.time_boot_us - first.time_boot_us)
+    return mean_m_s + 0.5 * (last.velocity_ned_m_s[2] - first.velocity_ned_m_s[2])

@@ -1,0 +1,185 @@
+"""The interface of all collision detectors: samples and the flight's situation in, impact out, state explicit."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import ClassVar, NamedTuple, Protocol, TypeVar
+
+from companion.messages import LandedState, MessageId, Sample, Vector3
+from companion.motion.history import MotionHistory
+from companion.motion.strapdown import Strapdown
+from companion.reflex.correction import VelocityValidity
+from companion.reflex.detection.free_flight import ThrustGain
+
+
+class Phase(Enum):
+    """What a detector is doing; the value is the word shown to people."""
+
+    OFF = "off"  # not wanted now: `off_reason` says why
+    QUIET = "quiet"  # switched on, waiting for a quiet interval before it trusts itself
+    ARMED = "armed"  # the next sign of a hit fires
+    CONTACT = "contact"  # has fired; the same contact cannot fire again
+
+
+class ImpactKind(Enum):
+    """What was touched, as far as telemetry can tell; the value is the word shown to people."""
+
+    UNKNOWN = "hit"  # the detector does not classify
+    WALL = "wall"
+    CEILING = "ceiling"
+    FLOOR = "floor"  # the ground, not by a landing
+    STRUCK = "struck while hovering"  # the obstacle moved, not the vehicle
+    LANDING = "landing"  # touchdown
+    CRASH = "crash"  # the ground, tilted or faster than a landing may be
+    CONTACT = "contact"  # held or pushed gently, as by a hand
+
+
+# Why a detector is off that nobody switched off.
+ON_THE_GROUND, NO_POSITION = "on the ground", "no position"
+
+
+class Evidence(Enum):
+    """By what an impact was found."""
+
+    FORCE = "force"  # a sample's averaging window held the contact's own force
+    VELOCITY_JUMP = "aftermath"  # the contact fell between the samples; what followed it showed
+
+
+class Situation(NamedTuple):
+    """What the flight knows when samples arrive; None where it does not. A tuple: one is made in every step.
+
+    `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming;
+    `has_climbed`: the vehicle has been higher than a take-off reaches since it stood on the ground or touched it. The
+    setpoint is the place last sent, local NED, where one is flown to. `descent_commanded`: the vehicle goes down
+    because it was told to, or by the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`:
+    by a pilot's sticks. `has_position`: one came of late. `is_wreck`: it has crashed and not flown since; that it
+    bounces and is picked up is not told. The monitor fills in `validity` of the vehicle's velocity, which lacks a part
+    of a hit that was clipped, `strapdown` and `history`. All have heard the sample already.
+    """
+
+    off_reason: str | None = None
+    armed: bool | None = None
+    landed_state: LandedState = LandedState.UNDEFINED
+    height_m: float | None = None
+    descent_commanded: bool = False
+    setpoint_position_ned_m: Vector3 | None = None
+    validity: VelocityValidity | None = None
+    strapdown: Strapdown | None = None
+    flown_by_hand: bool = False
+    has_climbed: bool = True
+    history: MotionHistory | None = None
+    has_position: bool = True
+    is_wreck: bool = False
+
+    @property
+    def why_off(self) -> str | None:
+        """The flight's reason, or the ground: feet that stand on it shake and push."""
+        if self.off_reason is not None:
+            return self.off_reason
+        return ON_THE_GROUND if self.landed_state is LandedState.ON_GROUND else None
+
+    @property
+    def may_crash(self) -> bool:
+        """Whether the vehicle is known to fly, be it unwatched."""
+        return self.armed is True and self.landed_state is not LandedState.ON_GROUND
+
+
+@dataclass(frozen=True, slots=True)
+class Impact:
+    """A hit, on the first sample that shows it.
+
+    `contact_free_until_boot_us` is the latest time at which the vehicle was certainly still free: the start of
+    the sample's averaging window, or the previous sample where the stream left a gap before it.
+    `specific_force_frd_m_s2` is what the contact alone did to the vehicle, in body axes; where only the aftermath
+    was seen, the mean over the gap that the contact must have fallen into.
+    `confidence` is the detector's own, 0 to 1.
+    """
+
+    sample_time_boot_us: int
+    contact_free_until_boot_us: int
+    specific_force_frd_m_s2: Vector3
+    kind: ImpactKind = ImpactKind.UNKNOWN
+    evidence: Evidence = Evidence.FORCE
+    confidence: float = 1.0
+
+    @property
+    def size_m_s2(self) -> float:
+        """Of the contact's force per mass."""
+        return math.hypot(*self.specific_force_frd_m_s2)
+
+    @property
+    def is_ground(self) -> bool:
+        """The vehicle lies or stands on it now, or bounces."""
+        return self.kind in (ImpactKind.LANDING, ImpactKind.CRASH)
+
+    @property
+    def is_collision(self) -> bool:
+        """Touching the ground at the end of a landing and being caught by hand are nothing to recover from."""
+        return self.kind not in (ImpactKind.LANDING, ImpactKind.CONTACT)
+
+
+@dataclass(slots=True)
+class Innovation:
+    """What free flight does not explain, in the newest test of one sign, and the limit from which it is a hit.
+
+    Of a force in m/s^2, of a velocity in m/s. EKF2 calls the square of `ratio` a test ratio.
+    """
+
+    value: float = 0.0
+    limit: float = math.inf
+
+    def test(self, value: float, limit: float) -> float:
+        """Take a new test; its ratio."""
+        self.value, self.limit = value, limit
+        return value / limit
+
+    @property
+    def ratio(self) -> float:
+        """A hit from 1 on."""
+        return self.value / self.limit
+
+
+@dataclass(slots=True)
+class DetectorState:
+    """What every detector's state shows; a detector that remembers more extends it.
+
+    `threshold_m_s2` is what a sample must reach now. The two before it describe the present contact, or the
+    latest one: time of its last loud sample, and the largest contact force per unit mass in one sample so far. `thrust`
+    is learnt in free air.
+    """
+
+    phase: Phase = Phase.OFF
+    off_reason: str = "not started"
+    last_sample_boot_us: int = 0
+    last_loud_boot_us: int = 0
+    peak_specific_force_m_s2: float = 0.0
+    threshold_m_s2: float = 0.0
+    thrust: ThrustGain = field(default_factory=ThrustGain)
+
+    def describe(self) -> str:
+        if self.phase is Phase.OFF:
+            return f"off ({self.off_reason})"
+        return f"{self.phase.value} at {self.threshold_m_s2:.1f} m/s^2"
+
+
+StateT = TypeVar("StateT", bound=DetectorState)
+
+
+class Detector(Protocol[StateT]):
+    """A detector holds its parameters; all that changes is in the state passed through `step`.
+
+    `losses` are the streams it makes use of besides HIGHRES_IMU, with what is lost where one does not arrive.
+    """
+
+    name: str
+    losses: ClassVar[Mapping[MessageId, str]]
+
+    def initial(self) -> StateT: ...
+
+    def step(self, state: StateT, sample: Sample, situation: Situation) -> tuple[StateT, Impact | None]:
+        """Take one sample of any kind, in the order heard; IMU samples come in the order of their stamps.
+
+        The state given may be changed and returned; whoever wants to keep an old one copies it.
+        """
+        ...

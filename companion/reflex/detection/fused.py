@@ -1,0 +1,287 @@
+"""Detector `fused`, the default: an unexplained external force, or a velocity jump after an unseen contact.
+
+By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs show a
+contact, each compared with this vehicle's own flight:
+
+* horizontal: f_x, f_y differ from their running mean and from zero, with an allowance for drag on a turning vehicle;
+* vertical: f_z is outside the range of the propellers, from zero to their maximum (see `free_flight`). A failed motor,
+  free fall, a dropped payload and every manoeuvre stay inside;
+* the velocity jumps and the accelerometer does not show it (see `velocity_jump`). The threshold is lower beside a rate
+  jump.
+
+A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
+push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
+from one sample to the next. So a weak force on a hovering vehicle is observed for a moment, and is a strike as soon as
+it jumps. `classify` names the kind.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
+from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
+from companion.motion.rotation import ned_to_body
+from companion.motion.vector import ZERO, limited, minus
+from companion.reflex.config import (
+    CLEAR,
+    JUMP,
+    LEARNT_S,
+    MEAN_MEMORY_S,
+    SETTLED_US,
+    SHAKING,
+    WORSE_AFTER_US,
+    FusedConfig,
+)
+from companion.reflex.correction import VelocityValidity
+from companion.reflex.detection.classify import classified, hovers
+from companion.reflex.detection.detector import (
+    ON_THE_GROUND,
+    DetectorState,
+    Evidence,
+    Impact,
+    ImpactKind,
+    Innovation,
+    Phase,
+    Situation,
+)
+from companion.reflex.detection.free_flight import ForceNoise
+from companion.reflex.detection.velocity_jump import VelocityJump
+
+
+@dataclass(slots=True)
+class FusedState(DetectorState):
+    """Changed in place by `FusedDetector.step`; methods only read it. Times: vehicle's boot clock; forces: body FRD,
+    m/s^2.
+    """
+
+    side: Innovation = field(default_factory=Innovation)
+    vertical: Innovation = field(default_factory=Innovation)
+    velocity: Innovation = field(default_factory=Innovation)
+    """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
+    floor: ForceNoise = field(default_factory=ForceNoise)
+    jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
+    velocity_ned_m_s: Vector3 | None = None
+    hovered_boot_us: int | None = None
+    contact_began_boot_us: int = 0
+    kind: ImpactKind = ImpactKind.UNKNOWN
+    """Of the present contact, or the latest one."""
+    observed: Impact | None = None
+    """The first loud sample while it is observed whether that is a hand."""
+    last_frd_m_s2: Vector3 = ZERO
+    before_frd_m_s2: Vector3 = ZERO
+    """Of the sample before the last."""
+    before_boot_us: int = 0
+
+    def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
+        """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
+        speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
+        turning_rad_s = sum(map(abs, rates_frd_rad_s))
+        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, MEAN_MEMORY_S * turning_rad_s)
+
+    def vertical_threshold_m_s2(self, config: FusedConfig) -> float:
+        """Vertical threshold, m/s^2, beyond the force that propellers can make."""
+        return max(config.vertical_threshold_m_s2, config.noise_factor * self.floor.vertical_m_s2)
+
+    def side_force(self, config: FusedConfig, force_frd_m_s2: Vector3) -> tuple[float, float, bool]:
+        """Horizontal force, m/s^2; how many thresholds are a hit; whether it is that of two samples together.
+
+        Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
+        contact each sample speaks for itself: the one after a forged sample does not confirm it.
+        """
+        alone = math.dist(force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2])
+        if self.phase is not Phase.ARMED or self.threshold_m_s2 <= SHAKING * config.side_threshold_m_s2:
+            return alone, 1.0, False
+        together = self._together_m_s2(force_frd_m_s2)
+        return (together, 1.0, True) if together > alone / CLEAR else (alone, CLEAR, False)
+
+    def _together_m_s2(self, force_frd_m_s2: Vector3) -> float:
+        """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
+        noise of a sum grows. Vibration alternates, a contact does not.
+
+        Compared with zero, too: a slow swing that the mean has not followed is none.
+        """
+        (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
+        x, y = f_x + g_x, f_y + g_y
+        return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
+
+    @property
+    def is_hand(self) -> bool:
+        """Whether the present contact, or the latest one, was taken for a hand."""
+        return self.kind is ImpactKind.CONTACT
+
+    def may_be_hand(self, time_us: int) -> bool:
+        """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves."""
+        return self.hovered_boot_us is not None and time_us - self.hovered_boot_us < CURRENT_US
+
+    def jumps(self, force_frd_m_s2: Vector3) -> bool:
+        """Whether the force changed over one sample, or over two, by more than a hand's does."""
+        least_m_s2 = JUMP * self.threshold_m_s2
+        return any(math.dist(force_frd_m_s2, f) >= least_m_s2 for f in (self.last_frd_m_s2, self.before_frd_m_s2))
+
+
+class FusedDetector:
+    """See the module's text."""
+
+    name = "fused"
+    losses: ClassVar[Mapping[MessageId, str]] = {
+        MessageId.ATTITUDE_TARGET: "a force from below counts only beyond 5 g",
+        MessageId.ODOMETRY: "resets of the estimator look like hits, so a velocity jump must be twice as large",
+    }
+
+    def __init__(self, config: FusedConfig, averaging_interval_us: int) -> None:
+        self._config = config
+        self._averaging_us = averaging_interval_us
+
+    def initial(self) -> FusedState:
+        return FusedState(threshold_m_s2=self._config.side_threshold_m_s2, jump=VelocityJump(self._averaging_us))
+
+    def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
+        if type(sample) is ImuSample:
+            before_us = state.last_sample_boot_us
+            impact = self._imu(state, sample, situation)
+            state.before_boot_us, state.before_frd_m_s2 = before_us, state.last_frd_m_s2
+            state.last_frd_m_s2 = sample.specific_force_frd_m_s2
+            return state, impact
+        if isinstance(sample, (LocalPosition, Odometry)):
+            return state, self._velocity(state, sample, situation)
+        if isinstance(sample, AttitudeTarget):
+            state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
+        return state, None
+
+    # --- force ------------------------------------------------------------------------------------------------
+
+    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
+        config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
+        w, off = sample.angular_velocity_frd_rad_s, situation.why_off
+        free_until_us = before_us = s.last_sample_boot_us
+        s.last_sample_boot_us = now_us
+        s.jump.imu(before_us, now_us, w)
+        side, thresholds, is_of_two = s.side_force(config, f)
+        if is_of_two:
+            free_until_us = s.before_boot_us
+        beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
+        ratio = max(
+            s.side.test(side, thresholds * s.side_threshold_m_s2(config, w)),
+            s.vertical.test(beyond, s.vertical_threshold_m_s2(config)),
+        )
+        if off is not None:
+            s.phase, s.off_reason = Phase.OFF, off
+        elif s.phase is Phase.OFF:
+            s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
+        if ratio < 1.0:
+            s.observed = None
+            self._learn(s, f, before_us)
+            is_quiet = s.floor.known_s >= LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
+            if is_quiet and s.phase is not Phase.OFF:
+                s.phase = Phase.ARMED
+            return None
+        lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
+        x, y, z = s.floor.mean_frd_m_s2
+        force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
+        is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
+        is_learnt = math.dist(f, (x, y, z)) < s.threshold_m_s2
+        if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
+            self._learn(s, f, before_us)  # a shaking that stays
+        free_until_us = min(now_us - self._averaging_us, free_until_us)
+        impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio))
+        if s.phase is Phase.OFF:
+            s.observed = None
+            # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
+            return None if is_learnt else self._unwatched(s, situation, impact)
+        return self._loud(s, situation, impact, s.jumps(f))
+
+    def _unwatched(self, s: FusedState, situation: Situation, impact: Impact) -> Impact | None:
+        """A crash is reported where no hit is looked for, too: in a take-off, in a landing, under strong vibration."""
+        since_us = impact.sample_time_boot_us - s.contact_began_boot_us
+        is_known = s.kind is ImpactKind.CRASH and since_us <= 1e6 * self._config.longest_contact_s
+        if is_known or not situation.may_crash:
+            return None
+        if (impact := classified(impact, s.velocity_ned_m_s, situation)).kind is not ImpactKind.CRASH:
+            return None
+        s.contact_began_boot_us, s.peak_specific_force_m_s2 = impact.sample_time_boot_us, impact.size_m_s2
+        s.kind = impact.kind
+        return impact
+
+    def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
+        elapsed_us = s.last_sample_boot_us - before_us
+        # A sample after a gap or a reboot has the weight of the longest interval.
+        elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
+        s.floor.learn(f, elapsed_s)
+        s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
+        if s.phase in (Phase.QUIET, Phase.ARMED):
+            s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
+
+    def _loud(self, s: FusedState, situation: Situation, impact: Impact, has_jumped: bool) -> Impact | None:
+        now_us, size = impact.sample_time_boot_us, impact.size_m_s2
+        if s.phase is not Phase.ARMED:
+            s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
+            if s.phase is Phase.CONTACT:
+                is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
+                if is_another and size > 2.0 * s.peak_specific_force_m_s2:
+                    return self._fire(s, situation, impact)
+                # A touch that tips the vehicle over becomes a crash.
+                if (
+                    s.kind is not ImpactKind.CRASH
+                    and classified(impact, s.velocity_ned_m_s, situation).kind is ImpactKind.CRASH
+                ):
+                    return self._fire(s, situation, impact)
+                s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
+            return None
+        first = s.observed = s.observed or impact
+        impact = replace(impact, contact_free_until_boot_us=first.contact_free_until_boot_us)
+        if size < self._config.soft_m_s2 and s.may_be_hand(now_us) and not has_jumped:
+            if now_us - first.sample_time_boot_us < 1e6 * self._config.soft_wait_s:
+                return None
+            impact = replace(impact, kind=ImpactKind.CONTACT)
+        return self._fire(s, situation, impact)
+
+    def _fire(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
+        """Begin the contact."""
+        impact = classified(impact, s.velocity_ned_m_s, situation)
+        s.phase, s.off_reason = Phase.CONTACT, ""
+        s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
+        s.peak_specific_force_m_s2 = impact.size_m_s2
+        s.observed, s.kind = None, impact.kind
+        return impact
+
+    # --- velocity ---------------------------------------------------------------------------------------------
+
+    def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
+        time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, situation.strapdown
+        s.velocity_ned_m_s = v = sample.velocity_ned_m_s
+        s.velocity.test(0.0, math.inf)
+        if hovers(v):
+            s.hovered_boot_us = time_us
+        if strapdown is None or not strapdown.has_new_fix:
+            return None
+        step = jump.step_m_s(strapdown.fixes)
+        if time_us - s.last_loud_boot_us < SHOWN_US:
+            jump.since_us = time_us
+            return None
+        if step is None:
+            return None
+        shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
+        change_m_s2 = abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2])
+        validity = situation.validity or VelocityValidity()
+        # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
+        caution = 1.0 if type(sample) is Odometry and validity.is_valid else 2.0
+        size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
+        corrected_m_s = validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
+        is_jump = s.velocity.test(size, least + corrected_m_s) > 1.0
+        if is_jump or validity.is_valid:
+            jump.learn(limited(step, least))
+        if s.phase is not Phase.ARMED or not is_jump:
+            return None
+        jump.since_us = time_us
+        now_us = max(time_us, s.last_sample_boot_us)
+        free_until_us = strapdown.fixes[-2].time_boot_us - LONGEST_DELAY_US
+        over_s = max(now_us - free_until_us, 1) * 1e-6
+        push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
+        force = ned_to_body(strapdown.valid_wxyz, push)
+        s.velocity_ned_m_s = minus(v, step)
+        impact = Impact(
+            now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
+        )
+        return self._fire(s, situation, impact)

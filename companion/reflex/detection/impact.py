@@ -1,0 +1,208 @@
+"""The estimate of an impact: a first one at detection, refined by the contact's force, final when that is over."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+from companion.messages import Attitude, GpsVelocity, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
+from companion.motion.config import STAMP_RESOLUTION_US
+from companion.motion.doppler import Doppler
+from companion.motion.history import MotionHistory
+from companion.motion.rotation import body_to_ned
+from companion.motion.strapdown import Strapdown
+from companion.motion.vector import ZERO, along, minus, plus
+from companion.reflex.config import CLIPPED_SHARE, SHORT, EstimateConfig
+from companion.reflex.correction import VelocityValidity
+from companion.reflex.detection.detector import DetectorState, Evidence, Impact, Phase
+from companion.reflex.surface import Normal, normal_of
+
+
+@dataclass(slots=True)
+class ContactForce:
+    """Changed only by `add`. Forces per unit mass, m/s^2; impulse per unit mass, m/s."""
+
+    free_frd_m_s2: Vector3
+    """The accelerometer's value without the contact."""
+    averaging_us: int
+    range_m_s2: float
+    impulse_ned_m_s: Vector3 = ZERO
+    forces_ned_m_s2: list[Vector3] = field(default_factory=list)
+    """The contact force in samples above the threshold."""
+    is_clipped: bool = False
+    has_gap: bool = False
+    """Whether samples are missing; PX4's own estimate does not lack them."""
+    begun_boot_us: int | None = None
+
+    def add(self, sample: ImuSample, elapsed_us: int, attitude_wxyz: Quaternion) -> None:
+        """Take one IMU sample above the threshold, so long after the one before it, and the attitude at its time.
+
+        The first one comes so long after the latest time without contact.
+        """
+        f = sample.specific_force_frd_m_s2
+        force = body_to_ned(attitude_wxyz, minus(f, self.free_frd_m_s2))
+        # Of the time before the first sample only its own window is known.
+        elapsed_s = 1e-6 * (elapsed_us if self.forces_ned_m_s2 else min(elapsed_us, self.averaging_us))
+        is_contiguous = elapsed_us < 2 * self.averaging_us  # less than one window is missing
+        self.has_gap |= not is_contiguous
+        self.is_clipped |= max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
+        self.impulse_ned_m_s = plus(self.impulse_ned_m_s, elapsed_s, force)
+        self.forces_ned_m_s2.append(force)
+        if len(self.forces_ned_m_s2) == 2 and is_contiguous:
+            # The contact began within the first window: its mean is that share of the second window's.
+            first_m_s2, second_m_s2 = (math.hypot(*each) for each in self.forces_ned_m_s2)
+            share = min(1.0, first_m_s2 / second_m_s2) if second_m_s2 > 0.0 else 1.0
+            self.begun_boot_us = sample.time_boot_us - elapsed_us - round(share * self.averaging_us)
+
+    @property
+    def peak_m_s2(self) -> float:
+        return max(math.hypot(*force) for force in self.forces_ned_m_s2)
+
+    @property
+    def is_fully_measured(self) -> bool:
+        """Whether the force so far was measured without clipping, as far as the samples show."""
+        largest = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
+        least = 0.5 * along(largest, largest)
+        lasting = sum(along(force, largest) >= least for force in self.forces_ned_m_s2)
+        return not self.is_clipped and lasting > SHORT
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactEstimate:
+    """One impact. Times are the vehicle's boot clock, vectors local NED, SI.
+
+    `time_boot_us` is t_c, good to `time_error_us` either way; `velocity_ned_m_s` is v_c, the velocity just before
+    it, and `velocity_error_m_s` its standard deviation on an axis. `normal` is the direction out of the
+    obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
+    IMU sample. `is_fully_measured`: nothing was clipped; otherwise the vehicle's own estimate may lack a part of the
+    hit. `is_lower_bound`: it may have been clipped, or samples are missing, and both may be larger. `is_final`: the
+    contact is over. `earlier` is the IMU sample before the first one that shows it.
+    """
+
+    impact: Impact
+    time_boot_us: int
+    time_error_us: int
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    velocity_error_m_s: float
+    normal: Normal
+    peak_specific_force_m_s2: float
+    impulse_m_s: float
+    is_fully_measured: bool
+    is_lower_bound: bool
+    is_final: bool
+    earlier: ImuSample | None = None
+
+
+@dataclass(slots=True)
+class ImpactEstimator:
+    """Takes all samples, and refines the estimate of the latest impact with each. Times: vehicle's boot clock."""
+
+    config: EstimateConfig
+    history: MotionHistory = field(default_factory=MotionHistory)
+    strapdown: Strapdown = field(default_factory=Strapdown)
+    validity: VelocityValidity = field(default_factory=VelocityValidity)
+    doppler: Doppler = field(default_factory=Doppler)
+    hides_clipping: bool = False  # filtered samples do not show it
+    imu: ImuSample | None = None
+    earlier_imu: ImuSample | None = None
+    estimate: ImpactEstimate | None = None
+    contact: ContactForce | None = None
+    came_ned_m_s: Vector3 = ZERO
+    """v_c, where the vehicle's estimate is valid: zero in a hit that follows another that clipping hid a part of."""
+
+    def update(self, sample: Sample) -> None:
+        """Take one sample of any kind."""
+        if isinstance(sample, ImuSample):
+            f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+            self.strapdown.imu(sample.time_boot_us, f, w)
+            self.earlier_imu, self.imu = self.imu, sample
+        elif isinstance(sample, (LocalPosition, Odometry)):
+            if isinstance(sample, LocalPosition):
+                self.history.add(sample)
+            self.strapdown.velocity(sample)
+            self.validity.update(sample.time_boot_us)
+        elif isinstance(sample, GpsVelocity):
+            is_free = self.validity.is_valid and (self.estimate is None or self.estimate.is_final)
+            self.doppler.take(sample, self.strapdown, is_free)
+        elif isinstance(sample, Attitude):
+            time_us = sample.time_boot_us
+            self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.tilt_error_rad(time_us))
+
+    def begin(self, impact: Impact) -> ImpactEstimate:
+        """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""
+        sample_us, free_until_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
+        place, velocity, error_m_s = self._motion(free_until_us)
+        force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
+        size = math.hypot(*force_ned)
+        self.contact = None
+        # A velocity that alone shows a contact has no force of its own.
+        if self.imu is not None and impact.evidence is Evidence.FORCE:
+            free = minus(self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
+            averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
+            range_m_s2 = self.config.accelerometer_range_m_s2
+            self.contact = ContactForce(free, averaging_us, range_m_s2, is_clipped=self.hides_clipping)
+            self.contact.add(self.imu, self.imu.time_boot_us - free_until_us, self.strapdown.valid_wxyz)
+        self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
+        self.validity.invalidate(sample_us, math.hypot(*velocity))
+        self.estimate = estimate = ImpactEstimate(
+            impact=impact,
+            time_boot_us=(free_until_us + sample_us) // 2,
+            time_error_us=(sample_us - free_until_us) // 2,
+            position_ned_m=place,
+            velocity_ned_m_s=velocity,
+            velocity_error_m_s=error_m_s,
+            normal=self._normal(force_ned),
+            peak_specific_force_m_s2=size,
+            impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
+            is_fully_measured=False,
+            is_lower_bound=True,
+            is_final=False,
+            earlier=self.earlier_imu,
+        )
+        return estimate
+
+    def follow(self, sample: ImuSample, state: DetectorState) -> ImpactEstimate | None:
+        """Take each IMU sample, and the detector's state after it.
+
+        Returns the final estimate, once: when the contact is over.
+        """
+        estimate, contact = self.estimate, self.contact
+        if estimate is None or estimate.is_final:
+            return None
+        is_over = state.phase is not Phase.CONTACT
+        if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
+            contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
+            # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
+            self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
+            estimate = self._refined(estimate, contact)
+        self.estimate = replace(estimate, is_final=is_over)
+        return self.estimate if is_over else None
+
+    def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
+        begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
+        if contact.begun_boot_us is not None:
+            begun_us, error_us = contact.begun_boot_us, contact.averaging_us // 4
+        return replace(
+            estimate,
+            time_boot_us=begun_us,
+            time_error_us=error_us,
+            normal=self._normal(contact.impulse_ned_m_s),
+            peak_specific_force_m_s2=contact.peak_m_s2,
+            impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
+            is_fully_measured=contact.is_fully_measured,
+            is_lower_bound=contact.has_gap or not contact.is_fully_measured,
+        )
+
+    def _normal(self, impulse_ned: Vector3) -> Normal:
+        return normal_of(impulse_ned, self.came_ned_m_s, self.hides_clipping)
+
+    def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
+        """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.
+
+        What comes later may lack a part of the hit: after a stiff contact PX4's estimate is not valid.
+        """
+        latest = self.history.before(contact_us - STAMP_RESOLUTION_US)
+        if latest is None:
+            return ZERO, ZERO, math.inf
+        ahead_s = 1e-6 * (contact_us - latest.time_boot_us)
+        place = plus(latest.position_ned_m, ahead_s, latest.velocity_ned_m_s)
+        return place, latest.velocity_ned_m_s, self.config.velocity_noise_m_s

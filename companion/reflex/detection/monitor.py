@@ -1,0 +1,222 @@
+"""The collision monitor joins the detector, the impact estimate and the stream health.
+
+It is pure, and the same in flight, replay and bench. A `CollisionMonitor` is changed only by `advance`: the same
+samples at the same times give the same impacts and notices.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
+
+from pydantic import field_validator
+
+from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vector3
+from companion.motion.config import KEPT_US
+from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
+from companion.reflex.detection.classify import classified
+from companion.reflex.detection.detector import Detector, DetectorState, Impact, ImpactKind, Phase, Situation
+from companion.reflex.detection.fused import FusedDetector, FusedState
+from companion.reflex.detection.health import Promise, SampleGate, StreamHealth, promise_of
+from companion.reflex.detection.impact import ImpactEstimate, ImpactEstimator
+from companion.strict_model import StrictModel
+
+# Optional streams besides HIGHRES_IMU.
+OPTIONAL_STREAMS: dict[type, MessageId] = {
+    AttitudeTarget: MessageId.ATTITUDE_TARGET,
+    Odometry: MessageId.ODOMETRY,
+}
+
+
+class CollisionMonitorConfig(StrictModel):
+    """Settings of the collision monitor."""
+
+    retired = frozenset({"fuzzy", "hybrid", "lateral", "momentum", "threshold", "tracking"})
+
+    detectors: ClassVar[Mapping[str, Callable[[Any, int], Detector[Any]]]] = {FusedDetector.name: FusedDetector}
+    """By the names allowed in `detector`, from their settings and the IMU's averaging interval in microseconds. A
+    subclass adds others, with a key for the settings of each."""
+
+    detector: str = "fused"
+    """Its own settings are those under its name."""
+    fused: FusedConfig = FusedConfig()
+    sight: StreamHealthConfig = StreamHealthConfig()
+    estimate: EstimateConfig = EstimateConfig()
+
+    @field_validator("detector")
+    @classmethod
+    def _known_detector(cls, name: str) -> str:
+        if name not in cls.detectors:
+            choices = " or ".join(f"'{detector}'" for detector in sorted(cls.detectors))
+            raise ValueError(f"there is no detector '{name}': a drone flies with {choices}")
+        return name
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """An event of the timeline about the detector itself."""
+
+    kind: str  # of the event
+    text: str
+    data: Mapping[str, float | str | Vector3] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class CollisionMonitor:
+    """The monitor's state between two steps. It can be copied and pickled as a whole."""
+
+    config: CollisionMonitorConfig
+    detector: Detector[Any]
+    state: DetectorState
+    estimator: ImpactEstimator
+    stream_health: StreamHealth
+    no_data_reason: str | None = None
+    """Why an armed detector could miss a hit; None while the streams are healthy."""
+    gate: SampleGate = field(default_factory=SampleGate)
+    imu_fault: str | None = None  # what was wrong with the newest IMU message
+    is_introduced: bool = False  # threshold and losses have been reported
+    invalidity_reported: bool = False
+    promise: Promise | None = None  # while it was last armed
+    promised_us: int = 0
+    heard: set[MessageId] = field(default_factory=set)
+
+    @property
+    def is_attitude_old(self) -> bool:
+        """Whether the attitude is too old to integrate the accelerometer."""
+        latest, newest_us = self.gate.latest, self.estimator.strapdown.time_boot_us
+        return latest is not None and newest_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
+
+    def reject(self) -> None:
+        """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
+        self.estimator.validity.assess(True, self.estimator.strapdown.time_boot_us)
+
+    def describe(self) -> str:
+        """For the live line."""
+        if self.no_data_reason is not None:
+            return f"blind ({self.no_data_reason})"
+        if self.promise is not None and self.state.phase is Phase.ARMED:
+            return f"{self.state.phase.value} at {self.promise.text()}"
+        return self.state.describe()
+
+
+class MonitorResult(NamedTuple):
+    """Result of one step: impacts at their first sample, final estimates of contacts that have ended, notices."""
+
+    impacts: Sequence[ImpactEstimate]
+    finished: Sequence[ImpactEstimate]
+    notices: Sequence[Notice]
+
+
+def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
+    """A monitor before its first sample; ``now_us`` is on the clock of `advance`."""
+    averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
+    detector = config.detectors[config.detector](getattr(config, config.detector), averaging_us)
+    return CollisionMonitor(
+        config, detector, detector.initial(), ImpactEstimator(config.estimate), StreamHealth(now_us, now_us)
+    )
+
+
+def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Situation, now_us: int) -> MonitorResult:
+    """Take the samples received since the last call, in order. Call it without samples, too: that shows a silence."""
+    impacts: list[ImpactEstimate] = []
+    finished: list[ImpactEstimate] = []
+    imu_samples, is_on = 0, situation.off_reason is None
+    situation = situation._replace(
+        off_reason=situation.off_reason or _vibration(monitor),
+        strapdown=monitor.estimator.strapdown,
+        validity=monitor.estimator.validity,
+        history=monitor.estimator.history,
+    )
+    for sample in samples:
+        if type(sample) is ImuSample:
+            if not monitor.gate.imu(sample):
+                monitor.imu_fault = "IMU stuck at one value"
+                continue
+            monitor.imu_fault = None
+            imu_samples += 1
+            if 0 <= monitor.estimator.strapdown.time_boot_us - sample.time_boot_us < KEPT_US:
+                continue
+        elif type(sample) is Attitude:
+            if not monitor.gate.attitude(sample):
+                continue
+        elif type(sample) is Refused:
+            if sample.message == MessageId.HIGHRES_IMU.name:
+                monitor.imu_fault = f"HIGHRES_IMU not accepted: {sample.reason}"
+            continue
+        elif type(sample) in OPTIONAL_STREAMS:
+            monitor.heard.add(OPTIONAL_STREAMS[type(sample)])
+        monitor.estimator.update(sample)
+        if monitor.is_attitude_old:
+            monitor.estimator.strapdown.fixes.clear()
+        monitor.state, impact = monitor.detector.step(monitor.state, sample, situation)
+        if impact is not None:
+            impacts.append(monitor.estimator.begin(_on_ground(impact, situation)))
+        elif type(sample) is ImuSample:
+            final = monitor.estimator.follow(sample, monitor.state)
+            if final is not None:
+                finished.append(final)
+    monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
+    _promise(monitor, now_us)
+    return MonitorResult(impacts, finished, _notices(monitor, is_on, now_us))
+
+
+def _on_ground(impact: Impact, situation: Situation) -> Impact:
+    """A landing of a detector that does not classify: the ground is no hit."""
+    named = classified(impact, None, situation)
+    return named if named.kind is ImpactKind.LANDING else impact
+
+
+def _promise(monitor: CollisionMonitor, now_us: int) -> None:
+    """Once a second, of an armed detector whose noise is known."""
+    state = monitor.state
+    if isinstance(state, FusedState) and state.phase is Phase.ARMED and now_us - monitor.promised_us >= 1e6:
+        fixes, imu_hz = monitor.estimator.strapdown.fixes, len(monitor.stream_health.arrivals_us)
+        counted = MessageId.ODOMETRY in monitor.heard
+        monitor.promise = promise_of(state, monitor.config.fused, fixes, imu_hz, counted)
+        monitor.promised_us = now_us
+
+
+def _vibration(monitor: CollisionMonitor) -> str | None:
+    """Why nothing but a crash is reported now: vibration has grown until only a crash would exceed the threshold."""
+    threshold_m_s2 = monitor.state.threshold_m_s2
+    is_hidden = threshold_m_s2 > monitor.config.sight.max_threshold_m_s2
+    return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2" if is_hidden else None
+
+
+def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
+    """Why an armed detector could miss a hit, in one phrase, or None."""
+    config = monitor.config.sight
+    fault = monitor.stream_health.fault(config, now_us)
+    if fault is not None:
+        return monitor.imu_fault or fault
+    if (vibration := _vibration(monitor)) is not None:
+        return vibration
+    return f"no ATTITUDE_QUATERNION for {round(config.silence_s * 1e3)} ms" if monitor.is_attitude_old else None
+
+
+def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice]:
+    """Whether the detector sees while it is on, and whether the velocity is valid once the contact is over.
+
+    Each when it changes; threshold and losses once.
+    """
+    notices: list[Notice] = []
+    was, reason = monitor.no_data_reason, _stream_fault(monitor, now_us) if is_on else None
+    monitor.no_data_reason = reason
+    if (reason is None) != (was is None) and is_on:
+        notices.append(Notice("link", "the detector sees again" if reason is None else f"detector blind: {reason}"))
+    has_waited = now_us - monitor.stream_health.started_us >= KEPT_US
+    if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
+        monitor.is_introduced = True
+        threshold_m_s2 = monitor.state.threshold_m_s2
+        means = f"{threshold_m_s2:.1f} m/s^2" if monitor.promise is None else monitor.promise.text()
+        text = f"detector '{monitor.detector.name}' armed: from {means}"
+        notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
+        losses = monitor.detector.losses.items()
+        notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]
+    estimate = monitor.estimator.estimate
+    is_hit = estimate is not None and estimate.impact.is_collision
+    is_invalid = is_hit and not monitor.estimator.validity.is_valid and monitor.state.phase is not Phase.CONTACT
+    if is_invalid != monitor.invalidity_reported:
+        monitor.invalidity_reported = is_invalid
+        text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"
+        notices.append(Notice("estimate", text))
+    return notices

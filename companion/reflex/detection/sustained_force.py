@@ -1,0 +1,131 @@
+"""A sustained external force: more and more thrust does not move the vehicle in the thrust's direction.
+
+A vehicle that meets an obstacle slowly shows no hit. Its loops tilt it and raise its thrust by the position error and
+by its integral, until it slips off or its own thrust tips it over. A wall met at 0.2 m/s had it on the ground three
+seconds later, whether it stood there or slid along. In free air thrust is an acceleration, except for drag and wind.
+The missing one is the external force, unless the vehicle moves: with the thrust, or against it, as a gust has it.
+The thrust is the commanded one (ATTITUDE_TARGET): a ceiling cancels what the accelerometer would show of it. Without
+that message the thrust is what the accelerometer shows along body z.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from companion.messages import LocalPosition, Quaternion, Vector3
+from companion.motion.config import GRAVITY_M_S2
+from companion.motion.rotation import body_to_ned, ned_to_body
+from companion.motion.vector import ZERO, minus, plus, split, towards, unit
+from companion.reflex.config import (
+    FOLLOWED_S,
+    FREE_M_S,
+    HELD_M_S2,
+    IMPULSE_RAD,
+    LEAD_S,
+    PLACE_SPREAD_M,
+    SMOOTHING_S,
+    STEADY_M_S,
+)
+from companion.reflex.detection.detector import Impact, ImpactKind
+from companion.reflex.detection.free_flight import ThrustGain
+from companion.reflex.detection.impact import ImpactEstimate
+from companion.reflex.surface import Normal, away_from
+
+
+@dataclass(slots=True)
+class SustainedForceMonitor:
+    """Updated with each position, and with the setpoint while one is flown to; reset by `forget`. Vectors: NED."""
+
+    gain: ThrustGain = field(default_factory=ThrustGain)
+    """Learnt at the setpoint."""
+    time_us: int = 0
+    measured_m_s2: float = GRAVITY_M_S2
+    imu_count: int = 0
+    """IMU samples in the mean since the last position."""
+    velocity_m_s: Vector3 = ZERO
+    thrust_ned_m_s2: Vector3 = ZERO
+    missing_m_s2: Vector3 = ZERO
+    wind_m_s2: Vector3 = ZERO
+    """Mean of the missing acceleration at the setpoint and in free motion: it balances drag and wind."""
+    pushed_since_us: int = 0
+    """Time since which half of a sustained force has been missing."""
+
+    def forget(self) -> None:
+        self.time_us = 0
+
+    def add_imu(self, specific_force_frd_m_s2: Vector3) -> None:
+        """Take one sample of the accelerometer; the mean of those between two positions counts."""
+        self.imu_count += 1
+        self.measured_m_s2 += (-specific_force_frd_m_s2[2] - self.measured_m_s2) / self.imu_count
+
+    def step(
+        self, sample: LocalPosition, attitude_wxyz: Quaternion, goal_ned_m: Vector3 | None
+    ) -> ImpactEstimate | None:
+        """Take one sample, the attitude and the setpoint as last sent; None while none is flown to.
+
+        What is in the way, as an impact of a vehicle that hardly moves: its force is what it takes of the acceleration.
+        """
+        is_first, now_us, elapsed_s = self.time_us == 0, sample.time_boot_us, self._smooth(sample, attitude_wxyz)
+        short = ZERO if goal_ned_m is None else minus(goal_ned_m, sample.position_ned_m)
+        is_there = math.hypot(*short) < PLACE_SPREAD_M
+        if goal_ned_m is None:
+            self.gain.known_s = 0.0
+        elif is_there or not self.gain.is_known:
+            self.gain.learn(now_us, self.measured_m_s2, elapsed_s)
+        if is_first:
+            self.wind_m_s2 = self.missing_m_s2
+        grown = minus(self.missing_m_s2, self.wind_m_s2)
+        towards = unit(grown)
+        force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
+        along_m_s, across = split(self.velocity_m_s, towards)
+        is_free = _is_free(along_m_s, math.hypot(*across))
+        if is_there or is_free:
+            share = 1.0 if abs(along_m_s) > FREE_M_S else elapsed_s / (FOLLOWED_S + elapsed_s)
+            self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
+        if is_free or force_m_s2 < 0.5 * HELD_M_S2 or split(short, towards)[0] <= 0.0:
+            self.pushed_since_us = now_us
+        # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
+        since_us = self.pushed_since_us
+        if force_m_s2 < HELD_M_S2 or now_us - since_us < 2.0 * 1e6 * LEAD_S:
+            return None
+        self.pushed_since_us = now_us
+        normal = away_from(plus(ZERO, -1.0, grown))
+        force = ned_to_body(attitude_wxyz, plus(ZERO, force_m_s2, normal))
+        return ImpactEstimate(
+            impact=Impact(now_us, since_us, force, ImpactKind.STRUCK),
+            time_boot_us=now_us,
+            time_error_us=now_us - since_us,
+            position_ned_m=sample.position_ned_m,
+            velocity_ned_m_s=sample.velocity_ned_m_s,
+            velocity_error_m_s=0.0,
+            normal=Normal(normal, IMPULSE_RAD),
+            peak_specific_force_m_s2=force_m_s2,
+            impulse_m_s=0.5e-6 * force_m_s2 * (now_us - since_us),
+            is_fully_measured=True,
+            is_lower_bound=False,
+            is_final=True,
+        )
+
+    def _smooth(self, sample: LocalPosition, attitude_wxyz: Quaternion) -> float:
+        """Low-pass velocity and thrust; missing: the thrust less the velocity's change. Returns the time step in s."""
+        now_us, velocity = sample.time_boot_us, sample.velocity_ned_m_s
+        thrust_m_s2 = -self.gain.expected_m_s2(now_us, -self.measured_m_s2)
+        thrust = plus((0.0, 0.0, GRAVITY_M_S2), 1.0, body_to_ned(attitude_wxyz, (0.0, 0.0, -thrust_m_s2)))
+        if self.time_us == 0:
+            self.velocity_m_s, self.thrust_ned_m_s2, self.time_us = velocity, thrust, now_us
+        elapsed_s, self.time_us, self.imu_count = (now_us - self.time_us) * 1e-6, now_us, 0
+        weight = elapsed_s / (SMOOTHING_S + elapsed_s)
+        self.velocity_m_s = towards(self.velocity_m_s, velocity, weight)
+        self.thrust_ned_m_s2 = towards(self.thrust_ned_m_s2, thrust, weight)
+        changes = minus(velocity, self.velocity_m_s)
+        self.missing_m_s2 = plus(self.thrust_ned_m_s2, -1.0 / SMOOTHING_S, changes)
+        return elapsed_s
+
+
+def _is_free(along_m_s: float, across_m_s: float) -> bool:
+    """Whether a vehicle with this velocity along a force, and across it, is not held by a surface.
+
+    One that slides moves along the force, too: friction and wind turn the force by up to 60 degrees.
+    """
+    most_back_m_s = max(STEADY_M_S, min(across_m_s, 2.0 * STEADY_M_S))
+    most_on_m_s = max(STEADY_M_S, min(2.0 * across_m_s, FREE_M_S))
+    return along_m_s >= most_on_m_s or along_m_s <= -most_back_m_s

@@ -1,0 +1,1 @@
+"""After a hit: where the vehicle is, and the way to rest."""

@@ -1,0 +1,130 @@
+"""The record of one collision: the state at the hit, and what telemetry has shown since."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from companion.messages import LocalPosition, Vector3
+from companion.motion.config import LATEST_S
+from companion.motion.history import MotionHistory
+from companion.motion.strapdown import VelocityFix
+from companion.motion.vector import ZERO, minus, split, unit
+from companion.reflex.config import DECIDED_US, FADED_US
+from companion.reflex.detection.confirmation import Hypothesis
+from companion.reflex.detection.detector import DetectorState, Phase
+from companion.reflex.detection.impact import ImpactEstimator
+from companion.reflex.recovery.laws import Contact
+from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.surface import Normal, level, with_change
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionReport:
+    """One collision, as the companion measured it from telemetry. Positions are the vehicle's local NED.
+
+    `impact_velocity_ned_m_s` is v_c of the paper: the velocity just before contact. `normal_ned` is the horizontal unit
+    direction of the obstacle's push, taken over the whole contact. `peak_specific_force_m_s2` is the largest specific
+    force perpendicular to thrust in one IMU sample. `settled_after_s` runs from the detection to the start of the
+    interval in which the vehicle stayed settled; None when it did not settle. `overshoot_m` is the largest distance
+    past the setpoint, away from the obstacle, until the recovery ended. `rebound_speed_m_s` is the largest speed along
+    the normal until 0.1 s after the contact; 0 when it never moved back, None when the vehicle's velocity was not
+    valid then (a clipped hit).
+    """
+
+    detected_at_us: int
+    sample_time_boot_us: int
+    detector: str
+    position_ned_m: Vector3
+    impact_velocity_ned_m_s: Vector3
+    impact_speed_m_s: float
+    normal_ned: Vector3
+    peak_specific_force_m_s2: float
+    recovery_setpoint_ned_m: Vector3
+    settled_after_s: float | None
+    overshoot_m: float
+    rebound_speed_m_s: float | None
+
+
+@dataclass(slots=True)
+class CollisionRecord:
+    """Positions and velocities in local NED; boot times in the vehicle's clock."""
+
+    detected_at_us: int
+    sample_time_boot_us: int
+    detector: str
+    contact: Contact
+    peak_specific_force_m_s2: float
+    estimator: MotionEstimator
+    setpoint_ned_m: Vector3 = ZERO  # where to rest, as its recovery has it now
+    fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
+    hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
+    settled_after_s: float | None = None  # from its first sample to the beginning of its rest
+    is_over: bool = False  # settled, or given up on
+    overshoot_m: float = 0.0
+    rebound_speed_m_s: float | None = None  # the largest along the normal, until the rebound is over
+
+    @property
+    def normal(self) -> Normal:
+        """The obstacle's normal by all that is known now."""
+        before_m_s, estimator = self.contact.velocity_ned_m_s, self.estimator
+        normal, after_m_s = estimator.normal, estimator.after_ned_m_s
+        if after_m_s is not None:
+            normal = with_change(normal, before_m_s, after_m_s, estimator.after_error_m_s)
+        return level(normal)
+
+    def follow(self, state: DetectorState, source: ImpactEstimator, positions: Sequence[LocalPosition]) -> None:
+        """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
+        strapdown, estimate, self.fixes = source.strapdown, source.estimate, source.strapdown.fixes
+        # In these phases the state still describes the contact.
+        is_in_contact = state.phase in (Phase.CONTACT, Phase.ARMED)
+        # A velocity that shows it may have come before the sample of the same time.
+        is_larger = state.peak_specific_force_m_s2 > self.peak_specific_force_m_s2
+        is_seen_again = is_in_contact and (is_larger or state.last_loud_boot_us > self.sample_time_boot_us)
+        if self.hypothesis is not None:
+            self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
+            self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis
+        if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
+            self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
+            self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal)
+        self.estimator.imu(strapdown)
+        self.estimator.measure(source.doppler)
+        if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US:
+            for sample in positions:
+                self.estimator.update(sample)
+
+    def is_rejected(self, now_boot_us: int, places: MotionHistory) -> bool:
+        """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
+        if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
+            return False
+        hypothesis, self.hypothesis = self.hypothesis, None
+        return hypothesis.is_rejected(self.fixes, places, self.estimator.config.position_noise_m)
+
+    def is_rebound(self, time_boot_us: int) -> bool:
+        """Whether a velocity, which may be late, shows the rebound. Later the vehicle's own controller makes it."""
+        return time_boot_us - self.estimator.pushed_boot_us <= LATEST_S * 1e6
+
+    def follow_recovery(self, sample: LocalPosition) -> None:
+        """Update overshoot and rebound speed while the vehicle recovers."""
+        normal = self.normal.direction_ned
+        away = unit(minus(self.setpoint_ned_m, self.contact.position_ned_m))
+        past_m = split(minus(sample.position_ned_m, self.setpoint_ned_m), normal if away == ZERO else away)[0]
+        self.overshoot_m = max(self.overshoot_m, past_m)
+        if self.is_rebound(sample.time_boot_us):
+            self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, split(sample.velocity_ned_m_s, normal)[0])
+
+    def report(self) -> CollisionReport:
+        velocity = self.contact.velocity_ned_m_s
+        return CollisionReport(
+            detected_at_us=self.detected_at_us,
+            sample_time_boot_us=self.sample_time_boot_us,
+            detector=self.detector,
+            position_ned_m=self.contact.position_ned_m,
+            impact_velocity_ned_m_s=velocity,
+            impact_speed_m_s=math.hypot(*velocity),
+            normal_ned=self.normal.direction_ned,
+            peak_specific_force_m_s2=self.peak_specific_force_m_s2,
+            recovery_setpoint_ned_m=self.setpoint_ned_m,
+            settled_after_s=self.settled_after_s,
+            overshoot_m=self.overshoot_m,
+            rebound_speed_m_s=self.rebound_speed_m_s,
+        )

@@ -1,0 +1,90 @@
+"""A bank of Kalman filters of the motion after a hit, one for each model of how the vehicle's estimate corrects itself.
+
+At a time t after the hit the vehicle reports v(t) + e g(t) and x(t) + e G(t), where e is what the accelerometer did not
+show of the hit (see `correction`). Each model is weighted by the likelihood of its innovations (Magill 1965).
+"""
+
+import math
+
+import numpy as np
+
+from companion.messages import Vector3
+from companion.motion.config import DRIFT_M2_S3
+from companion.reflex import config as reflex
+from companion.reflex.correction import MODELS, Floats, tilt_response
+from companion.reflex.recovery.laws import MotionState
+
+
+class FilterBank:
+    """Kalman filters of x, v, e: states (models, axes, 3), covariances of each axis (models, 3, 3); in the last e = 0.
+
+    Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
+    """
+
+    __slots__ = ("covariance", "leaves", "log_likelihoods", "state", "tilted")
+
+    def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
+        """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
+        models, state = MODELS, np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
+        spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
+        self.state = np.tile(state, (models, 1, 1))
+        self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
+        self.log_likelihoods, self.leaves = np.zeros(models), np.ones(models)
+        self.tilted = np.zeros((2, models, 3))  # errors of what is reported by a tilt that is wrong across e
+        self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
+        self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
+
+    def predict(self, elapsed_s: float, faster_m_s: Vector3, level_m_s2: Vector3) -> None:
+        """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong.
+
+        `level_m_s2`: acceleration of a vehicle that is level by its own tilt. Along e the models contain it.
+        """
+        hidden, pushed = self.state[..., 2], np.array(level_m_s2)
+        along_e = hidden @ pushed / np.maximum((hidden**2).sum(axis=1), 1e-9)
+        self.tilted = tilt_response(self.tilted, pushed - along_e[:, None] * hidden, elapsed_s)
+        leads, added = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array(faster_m_s)
+        self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0]
+        self.covariance = leads @ self.covariance @ leads.T
+        self.covariance[:, 1, 1] += DRIFT_M2_S3 * elapsed_s
+
+    def update(self, which: int, share: Floats, measured: Vector3, variance: float) -> None:
+        """Take a reported position (0) or velocity (1), with each model's share of e in it."""
+        missed = np.array(measured) - self.state[..., which] - share[:, None] * self.state[..., 2] - self.tilted[which]
+        with_it = self.covariance[:, which] + share[:, None] * self.covariance[:, 2]
+        size = with_it[:, which] + share * with_it[:, 2] + variance
+        gain = with_it / size[:, None]
+        self.state = self.state + missed[..., None] * gain[:, None]
+        self.covariance = self.covariance - with_it[..., None] * gain[:, None]
+        self.log_likelihoods = self.log_likelihoods - (missed**2).sum(axis=1) / size - 3.0 * np.log(size)
+
+    def leave(self, normal: Vector3, along_m_s: float, error_rad: float) -> None:
+        """Take that no vehicle goes on into what it has hit: the probability that a model's velocity left it.
+
+        `along_m_s`: what the vehicle's own thrust has added since; `error_rad`: of the normal.
+        """
+        velocity, variance = self.state[..., 1], self.covariance[:, 1, 1]
+        off_m_s = velocity @ np.array(normal) - along_m_s
+        spread2 = variance + error_rad**2 * (velocity**2).sum(axis=1)
+        self.leaves = np.maximum(0.5 + 0.5 * np.tanh(0.5 * reflex.LOGISTIC * off_m_s / np.sqrt(spread2)), 1e-9)
+
+    def estimate(self, left: Floats) -> tuple[MotionState, float, float]:
+        """Motion, largest standard deviation of its velocity, largest further swing of the reported velocity.
+
+        `left` is each model's remaining amplitude.
+        """
+        share = self._probabilities()
+        (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
+        spread2 = (share @ (self.covariance[:, 1, 1, None] + (self.state[..., 1] - [u, v, w]) ** 2)).max()
+        left2 = share @ (left**2 * (3.0 * self.covariance[:, 2, 2] + (self.state[..., 2] ** 2).sum(axis=1)))
+        return MotionState((x, y, z), (u, v, w)), math.sqrt(spread2), math.sqrt(left2)
+
+    def mean_error(self, which: int, share: Floats) -> Vector3:
+        """Mean error of the reported position (0) or velocity (1), with each model's share of e in it."""
+        n, e, d = (self._probabilities() @ (share[:, None] * self.state[..., 2] + self.tilted[which])).tolist()
+        return (n, e, d)
+
+    def _probabilities(self) -> Floats:
+        """Probability of each model."""
+        share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max())) * self.leaves
+        share /= share.sum()
+        return share

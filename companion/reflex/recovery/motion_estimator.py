@@ -1,0 +1,350 @@
+"""Position and velocity of a vehicle after a hit, although its own estimate may lack a part of the hit.
+
+A clipped accelerometer hides a part of the impulse. That part is missing in the vehicle's own velocity estimate, and
+then in its position. Its estimator corrects both by other sensors. So at a time t after the hit the vehicle reports
+
+    v(t) + e g(t),    x(t) + e G(t)
+
+for its velocity v and position x, where e is the error just after the hit. Between two reports the accelerometer is
+integrated; a Kalman filter estimates x, v and e on each axis. Delay and speed of the correction differ between
+estimators. A bank of filters has one hypothesis each, one of them e = 0; each is weighted by the likelihood of its
+innovations (Magill 1965). Before the first report v is the expected rebound, with a wide standard deviation.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+from companion.messages import LocalPosition, Quaternion, Vector3
+from companion.motion.config import (
+    CURRENT_US,
+    DELAY_S,
+    DOPPLER_GATE,
+    GRAVITY_M_S2,
+    LATEST_S,
+    LEVEL_SPREAD_M_S2,
+    LONGEST_GAP_US,
+    SAME_M_S,
+    SHOWN_US,
+    STAMP_RESOLUTION_US,
+)
+from companion.motion.doppler import Doppler, MeasuredVelocity
+from companion.motion.rotation import body_to_ned, turned
+from companion.motion.strapdown import LEVEL, Strapdown
+from companion.motion.vector import ZERO, along, limited, minus, plus, split, towards
+from companion.reflex import config as reflex
+from companion.reflex.config import EstimateConfig
+from companion.reflex.correction import error_response
+from companion.reflex.recovery.attitude_law import Belief
+from companion.reflex.recovery.filter_bank import FilterBank
+from companion.reflex.recovery.laws import Contact, MotionState
+from companion.reflex.surface import Normal, level
+
+
+@dataclass(slots=True)
+class MotionEstimator:
+    """Local NED, SI, the vehicle's boot clock. Changed only by its methods."""
+
+    contact: Contact
+    hit_boot_us: int  # its first sample
+    start: MotionState  # the expected motion after it
+    config: EstimateConfig
+    is_second: bool = False  # the error of an earlier hit was still being corrected
+    fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
+    motion: MotionState = field(init=False)
+    normal: Normal = field(init=False)  # by the contact's force
+    pushed_boot_us: int = field(init=False)  # the contact's last sample
+    is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
+    has_converged: bool = False  # the vehicle's estimate is right again
+    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
+    external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
+    attitude_wxyz: Quaternion = LEVEL
+    yaw_rate_rad_s: float = 0.0
+    level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, by gyroscopes, NED
+    _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
+    spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
+    position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
+    after_ned_m_s: Vector3 | None = None  # the velocity just after the contact, by when it was known best
+    after_error_m_s: float = math.inf  # its standard deviation
+    _bank: FilterBank | None = None  # from the first report on
+    _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
+    _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
+    _at_boot_us: int = 0  # the bank's time
+    _moved_m_s: Vector3 = ZERO  # the integral up to that time
+    _time_boot_us: int = 0  # of the newest sample of the accelerometer
+    _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
+    _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
+    _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
+    _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
+    _has_agreed: bool = False  # with the measured one, by itself
+    # Since when the reported velocity, less its mean error and as it is, is the measured one.
+    _agrees_since_boot_us: tuple[int | None, int | None] = (None, None)
+    _newest: LocalPosition | None = None  # newest report since convergence, corrected
+
+    def __post_init__(self) -> None:
+        self.motion, self.pushed_boot_us = self.start, self.hit_boot_us
+        self.normal = Normal(self.contact.normal_ned, self.contact.normal_error_rad)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
+        self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
+        self.has_converged = self._has_agreed = self._was_odd = False
+        self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
+        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
+
+    def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal) -> None:
+        """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
+        by the force."""
+        self.is_fully_measured, self.normal = is_fully_measured and not self.is_second, normal
+        if pushed_boot_us > self.pushed_boot_us:
+            self.pushed_boot_us, self._released_m_s = pushed_boot_us, self._summed_m_s
+            self.after_ned_m_s, self.after_error_m_s = None, math.inf
+            if not self.is_fully_measured:
+                self._begin()
+
+    def imu(self, strapdown: Strapdown) -> None:
+        """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
+        time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
+        self._time_boot_us = time_us
+        if not 0.0 < elapsed_s < 1e-6 * LONGEST_GAP_US:
+            return
+        pushed = strapdown.acceleration_ned_m_s2
+        pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else pushed
+        was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
+        mean = towards(was.acceleration_ned_m_s2, pushed, weight)
+        place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
+        self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
+        self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
+        self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
+        if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
+            # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
+            self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
+        self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
+        if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
+            down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
+            n, e, _ = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
+            share = elapsed_s / (reflex.SMOOTHING_S + elapsed_s)
+            self.external_m_s2 = towards(self.external_m_s2, (n, e, 0.0), share)
+
+    @property
+    def _bias_m_s2(self) -> Vector3:
+        """Of a clipped hit PX4's estimator takes a part for the accelerometer's bias, and takes it off HIGHRES_IMU."""
+        return limited(self.external_m_s2, 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2)
+
+    @property
+    def wind_m_s2(self) -> Vector3:
+        """External force per mass across the thrust, horizontal: wind and drag."""
+        return minus(self.external_m_s2, self._bias_m_s2)
+
+    @property
+    def belief(self) -> Belief:
+        """What the attitude law goes by."""
+        motion = self.motion
+        return Belief(
+            motion.position_ned_m,
+            motion.velocity_ned_m_s,
+            self.spread_m_s,
+            self.tilt_m_s2,
+            self.wind_m_s2,
+            self.attitude_wxyz,
+            self.yaw_rate_rad_s,
+            self.tilted_m_s2,
+        )
+
+    @property
+    def tilted_m_s2(self) -> Vector3:
+        """Acceleration of a vehicle that is level by its own attitude, by gyroscopes and receiver, NED."""
+        return self.level_m_s2 if self._measured is None else plus(self.level_m_s2, 1.0, self._measured.unseen_m_s2)
+
+    def measure(self, doppler: Doppler) -> None:
+        """Take a receiver's velocity: the horizontal one from then on, until the vehicle's own agrees with it."""
+        was = self._measured
+        newest_us = self.pushed_boot_us if was is None else was.taken_boot_us
+        is_right = self.is_fully_measured or self._has_agreed or (self.has_converged and was is None)
+        if is_right or doppler.taken_boot_us <= newest_us:
+            return
+        now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
+        known = was or MeasuredVelocity(now_us, self._summed_m_s, velocity, variance)
+        known.predict(now_us, self._summed_m_s)
+        is_odd = known.deviation(doppler) > DOPPLER_GATE
+        was_odd, self._was_odd = self._was_odd, is_odd
+        if is_odd and not was_odd:
+            return
+        known.update(doppler)
+        self._measured = known
+        self._believe(self.motion, self.spread_m_s)
+
+    @property
+    def is_measured_apart(self) -> bool:
+        """Whether a receiver shows the velocity, and the vehicle's own is another, which it puts right by itself."""
+        is_right = self.is_fully_measured or self._has_agreed
+        if self._measured is None or is_right or self._time_boot_us - self.hit_boot_us > reflex.FADED_US:
+            return False
+        return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
+
+    @property
+    def is_reported(self) -> bool:
+        """Whether what the vehicle reports is its motion: the hit was measured whole, or is corrected."""
+        return self.is_fully_measured or (self.has_converged and not self.is_measured_apart)
+
+    def _believe(self, motion: MotionState, spread_m_s: float) -> None:
+        """The motion by the reports; the horizontal velocity by a receiver, where there is one."""
+        velocity, self.spread_m_s = motion.velocity_ned_m_s, spread_m_s
+        if self._measured is not None and self.is_measured_apart:
+            self._measured.predict(self._time_boot_us, self._summed_m_s)
+            n, e, _ = self._measured.velocity_ned_m_s
+            velocity, self.spread_m_s = (n, e, velocity[2]), self._measured.spread_m_s
+        self.motion = MotionState(motion.position_ned_m, velocity, self.motion.acceleration_ned_m_s2)
+        self._look_back()
+
+    def _look_back(self) -> None:
+        """The velocity just after the contact: the present one less what the accelerometer has shown since."""
+        since_s = 1e-6 * (self._time_boot_us - self.pushed_boot_us)
+        error_m_s = math.hypot(self.spread_m_s, LEVEL_SPREAD_M_S2 * since_s)
+        if error_m_s < self.after_error_m_s:
+            flown_m_s = minus(self._summed_m_s, self._released_m_s)
+            self.after_ned_m_s = minus(self.motion.velocity_ned_m_s, flown_m_s)
+            self.after_error_m_s = error_m_s
+
+    def update(self, sample: LocalPosition) -> None:
+        """Take the vehicle's reported position and velocity."""
+        at_us, since_us = sample.time_boot_us - round(1e6 * DELAY_S), sample.time_boot_us - self.hit_boot_us
+        changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
+        is_late = since_us < 1e6 * LATEST_S and changed_m_s <= SAME_M_S and not self.is_second
+        if at_us <= self.hit_boot_us or is_late:
+            return
+        if self.is_fully_measured:
+            self.has_converged = True
+        elif not self._has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
+            self._filter(sample, at_us)
+        if self.has_converged:
+            self._correct(sample)
+
+    def _filter(self, sample: LocalPosition, at_us: int) -> None:
+        """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
+        now_us = self._time_boot_us or at_us
+        if abs(now_us - at_us) > LONGEST_GAP_US or now_us <= self._at_boot_us:
+            # The report's time is outside the integrated interval.
+            return
+        config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - self._at_boot_us), 1e-6 * (now_us - at_us)
+        # Clipping hides between none and all of the change of velocity.
+        half = plus(ZERO, 0.5, minus(self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s))
+        bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
+        # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
+        level_m_s2 = minus(self.level_m_s2, self._bias_m_s2)
+        if not self.fits_models:
+            # By a wrong tilt a vehicle that leans reports a climb that there is none of. PX4 corrects its own sooner.
+            level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
+        bank.predict(elapsed_s, minus(self._summed_m_s, self._moved_m_s), level_m_s2)
+        self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
+        g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
+        # The report as of now.
+        place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)
+        velocity = plus(sample.velocity_ned_m_s, behind_s, self.motion.acceleration_ned_m_s2)
+        # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
+        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * STAMP_RESOLUTION_US))
+        # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
+        off_m_s = math.hypot(*half) * reflex.MODEL_ERROR
+        off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
+        bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
+        bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
+        normal = level(self.normal).direction_ned
+        bank.leave(normal, along(self._summed_m_s, normal), self.normal.error_rad)
+        motion, spread_m_s, left_m_s = bank.estimate(left)
+        # Of the height the report is right sooner than any model: a barometer shows no hit.
+        n, e, _ = self.motion.position_ned_m if self.has_converged else motion.position_ned_m
+        estimate = MotionState((n, e, place[2]), motion.velocity_ned_m_s)
+        is_known, error_m_s = left_m_s <= SAME_M_S, bank.mean_error(1, g)
+        if not self.fits_models:
+            # By then a receiver's velocity has come, where there is one.
+            is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US
+        if self.is_measured_apart:
+            self._believe(estimate, spread_m_s)
+            self._compare(velocity, error_m_s[2], elapsed_s, is_known, sample.time_boot_us)
+        elif self.has_converged or is_known:
+            self.has_converged = True
+        else:
+            self._believe(estimate, spread_m_s)
+        if self.has_converged and not self._has_agreed:
+            n, e, _ = bank.mean_error(0, way_s)
+            self.position_error_m = (n, e, 0.0)
+            if self._measured is None:
+                self._hidden_error_m_s = error_m_s
+
+    def _compare(
+        self, reported_m_s: Vector3, climb_error_m_s: float, elapsed_s: float, is_known: bool, time_boot_us: int
+    ) -> None:
+        """Take the reported velocity's error by the measured one.
+
+        It is known once it hardly changes, and by all models nothing swings (`is_known`): a swing only passes through
+        what was measured. Once the two have agreed for a while the receiver is needed no more.
+        """
+        off = minus(reported_m_s, self.motion.velocity_ned_m_s)
+        share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
+        n, e, _ = error = towards(self._hidden_error_m_s, off, share)
+        steady_us, same_us = self._agrees_since_boot_us
+        steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)
+        same_us = _since(_differs_m_s(off, ZERO) <= SAME_M_S, same_us, time_boot_us)
+        self._agrees_since_boot_us = (steady_us, same_us)
+        is_steady = self.fits_models and steady_us is not None and time_boot_us - steady_us > SHOWN_US
+        self._has_agreed = same_us is not None and time_boot_us - same_us > 1e6 * reflex.COMPARED_S
+        self.has_converged = self.has_converged or is_steady or self._has_agreed
+        self._hidden_error_m_s = ZERO if self._has_agreed else (n, e, climb_error_m_s)
+
+    def _correct(self, sample: LocalPosition) -> None:
+        """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter.
+
+        A velocity that is measured apart stays.
+        """
+        measured = self.corrected(sample)
+        was, share, before, self._newest = self.motion, 1.0, self._newest, measured
+        if before is not None:
+            elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
+            share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
+            if 0.0 < elapsed_s < reflex.COMPARED_S and not self.is_measured_apart:
+                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
+        place, velocity = towards(was.position_ned_m, measured.position_ned_m, share), was.velocity_ned_m_s
+        if not self.is_measured_apart:
+            velocity, self.spread_m_s = towards(velocity, measured.velocity_ned_m_s, share), 0.0
+        self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
+        self._look_back()
+
+    @property
+    def velocity_error_m_s(self) -> Vector3:
+        """Remaining error of the reported velocity, m/s, NED."""
+        return plus(self._hidden_error_m_s, 1.0, self._rate_error_m_s)
+
+    def corrected(self, sample: LocalPosition) -> LocalPosition:
+        """The report without its known errors."""
+        place = minus(sample.position_ned_m, self.position_error_m)
+        velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
+        return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
+
+
+def _since(is_so: bool, since_us: int | None, time_boot_us: int) -> int | None:
+    """Since when it is so; None: it is not."""
+    return (since_us or time_boot_us) if is_so else None
+
+
+def _differs_m_s(velocity_m_s: Vector3, other_m_s: Vector3) -> float:
+    """Horizontally."""
+    return math.dist(velocity_m_s[:2], other_m_s[:2])
+
+
+def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
+    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited.
+
+    The errors of positions are shorter than those of velocities. The reports are without the error so far.
+    """
+    half_s = 0.5 * elapsed_s
+    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
+    further_m = minus(led, measured.position_ned_m)
+    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
+
+
+def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
+    """Horizontal acceleration, NED, of a thrust that carries the vehicle, at the tilt in `lead_s`."""
+    ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, lead_s)
+    n, e, d = body_to_ned(ahead_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
+    upright = max(-d / GRAVITY_M_S2, reflex.LEAST_UPRIGHT_COSINE)
+    return (n / upright, e / upright, 0.0)

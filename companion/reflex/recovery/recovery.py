@@ -1,0 +1,182 @@
+"""The recovery of one collision: goal, law, touch and rest, from the companion's own belief.
+
+Until the vehicle rests it is flown by attitude and thrust, then by a position.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple, Protocol
+
+from companion.messages import LocalPosition, Vector3
+from companion.motion.config import SettledConfig
+from companion.motion.history import MotionHistory
+from companion.motion.settling import SettlingMonitor
+from companion.motion.vector import along, plus, split
+from companion.reflex import config as reflex
+from companion.reflex.config import RecoveryConfig
+from companion.reflex.recovery.attitude_law import Lean, wanted
+from companion.reflex.recovery.collision import CollisionRecord
+from companion.reflex.recovery.laws import Contact, Law, MotionState
+from companion.reflex.surface import Surface, projected
+
+
+class Room(Protocol):
+    """What is known of the space around by whoever flies; local NED."""
+
+    def surfaces(self, contact: Contact) -> Sequence[Surface]:
+        """What lies in front of a vehicle that has just been hit, besides what hit it."""
+        ...
+
+    def inside(self, contact_ned_m: Vector3, goal_ned_m: Vector3) -> Vector3:
+        """The goal, or where the way to it ends."""
+        ...
+
+
+class Progress(NamedTuple):
+    """What one position has shown, each None where it has not: seconds since the hit, and a speed off the obstacle.
+
+    `is_rejected`: the hit was none, as nothing but its first message shows it. `rested_s`: it rests, and is flown by a
+    position from now on. `rebound_m_s`: the goal has moved. `settled_s`: the recovery is over.
+    """
+
+    is_rejected: bool = False
+    rested_s: float | None = None
+    rebound_m_s: float | None = None
+    settled_s: float | None = None
+
+
+class Recovery:
+    """Changed only by `take`. `earlier`: the surfaces hit before in the same recovery; `places`: the vehicle's own."""
+
+    def __init__(
+        self,
+        record: CollisionRecord,
+        law: Law,
+        config: RecoveryConfig,
+        settled: SettledConfig,
+        room: Room,
+        earlier: Sequence[Surface],
+        places: MotionHistory,
+    ) -> None:
+        self.record, self.law, self.leans = record, law, law.leans
+        self._config, self._settled, self._room = config, settled, room
+        self._earlier, self._places = earlier, places
+        self._contact = record.contact  # as known now, at the vehicle's place while the obstacle goes along
+        self._surfaces = self._around(self._contact)
+        expected = record.contact.rebound(config.restitution)
+        record.setpoint_ned_m = self._told_ned_m = self._goal(expected)
+        self._has_left = False
+        self._slow_since_us: int | None = None
+        self._held_since_us = record.sample_time_boot_us  # by a position
+        self._monitor = SettlingMonitor(settled)
+
+    def lean(self, full_m_s2: float, yaw_rad: float, held_s: float) -> tuple[Vector3, Lean]:
+        """The acceleration wanted now, local NED, and what makes attitude and thrust of it."""
+        belief = self.record.estimator.belief
+        acceleration = wanted(belief, self._surfaces, self.record.setpoint_ned_m[2])
+        return acceleration, Lean(belief, self._surfaces, full_m_s2, yaw_rad, held_s)
+
+    def take(self, sample: LocalPosition) -> Progress:
+        """One position that the vehicle reports."""
+        record = self.record
+        is_rejected = record.is_rejected(sample.time_boot_us, self._places)
+        record.estimator.update(sample)
+        rested_s = rebound_m_s = None
+        if self.law.follows and (self.leans or not self.law.leans):
+            rested_s, rebound_m_s = self._follow(sample)
+        settled_s = self._settled_after_s(sample)
+        if settled_s is not None:
+            record.settled_after_s = settled_s
+        return Progress(is_rejected, rested_s, rebound_m_s, settled_s)
+
+    @property
+    def _is_known(self) -> bool:
+        """Whether the motion after the hit is known, as far as the law asks for it."""
+        return self.record.estimator.has_converged or not self.law.follows
+
+    def _settled_after_s(self, sample: LocalPosition) -> float | None:
+        """Time from the hit to the beginning of the present rest, s; None as long as that has not lasted."""
+        record, now_us = self.record, sample.time_boot_us
+        right: MotionState | LocalPosition = record.estimator.motion
+        if self._is_known:
+            corrected = record.estimator.corrected(sample)
+            record.follow_recovery(corrected)
+            right = right if self.leans else corrected
+        distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
+        since_us = self._monitor.settled_since(now_us, distance_m, right.velocity_ned_m_s)
+        is_held = not self.leans and now_us - self._held_since_us >= 1e6 * self._settled.duration_s
+        if since_us is None or not is_held or not self._is_known:
+            return None
+        return max(0.0, 1e-6 * (since_us - record.sample_time_boot_us))
+
+    def _state(self) -> MotionState:
+        """The present motion. During the contact it has no velocity into the obstacle."""
+        motion, normal = self.record.estimator.motion, self._contact.normal_ned
+        velocity = motion.velocity_ned_m_s
+        if not self._has_left:
+            off_m_s, sideways = split(velocity, normal)
+            velocity = plus(sideways, max(0.0, off_m_s), normal)
+        return MotionState(motion.position_ned_m, velocity)
+
+    def _follow(self, sample: LocalPosition) -> tuple[float | None, float | None]:
+        """Set the goal again by contact and motion; hand over to it once the vehicle rests."""
+        self._touch(sample)
+        record, state, rested_s = self.record, self._state(), None
+        self._surfaces = self._around(self._contact)
+        record.setpoint_ned_m = place = self._goal(state)
+        if self.leans and self._rests(sample):
+            self.leans, self._held_since_us, record.overshoot_m = False, sample.time_boot_us, 0.0
+            rested_s = 1e-6 * (sample.time_boot_us - record.sample_time_boot_us)
+        elif not self._is_known:
+            return None, None
+        if math.dist(place, self._told_ned_m) <= self._settled.distance_m:
+            return rested_s, None
+        self._told_ned_m, record.overshoot_m = place, 0.0  # measured past the earlier setpoint
+        return rested_s, along(state.velocity_ned_m_s, self._contact.normal_ned)
+
+    def _rests(self, sample: LocalPosition) -> bool:
+        """Whether it rests, clear of all surfaces, and the errors of the vehicle's own estimate are known."""
+        estimator, motion = self.record.estimator, self.record.estimator.motion
+        is_clear = all(
+            one.off_m(motion.position_ned_m) >= reflex.CLEAR_SHARE * one.distance_m for one in self._surfaces
+        )
+        if not estimator.has_converged or not is_clear or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
+            self._slow_since_us = None
+            return False
+        self._slow_since_us = self._slow_since_us or sample.time_boot_us
+        return sample.time_boot_us - self._slow_since_us >= 1e6 * reflex.RESTS_S
+
+    def _touch(self, sample: LocalPosition) -> None:
+        """Update the surface. While it is touched it is where the vehicle is: frames and arms fold, obstacles move."""
+        estimator, normal = self.record.estimator, self.record.normal
+        is_touched = sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S
+        is_touched = is_touched or along(estimator.external_m_s2, normal.direction_ned) > reflex.HELD_M_S2
+        off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)
+        self._has_left = (self._has_left or off_m_s > 0.0) and not is_touched
+        place = estimator.motion.position_ned_m if is_touched else self._contact.position_ned_m
+        self._contact = replace(
+            self._contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad
+        )
+
+    def _goal(self, motion: MotionState) -> Vector3:
+        """The law's goal, moved clear of surfaces and into the fence."""
+        goal = self.law.goal_ned_m(self._config, self._contact, motion)
+        goal = projected(goal, [(one.normal_ned, one.level_m) for one in self._surfaces[1:]])
+        return self._room.inside(self._contact.position_ned_m, goal)
+
+    def _around(self, contact: Contact) -> list[Surface]:
+        """The surface just hit first, then those hit before in the same recovery, then the room's.
+
+        Between facing surfaces the clearance is at most half of the room. One that the vehicle is behind is ignored.
+        """
+        found = [Surface(contact.position_ned_m, contact.normal_ned, self._config.clearance_m)]
+        for other in [*self._earlier, *self._room.surfaces(contact)]:
+            room_m, most_m = other.off_m(contact.position_ned_m), other.distance_m
+            if room_m < -reflex.BEHIND_M:
+                continue
+            if along(contact.normal_ned, other.normal_ned) < reflex.FACING_COSINE:
+                most_m = min(most_m, 0.5 * max(0.0, room_m))
+                found[0] = replace(found[0], distance_m=min(found[0].distance_m, most_m))
+            found.append(replace(other, distance_m=most_m))
+        return found

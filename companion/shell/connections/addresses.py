@@ -1,0 +1,139 @@
+"""Connection addresses, in MAVSDK's convention, turned into connections.
+
+udpin://0.0.0.0:14540            listen, and answer the vehicle that speaks there (see peer.py)
+udpout://192.168.1.20:14580      send first, to this address, and hear nobody else
+tcpout://127.0.0.1:5760          connect to a server
+tcpin://0.0.0.0:5760             wait for one client
+serial:///dev/ttyAMA0:921600     serial port and baud rate
+udp://:14540                     the older form of udpin (or of udpout when a remote host is given)
+"""
+
+import ipaddress
+import re
+import socket
+from collections.abc import Callable
+
+from companion.errors import AddressError, ConnectionSetupError
+from companion.shell.connections.connection import ANY_HOST, Selectable, resolve, udp_in, udp_out
+from companion.shell.connections.peer import Peer
+from companion.shell.connections.streams import TcpInConnection, serial_port, tcp_out
+
+_HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
+_MOST_PORT = 65_535  # 16 bits
+_BROADCAST = ipaddress.IPv4Address("255.255.255.255")
+_SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
+_FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
+
+
+def open_connection(
+    url: str,
+    peer: str | None = None,
+    is_genuine: Callable[[bytes], bool] = lambda packet: True,
+    has_key: Callable[[bytes], bool] = lambda packet: True,
+    waits: bool = False,
+) -> Selectable:
+    """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin, and only genuine packets pin it.
+
+    `waits`: a port that is not there, or a server that does not answer, is looked for until it is.
+    Raises ConnectionSetupError with one clear sentence.
+    """
+    scheme, rest = scheme_and_rest(url)
+    if scheme == "udp":
+        scheme = "udpin" if host_and_port(url, rest)[0] in ("", "0.0.0.0", "[::]") else "udpout"
+    if peer is not None and scheme != "udpin":
+        raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
+    if scheme == "serial":
+        return serial_port(*_device_and_baud(url, rest), waits)
+    host, port = host_and_port(url, rest)
+    if scheme in ("udpout", "tcpout") and (not host or port == 0):
+        raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
+    if scheme in ("udpout", "tcpout"):
+        _check_one_host(url, scheme, host, port)
+    if scheme == "udpin":
+        return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), is_genuine, has_key))
+    if scheme == "udpout":
+        return udp_out(host, port)
+    if scheme == "tcpout":
+        return tcp_out(host, port, waits)
+    return TcpInConnection(host, port)
+
+
+def serial_device(url: str) -> tuple[str, int] | None:
+    """Device and baud rate of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
+    scheme, rest = scheme_and_rest(url)
+    if scheme == "serial":
+        return _device_and_baud(url, rest)
+    host_and_port(url, rest)
+    return None
+
+
+def scheme_and_rest(url: str) -> tuple[str, str]:
+    scheme, separator, rest = url.partition("://")
+    if not separator:
+        meant = _meant(url)
+        hint = f"use {_FORMS}." if meant is None else f"did you mean {meant}?"
+        raise AddressError(f"{url!r} is not a connection address: {hint}")
+    if scheme not in _SCHEMES:
+        raise AddressError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
+    return scheme, rest
+
+
+def _meant(text: str) -> str | None:
+    """What other programs' habits stand for: pymavlink's `udp:HOST:PORT`, a device, a host and port, a port alone."""
+    scheme, _, rest = text.partition(":")
+    if text.startswith("/dev/"):
+        # PX4's TELEM2 for a companion.
+        device, _, baud = text.replace(",", ":").partition(":")
+        return f"serial://{device}:{baud or 921600}"
+    host_port = _HOST_PORT.match(rest) or _HOST_PORT.match(text)
+    if host_port is not None and int(host_port["port"]) > _MOST_PORT:
+        return None
+    known = {"udp": "udpin", "udpin": "udpin", "udpout": "udpout", "tcp": "tcpout", "tcpin": "tcpin"}.get(scheme)
+    if known is not None and _HOST_PORT.match(rest):
+        return f"{known}://{rest}"
+    if text.isdecimal():
+        return f"udpin://0.0.0.0:{text}"
+    if not _HOST_PORT.match(text):
+        return None
+    return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
+
+
+def _check_one_host(url: str, scheme: str, host: str, port: int) -> None:
+    """Only who answers from the address that was sent to is ever heard."""
+    _, address = resolve(socket.SOCK_DGRAM, host, port)
+    number = ipaddress.ip_address(address[0])
+    if number.is_unspecified:
+        listening = f"{scheme.removesuffix('out')}in://{host}:{port}"
+        raise AddressError(f"{url!r} names any host: to listen, use {listening}; to send, name one.")
+    if number.is_multicast or number == _BROADCAST:
+        raise AddressError(f"{url!r} names many hosts: give the vehicle's own address.")
+
+
+def _peer(text: str, listening: str) -> tuple[str, int | None]:
+    """The number of a host, as the socket that listens there sees it, and its port where one is given."""
+    host, _, port = text.rpartition(":") if _HOST_PORT.match(text) else (text, "", "")
+    family, _ = resolve(socket.SOCK_DGRAM, listening or ANY_HOST, 0)
+    try:
+        _, address = resolve(socket.SOCK_DGRAM, host, 0, family)
+    except ConnectionSetupError as error:
+        version = "IPv6" if family == socket.AF_INET6 else "IPv4"
+        raise ConnectionSetupError(
+            f"--peer {text}: this host is unknown over {version}; give HOST or HOST:PORT."
+        ) from error
+    return str(address[0]), int(port) if port else None
+
+
+def _device_and_baud(url: str, rest: str) -> tuple[str, int]:
+    device, separator, baud = rest.rpartition(":")
+    if not separator or not device or not baud.isdecimal() or int(baud) == 0:
+        raise AddressError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
+    return device, int(baud)
+
+
+def host_and_port(url: str, rest: str) -> tuple[str, int]:
+    match = _HOST_PORT.match(rest)
+    if match is None:
+        raise AddressError(f"{url!r} names no host and port: use {_FORMS}.")
+    if int(match["port"]) > _MOST_PORT:
+        raise AddressError(f"{url!r}: there is no port {match['port']}, the last is {_MOST_PORT}.")
+    return match["host"], int(match["port"])

@@ -1,0 +1,237 @@
+"""The guard in between: the sockets of its clients, and the vehicle's connection as it is shared with them.
+
+Nobody is waited for. What a client does not read is lost to that client alone.
+"""
+
+import select
+import socket
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, Protocol
+
+from companion.errors import AddressError
+from companion.guard.between import Between, datagrams
+from companion.shell.connections.addresses import host_and_port, scheme_and_rest, serial_device
+from companion.shell.connections.connection import LinkCounts, Selectable, Way, bound_socket, resolve, send_datagram
+
+# A sender of heartbeats has missed nine.
+FORGOTTEN_US = 10_000_000
+# A vehicle has a pilot's ground station, a program or two, a log. Each costs the link a copy.
+MOST_CLIENTS = 8
+# PX4 itself takes 1,600 bytes of a datagram.
+READ_BYTES = 4096
+# Of one address, before the vehicle is looked at again.
+MOST_DATAGRAMS = 32
+# An Ethernet frame's 1,500 without the headers of IPv6 and UDP.
+DATAGRAM_BYTES = 1452
+# Three seconds of a full UART of 921,600 baud: longer than a garbage collection, and old by then.
+UNREAD_BYTES = 256_000
+# A serial port's ten bits a byte. A network's is bounded by this computer: twice what a fast link carries.
+BITS_A_BYTE, NETWORK_BYTES_S = 10, 2_000_000
+# A vehicle whose port is gone, and packets that wait their turn, are looked for so often.
+LOOK_S, TURN_S = 0.02, 0.001
+
+
+class Port(Protocol):
+    """An address of --between and whoever is there."""
+
+    def sources(self) -> list[socket.socket]:
+        """What may be read."""
+
+    def receive(self, now_us: int) -> None:
+        """Hand over what has come."""
+
+    def send(self, packets: Sequence[bytes]) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class UdpPort:
+    """Whoever sends there, or for udpout the one host that is sent to first."""
+
+    def __init__(self, opened: socket.socket, remote: Any, between: Between) -> None:
+        opened.setblocking(False)
+        self._socket, self._remote, self._between = opened, remote, between
+        self._heard_us: dict[Any, int] = {} if remote is None else {remote: 0}
+        self._is_full = False
+
+    def sources(self) -> list[socket.socket]:
+        return [self._socket]
+
+    def receive(self, now_us: int) -> None:
+        for sender, heard_us in [*self._heard_us.items()]:
+            if sender != self._remote and now_us - heard_us > FORGOTTEN_US:
+                del self._heard_us[sender]
+                self._between.forget(_name(sender))
+        with suppress(OSError):
+            for _ in range(MOST_DATAGRAMS):
+                content, sender = self._socket.recvfrom(READ_BYTES)
+                if sender in self._heard_us or (self._remote is None and len(self._heard_us) < MOST_CLIENTS):
+                    self._heard_us[sender] = now_us
+                    self._between.hear(_name(sender), content, now_us)
+                elif not self._is_full:
+                    self._is_full = True
+                    self._between.note(f"{_name(sender)} sends to the clients' port, too; it is not listened to")
+
+    def send(self, packets: Sequence[bytes]) -> None:
+        for datagram in datagrams(packets, DATAGRAM_BYTES):
+            for remote in self._heard_us:
+                send_datagram(self._socket, datagram, remote)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class TcpPort:
+    """A server; what a client has not read yet waits here, whole packets of it."""
+
+    def __init__(self, listener: socket.socket, between: Between) -> None:
+        listener.listen()
+        listener.setblocking(False)
+        self._listener, self._between = listener, between
+        self._unread: dict[socket.socket, bytearray] = {}
+        self._names: dict[socket.socket, str] = {}
+        self._told: set[str] = set()
+
+    def sources(self) -> list[socket.socket]:
+        """A client whose packets wait is not read: it waits, too."""
+        clients = [client for client, name in self._names.items() if self._between.has_room(name)]
+        return clients if len(self._names) >= MOST_CLIENTS else [self._listener, *clients]
+
+    def receive(self, now_us: int) -> None:
+        for source in select.select(self.sources(), [], [], 0.0)[0]:
+            if source is self._listener:
+                self._accept()
+            elif content := _received(source):
+                self._between.hear(self._names[source], content, now_us)
+            else:
+                source.close()
+                del self._unread[source]
+                self._between.forget(self._names.pop(source))
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            client, sender = self._listener.accept()
+            # Packets are small and each is due now. A client that does not read for a while keeps its connection.
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            client.setblocking(False)
+            self._unread[client], self._names[client] = bytearray(), _name(sender)
+
+    def send(self, packets: Sequence[bytes]) -> None:
+        content = b"".join(packets)
+        for client, unread in self._unread.items():
+            name = self._names[client]
+            if len(unread) + len(content) <= UNREAD_BYTES:
+                unread += content
+            elif name not in self._told:
+                self._told.add(name)
+                self._between.note(f"{name} does not read what it is sent: what it misses is lost")
+            # That one has gone is learned when it is read.
+            with suppress(OSError):
+                del unread[: client.send(unread)]
+
+    def close(self) -> None:
+        for source in (self._listener, *self._unread):
+            source.close()
+
+
+def _received(client: socket.socket) -> bytes:
+    """Empty where the client has gone."""
+    try:
+        return client.recv(READ_BYTES)
+    except OSError:
+        return b""
+
+
+class SharedConnection:
+    """The vehicle's connection, for the guard, with its clients beside it."""
+
+    def __init__(self, vehicle: Selectable, clients: Sequence[str], between: Between) -> None:
+        """`clients`: their addresses. Raises AddressError, ConnectionSetupError."""
+        self._vehicle, self._between = vehicle, between
+        self._ports: list[Port] = []
+        try:
+            for client in clients:
+                self._ports.append(_open(client, between))
+        except Exception:
+            self.close()
+            raise
+
+    def receive(self, timeout_s: float) -> bytes:
+        """The vehicle's bytes, which have been passed on then; the clients' are passed on meanwhile."""
+        until_s = time.monotonic() + timeout_s
+        while True:
+            self._wait(until_s - time.monotonic())
+            received = self._vehicle.receive(0.0)
+            if received and (packets := self._between.to_clients(received)):
+                self._to_clients(packets)
+            self._serve()
+            if received or time.monotonic() >= until_s:
+                return received
+
+    def _wait(self, timeout_s: float) -> None:
+        vehicle = self._vehicle.fileno()
+        sources: list[int | socket.socket] = [] if vehicle is None else [vehicle]
+        for port in self._ports:
+            sources += port.sources()
+        longest_s = TURN_S if self._between.waits else LOOK_S if vehicle is None else timeout_s
+        select.select(sources, [], [], max(min(timeout_s, longest_s), 0.0))
+
+    def _serve(self) -> None:
+        now_us = time.monotonic_ns() // 1000
+        for port in self._ports:
+            port.receive(now_us)
+        for packet in self._between.to_vehicle(now_us):
+            self._vehicle.send(packet)
+
+    def _to_clients(self, packets: Sequence[bytes]) -> None:
+        for port in self._ports:
+            port.send(packets)
+
+    def send(self, frame: bytes) -> None:
+        """The guard's own, before all that waits."""
+        self._vehicle.send(frame)
+        if self._between.sends(frame):
+            self._to_clients([frame])
+
+    def way(self, frame: bytes) -> Way | None:
+        return self._vehicle.way(frame)
+
+    def news(self) -> str | None:
+        return self._vehicle.news() or self._between.news()
+
+    @property
+    def counts(self) -> LinkCounts:
+        return self._vehicle.counts
+
+    def close(self) -> None:
+        self._vehicle.close()
+        for port in self._ports:
+            port.close()
+
+
+def carried_bytes_s(url: str) -> float:
+    """What a link carries. Raises AddressError."""
+    serial = serial_device(url)
+    return NETWORK_BYTES_S if serial is None else serial[1] / BITS_A_BYTE
+
+
+def _open(url: str, between: Between) -> Port:
+    scheme, rest = scheme_and_rest(url)
+    if scheme not in ("udpin", "udpout", "tcpin"):
+        forms = "udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"
+        raise AddressError(f"--between {url}: clients come by {forms}.")
+    host, port = host_and_port(url, rest)
+    if scheme == "tcpin":
+        return TcpPort(bound_socket(socket.SOCK_STREAM, host, port), between)
+    if scheme == "udpin":
+        return UdpPort(bound_socket(socket.SOCK_DGRAM, host, port), None, between)
+    if not host or port == 0:
+        raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
+    family, remote = resolve(socket.SOCK_DGRAM, host, port)
+    return UdpPort(socket.socket(family, socket.SOCK_DGRAM), remote, between)
+
+
+def _name(address: Any) -> str:
+    return f"{address[0]}:{address[1]}"

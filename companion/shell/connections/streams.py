@@ -1,0 +1,293 @@
+"""Byte streams to a vehicle, TCP and serial: opened again when they end, without anybody waiting for it.
+
+open    bytes pass
+lost    nothing passes; a thread opens the stream anew, at once and then every RETRY_S
+open    again: told and counted
+"""
+
+import os
+import select
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Protocol
+
+from companion.autopilot.known import ASSUMED
+from companion.errors import ConnectionSetupError
+from companion.mavlink.packet import packet_length
+from companion.shell.connections.connection import READ_SIZE, LinkCounts, Way, bound_socket, plain, readable
+
+# A local server answers within milliseconds and a radio link within a second; longer means nobody is there.
+TCP_CONNECT_TIMEOUT_S = 5.0
+# The last setpoint is flown on for a second: a link that is back has five attempts in it.
+RETRY_S = 0.2
+# The round trip of a telemetry radio stays below half a second; a SYN without an answer by then was lost.
+ATTEMPT_S = 0.5
+# What no host has acknowledged while the last setpoint is flown on is old: the other end has gone without a word.
+UNACKNOWLEDGED_MS = ASSUMED.defaults.loss_us // 1000
+# A send that blocks longer than this would stall the setpoints, 20 to 50 a second; the packet is dropped instead.
+SEND_TIMEOUT_S = 0.02
+# Where udev names serial devices by maker, model and serial number.
+SERIAL_BY_ID = Path("/dev/serial/by-id")
+
+
+class Port(Protocol):
+    """A socket or a serial port."""
+
+    def fileno(self) -> int: ...
+
+    def close(self) -> None: ...
+
+
+class Stream:
+    """An open byte stream; broken once the other end has gone.
+
+    A UART's driver hands on a few bytes at a time. The beginning of a packet is kept back until the rest has come: a
+    step for it takes as long as for a whole packet, and decides nothing.
+    """
+
+    def __init__(self, port: Port, at: str) -> None:
+        """`at` is its address or device, for people."""
+        self._port, self.at = port, at
+        self._descriptor = port.fileno()
+        self.broken = False
+        self._begun = b""
+        os.set_blocking(self._descriptor, False)
+
+    def receive(self, timeout_s: float) -> bytes:
+        until_s = time.monotonic() + timeout_s
+        while not self.broken and readable(self._descriptor, until_s - time.monotonic()):
+            try:
+                content = os.read(self._descriptor, READ_SIZE)
+            except BlockingIOError:
+                return b""
+            except OSError:
+                content = b""
+            self.broken = not content
+            content = self._begun + content
+            end = _end_of_whole(content)
+            content, self._begun = content[:end], content[end:]
+            if content:
+                return content
+        return b""
+
+    def fileno(self) -> int:
+        return self._descriptor
+
+    def send(self, frame: bytes) -> None:
+        remaining = memoryview(frame)
+        while remaining and not self.broken:
+            try:
+                written = os.write(self._descriptor, remaining)
+            except BlockingIOError:
+                written = 0
+            except OSError:
+                self.broken = True
+                return
+            remaining = remaining[written:]
+            if remaining and not select.select([], [self._descriptor], [], SEND_TIMEOUT_S)[1]:
+                return
+
+    def close(self) -> None:
+        self._port.close()
+
+
+def _end_of_whole(content: bytes) -> int:
+    """Where the last whole packet ends. All counts as whole where a packet should begin and none does: after a loss
+    whatever is there is handed on at once.
+    """
+    end = 0
+    while end < len(content):
+        length = packet_length(content, end)
+        if length == 0:
+            return len(content)
+        if end + length > len(content):
+            return end
+        end += length
+    return end
+
+
+class StreamConnection:
+    """A stream that is opened again for as long as the program runs.
+
+    On a thread: a name is looked up, and a driver keeps whoever opens or closes a port of a device that is going, for
+    seconds.
+    """
+
+    def __init__(self, stream: Stream | None, open_anew: Callable[[], Stream], missing: str | None = None) -> None:
+        """`open_anew` raises where it fails. Without a stream it is opened for the first time; `missing` says why."""
+        self._stream, self._open_anew = stream, open_anew
+        self._found: SimpleQueue[Stream] = SimpleQueue()
+        self._closed = threading.Event()
+        self._news = deque([] if missing is None else [f"{missing} Waiting for it."])
+        self._is_missed = missing is not None
+        self._lost_s: float | None = None
+        self._reconnects = 0
+        if stream is None:
+            self._begin(None)
+
+    def receive(self, timeout_s: float) -> bytes:
+        if self._stream is None:
+            self._look(timeout_s)
+            return b""
+        content = self._stream.receive(timeout_s)
+        if self._stream.broken:
+            self._news.append(f"connection to {self._stream.at} lost, reconnecting")
+            self._lost_s = time.monotonic()
+            old, self._stream = self._stream, None
+            self._begin(old)
+        return content
+
+    def _look(self, timeout_s: float) -> None:
+        try:
+            self._stream = self._found.get(timeout=max(timeout_s, 0.0))
+        except Empty:
+            return
+        if self._lost_s is not None:
+            self._reconnects += 1
+            self._news.append(f"connected again after {time.monotonic() - self._lost_s:.1f} s: {self._stream.at}")
+        elif self._is_missed:
+            self._news.append(f"connected: {self._stream.at}")
+
+    def _begin(self, old: Stream | None) -> None:
+        threading.Thread(target=self._reopen, args=(old,), name="rebound link", daemon=True).start()
+
+    def _reopen(self, old: Stream | None) -> None:
+        if old is not None:
+            # A driver may refuse to close a port whose device has gone: it is opened anew all the same.
+            with suppress(OSError):
+                old.close()
+        while not self._closed.is_set():
+            try:
+                self._found.put(self._open_anew())
+                return
+            except Exception:
+                # Whatever the system or a driver raises, the next attempt may find the other end.
+                self._closed.wait(RETRY_S)
+
+    def fileno(self) -> int | None:
+        return None if self._stream is None else self._stream.fileno()
+
+    def way(self, frame: bytes) -> Way | None:
+        descriptor = self.fileno()
+        return None if descriptor is None else Way(frame, descriptor)
+
+    def send(self, frame: bytes) -> None:
+        """Send one packet; it is dropped while there is no stream."""
+        if self._stream is not None:
+            self._stream.send(frame)
+
+    def news(self) -> str | None:
+        return self._news.popleft() if self._news else None
+
+    @property
+    def counts(self) -> LinkCounts:
+        return LinkCounts(reconnects=self._reconnects)
+
+    def close(self) -> None:
+        """What a thread still opens ends with the program."""
+        self._closed.set()
+        if self._stream is not None:
+            self._stream.close()
+
+
+def tcp_out(host: str, port: int, waits: bool = False) -> StreamConnection:
+    """A client of a TCP server."""
+
+    def open_anew() -> Stream:
+        return _connected(host, port, ATTEMPT_S)
+
+    try:
+        stream = _connected(host, port, TCP_CONNECT_TIMEOUT_S)
+    except (OSError, UnicodeError) as error:
+        text = f"Cannot connect to {host}:{port} over TCP: {plain(error)}."
+        if waits:
+            return StreamConnection(None, open_anew, text)
+        raise ConnectionSetupError(text) from error
+    return StreamConnection(stream, open_anew)
+
+
+def _connected(host: str, port: int, timeout_s: float) -> Stream:
+    connected = socket.create_connection((host.strip("[]"), port), timeout_s)
+    # Without a server on this machine the kernel may, one time in 28 000, connect the socket with itself.
+    if connected.getpeername() == connected.getsockname():
+        connected.close()
+        raise ConnectionRefusedError("connection refused")
+    _set_up(connected)
+    return Stream(connected, f"{host}:{port}")
+
+
+class TcpInConnection(StreamConnection):
+    """A server for one client at a time; the next one is taken when the last has gone."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._listener = bound_socket(socket.SOCK_STREAM, host, port)
+        self._listener.listen(1)
+        self._listener.settimeout(RETRY_S)
+        super().__init__(None, self._client)
+
+    @property
+    def local_port(self) -> int:
+        return int(self._listener.getsockname()[1])
+
+    def _client(self) -> Stream:
+        client, address = self._listener.accept()
+        _set_up(client)
+        return Stream(client, f"{address[0]}:{address[1]}")
+
+    def close(self) -> None:
+        super().close()
+        self._listener.close()
+
+
+def _set_up(connected: socket.socket) -> None:
+    # Packets are small and each is due now: Nagle's algorithm would hold setpoints back.
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
+
+
+class SerialDevice:
+    """A device, and the names by which it is found again when it is plugged in anew.
+
+    While it is open, udev's links that lead to it are remembered. Where there are any, it is looked for by these alone:
+    its old path may be another device's by now.
+    """
+
+    def __init__(self, path: str, baud: int) -> None:
+        self._path, self._baud = path, baud
+        self._links: list[Path] = []
+
+    def open(self) -> Stream:
+        """Raises OSError, ValueError."""
+        import serial  # only here: it costs start-up time
+
+        links = [link for link in self._links if link.exists()]
+        if self._links and not links:
+            raise FileNotFoundError(self._links[0])
+        path = str(links[0]) if links else self._path
+        # 8 data bits, no parity, one stop bit, without flow control, as PX4's TELEM ports.
+        stream = Stream(serial.Serial(path, self._baud), path)
+        device = Path(path).resolve()
+        by_id = SERIAL_BY_ID.iterdir() if SERIAL_BY_ID.is_dir() else ()
+        self._links = sorted(link for link in by_id if link.resolve() == device)
+        return stream
+
+
+def serial_port(path: str, baud: int, waits: bool = False) -> StreamConnection:
+    """A port that may not be opened is waited for by nobody: that is a matter of rights."""
+    device = SerialDevice(path, baud)
+    if not os.path.exists(path):
+        text = f"Serial port {path} does not exist: is the cable plugged in?"
+        if waits:
+            return StreamConnection(None, device.open, text)
+        raise ConnectionSetupError(text)
+    try:
+        stream = device.open()
+    except (OSError, ValueError) as error:
+        raise ConnectionSetupError(f"Serial port {path} cannot be opened: {plain(error)}.") from error
+    return StreamConnection(stream, device.open)

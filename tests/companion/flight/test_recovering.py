@@ -1,0 +1,181 @@
+"""A recovery: by attitude until the vehicle rests and the errors of its own estimate are known, then by a position."""
+
+import math
+
+import pytest
+
+from companion.core import Limiter
+from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.envelope import SetpointError
+from companion.flight.handlers.recovering import Recover
+from companion.flight.obstacle_map import FlightRoom
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle
+from companion.messages import Attitude, AttitudeSetpoint, LocalPosition, PositionSetpoint
+from companion.mission.model import Mission
+from companion.motion.strapdown import LEVEL
+from companion.motion.vector import ZERO
+from companion.reflex.config import NOTICED_S, EstimateConfig
+from companion.reflex.recovery.collision import CollisionRecord
+from companion.reflex.recovery.laws import Contact
+from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.recovery.recovery import Recovery
+from companion.reflex.reflex import start_reflex
+from companion.reflex.surface import Normal
+
+HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
+AT = (3.0, 0.0, -2.0)
+MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
+
+
+def flight_with(
+    loss_s: float | None = 0.3, learnt_s: float = 2.0, estimator: MotionEstimator | None = None
+) -> FlightContext:
+    """A flight that has just hit a wall in the north, at 2 m/s and measured whole unless told otherwise."""
+    mission = Mission.model_validate(MISSION)
+    config = mission.companion
+    reflex = start_reflex(config, mission.recovery, config.settled, 0)
+    flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams), reflex)
+    flight.origin_ned_m, reflex.loss_s = (0.0, 0.0, 0.0), loss_s
+    flight.vehicle.attitude = reflex.monitor.gate.latest = Attitude(HIT_US, LEVEL)
+    reflex.thrust.full_m_s2, reflex.thrust.known_s = 16.0, learnt_s
+    if estimator is None:
+        contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH, 0.2)
+        estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
+        estimator.note_contact(True, HIT_US, estimator.normal)
+    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator))
+    return flight
+
+
+def recover_in(flight: FlightContext) -> Recover:
+    reflex, settled = flight.reflex, flight.mission.companion.settled
+    record, room = flight.collisions[-1], FlightRoom(flight)
+    reflex.recovery = Recovery(record, reflex.law, flight.mission.recovery, settled, room, (), flight.vehicle.history)
+    return Recover(flight, reflex.recovery)
+
+
+def hears(flight: FlightContext, recover: Recover, since_us: int, north_m: float, north_m_s: float):
+    sample = LocalPosition(HIT_US + since_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
+    recover.step(flight, Inputs(positions=[sample]), since_us)
+    target = recover.target(since_us)
+    assert target is not None
+    return target, target.setpoint(0)
+
+
+def test_it_is_flown_by_attitude_until_it_rests_and_then_by_the_place_where_it_does():
+    flight = flight_with()
+    recover, kinds = recover_in(flight), []
+    for since_us in range(100_000, 1_600_000, 20_000):
+        left = math.exp(-since_us / 0.2e6)
+        _, sent = hears(flight, recover, since_us, 2.4 + 0.2 * left, -1.0 * left)
+        kinds.append(type(sent))
+    # Then the kind changes once, at a place that the vehicle is at
+    change = kinds.index(PositionSetpoint)
+    assert set(kinds[:change]) == {AttitudeSetpoint} and set(kinds[change:]) == {PositionSetpoint}
+    assert 0.3 < 0.1 + 0.02 * change < 0.7, "|v| < 0.2 m/s for 0.1 s"
+    assert sent.position_ned_m == pytest.approx((2.4, 0.0, -2.0), abs=0.05)
+    assert [event.kind for event in flight.events].count("hand_over") == 1
+
+
+def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_when_it_rested():
+    # Given a vehicle that rests, clear of the obstacle, from the first report on
+    flight, handed_us, over_us = flight_with(), 0, 0
+    recover, record = recover_in(flight), flight.collisions[0]
+    for since_us in range(100_000, 1_600_000, 20_000):
+        _, sent = hears(flight, recover, since_us, 2.4, 0.0)
+        handed_us = handed_us or (since_us if type(sent) is PositionSetpoint else 0)
+        over_us = over_us or (since_us if record.settled_after_s is not None else 0)
+    assert handed_us == 200_000 and over_us == handed_us + 500_000
+    assert record.settled_after_s == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("after_ned_m_s", "direction_ned"),
+    [
+        ((-1.0, 0.0, 0.0), (-0.97, -0.26, 0.0)),  # the change is south, the force was south-west
+        ((1.5, 0.0, 2.5), (-0.49, -0.32, 0.81)),  # a wall that leans over it pushes it down
+        ((-0.6, 0.0, 0.6), (-0.97, -0.26, 0.0)),  # friction at an upright one does so, too
+    ],
+)
+def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(after_ned_m_s, direction_ned):
+    record = flight_with().collisions[0]
+    half = math.sqrt(0.5)
+    record.estimator.note_contact(True, HIT_US, Normal((-half, -half, 0.0), 0.35))
+    assert record.normal.direction_ned == (-half, -half, 0.0)
+    record.estimator.after_ned_m_s, record.estimator.after_error_m_s = after_ned_m_s, 0.05
+    assert record.normal.direction_ned == pytest.approx(direction_ned, abs=0.02)
+
+
+def test_the_way_off_follows_the_normal_as_it_becomes_known():
+    # Given a force whose first sample shows a wall in the north, and the next ones one in the north-west
+    flight = flight_with()
+    recover, estimator = recover_in(flight), flight.collisions[0].estimator
+    hears(flight, recover, 100_000, 2.95, 0.0)
+    straight_m = flight.collisions[0].setpoint_ned_m[1]
+    estimator.note_contact(True, HIT_US, Normal((-0.8, 0.6, 0.0), 0.1))
+    hears(flight, recover, 120_000, 2.95, 0.0)
+    assert straight_m == pytest.approx(0.0, abs=0.02) and flight.collisions[0].setpoint_ned_m[1] > 0.1
+
+
+def test_it_is_not_handed_over_on_the_obstacle():
+    flight = flight_with()
+    recover = recover_in(flight)
+    for since_us in range(100_000, 1_600_000, 20_000):
+        target, sent = hears(flight, recover, since_us, 2.95, 0.0)
+    # Then it is flown off
+    assert isinstance(sent, AttitudeSetpoint)
+    w, _, y, _ = sent.attitude_wxyz
+    assert 2.0 * w * y > 0.05, "nose up: it leans south"
+    # PX4 flies it on until it misses the next one, and loops of 12 rad/s take two time constants to turn the thrust
+    assert target.lean.held_s == pytest.approx(0.3 + NOTICED_S + 2.0 / 12.0, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("loss_s", "learnt_s", "word"),
+    [
+        (1.0, 2.0, "for 1 s"),
+        (None, 2.0, "unknown time"),
+        (math.inf, 2.0, "takes no thrust"),
+        (0.3, 0.1, "not known yet"),
+    ],
+)
+def test_where_an_attitude_is_not_safe_the_plain_place_of_law_paper_is_sent(loss_s, learnt_s, word):
+    flight = flight_with(loss_s, learnt_s)
+    assert word in flight.reflex.why_by_position
+    _, sent = hears(flight, recover_in(flight), 100_000, 2.9, -0.5)
+    assert isinstance(sent, PositionSetpoint)
+    assert sent.velocity_ned_m_s is None and sent.acceleration_ned_m_s2 is None
+
+
+def test_a_surface_goes_along_while_it_pushes():
+    # Given a screen that carries a vehicle south
+    flight = flight_with()
+    recover = recover_in(flight)
+    for since_us in range(100_000, 600_000, 20_000):
+        flight.collisions[0].estimator.external_m_s2 = (-3.0, 0.0, 0.0)
+        hears(flight, recover, since_us, 3.0 - 0.8e-6 * since_us, -0.8)
+    # Then its goal stays ahead of it
+    assert flight.collisions[0].setpoint_ned_m[0] < 3.0 - 0.8 * 0.58 - 0.3
+
+
+@pytest.mark.parametrize("wrong_m_s", [40.0, math.nan])
+def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_is_a_fault(wrong_m_s):
+    # Given an estimate whose known errors no vehicle has
+    flight = flight_with()
+    estimator = flight.collisions[0].estimator
+    estimator.has_converged, estimator._hidden_error_m_s = True, (0.0, wrong_m_s, 0.0)
+    estimator.position_error_m = estimator.level_m_s2 = (wrong_m_s, wrong_m_s, 0.0)
+    asked, hit_us = Target((1.0, 2.0, -3.0), 0.5), flight.collisions[0].sample_time_boot_us
+
+    def sent() -> Target:
+        return Limiter().in_vehicles_view(flight, asked, has_floor=True, time_boot_us=hit_us + 1_000_000)
+
+    # Then what would leave is no further than the fence, and no faster than the limits, or nothing
+    if math.isnan(wrong_m_s):
+        with pytest.raises(SetpointError):
+            sent()
+    else:
+        limits, place = flight.mission.limits, sent().position_ned_m
+        assert flight.mission.fence.nearest_inside(*place[:2]) == pytest.approx(place[:2], abs=1e-4)
+        assert math.hypot(*(sent().velocity_ned_m_s or ZERO)) <= limits.max_speed_m_s + 1e-9
+        assert math.hypot(*(sent().acceleration_ned_m_s2 or ZERO)) <= 9.81 * math.tan(math.radians(limits.max_tilt_deg))

@@ -1,0 +1,318 @@
+"""A vehicle's motion by what it tells: history, rotations, how late its velocity is, and the satellites' own."""
+
+import math
+import random
+
+import pytest
+
+from companion.mavlink.readers import sample_from
+from companion.messages import GpsVelocity, LocalPosition, Refused
+from companion.motion.config import FINEST_DOPPLER_M_S, LATEST_S, SAME_M_S
+from companion.motion.delay import RECEIVER, Delay
+from companion.motion.doppler import Doppler
+from companion.motion.history import MotionHistory
+from companion.motion.rotation import body_to_ned, yaw_rad
+from companion.motion.strapdown import Strapdown
+from companion.reflex.config import EstimateConfig
+from companion.reflex.recovery.laws import Contact
+from companion.reflex.recovery.motion_estimator import MotionEstimator
+
+CONTACT_US = 10_000_000
+
+
+def test_history_keeps_two_seconds_drops_late_packets_and_starts_anew_after_a_reboot():
+    history = MotionHistory()
+    samples = [
+        LocalPosition(t_us, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        for t_us in range(CONTACT_US - 5_000_000, CONTACT_US, 20_000)
+    ]
+    assert all(history.add(sample) for sample in samples)
+    kept = history.between(0, CONTACT_US)
+    assert kept[-1] is samples[-1]
+    assert 1.95 <= (kept[-1].time_boot_us - kept[0].time_boot_us) * 1e-6 <= 2.0
+    assert not history.add(samples[-2])
+    assert history.latest() is samples[-1]
+    rebooted = LocalPosition(1000, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert history.add(rebooted)
+    assert history.between(0, CONTACT_US) == [rebooted]
+    assert history.before(1001) is rebooted and history.before(1000) is None
+
+
+HALF = math.sqrt(0.5)
+
+
+@pytest.mark.parametrize(
+    ("attitude", "nose_ned", "right_ned", "yaw"),
+    [
+        ((1.0, 0.0, 0.0, 0.0), (1, 0, 0), (0, 1, 0), 0.0),  # nose north
+        ((HALF, 0.0, 0.0, HALF), (0, 1, 0), (-1, 0, 0), math.pi / 2),  # nose east
+        ((HALF, 0.0, HALF, 0.0), (0, 0, -1), (0, 1, 0), None),  # nose up
+        ((HALF, HALF, 0.0, 0.0), (1, 0, 0), (0, 0, 1), 0.0),  # right wing down
+    ],
+)
+def test_rotation_on_attitudes_everyone_knows(attitude, nose_ned, right_ned, yaw):
+    assert body_to_ned(attitude, (1.0, 0.0, 0.0)) == pytest.approx(nose_ned, abs=1e-12)
+    assert body_to_ned(attitude, (0.0, 1.0, 0.0)) == pytest.approx(right_ned, abs=1e-12)
+    if yaw is not None:
+        assert yaw_rad(attitude) == pytest.approx(yaw)
+
+
+NOISE_M_S = 0.05
+
+
+def learnt(late_s, changes):
+    """After steps of velocity less sum of a vehicle whose acceleration changes so."""
+    rng, delay = random.Random(1), Delay()
+    for change in changes:
+        step = tuple(-late_s * part + rng.gauss(0.0, NOISE_M_S) for part in change)
+        delay.learn(step, change)
+    return delay.delay_s(NOISE_M_S**2)
+
+
+def manoeuvres(count, size_m_s2, seed=2):
+    rng = random.Random(seed)
+    return [tuple(rng.gauss(0.0, size_m_s2) for _ in range(3)) for _ in range(count)]
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.02, 0.05, 0.08])
+def test_a_flight_with_manoeuvres_shows_how_late_the_velocity_is(late_s):
+    # Given half a minute at 30 Hz in which the acceleration changes by 0.5 m/s^2
+    assert learnt(late_s, manoeuvres(1_000, 0.5)) == pytest.approx(late_s, abs=0.005)
+
+
+def test_one_step_that_was_a_hit_moves_it_little_and_never_beyond_what_can_be_flown():
+    delay = Delay()
+    delay.learn((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    assert delay.delay_s(NOISE_M_S**2) < 0.06
+    delay.learn((-100.0, 0.0, 0.0), (10.0, 0.0, 0.0))
+    assert delay.delay_s(NOISE_M_S**2) == LATEST_S
+
+
+G = 9.80665
+SOUTH, HIT_US = (-1.0, 0.0, 0.0), 10_000_000
+
+
+class Air:
+    """A vehicle without tilt that speeds up north as it is told; IMU 250 Hz, reports 50 Hz, receiver 10 Hz."""
+
+    def __init__(self, late_s, noise_m_s=0.0, began_us=0):
+        self.strapdown, self.doppler, self.draw = Strapdown(), Doppler(), random.Random(1)
+        self.late, self.noise_m_s = round(late_s / 0.004), noise_m_s
+        self.now_us, self.velocities, self.reported_off_m_s = began_us, [0.0], 0.0
+
+    def step(self, acceleration_m_s2=0.0, is_free=True, receives=True, turns_rad_s=0.0):
+        self.now_us += 4_000
+        self.velocities.append(self.velocities[-1] + 0.004 * acceleration_m_s2)
+        self.strapdown.imu(self.now_us, (acceleration_m_s2, 0.0, -G), (0.0, turns_rad_s, 0.0))
+        tick, sample = len(self.velocities), None
+        if tick % 5 == 0:
+            velocity = (self.velocities[-1] + self.reported_off_m_s, 0.0, 0.0)
+            sample = LocalPosition(self.now_us, (4.0 + 0.004 * sum(self.velocities), 0.0, -2.0), velocity)
+            self.strapdown.velocity(sample)
+        if receives and tick % 25 == 0 and tick > self.late:
+            noise = [self.draw.gauss(0.0, self.noise_m_s) for _ in range(2)]
+            self.doppler.take(
+                GpsVelocity((self.velocities[-1 - self.late] + noise[0], noise[1])), self.strapdown, is_free
+            )
+        return sample
+
+
+@pytest.mark.parametrize("late_s", [0.012, 0.06, 0.2])
+def test_the_delay_is_learnt_where_the_vehicle_speeds_up_and_brakes(late_s):
+    # Given a receiver that is late by another time than most, and a flight that speeds up and brakes for half a minute
+    air = Air(late_s, noise_m_s=0.05)
+    for tick in range(7_500):
+        air.step(2.0 * math.sin(2.0e-3 * tick))
+    # Then its delay is known, and its velocity is the vehicle's own as of now
+    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(late_s, abs=0.015)
+    assert air.doppler.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.2)
+    assert air.doppler.trusted_variance_m2_s2 == pytest.approx(FINEST_DOPPLER_M_S**2, rel=0.2)
+
+
+def test_a_steady_flight_teaches_no_delay_and_the_receivers_noise():
+    air = Air(0.2, noise_m_s=0.4)
+    for _ in range(7_500):
+        air.step()
+    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(RECEIVER.expected_s, abs=0.02)
+    assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.4, rel=0.25)
+
+
+def test_a_hit_that_the_receiver_shows_before_any_sample_is_neither_its_noise_nor_its_delay():
+    air = Air(0.012, noise_m_s=0.05)
+    for tick in range(7_500):
+        air.step(2.0 * math.sin(2.0e-3 * tick))
+    known, variance_m2_s2 = air.doppler.delay.delay_s(air.doppler.variance_m2_s2), air.doppler.variance_m2_s2
+    air.velocities = [velocity - 7.0 for velocity in air.velocities]
+    air.reported_off_m_s = 7.0
+    for _ in range(25):
+        air.step()
+    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(known, abs=0.002)
+    assert air.doppler.variance_m2_s2 < 1.3 * variance_m2_s2
+
+
+def test_a_receiver_that_gets_worse_is_known_for_worse():
+    air = Air(0.012, noise_m_s=0.05)
+    for _ in range(3_000):
+        air.step()
+    air.noise_m_s = 0.8
+    for _ in range(7_500):
+        air.step()
+    assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.8, rel=0.4)
+
+
+def clipped(off_m_s=6.0, rebound_m_s=-3.0):
+    """A vehicle just after a hit of which its estimate knows nothing, and its belief."""
+    air = Air(0.112, noise_m_s=0.02, began_us=HIT_US)
+    contact = Contact(HIT_US, (4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
+    found = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
+    air.velocities, air.reported_off_m_s = [rebound_m_s], off_m_s
+    return air, found
+
+
+def go_on(air, found, seconds, **settings):
+    """The newest report."""
+    newest = None
+    for _ in range(round(seconds / 0.004)):
+        sample = air.step(is_free=False, **settings)
+        found.imu(air.strapdown)
+        found.measure(air.doppler)
+        if sample is not None:
+            newest = sample
+            found.update(sample)
+    return newest
+
+
+def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_a_while():
+    # Given an estimate that is wrong by 6 m/s, in no way that any model has
+    air, found = clipped()
+    go_on(air, found, 0.5)
+    # Then the receiver is believed, for as long as the two contradict each other
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-3.0, abs=0.25)
+    go_on(air, found, 3.0)
+    assert found.is_measured_apart
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-3.0, abs=0.15)
+    # When the reported velocity passes the true one, as a swing does
+    air.reported_off_m_s = 0.0
+    go_on(air, found, 0.2)
+    assert found.is_measured_apart
+    air.reported_off_m_s = -1.0
+    go_on(air, found, 0.5)
+    assert found.is_measured_apart
+    # When it stays there
+    air.reported_off_m_s = 0.0
+    go_on(air, found, 0.7)
+    # Then it counts again
+    assert found.has_converged
+    assert found.is_reported
+    assert abs(found.velocity_error_m_s[0]) < SAME_M_S
+
+
+def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
+    # Given an estimate that stays wrong, as PX4's by satellites does for ten seconds
+    air, found = clipped(rebound_m_s=0.0)
+    go_on(air, found, 0.5)
+    air.reported_off_m_s = -0.8
+    go_on(air, found, 3.5)
+    assert found.has_converged
+    # Then a next hit's velocity is the measured one's
+    assert found.is_measured_apart
+    assert not found.is_reported
+    # When it puts itself right slowly
+    for _ in range(40):
+        air.reported_off_m_s += 0.01
+        newest = go_on(air, found, 0.1)
+        # Then what is taken off it is its error, and the place is the reported one less its own
+        assert found.velocity_error_m_s[0] == pytest.approx(air.reported_off_m_s, abs=0.12)
+        assert math.dist(found.motion.position_ned_m, found.corrected(newest).position_ned_m) < 0.05
+        assert 0.0 < found.spread_m_s < 0.2, "the velocity is the receiver's, and as good"
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.0, abs=0.1)
+
+
+def test_an_error_that_changes_is_not_known():
+    air, found = clipped(rebound_m_s=0.0)
+    for _ in range(50):
+        air.reported_off_m_s -= 0.1
+        go_on(air, found, 0.1)
+    assert found.is_measured_apart
+    assert not found.has_converged
+
+
+def test_after_twelve_seconds_the_vehicle_has_put_itself_right():
+    air, found = clipped(off_m_s=6.0, rebound_m_s=0.0)
+    go_on(air, found, 11.9)
+    assert found.is_measured_apart
+    go_on(air, found, 0.2)
+    assert not found.is_measured_apart
+
+
+def test_a_swing_that_passes_the_measured_velocity_before_any_model_knows_it_is_no_agreement():
+    air, found = clipped()
+    go_on(air, found, 0.3)
+    # When what is reported is right for longer than a model would need
+    air.reported_off_m_s = 0.0
+    go_on(air, found, 0.3)
+    # Then it is not right for good
+    assert found.is_measured_apart
+
+
+def test_what_was_measured_before_the_contacts_next_push_does_not_count():
+    air, found = clipped()
+    go_on(air, found, 0.5)
+    assert found.is_measured_apart
+    found.note_contact(False, air.now_us, found.normal)
+    assert not found.is_measured_apart
+
+
+def test_an_acceleration_that_the_accelerometer_does_not_show_is_found():
+    # Given gyroscopes whose tilt is wrong by 3 degrees
+    air, found = clipped()
+    for _ in range(1_000):
+        air.velocities[-1] += 0.004 * 0.5
+        go_on(air, found, 0.004)
+    # Then the belief does not lag behind, and the law is told what to lean against
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.15)
+    assert found.belief.level_m_s2[0] == pytest.approx(0.5, abs=0.15)
+
+
+def test_gyroscopes_that_drift_mislead_the_belief_by_no_more_than_the_receivers_noise():
+    # Given what a real PX4 makes of a clipped hit: 0.009 rad/s of the rates are its gyroscopes' bias
+    air, found = clipped(rebound_m_s=0.0)
+    go_on(air, found, 0.5, turns_rad_s=0.009)
+    for _ in range(75):
+        go_on(air, found, 0.1, turns_rad_s=0.009)
+        # Then a vehicle at rest is known to be at rest, for as long as its own estimate is wrong
+        assert found.is_measured_apart
+        assert abs(found.motion.velocity_ned_m_s[0]) < 0.12
+
+
+def test_one_velocity_beyond_belief_does_not_count_and_two_do():
+    air, found = clipped()
+    go_on(air, found, 1.0)
+    belief_m_s = found.motion.velocity_ned_m_s[0]
+    for expected_m_s in (belief_m_s, 20.0):
+        air.now_us += 4_000
+        air.strapdown.imu(air.now_us, (0.0, 0.0, -G), (0.0, 0.0, 0.0))
+        found.imu(air.strapdown)
+        air.doppler.take(GpsVelocity((30.0, 0.0)), air.strapdown, is_free=False)
+        found.measure(air.doppler)
+        shown_m_s = found.motion.velocity_ned_m_s[0]
+        assert shown_m_s == pytest.approx(expected_m_s, abs=0.1) if expected_m_s < 0.0 else shown_m_s > expected_m_s / 4
+
+
+def test_a_receiver_that_falls_silent_leaves_the_belief_to_the_reports():
+    air, found = clipped()
+    go_on(air, found, 1.0)
+    assert found.is_measured_apart
+    go_on(air, found, 0.7, receives=False)
+    assert not found.is_measured_apart
+
+
+def gps(**fields):
+    return sample_from("GPS_RAW_INT", (1, 1), {"fix_type": 3, "vel": 250, "cog": 9000, **fields})
+
+
+def test_gps_raw_int_is_read_as_a_velocity():
+    assert gps().velocity_ne_m_s == pytest.approx((0.0, 2.5))
+    for unknown in ({"fix_type": 2}, {"vel": 0xFFFF}, {"cog": 0xFFFF}):
+        assert gps(**unknown) is None
+    assert isinstance(gps(vel=10_100), Refused)

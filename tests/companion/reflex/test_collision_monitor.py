@@ -1,0 +1,319 @@
+"""The watch and the reflex around it: samples in, hits out; what it says of itself, and what a hit leaves in doubt.
+
+A `Watch` in flight hears what a test says the vehicle measures: every 4 ms its IMU, every 32 ms the rest.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import pytest
+
+from bench.detectors.config import BaselineConfig
+from companion import messages
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Quaternion, Sample, Vector3
+from companion.mission.config import CompanionConfig
+from companion.motion.config import GRAVITY_M_S2
+from companion.motion.strapdown import LEVEL
+from companion.motion.vector import ZERO
+from companion.reflex.config import RecoveryConfig
+from companion.reflex.detection.detector import ImpactKind, Phase, Situation
+from companion.reflex.detection.monitor import advance, start_monitor
+from companion.reflex.reflex import start_reflex
+
+STILL = (0.0, 0.0, 0.0)
+IN_FLIGHT = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
+# Noise by a hair's breadth: velocities that stand still to the last digit are no estimate.
+HAIR_M_S = 1e-3
+
+
+@dataclass
+class Watch:
+    """`impacts`, `finished` and `notices`: of all that has been heard, the last with its time."""
+
+    impacts: list = field(default_factory=list)
+    finished: list = field(default_factory=list)
+    told: list[tuple[int, str, str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.monitor = start_monitor(CompanionConfig(detector="fused"), 0)
+
+    def texts(self, kind: str) -> list[str]:
+        return [text for _, of, text in self.told if of == kind]
+
+    def fly(
+        self,
+        until_us: int,
+        push: Callable[[int], Vector3] = lambda t: STILL,
+        velocity: Callable[[int], Vector3] = lambda t: STILL,
+        place: Callable[[int], Vector3] = lambda t: STILL,
+        rates: Callable[[int], Vector3] = lambda t: STILL,
+        attitude: Callable[[int], Quaternion | None] = lambda t: LEVEL,
+        look: Callable[[int], None] = lambda t: None,
+    ) -> "Watch":
+        """`push` is what moves it beside its thrust, body m/s^2; no attitude comes where there is none."""
+        for t in range(4_000, until_us, 4_000):
+            x, y, z = push(t)
+            samples: list[Sample] = [ImuSample(t, (x, y, z - 9.80665), rates(t))]
+            if t % 32_000 == 0:
+                n, e, d = velocity(t)
+                told = (n + HAIR_M_S * (t // 32_000 % 2), e, d)
+                samples += [Odometry(t, place(t), told, 0), LocalPosition(t, place(t), told)]
+                wxyz = attitude(t)
+                samples += [] if wxyz is None else [Attitude(t, wxyz, rates(t))]
+            seen = advance(self.monitor, samples, IN_FLIGHT, t)
+            self.impacts += seen.impacts
+            self.finished += seen.finished
+            self.told += [(t, notice.kind, notice.text) for notice in seen.notices]
+            look(t)
+        return self
+
+
+INTERVAL_US = 4_000
+WANTED = Situation()
+
+
+def lateral(**changes):
+    return BaselineConfig(detector="lateral", **changes)
+
+
+def fly(monitor, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WANTED, start_us=INTERVAL_US):
+    """North at 2 m/s, level; `push` is the contact's force per unit mass on body x, m/s^2."""
+    impacts, finished, notices = [], [], []
+    for t in range(start_us, until_us, every_us):
+        north_m = 2.0 * t * 1e-6
+        samples: list[Sample] = [ImuSample(t, (push(t), 0.0, -9.81), (0.0, 0.0, 0.0))]
+        samples.append(LocalPosition(t, (north_m, 0.0, -1.5), (2.0, 0.0, 0.0)))
+        samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
+        seen = advance(monitor, samples, situation, t)
+        impacts += seen.impacts
+        finished += seen.finished
+        notices += seen.notices
+    return impacts, finished, notices
+
+
+def test_late_and_doubled_samples_are_dropped_and_a_reboot_is_not():
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 2_900_000)
+    at = monitor.estimator.strapdown.time_boot_us
+    late = ImuSample(at - INTERVAL_US, (-50.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    assert advance(monitor, [late], WANTED, 2_900_000).impacts == []
+    fly(monitor, 500_000)
+    assert monitor.estimator.strapdown.time_boot_us < 500_000
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda monitor: advance(monitor, [], WANTED, 1_500_000), "no HIGHRES_IMU for 250 ms"),
+        (
+            lambda monitor: fly(monitor, 4_000_000, every_us=100_000, start_us=1_000_000),
+            "HIGHRES_IMU at 10 Hz, below 20",
+        ),
+        (lambda monitor: fly(monitor, 4_000_000, lambda t: 12.0 * math.sin(t), start_us=1_000_000), "vibration hides"),
+    ],
+)
+def test_a_blind_watch_says_why_and_a_seeing_one_says_it_sees_again(spoil, reason):
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_000_000)
+    assert monitor.no_data_reason is None
+    spoil(monitor)
+    assert reason in monitor.no_data_reason
+    assert monitor.describe().startswith("blind (")
+    _, _, notices = fly(monitor, 12_000_000, start_us=4_000_000)
+    assert monitor.no_data_reason is None
+    assert monitor.state.phase is Phase.ARMED
+    assert "the detector sees again" in [notice.text for notice in notices]
+
+
+def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_is_blind():
+    # Given a level vehicle that flies north; no attitude comes from 4 s on, and at 4.4 s it leans to gain 1.8 m/s
+    from_us, until_us, speeding_up_m_s2 = 4_400_000, 5_000_000, 3.0
+    thrust = 9.80665 - math.hypot(9.80665, speeding_up_m_s2)
+    watch = Watch().fly(
+        6_000_000,
+        push=lambda t: (0.0, 0.0, thrust if from_us < t <= until_us else 0.0),
+        velocity=lambda t: (1.0 + speeding_up_m_s2 * max(0, min(t, until_us) - from_us) * 1e-6, 0.0, 0.0),
+        attitude=lambda t: None if 4_000_000 < t <= until_us else (1.0, 0.0, 0.0, 0.0),
+    )
+    # Then a velocity that no force explains is no hit, and it is told
+    assert watch.impacts == []
+    assert watch.texts("link") == ["detector blind: no ATTITUDE_QUATERNION for 250 ms", "the detector sees again"]
+
+
+def test_a_touch_that_tips_the_vehicle_over_is_a_crash_as_soon_as_it_lies_there():
+    # Given a vehicle that has touched the ground, upright, and is in its next take-off for the detector
+    down = Situation(armed=True, height_m=0.2, descent_commanded=True)
+    monitor = start_monitor(CompanionConfig(), 0)
+    fly(monitor, 2_000_000, situation=down._replace(height_m=3.0))
+    (touch,), *_ = fly(monitor, 2_020_000, lambda t: -60.0, situation=down, start_us=2_000_000)
+    assert touch.impact.kind.value == "landing"
+    # When it tumbles 0.2 s later
+    monitor.estimator.strapdown.valid_wxyz = (0.5, math.sqrt(0.75), 0.0, 0.0)
+    tilted = down._replace(off_reason="below 0.5 m", strapdown=monitor.estimator.strapdown)
+    sample = ImuSample(2_220_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    _, impact = monitor.detector.step(monitor.state, sample, tilted)
+    assert impact is not None and impact.kind.value == "crash"
+    # Then it is one crash
+    again = ImuSample(2_240_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    assert monitor.detector.step(monitor.state, again, tilted)[1] is None
+
+
+def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():
+    """North at 1.5 m/s, a wall stops the vehicle with 30 m/s^2 for 50 ms."""
+    hit_us = 3_002_000
+
+    def pushed_us(t):
+        return max(0, min(t - hit_us, 50_000))
+
+    watch = Watch().fly(
+        4_400_000,
+        push=lambda t: (-30.0 * (pushed_us(t) - pushed_us(t - 4_000)) / 4_000, 0.0, 0.0),
+        velocity=lambda t: (1.5 - 30e-6 * pushed_us(t), 0.0, 0.0),
+        place=lambda t: (1.5e-6 * t, 0.0, -3.0),
+    )
+    (final,) = watch.finished
+    assert final.impact.kind is ImpactKind.WALL
+    assert abs(final.time_boot_us - hit_us) < 2_000
+    assert final.velocity_ned_m_s == pytest.approx((1.5, 0.0, 0.0), abs=0.03)
+    assert final.position_ned_m[0] == pytest.approx(1.5 * hit_us * 1e-6, abs=0.03)
+    assert final.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.15)
+    assert final.impulse_m_s == pytest.approx(1.5, abs=0.05)
+    assert not final.is_lower_bound
+    assert final.is_fully_measured
+
+
+def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, speed=0.0, **more_m_s2):
+    """Flying north, or still; a push at 2.0 s; then velocities that are off by what `error_m_s` of the time says.
+
+    `more_m_s2`: what else pushes: the push's `first` sample, its last where arms meet their `stop`, one sample of the
+    `other_guard` at 2.04 s, or a touch `again` at 2.12 s, for 40 ms.
+    """
+    until_us = 2_000_000 + 4_000 * lasts
+    spans_us = {"first": (2_000_000, 2_004_000), "stop": (until_us - 4_000, until_us)}
+    spans_us |= {"other_guard": (2_040_000, 2_044_000), "again": (2_120_000, 2_160_000)}
+    pushes = [(peak_m_s2, 2_000_000, until_us), *((more_m_s2[name], *spans_us[name]) for name in more_m_s2)]
+    north_m_s, trusted, watch = {0: speed}, [], Watch()
+
+    def push(t):
+        pushed_m_s2 = -sum(size for size, from_us, to_us in pushes if from_us <= t < to_us)
+        north_m_s[t] = north_m_s[t - 4_000] + 0.004 * pushed_m_s2
+        return pushed_m_s2, 0.0, 0.0
+
+    def velocity(t):
+        return north_m_s[t] + (error_m_s(t * 1e-6 - 2.0) if t > 2_000_000 else 0.0), 0.0, 0.0
+
+    watch.fly(
+        round(seconds * 1e6), push, velocity, look=lambda t: trusted.append(watch.monitor.estimator.validity.is_valid)
+    )
+    return watch.impacts, [(t, text) for t, kind, text in watch.told if kind == "estimate"], trusted
+
+
+def swing(since_s):
+    """What a real PX4's velocity is off by after a clipped hit: 3 m/s, late, then a swing back through the truth."""
+    late_s = max(0.0, since_s - 0.14)
+    return 3.0 * math.exp(-2.6 * late_s) * (math.cos(3.6 * late_s) + 0.73 * math.sin(3.6 * late_s))
+
+
+IN_DOUBT, AGAIN = "velocity not valid: part of the hit was not measured", "velocity valid again"
+
+
+@pytest.mark.parametrize(
+    ("peak_m_s2", "lasts", "more"),
+    [
+        (120.0, 3, {}),
+        (120.0, 3, {"speed": 2.0}),
+        # Arms that meet their stop late in a hit: springs push for six samples, and the seventh clips
+        (30.0, 7, {"stop": 90.0}),
+        # A stiff hit of a millisecond, whose means stay far below the range, and which rings
+        (3.0, 4, {"first": 23.0}),
+        # A push measured whole, and the other guard that swings in 30 ms later and clips
+        (20.0, 4, {"other_guard": 90.0}),
+    ],
+    ids=["hovering", "into a wall", "stops", "stiff", "other guard"],
+)
+def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit(peak_m_s2, lasts, more):
+    impacts, told, trusted = after_a_hit(7.0, peak_m_s2, lasts, swing, **more)
+    assert len(impacts) == 1 and trusted[-1]
+    assert [text for _, text in told] == [IN_DOUBT, AGAIN]
+    assert told[1][0] == pytest.approx(6_500_000, abs=150_000)
+
+
+@pytest.mark.parametrize(("jump_m_s", "later_s", "hits"), [(1.0, 1.5, 2), (0.3, 3.0, 2), (0.3, 0.6, 1)])
+def test_a_hit_that_only_the_velocity_shows_is_found_while_another_is_corrected(jump_m_s, later_s, hits):
+    """Given a clipped hit at 2 m/s, a contact between the samples is one where no correction makes such a jump."""
+    impacts, _, _ = after_a_hit(7.0, 120.0, 3, lambda s: swing(s) + jump_m_s * (s >= later_s), speed=2.0)
+    assert len(impacts) == hits
+
+
+def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
+    impacts, told, trusted = after_a_hit(3.0, 20.0, 8, lambda since_s: 0.0)
+    assert len(impacts) == 1 and not told
+    assert trusted.count(False) <= 2
+
+
+@pytest.mark.parametrize(("turns", "leans_m_s2"), [(False, 9.80665 * math.tan(math.radians(4.0))), (True, 0.0)])
+def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2):
+    """Told to be level, a vehicle whose filter says nose up by 4 degrees too much leans forward by as much."""
+    rate_rad_s, watch = math.radians(20.0), Watch()
+    strapdown = watch.monitor.estimator.strapdown
+
+    def up_rad(t):
+        return rate_rad_s * 1e-6 * (min(max(t, 2_140_000), 2_340_000) - 2_140_000)
+
+    def leans(t):
+        assert t >= 2_140_000 or strapdown.level_acceleration_m_s2 == STILL
+
+    # Given a clipped hit at 2.0 s, from 0.14 s after which the nose is told to come up at 20 degrees a second
+    watch.fly(
+        2_500_000,
+        push=lambda t: (-120.0 if 2_000_000 <= t < 2_012_000 else 0.0, 0.0, 0.0),
+        # When the gyroscopes show that turn, or nothing of it
+        rates=lambda t: (0.0, rate_rad_s if turns and 2_140_000 < t <= 2_340_000 else 0.0, 0.0),
+        attitude=lambda t: (math.cos(0.5 * up_rad(t)), 0.0, math.sin(0.5 * up_rad(t)), 0.0),
+        look=leans,
+    )
+    # Then it is the filter's in the one case and the vehicle's in the other
+    assert not watch.monitor.estimator.validity.is_valid
+    assert strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
+
+
+TICK_US = 4_000
+
+
+class FreeRoom:
+    """Nothing else is known, and there is no fence."""
+
+    def surfaces(self, contact):
+        return ()
+
+    def inside(self, contact_ned_m, goal_ned_m):
+        return goal_ned_m
+
+
+@pytest.mark.parametrize("force_m_s2", [0.0, 40.0])
+def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_order_they_come(force_m_s2):
+    # Given a vehicle that flies north, whose estimator takes a jump back, as of a hit that clipping hides whole
+    config, rejected = CompanionConfig(), []
+    reflex = start_reflex(config, RecoveryConfig(), config.settled, 0)
+    for us in range(TICK_US, 3_600_000, TICK_US):
+        samples: list[Sample] = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
+        if us % (5 * TICK_US) == 0:
+            place = (2e-6 * us, 0.0, -2.0)
+            velocity = (1.0 if us == 3_000_000 else 2.0, 0.0, 1e-3 * (us // (5 * TICK_US) % 2))
+            told = [Odometry(us, place, velocity, 0), Attitude(us, LEVEL, ZERO), LocalPosition(us, place, velocity)]
+            samples = [*told, messages.AttitudeTarget(us, 0.6), *samples]
+        for estimate in reflex.step(samples, IN_FLIGHT, us).collisions:
+            assert us == 3_000_000, "told with the first sample that shows it"
+            reflex.begin(estimate, FreeRoom(), us)
+        if reflex.recovery is not None:
+            shown = [reflex.recovery.take(sample) for sample in samples if isinstance(sample, LocalPosition)]
+            rejected += [progress for progress in shown if progress.is_rejected]
+        reflex.follow(samples, 2.0, LandedState.IN_AIR)
+    # Then the jump alone was none, and with a force of the same time it was a hit
+    assert len(reflex.hits) == 1
+    assert bool(rejected) is (force_m_s2 == 0.0)
+    # And one that is taken back leaves nothing
+    assert not reflex.monitor.estimator.validity.is_valid
+    reflex.take_back()
+    assert reflex.hits == [] and reflex.monitor.estimator.validity.is_valid

@@ -1,0 +1,266 @@
+"""Detector `fused` on a point mass that flies by eq. 1, its messages thinned as a link thins them; what it promises."""
+
+import math
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
+from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.motion.vector import ZERO, plus
+from companion.reflex.config import EXCESS, FusedConfig
+from companion.reflex.detection.detector import Evidence, ImpactKind, Phase, Situation
+from companion.reflex.detection.fused import FusedDetector, FusedState
+from companion.reflex.detection.health import promise_of
+
+TICK_US = 1_000
+WINDOW_US = 4_000
+GRAVITY = 9.81
+HOVER_FRACTION = 0.7
+IN_FLIGHT = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=5.0)
+HIT_US = 3_001_000
+
+
+def nothing(t_us):
+    return (0.0, 0.0, 0.0)
+
+
+def pulse(force_frd, start_us=HIT_US, length_us=1_000):
+    return lambda t_us: force_frd if start_us <= t_us < start_us + length_us else (0.0, 0.0, 0.0)
+
+
+@dataclass
+class Flight:
+    """Level at `velocity`, pushed by `push(t)` (m/s^2, body)."""
+
+    push: Callable = nothing
+    imu_every_us: int = 4_000
+    velocity: tuple = (2.0, 0.0, 0.0)
+    noise: float = 0.25
+    lift: Callable = lambda t: GRAVITY  # what the propellers push up, m/s^2
+    rates: Callable = nothing
+    jump: tuple | None = None  # (time, velocity step, counted): the estimator's own
+    heard: tuple = (LocalPosition, Odometry, Attitude, AttitudeTarget)
+    situation: Callable = lambda t: IN_FLIGHT
+    slower: int = 1  # velocities come so much more seldom
+
+    def __post_init__(self):
+        self.rng = random.Random(1)
+
+    def samples(self, until_us):
+        window, resets, offset = [], 0, (0.0, 0.0, 0.0)
+        for t in range(TICK_US, until_us, TICK_US):
+            push, lift = self.push(t), self.lift(t)
+            force = (push[0], push[1], push[2] - lift)
+            self.velocity = plus(self.velocity, 1e-6 * TICK_US, (force[0], force[1], force[2] + GRAVITY))
+            window = [*window[-(WINDOW_US // TICK_US - 1) :], force]
+            if self.jump is not None and t == self.jump[0]:
+                offset, resets = self.jump[1], resets + self.jump[2]
+            seen: Any = tuple(v + o + self.rng.gauss(0.0, 0.01) for v, o in zip(self.velocity, offset, strict=True))
+            if t % self.imu_every_us == 0:
+                mean = [
+                    sum(f[axis] for f in window) / len(window) + self.rng.gauss(0.0, self.noise) for axis in (0, 1, 2)
+                ]
+                yield t, ImuSample(t, tuple(mean), self.rates(t))
+            if t % (20_000 * self.slower) == 0:
+                yield t, LocalPosition(t, (0.0, 0.0, -5.0), seen)
+            if t % 20_000 == 0:
+                yield t, Attitude(t, (1.0, 0.0, 0.0, 0.0))
+                yield t, AttitudeTarget(t, HOVER_FRACTION * lift / GRAVITY)
+            if t % (32_000 * self.slower) == 0:
+                yield t, Odometry(t, (0.0, 0.0, -5.0), seen, resets)
+
+    def fly(self, until_us=4_000_000, **config):
+        detector = FusedDetector(FusedConfig(**config), WINDOW_US)
+        self.state, impacts, strapdown = detector.initial(), [], Strapdown()
+        for t, sample in self.samples(until_us):
+            if not isinstance(sample, ImuSample) and not isinstance(sample, self.heard):
+                continue
+            match sample:
+                case ImuSample():
+                    f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+                    strapdown.imu(sample.time_boot_us, f, w)
+                case Attitude():
+                    strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
+                case LocalPosition() | Odometry():
+                    strapdown.velocity(sample)
+            known = self.situation(t)._replace(strapdown=strapdown)
+            self.state, impact = detector.step(self.state, sample, known)
+            if impact is not None:
+                impacts.append(impact)
+        return impacts
+
+
+# --- force --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("direction_deg", [0, 77, 180, 301])
+@pytest.mark.parametrize("speed_m_s", [0.5, 5.0])
+def test_a_foldable_hit_shows_in_the_first_sample_that_holds_it(speed_m_s, direction_deg):
+    c, s = math.cos(math.radians(direction_deg)), math.sin(math.radians(direction_deg))
+    force = 30.0 * speed_m_s
+    impacts = Flight(pulse((force * c, force * s, 0.0), length_us=20_000)).fly()
+    assert [(i.sample_time_boot_us, i.evidence) for i in impacts] == [(3_004_000, Evidence.FORCE)]
+    assert impacts[0].contact_free_until_boot_us <= HIT_US
+    assert impacts[0].kind is ImpactKind.WALL
+
+
+@pytest.mark.parametrize(
+    ("push", "kind"), [((0.0, 0.0, 900.0), ImpactKind.CEILING), ((0.0, 0.0, -900.0), ImpactKind.STRUCK)]
+)
+def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push, kind):
+    velocity = (0.0, 0.0, -1.0) if kind is ImpactKind.CEILING else (0.0, 0.0, 0.0)
+    impacts = Flight(pulse(push), velocity=velocity).fly()
+    assert [(i.sample_time_boot_us, i.kind) for i in impacts] == [(3_004_000, kind)]
+
+
+# --- velocity jump ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("imu_every_us", [10_000, 20_000])
+@pytest.mark.parametrize("push", [(-950.0, 0.0, 0.0), (0.0, 0.0, 950.0), (400.0, 400.0, -400.0)])
+def test_a_hit_between_the_samples_is_found_from_the_velocity_it_leaves(push, imu_every_us):
+    """A rigid hit of 1 ms at 0.5 m/s, where the wire shows 4 ms of every 10 or 20."""
+    impacts = Flight(pulse(push), imu_every_us=imu_every_us, velocity=(0.5, 0.0, 0.0)).fly()
+    assert [i.evidence for i in impacts] == [Evidence.VELOCITY_JUMP]
+    assert impacts[0].contact_free_until_boot_us <= HIT_US < impacts[0].sample_time_boot_us <= HIT_US + 100_000
+    along = sum(a * b for a, b in zip(impacts[0].specific_force_frd_m_s2, push, strict=True))
+    assert along > 0.97 * math.hypot(*impacts[0].specific_force_frd_m_s2) * math.hypot(*push)
+
+
+def stepped(change_m_s, at_us=3_002_000, turn_frd_rad_s=(0.0, 0.0, 0.0), **scene):
+    """Hits told at 50 Hz of a velocity that changes at once, between the samples, while the vehicle begins to turn."""
+    flight = Flight(imu_every_us=20_000, jump=(at_us, change_m_s, 0), **scene)
+    flight.rates = lambda t: turn_frd_rad_s if t > at_us else (0.0, 0.0, 0.0)
+    return [impact.evidence for impact in flight.fly(until_us=at_us + 35_000 * scene.get("slower", 1) ** 2)]
+
+
+@pytest.mark.parametrize(
+    ("change_m_s", "scene", "hits"),
+    [
+        # Straight into a ceiling, without a turn: a sensor that clips at 16 g shows the estimator 1 ms of that
+        ((0.0, 0.0, 0.16), {"velocity": (0.0, 0.0, -1.0)}, 1),
+        ((0.0, 0.0, 0.08), {"velocity": (0.0, 0.0, -1.0)}, 0),
+        # Velocities ten times a second show a large step alone
+        ((1.5, 0.0, 0.0), {"slower": 3}, 1),
+        ((0.6, 0.0, 0.0), {"slower": 3}, 0),
+        # A beam met in the climb: within 20 ms the nimblest motors turn the vehicle by 10 rad/s at most, and by a third
+        # of that about yaw; beside a turn that no motor makes little of a step is enough
+        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (7.7, 7.7, 0.0)}, 1),
+        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (2.1, 2.1, 0.0)}, 0),
+        # Step and turn are together what neither is alone
+        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (5.4, 5.4, 0.0)}, 1),
+        ((0.0, 0.0, 0.08), {"at_us": 3_010_000, "turn_frd_rad_s": (5.4, 5.4, 0.0)}, 0),
+        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (3.4, 0.0, 0.0)}, 0),
+        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (0.0, 0.0, 3.4)}, 1),
+    ],
+)
+def test_of_what_no_sample_showed_the_velocity_that_it_leaves_and_the_turn_tell(change_m_s, scene, hits):
+    assert stepped(change_m_s, **scene) == [Evidence.VELOCITY_JUMP] * hits
+
+
+@pytest.mark.parametrize(("counted", "heard_odometry", "hits"), [(1, True, 0), (0, True, 1), (1, False, 1)])
+def test_a_jump_that_the_estimator_counts_as_its_own_is_no_hit(counted, heard_odometry, hits):
+    """Without ODOMETRY nothing tells the two apart: that is what is lost."""
+    heard = (LocalPosition, Odometry, Attitude) if heard_odometry else (LocalPosition, Attitude)
+    jump = (3_000_000, (0.8, 0.0, 0.0), counted)
+    assert len(Flight(imu_every_us=20_000, jump=jump, heard=heard).fly()) == hits
+
+
+# --- no collision -------------------------------------------------------------------------------------------
+
+
+def gone(t):
+    return max(0.0, 1.0 - (t - HIT_US) / 60_000) if t > HIT_US else 1.0
+
+
+@pytest.mark.parametrize("imu_every_us", [4_000, 20_000])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {"lift": lambda t: GRAVITY * gone(t)},  # free fall
+        {
+            "lift": lambda t: GRAVITY * (0.75 + 0.25 * gone(t)),
+            "rates": lambda t: (80e-6 * max(0, t - HIT_US), 0.0, 0.0),
+        },
+        {"lift": lambda t: GRAVITY * (1.0 if t < HIT_US else 1.3)},  # payload dropped: 30 % more lift for its mass
+        {"lift": lambda t: GRAVITY * (1.0 + 0.4 * math.sin(t * 20e-6))},  # climbs and dives
+        {"push": lambda t: (1.1 * min(1.0, max(0.0, (t - HIT_US) / 3e5)), 0.0, 0.0)},  # a gust of 5 m/s in 0.3 s
+        {"noise": 2.5},
+        {"push": lambda t: (1.5 * (t > HIT_US), 0.0, 0.0)},  # an accelerometer whose zero moves at once
+    ],
+    ids=["free fall", "motor failure", "payload drop", "climbs", "gust", "shaking", "zero moves"],
+)
+def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
+    until_us = 3_150_000 if "rates" in scene else 6_000_000
+    assert Flight(imu_every_us=imu_every_us, **scene).fly(until_us) == []
+
+
+def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
+    once = Flight(pulse((0.0, 10.0, 0.0), 3_000_500, 4_000), noise=1.5)
+    assert once.fly() == []
+    assert once.state.threshold_m_s2 > 8.0
+    twice = Flight(pulse((0.0, 13.0, 0.0), 3_000_500, 20_000), noise=1.5)
+    assert [i.sample_time_boot_us for i in twice.fly()] in ([3_004_000], [3_008_000])
+    together = Flight(pulse((0.0, 8.5, 0.0), 3_000_500, 8_000), noise=1.5)
+    assert [i.contact_free_until_boot_us for i in together.fly()] == [3_000_000]
+    assert together.state.peak_specific_force_m_s2 < together.state.threshold_m_s2
+    strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5)
+    assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
+    to_and_fro = Flight(lambda t: (0.0, {750: 10.0, 751: -10.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5)
+    assert to_and_fro.fly() == []
+
+
+def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
+    def grip(t):
+        return (6.0 * min(1.0, (t - HIT_US) / 150_000), 0.0, 0.0) if HIT_US < t < HIT_US + 400_000 else (0.0, 0.0, 0.0)
+
+    hand = Flight(grip, velocity=(0.0, 0.0, 0.0)).fly()
+    ball = Flight(pulse((80.0, 0.0, 0.0), length_us=8_000), velocity=(0.0, 0.0, 0.0)).fly()
+    assert [(i.kind, i.is_collision) for i in hand] == [(ImpactKind.CONTACT, False)]
+    assert [(i.kind, i.is_collision) for i in ball] == [(ImpactKind.STRUCK, True)]
+
+
+# --- phases -------------------------------------------------------------------------------------------------
+
+
+def test_one_contact_is_one_impact_and_a_shaking_that_stays_is_learnt():
+    loud = Flight(lambda t: (20.0 * math.sin(t * 1e-3), 0.0, 0.0) if t > HIT_US else (0.0, 0.0, 0.0))
+    assert len(loud.fly(8_000_000)) == 1
+    assert loud.state.phase is Phase.ARMED
+    assert loud.state.threshold_m_s2 > 20.0
+
+
+def test_what_thrust_there_is_is_learnt_before_the_detector_trusts_its_noise():
+    # Given half a second in free air, which is enough to recover by (THRUST_LEARNT_S)
+    flown = Flight()
+    flown.fly(until_us=700_000)
+    assert flown.state.phase is Phase.QUIET and flown.state.thrust.known_s > 0.5
+    assert flown.state.thrust.full_m_s2 == pytest.approx(GRAVITY / HOVER_FRACTION, rel=0.02)
+
+
+FIXES = [VelocityFix(time_us, ZERO, ZERO) for time_us in range(0, 1_000_001, 20_000)]
+CONFIG = FusedConfig()
+
+
+def promise(side_m_s2, imu_hz=250):
+    state = FusedState()
+    state.floor.side_m_s2 = EXCESS * side_m_s2
+    state.threshold_m_s2 = max(CONFIG.side_threshold_m_s2, CONFIG.noise_factor * EXCESS * side_m_s2)
+    state.jump.known = 100
+    return promise_of(state, CONFIG, FIXES, imu_hz, True)
+
+
+def test_noise_at_the_bound_exceeds_it_once_in_half_a_thousand_hours():
+    # 6.3 standard deviations, 250 samples a second
+    assert promise(side_m_s2=2.0).false_alarms_per_h == pytest.approx(1.0 / 460.0, rel=0.1)
+    assert promise(side_m_s2=2.0, imu_hz=50).false_alarms_per_h == pytest.approx(1.0 / 2300.0, rel=0.1)
+
+
+def test_a_quiet_vehicle_promises_less_false_alarms_and_sees_less_force():
+    quiet, loud = promise(side_m_s2=0.1), promise(side_m_s2=2.0)
+    assert quiet.false_alarms_per_h < 1e-6 * loud.false_alarms_per_h
+    assert quiet.force_m_s2 == CONFIG.side_threshold_m_s2 < loud.force_m_s2

@@ -1,0 +1,272 @@
+"""The motion after a hit that the accelerometer could not show whole: what is reckoned, when the estimate counts."""
+
+import math
+import random
+
+import pytest
+
+from companion.flight.context import Inputs
+from companion.messages import Attitude, LocalPosition
+from companion.motion.config import CURRENT_US, SAME_M_S
+from companion.motion.strapdown import Strapdown
+from companion.reflex.config import TILT_PER_S, EstimateConfig
+from companion.reflex.recovery.laws import Contact
+from companion.reflex.recovery.motion_estimator import MotionEstimator
+from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
+
+NORTH = (1.0, 0.0, 0.0)
+ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+# A real PX4's, and others: after how long what was hidden is put right, with which frequency and damping.
+PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)
+WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
+
+
+def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True):
+    contact = Contact(HIT_US, AT, velocity, SOUTH, 0.2)
+    return MotionEstimator(contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits)
+
+
+def said(north_m_s, since_us=60_000, position=AT):
+    return LocalPosition(HIT_US + since_us, position, (north_m_s, 0.0, 0.0))
+
+
+def missing(since_s, late_s, rad_s, damping):
+    """Of what was hidden, what is missing in velocity and place, by small steps of the estimator's own equations."""
+    velocity, place, tilt, step_s = 1.0, min(since_s, late_s), 0.0, 1e-4
+    swing, rest = 2 * damping * rad_s, TILT_PER_S
+    for _ in range(round(max(0.0, since_s - late_s) / step_s)):
+        velocity, place, tilt = (
+            velocity + step_s * (tilt - (rad_s**2 + swing * rest) * place),
+            place + step_s * (velocity - (swing + rest) * place),
+            tilt - step_s * rad_s**2 * rest * place,
+        )
+    return velocity, place
+
+
+def reports(found, strapdown, until_s, way=PX4):
+    """When the vehicle reports: since the hit, s; and of what was hidden, what is missing in velocity and place."""
+    for tick in range(1, round(until_s / 0.004)):
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            yield 0.004 * tick, *missing(0.004 * tick, *way)
+
+
+def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, fits=True):
+    """Since the hit, s; true velocity; told velocity; reckoning: after each that a vehicle tells, noise included."""
+    draw = random.Random(1)
+    after_m_s = -restitution * speed_m_s
+    hidden_m_s = hides * (speed_m_s - after_m_s)
+    found = reckoned((speed_m_s, 0.0, 0.0), restitution=0.45, fits=fits)
+    strapdown, noise = Strapdown(), [0.0, 0.0]
+    for since_s, lacks_m_s, lacks_m in reports(found, strapdown, until_s, way):
+        noise = [0.935 * each + 0.354 * draw.gauss(0.0, 0.03) for each in noise]
+        velocity = (after_m_s + hidden_m_s * lacks_m_s + noise[0], noise[1], 0.0)
+        place = (AT[0] + after_m_s * since_s + hidden_m_s * lacks_m + draw.gauss(0.0, 0.01), 0.0, AT[2])
+        found.update(LocalPosition(strapdown.time_boot_us, place, velocity))
+        yield since_s, after_m_s, velocity[0], found
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("speed_m_s", "restitution"), [(1.0, 0.2), (2.0, 0.8), (4.0, 0.85), (3.0, 0.0)])
+def test_the_motion_is_found_long_before_the_estimate_is_right_again(way, speed_m_s, restitution):
+    # Given a hit of which the vehicle's own estimate knows nothing
+    for since_s, true_m_s, told_m_s, found in followed(way, speed_m_s, restitution, until_s=3.0):
+        velocity_error_m_s = found.motion.velocity_ned_m_s[0] - true_m_s
+        hidden_m_s = (1.0 + restitution) * speed_m_s
+        # Then it is never taken for right before what is missing still is known: to a few times its noise and a share
+        least_m_s = SAME_M_S + 0.05 * hidden_m_s
+        assert not found.has_converged or abs(told_m_s - found.velocity_error_m_s[0] - true_m_s) < least_m_s
+        # and the motion is known to half of what was hidden at any time, and to a tenth and noise after a second
+        assert abs(velocity_error_m_s) < 0.01 + (0.5 if since_s < 1.0 else 0.1) * hidden_m_s
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 3.0])
+def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
+    within = [
+        abs(found.motion.velocity_ned_m_s[0] - true_m_s) <= 2.0 * found.spread_m_s + 0.1
+        for restitution in (0.0, 0.3, 0.6, 0.9)
+        for _, true_m_s, _, found in followed(PX4, speed_m_s, restitution)
+    ]
+    assert sum(within) >= 0.95 * len(within)
+
+
+@pytest.mark.parametrize("later_s", [0.06, 1.0])
+def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust_has_added(later_s):
+    # Given a contact of 20 ms whose own force is less than 1 g
+    found, strapdown = reckoned((1.5, -2.5, 0.0)), Strapdown()
+
+    def go_on(seconds, acceleration):
+        for _ in range(round(seconds / 0.004)):
+            strapdown.time_boot_us = (strapdown.time_boot_us or HIT_US) + 4_000
+            strapdown.acceleration_ned_m_s2 = acceleration
+            found.imu(strapdown)
+
+    go_on(0.02, (-9.0, 0.0, 0.0))
+    found.note_contact(True, strapdown.time_boot_us, found.normal)
+    # and a vehicle that leaves at 1 m/s to the south and 2 m/s to the west, and brakes with 3 m/s^2 from then on
+    go_on(later_s, (1.0, 3.0, 0.0))
+    # When the first velocity comes, soon or late
+    velocity = (-1.0 + 1.0 * later_s, -2.0 + 3.0 * later_s, 0.0)
+    found.update(LocalPosition(strapdown.time_boot_us, AT, velocity))
+    # Then it is known how the vehicle left, the worse the later
+    assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
+    assert found.after_error_m_s == pytest.approx(0.5 * later_s, abs=0.01)
+    # and a later one, which is known worse, does not count
+    go_on(0.1, (1.0, 3.0, 0.0))
+    found.update(LocalPosition(strapdown.time_boot_us, AT, (5.0, 5.0, 0.0)))
+    assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
+    # until it is pushed again
+    found.note_contact(True, strapdown.time_boot_us, found.normal)
+    assert found.after_ned_m_s is None
+
+
+def test_the_height_is_the_reported_one_while_a_hit_is_corrected_and_after_it():
+    # Given a vehicle whose velocity is wrong downwards, too, and whose heights stand
+    found, strapdown = reckoned((3.0, 0.0, 1.0)), Strapdown()
+    for since_s, lacks_m_s, lacks_m in reports(found, strapdown, 3.0):
+        place = (AT[0] - 0.6 * since_s + 3.6 * lacks_m, 0.0, AT[2])
+        found.update(LocalPosition(strapdown.time_boot_us, place, (-0.6 + 3.6 * lacks_m_s, 0.0, 1.5 * lacks_m_s)))
+        assert found.motion.position_ned_m[2] == pytest.approx(AT[2], abs=0.02)
+    assert found.has_converged and found.position_error_m[0] != 0.0 and found.position_error_m[2] == 0.0
+
+
+def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into_the_wall_is_not():
+    right_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, hides=0.0) if found.has_converged)
+    assert right_s < 0.5
+    lost_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, until_s=2.0) if found.has_converged)
+    assert lost_s > 0.9
+
+
+def test_an_autopilot_whose_estimate_follows_no_model_is_believed_once_its_receiver_could_have_spoken():
+    runs = (followed(PX4, 2.0, 0.5, hides=0.0, fits=fits) for fits in (True, False))
+    by_model_s, later_s = (next(since_s for since_s, _, _, found in run if found.has_converged) for run in runs)
+    assert by_model_s < 1e-6 * CURRENT_US < later_s
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_velocity_that_a_wrong_tilt_makes_across_the_hit_is_no_motion(way):
+    # Given a hit at 3 m/s that turns the vehicle: from 0.3 s on its tilt is wrong across it, and so is its velocity
+    _, rad_s, damping = way
+    found, strapdown = reckoned((3.0, 0.0, 0.0), restitution=0.8), Strapdown()
+    lacks_m = lacks_m_s = 0.0
+    for tick in range(1, 350):
+        since_s = 0.004 * tick
+        level_m_s2 = -2.0 if since_s > 0.3 else 0.0
+        lacks_m_s += 0.004 * (-level_m_s2 - rad_s**2 * lacks_m)
+        lacks_m += 0.004 * (lacks_m_s - 2.0 * damping * rad_s * lacks_m)
+        strapdown.time_boot_us, strapdown.level_acceleration_m_s2 = HIT_US + 4_000 * tick, (0.0, level_m_s2, 0.0)
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            swing_m_s, swing_m = missing(since_s, *way)
+            velocity = (-2.4 + 5.4 * swing_m_s, lacks_m_s, 0.0)
+            found.update(
+                LocalPosition(strapdown.time_boot_us, (3.0 - 2.4 * since_s + 5.4 * swing_m, lacks_m, -2.0), velocity)
+            )
+            # Then no motion across is taken from it, and none goes with the positions
+            assert abs(found.motion.velocity_ned_m_s[1]) < 0.15
+            right = found.corrected(LocalPosition(0, (0.0, 0.0, 0.0), velocity))
+            assert not found.has_converged or abs(right.velocity_ned_m_s[1]) < 0.15
+
+
+def test_a_climb_that_a_wrong_tilt_makes_of_a_lean_is_no_motion_of_a_copter():
+    # Given a vehicle that flies level to the south after a hit, and by its wrong tilt takes itself for climbing
+    found, strapdown = reckoned((3.0, 0.0, 0.0), restitution=0.8, fits=False), Strapdown()
+    strapdown.sinks_m_s2, climbs_m_s, climbed_m = 0.5, 0.0, 0.0
+    for tick in range(1, 250):
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+        climbs_m_s += 0.004 * (0.5 - PX4[1] ** 2 * climbed_m)
+        climbed_m += 0.004 * (climbs_m_s - 2.0 * PX4[2] * PX4[1] * climbed_m)
+        if tick % 5 == 0:
+            lacks_m_s, lacks_m = missing(0.004 * tick, *PX4)
+            place = (AT[0] - 2.4 * 0.004 * tick + 5.4 * lacks_m, AT[1], AT[2] - climbed_m)
+            found.update(LocalPosition(strapdown.time_boot_us, place, (-2.4 + 5.4 * lacks_m_s, 0.0, -climbs_m_s)))
+    assert climbs_m_s > 0.05
+    # Then it is known to fly level
+    assert abs(found.motion.velocity_ned_m_s[2]) < 0.02
+
+
+@pytest.mark.parametrize(("told_deg", "flown_deg"), [(0.0, 10.0), (10.0, 20.0), (20.0, 10.0)])
+def test_a_tilt_that_is_told_too_small_lifts_less_than_it_tells(told_deg, flown_deg):
+    told, flown = (math.radians(each) for each in (told_deg, flown_deg))
+    strapdown = Strapdown()
+    strapdown.valid_wxyz = (math.cos(0.5 * flown), 0.0, math.sin(0.5 * flown), 0.0)
+    strapdown.attitude(0, (math.cos(0.5 * told), 0.0, math.sin(0.5 * told), 0.0), math.radians(15.0))
+    assert strapdown.sinks_m_s2 == pytest.approx(9.80665 * (math.cos(told) - math.cos(flown)))
+    # And nothing is left of it once the attitude is valid
+    strapdown.attitude(0, strapdown.valid_wxyz)
+    assert strapdown.sinks_m_s2 == 0.0
+
+
+def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_again():
+    found, strapdown = reckoned(), Strapdown()
+    for at_us, level_m_s2 in ((4_400_000, 0.9), (5_000_000, 0.0)):
+        for strapdown.time_boot_us in (HIT_US + at_us, HIT_US + at_us + 4_000):
+            strapdown.level_acceleration_m_s2 = (0.0, level_m_s2, 0.0)
+            found.imu(strapdown)
+        assert found.belief.level_m_s2 == (0.0, 0.9, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("is_fully_measured", "across_m_s2", "wind_m_s2"), [(True, -0.35, -0.35), (False, -0.35, 0.0), (False, 2.4, 2.0)]
+)
+def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(is_fully_measured, across_m_s2, wind_m_s2):
+    # Given a level vehicle after a hit, and a force across its thrust
+    found, strapdown = reckoned(), Strapdown()
+    found.note_contact(is_fully_measured, HIT_US, found.normal)
+    for tick in range(1, 500):
+        strapdown.imu(HIT_US + 4_000 * tick, (across_m_s2, 0.0, -9.81), ZERO)
+        found.imu(strapdown)
+    # Then it counts as wind as far as PX4's estimator cannot have made it up
+    assert found.belief.external_m_s2 == pytest.approx((wind_m_s2, 0.0, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize("ahead_us", [1_000_000, 120_000, -70_000])
+@pytest.mark.parametrize("hides", [0.0, 1.0])
+def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(ahead_us, hides):
+    # Given a hit, and now and then in the second after it a place that is stamped ahead of its time, or behind
+    found, strapdown = reckoned(), Strapdown()
+    for number, (since_s, lacks_m_s, lacks_m) in enumerate(reports(found, strapdown, 2.4), start=1):
+        place = (3.0 - 0.4 * since_s + 2.4 * hides * lacks_m, 0.0, -2.0)
+        at_us = round(1e6 * since_s) + (ahead_us if number % 5 == 0 and number < 50 else 0)
+        found.update(said(-0.4 + 2.4 * hides * lacks_m_s, at_us, place))
+        # Then the motion stays one that a vehicle can have
+        assert math.isfinite(found.spread_m_s)
+        assert -2.5 < found.motion.velocity_ned_m_s[0] < 2.5
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-0.4, abs=0.15)
+
+
+def recovering():
+    flight = flight_with(estimator=reckoned())
+    return flight, flight.collisions[0], recover_in(flight)
+
+
+def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
+    # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
+    flight, record, recover = recovering()
+    record.estimator.note_contact(True, HIT_US, record.estimator.normal)
+    for at_us in range(100_000, 5_000_000, 20_000):
+        recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
+        if record.is_over:
+            break
+    # Then the recovery is over although 0.15 m/s is told
+    assert record.setpoint_ned_m[0] == pytest.approx(2.38, abs=0.05)
+    assert record.estimator.velocity_error_m_s[0] == pytest.approx(0.15, abs=0.05)
+    assert record.is_over and record.settled_after_s < 3.5
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "asked_deg"), [(10.0, 0.0), (-15.0, 0.0), (-120.0, -104.0), (120.0, 104.0), (350.0, 0.0)]
+)
+def test_a_vehicle_that_a_hit_has_turned_is_turned_back_at_leisure(heading_deg, asked_deg):
+    # Given a vehicle that is to head north
+    flight, _, recover = recovering()
+    flight.yaw_rad, half_rad = 0.0, math.radians(0.5 * heading_deg)
+    flight.vehicle.attitude = Attitude(HIT_US, (math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)))
+    # When it recovers, then it is asked for no heading far from its own
+    recover.step(flight, Inputs(), 100_000)
+    assert math.degrees(recover.target(100_000).yaw_rad) == pytest.approx(asked_deg, abs=0.1)
+    # And for its heading of before when that is over
+    assert recover.step(flight, Inputs(), 11_000_000) is not None
+    assert flight.target.yaw_rad == 0.0

@@ -1,0 +1,167 @@
+"""Being pushed for long: a vehicle that leans on something is told from one that leans on the wind.
+
+So is one that presses on a ceiling, met too slowly for any sample to show it.
+"""
+
+import math
+
+import pytest
+
+from companion.messages import LocalPosition
+from companion.reflex.config import HELD_M_S2
+from companion.reflex.detection.sustained_force import SustainedForceMonitor
+from tests.simulated import SimulatedFlight, flown, wall
+
+EVERY_S = 0.02
+
+
+def leaning_north(acceleration_m_s2):
+    """The attitude, nose north, of a vehicle whose thrust carries it and gives that acceleration."""
+    half = -0.5 * math.atan(acceleration_m_s2 / 9.80665)
+    return (math.cos(half), 0.0, math.sin(half), 0.0)
+
+
+def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True):
+    """The first time at which something is found in the way of a vehicle that leans north, and what.
+
+    Its velocity and lean are functions of the time. The goal goes with it, unless it stands where it was.
+    """
+    monitor, north_m, east_m = SustainedForceMonitor(), 0.0, 0.0
+    for step in range(round(seconds / EVERY_S)):
+        t = step * EVERY_S
+        n, e = velocity_m_s(t)
+        north_m, east_m = north_m + n * EVERY_S, east_m + e * EVERY_S
+        sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m, east_m, -1.5), (n, e, 0.0))
+        monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
+        ahead_n, ahead_e = goal_ahead_m
+        goal = (north_m + ahead_n, east_m + ahead_e, -1.5) if goes else (ahead_n, ahead_e, -1.5)
+        held = monitor.step(sample, leaning_north(tilt_m_s2(t)), goal)
+        if held is not None:
+            return t, held
+    return None
+
+
+def still(t):
+    return 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("velocity_m_s", "goal_ahead_m"),
+    [(still, (1.0, 0.0)), (lambda t: (0.05, 0.4 + 0.1 * t), (0.3, 0.3)), (lambda t: (0.25, 0.25), (0.3, 0.3))],
+    ids=["stands", "slides along", "slides while friction turns the force by 45 degrees"],
+)
+def test_a_vehicle_that_leans_on_a_wall_more_and_more_is_kept_off(velocity_m_s, goal_ahead_m):
+    # Given a lean that grows from the first second on
+    at_s, held = watched(5.0, velocity_m_s, lambda t: 1.2 * max(0.0, t - 1.0), goal_ahead_m)
+    # Then it is told as soon as that much has had no effect, with the way out
+    assert 1.2 * (at_s - 1.3) == pytest.approx(HELD_M_S2, abs=0.2)
+    assert held.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.03)
+
+
+def gust(t):
+    """Back by 0.4 m with up to 0.4 m/s."""
+    return -0.4 * math.sin(math.pi * t / 1.6) if t < 1.6 else 0.0
+
+
+def glide(t):
+    braking_s, begun_s = max(0.0, t - 0.24), min(t, 0.24)
+    return 0.95 + 2.2 * begun_s - 7.5 * begun_s**2 - 1.4 * braking_s - 2.0 * braking_s**2, 0.0
+
+
+@pytest.mark.parametrize(
+    ("seconds", "velocity_m_s", "tilt_m_s2", "goal_m"),
+    [
+        (3.0, lambda t: (t, 0.0), lambda t: min(1.0, 5.0 * t), (9.0, 0.0)),
+        (2.0, lambda t: (1.0 - t, 0.0), lambda t: -1.0, (9.0, 0.0)),
+        # Taken up while the vehicle speeds up away from what it hit, with a tail wind that gives it 0.7 m/s^2
+        (0.7, glide, lambda t: 1.5 - 15.0 * min(t, 0.24) - 4.0 * max(0.0, t - 0.24), (0.0, 0.0)),
+        (5.0, still, lambda t: 3.0, (1.0, 0.0)),
+        # The lean follows late and is what the gust is at last
+        (4.0, lambda t: (gust(t), 0.0), lambda t: min(1.8, 1.2 * t), (1.0, 0.0)),
+        (6.0, lambda t: (gust(t), 3.0), lambda t: min(2.4, 1.6 * t), (0.3, 0.3)),
+        (4.0, lambda t: (0.2, 0.0), lambda t: 0.8 * t, (1.0, 0.0)),
+    ],
+    ids=["speeds up", "brakes", "glides past its goal", "wind", "gust", "gust across the way", "comes nearer"],
+)
+def test_a_lean_that_something_else_explains_is_no_wall(seconds, velocity_m_s, tilt_m_s2, goal_m):
+    assert watched(seconds, velocity_m_s, tilt_m_s2, goal_m, goes=goal_m[1] > 0.0) is None
+
+
+# --- in flight
+
+
+def in_room(*items, height_m=1.5, hz=200, **sim) -> SimulatedFlight:
+    fence, then = {"radius_m": 10, "max_height_m": 6}, {"then": "hold", "hold_s": 1}
+    streams = {"streams": {"highres_imu_hz": hz}}
+    flight = flown(*items, height_m=height_m, companion=streams, on_collision=then, fence=fence, sim=sim)
+    assert flight.report.outcome == "completed"
+    return flight
+
+
+def test_a_wall_met_at_a_crawl_is_backed_away_from():
+    # Given a goal 1 m behind a wall, when the vehicle comes with 0.06 m/s, which no detector takes for a hit
+    flight = in_room({"go_to": {"position_ned_m": [1.5, 0, -1.5], "speed_m_s": 0.06}}, walls=[wall(0.5)])
+    # Then it leans on it for no longer than it takes to be sure, backs away, and the policy follows
+    (collision,) = flight.report.collisions
+    assert flight.kinds().count("in_the_way") == 1 and flight.tilt_deg.max() < 45.0
+    assert collision.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.2)
+    assert collision.recovery_setpoint_ned_m[0] < collision.position_ned_m[0] - 0.25
+    assert collision.settled_after_s is not None and collision.settled_after_s < 4.0
+    assert flight.report.obstacles
+
+
+def test_a_beam_met_at_a_crawl_is_moved_away_from():
+    # Given a goal a metre above a beam, when the vehicle comes with 0.1 m/s
+    beam = {"name": "beam", "point_ned_m": [0.15, 0, -2], "normal_ned": [0, 0, 1], "width_m": 0.2, "height_m": 6}
+    up = {"go_to": {"position_ned_m": [0, 0, -3], "speed_m_s": 0.1}}
+    flight = in_room(up, height_m=1.3, hz=50, walls=[beam])
+    # Then it presses for two seconds and not until the item's time is over, and comes down again
+    assert flight.kinds().count("in_the_way") == 1
+    hit = flight.report.collisions[-1]
+    assert hit.normal_ned == pytest.approx((0.0, 0.0, 1.0), abs=0.1) and hit.settled_after_s is not None
+    assert hit.recovery_setpoint_ned_m[2] > hit.position_ned_m[2] + 0.25
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed_m_s", [0.06, 0.8, 1.3, 1.4])
+def test_a_door_that_comes_after_the_hovering_vehicle_is_moved_away_from(speed_m_s):
+    # Given a hovering vehicle, and a door that pushes it, or strikes it and goes on for two metres more
+    comes = {"velocity_ned_m_s": [-speed_m_s, 0, 0], "from_s": 9.5, "until_s": 20.5 if speed_m_s < 0.1 else 12.5}
+    flight = in_room({"hold": {"duration_s": 14}}, walls=[wall(0.6 if speed_m_s < 0.1 else 1.0, motion=comes)])
+    # Then the vehicle gives way, never leans on it, and takes the end of the long push for no hit from the other side
+    assert flight.report.collisions and flight.tilt_deg.max() < 45.0
+    assert all(collision.normal_ned[0] < -0.5 for collision in flight.report.collisions)
+    assert flight.report.collisions[-1].settled_after_s is not None
+
+
+GUSTS = [
+    {"kind": "gust", "between_s": [9 + 4 * k, 12.5 + 4 * k], "velocity_ned_m_s": [-5 * n, 5 * e, 0], "rise_s": rise}
+    for k, (n, e, rise) in enumerate([(1.0, 0.0, 0.3), (0.0, 1.0, 1.0), (-0.7, 0.7, 1.6)])
+]
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(GUSTS, marks=pytest.mark.slow, id="gusts"),
+        pytest.param(
+            [{"kind": "gust", "between_s": [10, 20], "velocity_ned_m_s": [0, 0, 5]}],
+            marks=pytest.mark.slow,
+            id="wind from above",
+        ),
+        pytest.param(
+            [{"kind": "battery_sag", "between_s": [10, 12], "voltage_share": 0.95}],
+            marks=pytest.mark.slow,
+            id="weak battery",
+        ),
+        pytest.param([{"kind": "motor_failure", "at_s": 10, "motor": 1, "thrust_share": 0.85}], id="weak motor"),
+        pytest.param(
+            [{"kind": "estimator_reset", "at_s": 10, "position_jump_ned_m": [0.8, 0, 0]}], id="place that jumps"
+        ),
+    ],
+)
+def test_what_keeps_a_vehicle_off_its_setpoint_is_not_always_in_the_way(fault):
+    slow = {"go_to": {"position_ned_m": [1, 0, -2], "speed_m_s": 0.2}}
+    fast = {"go_to": {"position_ned_m": [1, 0, -4], "speed_m_s": 1.0}}
+    flight = in_room({"hold": {"duration_s": 3}}, slow, fast, height_m=1.3, wind_ned_m_s=[2, 1, 0], faults=fault)
+    assert flight.told("in_the_way") == [] and flight.report.collisions == ()
