@@ -12,7 +12,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.config import SettledConfig
 from companion.motion.history import MotionHistory
 from companion.motion.settling import SettlingMonitor
-from companion.motion.vector import along, plus, split
+from companion.motion.vector import along, minus, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.recovery.attitude_law import Lean, wanted
@@ -154,7 +154,12 @@ class Recovery:
         is_touched = is_touched or along(estimator.external_m_s2, normal.direction_ned) > reflex.HELD_M_S2
         off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)
         self._has_left = (self._has_left or off_m_s > 0.0) and not is_touched
-        place = estimator.motion.position_ned_m if is_touched else self._contact.position_ned_m
+        here, place = estimator.motion.position_ned_m, self._contact.position_ned_m
+        if is_touched:
+            place = here
+        elif along(minus(here, place), normal.direction_ned) < -reflex.BEHIND_M:
+            # It has an end, and the vehicle has passed that: its own place is free.
+            place = plus(here, -self._config.clearance_m, normal.direction_ned)
         self._contact = replace(
             self._contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad
         )
