@@ -84,7 +84,12 @@ def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> 
     goal = plus(goal, 1.0, along_way)
     if config.tangential == "kept":
         goal = plus(goal, config.gamma_per_axis[0] / (WAY_S), along_way)
-    return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])
+    down_m, here_m = contact.position_ned_m[2], motion.position_ned_m[2]
+    if normal[2] != 0.0:
+        down_m = goal[2]
+    elif abs(here_m - down_m) > config.clearance_m:
+        down_m = here_m
+    return (goal[0], goal[1], down_m)
 
 
 RECOVERY_LAWS: Mapping[str, Law] = {
