@@ -8,7 +8,7 @@ positive axes; read for any approach, gamma_i |v_ci| back along each horizontal 
 `adaptive`, as near as is safe. From the motion x, v that follows the contact, with v_t the part of v along it:
 
     D   = max(d_0,  (x - x(t_c) + T v) . n),    T = WAY_S
-    x_d = x + (D - (x - x(t_c)) . n) n + T v_t, height x_3(t_c) unless the obstacle is steep
+    x_d = x + (D - (x - x(t_c)) . n) n + T v_t, height x_3(t_c) unless the obstacle is steep, or it fell by d_0
 
 that is d_0 (clearance_m) off the obstacle, further where the rebound carries the vehicle further, and along the
 obstacle where it comes to rest: T v is the way of the attitude law (see attitude_law), whatever the attitude's lag.

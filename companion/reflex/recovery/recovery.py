@@ -66,7 +66,7 @@ class Recovery:
         self._surfaces = self._around(self._contact)
         expected = record.contact.rebound(config.restitution)
         record.setpoint_ned_m = self._told_ned_m = self._goal(expected)
-        self._has_left = False
+        self._has_left = self._has_passed = False
         self._slow_since_us: int | None = None
         self._held_since_us = record.sample_time_boot_us  # by a position
         self._monitor = SettlingMonitor(settled)
@@ -155,10 +155,12 @@ class Recovery:
         off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)
         self._has_left = (self._has_left or off_m_s > 0.0) and not is_touched
         here, place = estimator.motion.position_ned_m, self._contact.position_ned_m
+        off_m = along(minus(here, place), normal.direction_ned)
+        # Where the vehicle is behind a surface, that has an end.
+        self._has_passed = not is_touched and (self._has_passed or off_m < -reflex.BEHIND_M)
         if is_touched:
             place = here
-        elif along(minus(here, place), normal.direction_ned) < -reflex.BEHIND_M:
-            # It has an end, and the vehicle has passed that: its own place is free.
+        elif self._has_passed and off_m < self._config.clearance_m:
             place = plus(here, -self._config.clearance_m, normal.direction_ned)
         self._contact = replace(
             self._contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad

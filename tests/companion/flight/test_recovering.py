@@ -77,6 +77,15 @@ def test_it_is_flown_by_attitude_until_it_rests_and_then_by_the_place_where_it_d
     assert [event.kind for event in flight.events].count("hand_over") == 1
 
 
+def test_who_has_passed_the_end_of_an_obstacle_is_not_driven_back_before_it():
+    flight = flight_with()
+    recover = recover_in(flight)
+    for since_us in range(100_000, 900_000, 20_000):
+        # Past a pole's middle and on, at 1 m/s: there is no wall there
+        hears(flight, recover, since_us, 3.3 + 1e-6 * since_us, 1.0)
+    assert flight.collisions[-1].setpoint_ned_m[0] > 4.1
+
+
 def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_when_it_rested():
     # Given a vehicle that rests, clear of the obstacle, from the first report on
     flight, handed_us, over_us = flight_with(), 0, 0
