@@ -164,13 +164,13 @@ class Reflex:
         self.hits.pop()
         self.monitor.reject()
 
-    def lean(self, yaw_rad: float) -> tuple[Vector3, Lean]:
+    def lean(self) -> tuple[Vector3, Lean]:
         """The acceleration wanted by the present recovery, local NED, and what makes attitude and thrust of it.
 
         What PX4 holds goes on while it turns its thrust.
         """
         assert self.recovery is not None and self.loss_s is not None, "only a known one lets it lean"
-        return self.recovery.lean(self.thrust.full_m_s2, yaw_rad, self.loss_s + numbers.NOTICED_S + numbers.LEAD_S)
+        return self.recovery.lean(self.thrust.full_m_s2, self.loss_s + numbers.NOTICED_S + numbers.LEAD_S)
 
     def follow(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """Take the samples of the step for the motion after the newest hit, and for what shows a crash."""

@@ -57,7 +57,7 @@ class Recover:
         place = self._recovery.record.setpoint_ned_m
         if not self._recovery.leans:
             return Target(place, self._yaw_rad)
-        acceleration, lean = self._flight.reflex.lean(self._yaw_rad or 0.0)
+        acceleration, lean = self._flight.reflex.lean()
         return Target(place, self._yaw_rad, None, acceleration, lean)
 
     @property

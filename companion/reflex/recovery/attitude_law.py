@@ -45,13 +45,12 @@ class Lean:
     belief: Belief
     surfaces: Sequence[Surface]
     full_m_s2: float  # specific force at full thrust
-    yaw_rad: float
     held_s: float  # for so long PX4 flies it on, if nothing follows
 
     def tilted_by(self, acceleration_ned_m_s2: Vector3) -> "Lean":
         """Of a vehicle that has the tilt of this acceleration already: its thrust is that tilt's."""
         n, e, _ = acceleration_ned_m_s2
-        attitude_wxyz = tilted((n, e, -GRAVITY_M_S2), self.yaw_rad)
+        attitude_wxyz = tilted((n, e, -GRAVITY_M_S2), turn_rad(self.belief.attitude_wxyz))
         return replace(self, belief=replace(self.belief, attitude_wxyz=attitude_wxyz))
 
     def setpoint(self, time_us: int, acceleration_ned_m_s2: Vector3) -> AttitudeSetpoint:
@@ -132,12 +131,19 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
     thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
     asked = minus((n, e, -lifts_m_s2), belief.level_m_s2)
-    return tilted(asked, lean.yaw_rad), thrust
+    # No heading is asked for but the present one: motors that turn the vehicle have no thrust left to lift it.
+    return tilted(asked, turn_rad(belief.attitude_wxyz)), thrust
 
 
 def turn_kept(yaw_rate_rad_s: float) -> float:
     """The turn that is asked for, so that no more than BRAKED_RAD_S of the present one is left to brake."""
     return yaw_rate_rad_s - min(max(yaw_rate_rad_s, -reflex.BRAKED_RAD_S), reflex.BRAKED_RAD_S)
+
+
+def turn_rad(attitude_wxyz: Quaternion) -> float:
+    """The turn from north about body z that, after the shortest tilt from level, makes an attitude."""
+    w, _, _, z = attitude_wxyz
+    return 2.0 * math.atan2(z, w)
 
 
 def tilted(force_ned: Vector3, yaw_rad: float) -> Quaternion:

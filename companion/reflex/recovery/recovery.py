@@ -71,11 +71,11 @@ class Recovery:
         self._held_since_us = record.sample_time_boot_us  # by a position
         self._monitor = SettlingMonitor(settled)
 
-    def lean(self, full_m_s2: float, yaw_rad: float, held_s: float) -> tuple[Vector3, Lean]:
+    def lean(self, full_m_s2: float, held_s: float) -> tuple[Vector3, Lean]:
         """The acceleration wanted now, local NED, and what makes attitude and thrust of it."""
         belief = self.record.estimator.belief
         acceleration = wanted(belief, self._surfaces, self.record.setpoint_ned_m[2])
-        return acceleration, Lean(belief, self._surfaces, full_m_s2, yaw_rad, held_s)
+        return acceleration, Lean(belief, self._surfaces, full_m_s2, held_s)
 
     def take(self, sample: LocalPosition) -> Progress:
         """One position that the vehicle reports."""

@@ -237,7 +237,7 @@ def surroundings(known=(), vehicle=HERE) -> Surroundings:
 
 
 def lean(acceleration, velocity=REST, place=HERE) -> Target:
-    return Target(place, 0.0, None, acceleration, Lean(Belief(place, velocity), (), 15.0, 0.0, HELD_BY_ATTITUDE_S))
+    return Target(place, 0.0, None, acceleration, Lean(Belief(place, velocity), (), 15.0, HELD_BY_ATTITUDE_S))
 
 
 def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, tuple]:

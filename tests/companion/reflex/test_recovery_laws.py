@@ -136,8 +136,8 @@ WALL = Surface(HERE, SOUTH, 0.35)
 FAR = Surface((5.0, 0.0, -2.0), SOUTH, 0.35)
 
 
-def lean(belief, surfaces=(), heading_rad=0.0, full_m_s2=FULL_M_S2) -> Lean:
-    return Lean(belief, surfaces, full_m_s2, heading_rad, MOST_HELD_S + NOTICED_S)
+def lean(belief, surfaces=(), full_m_s2=FULL_M_S2) -> Lean:
+    return Lean(belief, surfaces, full_m_s2, MOST_HELD_S + NOTICED_S)
 
 
 def up_of(attitude_wxyz):
@@ -220,6 +220,14 @@ def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_
     assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0)), "level by its own attitude"
 
 
+@pytest.mark.parametrize("heading_rad", [0.0, 1.0, -3.0])
+def test_a_lean_asks_for_no_turn_of_the_heading(heading_rad):
+    # Given a vehicle that tilts east
+    belief = Belief(HERE, ZERO, attitude_wxyz=tilted((0.0, 4.0, -GRAVITY_M_S2), heading_rad))
+    attitude, _ = attitude_and_thrust((3.0, 0.0, 0.0), lean(belief))
+    assert attitude == pytest.approx(tilted((3.0, 0.0, -GRAVITY_M_S2), heading_rad), abs=1e-9)
+
+
 @given(
     acceleration=st.tuples(*[st.floats(-50.0, 50.0)] * 3),
     turned=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 0.1),
@@ -231,7 +239,7 @@ def test_whatever_is_asked_for_the_attitude_is_upright_and_the_thrust_one_that_t
     # Given an acceleration as of a vehicle that shoots up to the top of its fence, faster than gravity stops it
     size = math.hypot(*turned)
     belief = Belief(HERE, ZERO, attitude_wxyz=tuple(part / size for part in turned))
-    attitude, thrust = attitude_and_thrust(acceleration, lean(belief, [WALL], 1.0, full_m_s2))
+    attitude, thrust = attitude_and_thrust(acceleration, lean(belief, [WALL], full_m_s2))
     assert math.hypot(*attitude) == pytest.approx(1.0)
     assert -up_of(attitude)[2] >= math.cos(MOST_TILT_RAD) - 1e-9
     assert LEAST_THRUST <= thrust <= 1.0
