@@ -155,13 +155,10 @@ RETURN_PER_S = 2.5
 HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 16.0, 8.0, 4.0
 # Largest tilt, 35 degrees: 6.9 m/s^2, with 22 % more thrust than hover's.
 MOST_TILT_RAD = 0.61
-# Thrust that the tilt leaves for the height, over what hovers at it.
-HOVER_MARGIN = 1.1
-# A vehicle that turns faster about its yaw axis than this, rad/s, leans less: the lean lags behind the turn, and one
-# that is held without a companion is not where it was asked for.
-SPIN_RAD_S = 3.0
-# To brake a turn PX4's mixer takes up to 0.15 of all thrust from what lifts (mixYaw). So PX4's loop of the yaw rate has
-# no more than this to brake; the rest of the turn is asked for.
+# Thrust that the tilt leaves for the height, over what hovers at it; and while a turn is braked, for which PX4's mixer
+# takes up to 0.15 of all thrust from what lifts (mixYaw).
+HOVER_MARGIN, TURN_MARGIN = 1.1, 1.0 / (1.0 - 0.15)
+# So PX4's loop of the yaw rate has no more than this to brake; the rest of the turn is asked for.
 BRAKED_RAD_S = 1.0
 # The rotors keep turning: PX4's MPC_THR_MIN.
 LEAST_THRUST = 0.12

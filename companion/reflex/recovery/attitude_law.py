@@ -116,9 +116,9 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     n, e, d = acceleration_ned_m_s2
     d = min(max(d, -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2)
     lifts_m_s2 = GRAVITY_M_S2 - d
-    least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), reflex.HOVER_MARGIN * GRAVITY_M_S2 / full_m_s2), 1.0)
+    margin = reflex.TURN_MARGIN if turns_rad_s > reflex.BRAKED_RAD_S else reflex.HOVER_MARGIN
+    least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), margin * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
-    most_m_s2 *= reflex.SPIN_RAD_S / max(turns_rad_s, reflex.SPIN_RAD_S)
     n, e, _ = limited((n, e, 0.0), most_m_s2)
     force = (n, e, d - GRAVITY_M_S2)
     up = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0))

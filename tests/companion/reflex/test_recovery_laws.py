@@ -220,6 +220,15 @@ def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_
     assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0)), "level by its own attitude"
 
 
+@pytest.mark.parametrize(
+    ("full_m_s2", "upright"), [(13.0, GRAVITY_M_S2 / 13.0 / 0.85), (30.0, math.cos(MOST_TILT_RAD))]
+)
+def test_a_vehicle_that_turns_leans_by_what_px4_leaves_of_its_thrust_for_the_turn(full_m_s2, upright):
+    belief = Belief(HERE, ZERO, yaw_rate_rad_s=4.0)
+    attitude, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=full_m_s2))
+    assert -up_of(attitude)[2] == pytest.approx(upright)
+
+
 @pytest.mark.parametrize("heading_rad", [0.0, 1.0, -3.0])
 def test_a_lean_asks_for_no_turn_of_the_heading(heading_rad):
     # Given a vehicle that tilts east
