@@ -5,20 +5,16 @@ positive axes; read for any approach, gamma_i |v_ci| back along each horizontal 
 
 `normal`, eq. 3 along the normal: x_d = x(t_c) + gamma |v_c . n| n + tau, tau = 0 (tangential: damped) or gamma v_t.
 
-`adaptive`, as near as is safe. From the motion x, v that follows the contact, with v_t the part of v along it:
-
-    D   = max(d_0,  (x - x(t_c) + T v) . n),    T = WAY_S
-    x_d = x + (D - (x - x(t_c)) . n) n + T v_t, height x_3(t_c) unless the obstacle is steep, or it fell by d_0
-
-that is d_0 (clearance_m) off the obstacle, further where the rebound carries the vehicle further, and along the
-obstacle where it comes to rest: T v is the way of the attitude law (see attitude_law), whatever the attitude's lag.
+`adaptive`, where the vehicle comes to rest, off the obstacle by d_0 (clearance_m). From the motion x, v that follows the
+contact x_d = x + T v, T = WAY_S: the way of the attitude law (see attitude_law), whatever the attitude's lag. The recovery
+moves it clear of surfaces. Height x_3(t_c), unless the obstacle is steep or the vehicle fell by d_0.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.vector import ZERO, along, minus, plus, split
+from companion.motion.vector import ZERO, plus, split
 from companion.reflex.config import WAY_S, RecoveryConfig
 
 
@@ -54,7 +50,7 @@ class Contact:
 @dataclass(frozen=True, slots=True)
 class Law:
     """`follows`: the goal is found anew as more is known of the contact. `leans`: attitude and thrust are set until the
-    vehicle rests; else its own loops fly it to the goal from the first moment on."""
+    vehicle rests, clear of what it hit; else its own loops fly it to the law's goal from the first moment on."""
 
     goal_ned_m: Callable[[RecoveryConfig, Contact, MotionState], Vector3]
     follows: bool
@@ -75,21 +71,13 @@ def _normal(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Ve
 
 
 def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
-    normal, ways_m = contact.normal_ned, plus(ZERO, WAY_S, motion.velocity_ned_m_s)
-    off_m = along(minus(motion.position_ned_m, contact.position_ned_m), normal)
-    off_way_m, along_way = split(ways_m, normal)
-    if normal[2] == 0.0:
-        along_way = (along_way[0], along_way[1], 0.0)
-    goal = plus(motion.position_ned_m, max(config.clearance_m - off_m, off_way_m), normal)
-    goal = plus(goal, 1.0, along_way)
+    goal, normal = plus(motion.position_ned_m, WAY_S, motion.velocity_ned_m_s), contact.normal_ned
     if config.tangential == "kept":
-        goal = plus(goal, config.gamma_per_axis[0] / (WAY_S), along_way)
-    down_m, here_m = contact.position_ned_m[2], motion.position_ned_m[2]
+        goal = plus(goal, config.gamma_per_axis[0], split(motion.velocity_ned_m_s, normal)[1])
     if normal[2] != 0.0:
-        down_m = goal[2]
-    elif abs(here_m - down_m) > config.clearance_m:
-        down_m = here_m
-    return (goal[0], goal[1], down_m)
+        return goal
+    down_m, here_m = contact.position_ned_m[2], motion.position_ned_m[2]
+    return (goal[0], goal[1], here_m if abs(here_m - down_m) > config.clearance_m else down_m)
 
 
 RECOVERY_LAWS: Mapping[str, Law] = {

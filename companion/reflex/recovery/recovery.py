@@ -167,9 +167,10 @@ class Recovery:
         )
 
     def _goal(self, motion: MotionState) -> Vector3:
-        """The law's goal, moved clear of surfaces and into the fence."""
+        """The law's goal, moved clear of surfaces and into the fence. One that does not lean is clear of what was hit."""
         goal = self.law.goal_ned_m(self._config, self._contact, motion)
-        goal = projected(goal, [(one.normal_ned, one.level_m) for one in self._surfaces[1:]])
+        surfaces = self._surfaces if self.law.leans else self._surfaces[1:]
+        goal = projected(goal, [(one.normal_ned, one.level_m) for one in surfaces])
         return self._room.inside(self._contact.position_ned_m, goal)
 
     def _around(self, contact: Contact) -> list[Surface]:

@@ -42,7 +42,9 @@ def off_m(touched, place):
 def goal_of(name, touched, motion=None, **config):
     settings = RecoveryConfig(law=name, **config)
     motion = motion or touched.rebound(settings.restitution)
-    return RECOVERY_LAWS[name].goal_ned_m(settings, touched, motion)
+    goal = RECOVERY_LAWS[name].goal_ned_m(settings, touched, motion)
+    clear = Surface(touched.position_ned_m, touched.normal_ned, settings.clearance_m).level_m
+    return projected(goal, [(touched.normal_ned, clear)]) if RECOVERY_LAWS[name].leans else goal
 
 
 # --- goals
