@@ -5,15 +5,14 @@ All else passes unchanged and in the order of its sender. Packets of different s
 bytes come inside another's packet: an unfinished packet stays here, and so do bytes that begin none.
 """
 
-import struct
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import ASSUMED
 from companion.mavlink.decode import Decoder, checksum_holds
-from companion.mavlink.moves import SETPOINT_IDS, asked_by, interval_asked, would_move
-from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, has_signature, message_id_of, payload_of, source_of
+from companion.mavlink.moves import SETPOINT_IDS, asked_by, fields_of, interval_asked, would_move
+from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, has_signature, message_id_of, source_of
 from companion.messages import Asked, SetMessageInterval
 
 # Of a client, still to be sent: a download of all parameters or a long mission is less.
@@ -31,8 +30,6 @@ AT_ONCE_US = 1_000_000
 # Of the guard's own messages these are for people, who are behind it now.
 _FOR_PEOPLE = frozenset({250, 251, 253, 390})  # DEBUG_VECT, NAMED_VALUE_FLOAT, STATUSTEXT, ONBOARD_COMPUTER_STATUS
 _TIMESYNC = 111
-# When the vehicle answered, 0 in a question; and the stamp of the question.
-_TIMES = struct.Struct("<2q")
 # Questions of the guard's that may still be answered: one a second.
 _MOST_ASKED = 64
 
@@ -123,7 +120,7 @@ class Between:
         self._budget_bytes -= len(packet)
         message_id = message_id_of(packet)
         if message_id == _TIMESYNC:
-            self._asked.append(_times(packet)[1])
+            self._asked.append(fields_of(packet)["ts1"])
         return message_id in _FOR_PEOPLE
 
     def new_setpoint(self, now_us: int) -> Asked | None:
@@ -177,8 +174,9 @@ class Between:
         """A program would take it for one to its own question, by another clock."""
         if isinstance(packet, Stray) or message_id_of(packet) != _TIMESYNC:
             return False
-        answered_ns, asked_ns = _times(packet)
-        return answered_ns != 0 and asked_ns in self._asked
+        times = fields_of(packet)
+        # A question says nothing of when it was answered.
+        return times["tc1"] != 0 and times["ts1"] in self._asked
 
 
 def datagrams(packets: Sequence[bytes], most_bytes: int) -> list[bytes]:
@@ -190,11 +188,6 @@ def datagrams(packets: Sequence[bytes], most_bytes: int) -> list[bytes]:
         else:
             grouped.append(packet)
     return grouped
-
-
-def _times(packet: bytes) -> tuple[int, int]:
-    answered_ns, asked_ns = _TIMES.unpack_from(payload_of(packet).ljust(_TIMES.size, b"\0"))
-    return answered_ns, asked_ns
 
 
 def _is_whole(data: bytes, start: int, length: int) -> bool:
