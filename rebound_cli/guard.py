@@ -35,7 +35,7 @@ def run_guard(options: Namespace) -> int:
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
         between = None
         if config.between:
-            between = Between(carried_bytes_s(options.connect), options.signing_key is not None)
+            between = Between(carried_bytes_s(options.connect))
 
         def shared(opened: Selectable) -> Connection:
             return opened if between is None else SharedConnection(opened, config.between, between)

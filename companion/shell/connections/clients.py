@@ -69,7 +69,7 @@ class UdpPort:
                 content, sender = self._socket.recvfrom(READ_BYTES)
                 if sender in self._heard_us or (self._remote is None and len(self._heard_us) < MOST_CLIENTS):
                     self._heard_us[sender] = now_us
-                    self._between.hear(_name(sender), content, now_us)
+                    self._between.hear(_name(sender), content)
                 elif not self._is_full:
                     self._is_full = True
                     self._between.note(f"{_name(sender)} sends to the clients' port, too; it is not listened to")
@@ -104,7 +104,7 @@ class TcpPort:
             if source is self._listener:
                 self._accept()
             elif content := _received(source):
-                self._between.hear(self._names[source], content, now_us)
+                self._between.hear(self._names[source], content)
             else:
                 source.close()
                 del self._unread[source]
