@@ -18,6 +18,15 @@ class Pilot(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class Mode:
+    """`name`: as the autopilot's own tools print it. `is_guarded`: a guard may take it over by default."""
+
+    name: str
+    pilot: Pilot
+    is_guarded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Remedies:
     """Of what preflight finds by listening, for people."""
 
@@ -84,14 +93,11 @@ class Autopilot:
     """The mode that a pilot who moved the sticks is given."""
     descents: frozenset[int]
     """Modes that end on the ground."""
-    mode_names: frozenset[str]
-    guarded_modes: tuple[str, ...]
-    """Names of the modes that a guard may take over by default."""
-    mode_name: Callable[[int], str]
-    """As the autopilot's own tools print it."""
-    pilot: Callable[[int], Pilot | None]
-    """None of a mode that is not known."""
-    set_mode: Callable[[int], SetMode]
+    modes: Mapping[int, Mode]
+    mode_mask: int
+    """Of a mode that is not listed the one with these bits alone counts, where it is."""
+    mode_parameters: Callable[[int], tuple[int, int]]
+    """The second and the third of the command that asks for it."""
     wire: Wire
     least_version: tuple[int, int, int]
     """Older ones are refused."""
@@ -130,3 +136,19 @@ class Autopilot:
     loss_text: Callable[[Mapping[str, int | float]], str]
     """What the vehicle does when setpoints stop, for people."""
     defaults: Defaults
+
+    def pilot(self, custom_mode: int) -> Pilot | None:
+        """None of a mode that is not known."""
+        mode = self._mode(custom_mode)
+        return None if mode is None else mode.pilot
+
+    def mode_name(self, custom_mode: int) -> str:
+        """For example OFFBOARD or AUTO.LAND."""
+        mode = self._mode(custom_mode)
+        return f"mode {self.mode_parameters(custom_mode)[0]}" if mode is None else mode.name
+
+    def set_mode(self, custom_mode: int) -> SetMode:
+        return SetMode(custom_mode, self.mode_name(custom_mode), self.mode_parameters(custom_mode))
+
+    def _mode(self, custom_mode: int) -> Mode | None:
+        return self.modes.get(custom_mode) or self.modes.get(custom_mode & self.mode_mask)

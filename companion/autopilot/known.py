@@ -7,5 +7,6 @@ AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4, ARDUPILO
 # Of a vehicle that has not announced itself yet.
 ASSUMED = PX4
 NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values())
-MODE_NAMES = frozenset(name for autopilot in AUTOPILOTS.values() for name in autopilot.mode_names)
-GUARDED_MODES = tuple(mode for autopilot in AUTOPILOTS.values() for mode in autopilot.guarded_modes)
+_MODES = [mode for autopilot in AUTOPILOTS.values() for mode in autopilot.modes.values()]
+MODE_NAMES = frozenset(mode.name for mode in _MODES)
+GUARDED_MODES = tuple(mode.name for mode in _MODES if mode.is_guarded)

@@ -26,11 +26,9 @@ ARDUPILOT = Autopilot(
     land=modes.LAND,
     sticks=modes.LOITER,
     descents=frozenset({modes.LAND}),
-    mode_names=modes.MODE_NAMES,
-    guarded_modes=modes.GUARDED,
-    mode_name=modes.mode_name,
-    pilot=modes.pilot,
-    set_mode=modes.set_mode,
+    modes=modes.MODES,
+    mode_mask=-1,
+    mode_parameters=lambda mode: (mode, 0),
     # All three rates or none: with one that is left out alone Copter stops where it is.
     wire=Wire(casts_whole_numbers=True, attitude_mask=0),
     least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
