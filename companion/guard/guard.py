@@ -10,10 +10,10 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.states import State
 from companion.guard.watching import GuardConnect, own_streams
+from companion.link.round_trip import RoundTrip
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
 from companion.reflex.recovery.collision import CollisionReport
-from companion.report import RoundTripReport
 
 
 class Guard(Stepped[GuardCore]):
@@ -87,5 +87,5 @@ class Guard(Stepped[GuardCore]):
         """Hits that were told and left to the program that flies."""
         return 0 if self._core is None else self._core.flight.left_alone
 
-    def round_trip(self) -> RoundTripReport:
-        return RoundTripReport() if self._core is None else self._core.flight.round_trip.report()
+    def round_trip(self) -> RoundTrip:
+        return RoundTrip() if self._core is None else self._core.flight.round_trip
