@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from companion.autopilot.setup import PreflightItem, SerialLine, Setup, Sight
+from companion.autopilot.setup import PreflightItem, SerialLine, Setup
 from companion.messages import MessageId, SetMessageInterval, SetMode, VehicleCommand
 
 
@@ -126,7 +126,7 @@ class Autopilot:
     """For so many seconds the last setpoint is flown on."""
     rate_parameter: str
     """Of a link's share for streams, for people."""
-    sight: Callable[[Sight], PreflightItem]
+    sight: Callable[[Setup], PreflightItem]
     """The smallest hit that shows."""
     asked: Callable[[SerialLine | None], tuple[str, ...]]
     """Parameters that preflight reads."""

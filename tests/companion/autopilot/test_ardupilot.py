@@ -362,7 +362,7 @@ ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
 
 
 def judged(parameters, line=None):
-    told = VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3)
+    told = VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3, 250.0, 5.0, "")
     return {item.item: item for item in (*setup.judge_vehicle(told), *setup.judge_parameters(told))}
 
 
