@@ -38,25 +38,6 @@ class Remedies:
 
 
 @dataclass(frozen=True, slots=True)
-class Defaults:
-    """How it flies unless a person has changed it: limits and patience of the companion follow from these."""
-
-    loss_us: int
-    """For so long the last setpoint is flown on."""
-    position_gain_per_s: float
-    """From a distance to the setpoint to the speed towards it."""
-    max_speed_m_s: float
-    max_yaw_rate_deg_s: float
-    turning_deg_s: float
-    """With which its own modes turn."""
-    landing_m_s: float
-    stick_deadzone: float
-    """Deflection around the middle that asks for no climb."""
-    stick_override: float
-    """Change of a deflection by which a pilot takes over."""
-
-
-@dataclass(frozen=True, slots=True)
 class Wire:
     """What of MAVLink it reads, or writes, in its own way."""
 
@@ -135,7 +116,10 @@ class Autopilot:
     remedies: Remedies
     loss_text: Callable[[Mapping[str, int | float]], str]
     """What the vehicle does when setpoints stop, for people."""
-    defaults: Defaults
+    stick_deadzone: float
+    """Deflection around the middle that asks for no climb, by default."""
+    stick_override: float
+    """Change of a deflection by which a pilot takes over, by default."""
 
     def pilot(self, custom_mode: int) -> Pilot | None:
         """None of a mode that is not known."""

@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import defaults
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.guard.config import GuardConfig
 from companion.guard.descent import Descent
@@ -13,7 +13,7 @@ from companion.messages import Asked, Sticks, Vector3
 from companion.motion.vector import minus
 
 # Setpoints are lost when there is none for so long.
-LONGEST_BETWEEN_S = ASSUMED.defaults.loss_us * 1e-6
+LONGEST_BETWEEN_S = defaults.LOSS_US * 1e-6
 
 
 @dataclass(frozen=True, slots=True)

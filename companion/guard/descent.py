@@ -33,7 +33,7 @@ class Descent:
         """
         if vehicle.landed is LandedState.LANDING or vehicle.descends or vehicle.pilot is Pilot.HAND:
             return True
-        deadzone = vehicle.autopilot.defaults.stick_deadzone
+        deadzone = vehicle.autopilot.stick_deadzone
         sinks = self.setpoint_us is None if self.throttle is None else self.throttle < -deadzone
         if vehicle.pilot is Pilot.STICKS and sinks:
             return True

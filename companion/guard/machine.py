@@ -156,7 +156,7 @@ class GuardMachine(StateMachine):
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight
         report, expected = guard.vehicle.mode, guard.expected_mode
-        override = guard.vehicle.autopilot.defaults.stick_override
+        override = guard.vehicle.autopilot.stick_override
         if guard.sticks is not None and any(has_moved(guard.sticks, now, override) for now in inputs.sticks):
             return STICKS
         if report is None or expected is None:

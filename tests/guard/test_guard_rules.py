@@ -49,7 +49,7 @@ def test_a_hit_is_answered_where_the_guard_watches_and_never_takes_the_vehicle_b
     ],
 )
 def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
-    assert has_moved(Sticks(before), Sticks(now), PX4.defaults.stick_override) is counts
+    assert has_moved(Sticks(before), Sticks(now), PX4.stick_override) is counts
 
 
 SECOND = 1_000_000
@@ -84,8 +84,8 @@ def throttle(deflection):
         (POSCTL, (down(None),), False),
         (AUTO_LOITER, (down(2.0), down(0.0)), False),
         # A throttle below its middle, where sticks ask for velocities
-        (POSCTL, (throttle(-1.5 * PX4.defaults.stick_deadzone),), True),
-        (ALTCTL, (throttle(-0.9 * PX4.defaults.stick_deadzone),), False),
+        (POSCTL, (throttle(-1.5 * PX4.stick_deadzone),), True),
+        (ALTCTL, (throttle(-0.9 * PX4.stick_deadzone),), False),
         (AUTO_LOITER, (throttle(-1.0),), False),
     ],
 )

@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.ardupilot import modes, setup
-from companion.autopilot.interface import Autopilot, Defaults, LastWords, Remedies, Wire
+from companion.autopilot.interface import Autopilot, LastWords, Remedies, Wire
 from companion.messages import MessageId, SetAuxFunction, SetMessageInterval, VehicleCommand
 
 # RC_Channel.h: while FORCEFLYING is high, neither the crash check nor the land detector stops the motors. A recovery
@@ -65,14 +65,6 @@ ARDUPILOT = Autopilot(
         no_estimator="look at EKF in Mission Planner",
     ),
     loss_text=setup.loss_text,
-    defaults=Defaults(
-        loss_us=3_000_000,  # GUID_TIMEOUT
-        position_gain_per_s=1.0,  # PSC_NE_POS_P
-        max_speed_m_s=10.0,  # WP_SPD
-        max_yaw_rate_deg_s=202.5,  # PILOT_Y_RATE
-        turning_deg_s=60.0,  # ATC_RATE_WPY_MAX
-        landing_m_s=0.5,  # LAND_SPD_MS
-        stick_deadzone=0.2,  # THR_DZ, of 500 from the middle
-        stick_override=math.inf,  # sticks end no mode
-    ),
+    stick_deadzone=0.2,  # THR_DZ, of 500 from the middle
+    stick_override=math.inf,  # sticks end no mode
 )
