@@ -84,13 +84,6 @@ class ExpectHeight(StrictModel):
         return self
 
 
-class ExpectSpeed(StrictModel):
-    """The vehicle's speed now."""
-
-    max_m_s: Positive
-    """At most."""
-
-
 class ExpectFlightTime(StrictModel):
     """Time since arming, now."""
 
@@ -105,7 +98,6 @@ Check: TypeAlias = (
     | ExpectRecovered
     | ExpectPosition
     | ExpectHeight
-    | ExpectSpeed
     | ExpectFlightTime
 )
 
@@ -121,7 +113,6 @@ class ExpectItem(StrictModel):
     recovered: ExpectRecovered | None = None
     position: ExpectPosition | None = None
     height: ExpectHeight | None = None
-    speed: ExpectSpeed | None = None
     flight_time: ExpectFlightTime | None = None
 
     @model_validator(mode="before")
