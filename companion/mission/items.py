@@ -92,13 +92,7 @@ class ExpectFlightTime(StrictModel):
 
 
 Check: TypeAlias = (
-    ExpectHit
-    | ExpectNoHit
-    | ExpectHits
-    | ExpectRecovered
-    | ExpectPosition
-    | ExpectHeight
-    | ExpectFlightTime
+    ExpectHit | ExpectNoHit | ExpectHits | ExpectRecovered | ExpectPosition | ExpectHeight | ExpectFlightTime
 )
 
 
