@@ -191,9 +191,10 @@ class FlightContext:
         """All so far."""
         return self.reflex.hits
 
-    def note_unconfirmed(self) -> None:
-        """The newest hit was none."""
-        self.unconfirmed += 1
+    @property
+    def hits(self) -> list[CollisionRecord]:
+        """Those since it was armed."""
+        return self.reflex.hits[self.motors.earlier_hits :]
 
     def note_touchdown(self) -> None:
         """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""

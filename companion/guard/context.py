@@ -37,7 +37,6 @@ class GuardContext(FlightContext):
     previous_mode: int | None = None
     then_hold: str = ""
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
-    hits: int = 0  # since it was armed
     left_alone: int = 0  # hits told, and left to the program that flies
     others_setpoint_us: int | None = None  # when one was last seen on its way
     asked: Asked | None = None  # where it leads
@@ -58,10 +57,6 @@ class GuardContext(FlightContext):
         if asked.velocity_ned_m_s is None and 0.0 < since_s < LONGEST_BETWEEN_S:
             north, east, down = (part / since_s for part in minus(asked.place_ned_m, before.place_ned_m))
             self.asked = Asked(asked.place_ned_m, (north, east, down))
-
-    def note_unconfirmed(self) -> None:
-        FlightContext.note_unconfirmed(self)
-        self.hits -= 1
 
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""

@@ -81,8 +81,9 @@ class GuardMachine(StateMachine):
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
                 self.flight.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif TABLE.moves(self.state, Trigger.HIT):
-                self._remember_hit(now_us)
                 is_first = self.state is State.WATCHING
+                if is_first:
+                    self._remember_mode()
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
                 self._take(GuardTransition(Trigger.HIT), now_us)
@@ -121,11 +122,6 @@ class GuardMachine(StateMachine):
         self._remember_mode()
         guard.target = stop(guard)
         return GuardTransition(Trigger.LEADS_BACK, "taking over: the program's setpoints lead into what was hit")
-
-    def _remember_hit(self, now_us: int) -> None:
-        self.flight.hits += 1
-        if self.state is State.WATCHING:
-            self._remember_mode()
 
     def _remember_mode(self) -> None:
         guard = self.flight
@@ -225,9 +221,9 @@ class GuardMachine(StateMachine):
                 assert isinstance(self.handler, TakeOver), "the table leads here from there alone"
                 return Recovering(self.handler.recover, now_us)
             case State.GIVING_BACK:
-                limit = guard.config.max_hits
-                if guard.hits >= limit and not guard.then_hold:
-                    guard.then_hold = f"hit {guard.hits} of at most {limit}"
+                limit, hits = guard.config.max_hits, len(guard.hits)
+                if hits >= limit and not guard.then_hold:
+                    guard.then_hold = f"hit {hits} of at most {limit}"
                 return GiveBack(guard, transition.trigger is Trigger.CROSSED, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)

@@ -40,7 +40,7 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
     guard.descent.update(samples, now_us)
     latest = guard.vehicle.history.latest()
     if guard.vehicle.armed is False:
-        guard.hits, guard.program_elsewhere = 0, False
+        guard.program_elsewhere = False
     # Not while the guard has the vehicle: one forged report would move the fence.
     stands = guard.vehicle.landed is LandedState.ON_GROUND and guard.expected_mode is None
     if guard.vehicle.armed is False or stands:
