@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from companion import messages
 from companion.autopilot.known import NAMES
 from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, judged
@@ -176,11 +178,7 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
 
 def spread(vectors: Sequence[Vector3]) -> float:
     """Root mean squared distance from the mean."""
-    count = len(vectors)
-    if count == 0:
-        return 0.0
-    mean = [sum(vector[axis] for vector in vectors) / count for axis in range(3)]
-    return math.sqrt(sum((vector[axis] - mean[axis]) ** 2 for vector in vectors for axis in range(3)) / count)
+    return float(np.sqrt(np.var(vectors, axis=0).sum()))
 
 
 def findings(survey: Survey) -> list[PreflightItem]:

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.autopilot.interface import Autopilot, Pilot
-from companion.mavlink.packet import message_id_of, opened, source_of
+from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Asked, SetMessageInterval, Vector3
 
 Source: TypeAlias = tuple[int, int]
@@ -29,8 +29,7 @@ _COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND
 
 def fields_of(packet: bytes) -> dict[str, Any]:
     """Of a whole packet of this dialect whose message has no array: its fields by name."""
-    message_id, _, payload = opened(packet)
-    message = dialect.mavlink_map[message_id]
+    message, payload = dialect.mavlink_map[message_id_of(packet)], payload_of(packet)
     values = message.unpacker.unpack(payload.ljust(message.unpacker.size, b"\0")[: message.unpacker.size])
     return dict(zip(message.ordered_fieldnames, values, strict=False))
 
