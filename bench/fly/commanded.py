@@ -53,7 +53,8 @@ class Commanded(VirtualTime):
 
     @property
     def state(self) -> State:
-        return State.CONNECTING if self.guard.core is None else self.guard.core.machine.state
+        state: State = self.guard.core.machine.state
+        return state
 
     @property
     def mode(self) -> Any:

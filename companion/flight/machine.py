@@ -145,7 +145,7 @@ class Machine(StateMachine):
             case State.CONNECT:
                 # A plan that has been shown is made anew, and agreed to anew.
                 flight.plan_confirmed &= previous is not State.READY
-                return Connect(now_us)
+                return Connect()
             case State.READY:
                 return Ready()
             case State.TAKEOFF:

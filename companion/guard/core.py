@@ -18,12 +18,12 @@ from companion.reflex.reflex import start_reflex
 class GuardCore(Core[GuardContext, GuardMachine]):
     """`keeps_others_out`: see GuardContext."""
 
-    def __init__(self, config: GuardConfig, keeps_others_out: bool, now_us: int) -> None:
+    def __init__(self, config: GuardConfig, keeps_others_out: bool) -> None:
         mission = config.as_mission()
-        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, now_us)
+        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, 0)
         streams = StreamMonitor(config.companion.streams, tuple(reflex.monitor.detector.losses))
         guard = GuardContext(mission, Vehicle(), streams, reflex, config=config, keeps_others_out=keeps_others_out)
-        super().__init__(guard, GuardMachine(guard, GuardConnect(now_us)), now_us)
+        super().__init__(guard, GuardMachine(guard, GuardConnect()))
         self.is_enabled = False  # asked for, and not yet taken up
 
     @property

@@ -205,7 +205,7 @@ class GuardMachine(StateMachine):
                 guard.collisions[-1].is_over = True
         match self.state:
             case State.CONNECTING:
-                return GuardConnect(now_us, is_first=False)
+                return GuardConnect(is_first=False)
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:

@@ -77,8 +77,8 @@ class GuardConnect(Meet[GuardTransition]):
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
     """
 
-    def __init__(self, now_us: int, is_first: bool = True) -> None:
-        super().__init__(now_us)
+    def __init__(self, is_first: bool = True) -> None:
+        super().__init__()
         self._is_first = is_first
 
     @property

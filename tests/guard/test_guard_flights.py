@@ -348,7 +348,7 @@ def test_a_guard_that_waits_begins_where_nobody_is_or_a_vehicle_without_a_positi
     for second in range(60):
         air.guard.step(b"", air.now_us + (second - 60) * 1_000_000)
     core = air.guard.core
-    assert core is not None and not air.guard.finished
+    assert not air.guard.finished
     # And whose satellites are not there yet
     core.flight.streams.streams = tuple(
         replace(one, min_hz=1000.0) if one.message_id.name == "LOCAL_POSITION_NED" else one
