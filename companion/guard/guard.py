@@ -9,10 +9,8 @@ from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.watching import GuardConnect, own_streams
-from companion.link.round_trip import RoundTrip
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
-from companion.reflex.recovery.collision import CollisionReport
 
 
 class Guard(Stepped[GuardCore]):
@@ -21,14 +19,9 @@ class Guard(Stepped[GuardCore]):
     def __init__(self, config: GuardConfig) -> None:
         super().__init__(GuardCore(config, bool(config.between)), GUARD_READERS)
 
-    @property
-    def holds(self) -> bool:
-        """Whether the vehicle flies by the guard's setpoints."""
-        return self.core.machine.holds
-
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
-        between.is_closed = self.holds
+        between.is_closed = self.core.machine.holds
         handler, vehicle = self.core.machine.handler, self.core.flight.vehicle
         between.autopilot = vehicle.autopilot
         begins = isinstance(handler, GuardConnect) and handler.begins
@@ -59,22 +52,3 @@ class Guard(Stepped[GuardCore]):
             is_enough = 0 < asked.interval_us <= request.interval_us
             if request.message_id == asked.message_id and not is_enough:
                 flight.outbox.append(SendCommand(request, 0))
-
-    @property
-    def outcome(self) -> str:
-        """Why it ended."""
-        return self.core.machine.outcome
-
-    def collisions(self) -> tuple[CollisionReport, ...]:
-        return self.core.collisions()
-
-    def crashed(self) -> str:
-        """How, where the vehicle has; empty otherwise."""
-        return self.core.flight.crashed
-
-    def left_alone(self) -> int:
-        """Hits that were told and left to the program that flies."""
-        return self.core.flight.left_alone
-
-    def round_trip(self) -> RoundTrip:
-        return self.core.flight.round_trip

@@ -46,7 +46,7 @@ def hit(flies: Callable[[BetweenFlight], None], parameters: dict[str, float] | N
     air = BetweenFlight(GuardConfig(**changes), parameters)
     air.take_off()
     flies(air)
-    air.run_until(lambda: air.guard.holds, 20.0)
+    air.run_until(lambda: air.guard.core.machine.holds, 20.0)
     return air
 
 
@@ -248,7 +248,7 @@ def test_the_vehicles_questions_of_the_time_are_the_programs_to_answer_and_the_g
     assert sent and all(message.tc1 == 0 for message in sent), "the guard asks, and does not answer"
     assert {message.ts1 for message in heard if message.tc1} == {theirs}
     assert any(message.tc1 == 0 for message in heard)
-    assert air.guard.round_trip().median_us is not None
+    assert air.guard.core.flight.round_trip.median_us is not None
 
 
 # --- the table

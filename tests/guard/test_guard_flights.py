@@ -181,7 +181,7 @@ def test_told_to_stop_while_it_holds_it_gives_the_vehicle_to_hold_first():
     air.run_for(0.7)
     air.guard.stop("stopped with Ctrl-C")
     air.run_until(lambda: air.guard.finished, 2.0)
-    assert (air.mode, air.guard.outcome) == ("AUTO.LOITER", "stopped with Ctrl-C")
+    assert (air.mode, air.guard.core.machine.outcome) == ("AUTO.LOITER", "stopped with Ctrl-C")
 
 
 def test_a_link_that_falls_silent_while_the_guard_holds_leaves_the_vehicle_to_its_own_failsafe():
@@ -236,7 +236,7 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
     assert air.state is State.WATCHING
     kinds = {m.get_type() for m in air.sent_by("guard", "", hit_s)}
     assert kinds <= {"HEARTBEAT", "STATUSTEXT", "TIMESYNC", "NAMED_VALUE_FLOAT"}
-    assert air.guard.left_alone() == len(air.told("left_alone"))
+    assert air.guard.core.flight.left_alone == len(air.told("left_alone"))
 
 
 def test_a_second_stream_that_appears_while_the_guard_holds_is_noticed_and_not_fought():
@@ -297,7 +297,9 @@ def test_a_report_of_the_ground_moves_heights_and_fence_only_while_somebody_else
 def test_a_guard_does_not_begin_at_the_end_of_a_slow_link():
     air = Air(faults=[{"kind": "wire", "delay_s": 0.2, "at_s": 0}])
     air.run_until(lambda: air.guard.finished, 30.0)
-    assert air.guard.outcome.startswith("the round trip to the vehicle takes 404 ms and at most 100 ms are allowed")
+    assert air.guard.core.machine.outcome.startswith(
+        "the round trip to the vehicle takes 404 ms and at most 100 ms are allowed"
+    )
 
 
 def test_a_guard_on_the_ground_does_not_go_in_while_the_link_is_slow():

@@ -303,7 +303,7 @@ def test_a_guard_meets_a_copter_and_hears_its_sticks_as_pulses():
 
 
 def test_a_guard_refuses_a_copter_that_is_too_old():
-    assert guarded(FakeCopter(flight_version=OLD), lambda _: False).outcome == TOO_OLD
+    assert guarded(FakeCopter(flight_version=OLD), lambda _: False).core.machine.outcome == TOO_OLD
 
 
 def test_a_switch_that_is_not_answered_is_set_again():
