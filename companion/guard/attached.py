@@ -93,10 +93,6 @@ class AttachedGuard:
         self.kept_out += 1
         return False
 
-    @property
-    def finished(self) -> bool:
-        return self.core.machine.finished
-
     def next_deadline_us(self) -> int:
         return self.core.next_deadline_us() if self._drained_us is None else self._drained_us
 
