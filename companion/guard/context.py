@@ -7,7 +7,6 @@ from typing import Protocol
 from companion.autopilot.known import defaults
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.guard.config import GuardConfig
-from companion.guard.descent import Descent
 from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks, Vector3
 from companion.motion.vector import minus
@@ -43,7 +42,8 @@ class GuardContext(FlightContext):
     sticks: Sticks | None = None  # before the hit
     sticks_now: Sticks | None = None
     sticks_us: int | None = None  # when these were heard
-    descent: Descent = field(default_factory=Descent)
+    sinks_m_s: float = 0.0  # as its position control is asked for
+    sinks_us: int | None = None  # when that was heard
     # When, and to where; PX4 echoes no attitude.
     sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
 

@@ -11,11 +11,10 @@ from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.machine import StateMachine
 from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
-from companion.guard.descent import THROTTLE
 from companion.guard.holding import GiveBack, GuardCrashed, Recovering, StandDown, TakeOver
 from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
-from companion.guard.watching import GuardConnect, StandBy, Watching
+from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down
 from companion.messages import Asked, Sticks
 from companion.motion.rotation import yaw_rad
 from companion.reflex.detection.detector import ImpactKind
@@ -70,7 +69,7 @@ class GuardMachine(StateMachine):
         before = self.handler
         self._take(self._from_outside(inputs, now_us), now_us)
         if self.state in MAY_CRASH:
-            meant = self.state not in HOLDING and self.flight.descent.is_meant(self.flight.vehicle, now_us)
+            meant = self.state not in HOLDING and goes_down(self.flight, now_us)
             if crashed(self.flight, meant, now_us) is not None:
                 self._take(GuardTransition(Trigger.CRASHED), now_us)
         for estimate in inputs.impacts:

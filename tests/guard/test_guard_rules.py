@@ -4,10 +4,12 @@ import pytest
 
 from companion.autopilot.px4.firmware import PX4
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
-from companion.guard.descent import Descent
+from companion.guard.config import GuardConfig
+from companion.guard.core import GuardCore
 from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.link.vehicle import ModeReport, Vehicle
+from companion.guard.watching import goes_down, observe
+from companion.link.vehicle import ModeReport
 from companion.messages import LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
 
@@ -57,9 +59,10 @@ ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 
 
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
-    descent = Descent()
-    descent.update(samples, 0)
-    return descent.is_meant(Vehicle(mode=ModeReport(mode, None, False), landed=landed), now_us)
+    guard = GuardCore(GuardConfig(), keeps_others_out=False).flight
+    guard.vehicle.mode, guard.vehicle.landed = ModeReport(mode, None, False), landed
+    observe(guard, samples, 0)
+    return goes_down(guard, now_us)
 
 
 def down(speed_m_s):
