@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from companion.flight.states import State, Trigger
 from companion.link.commands import CommandClient, CommandOutcome
@@ -276,18 +276,6 @@ class FlightContext:
     def mission_ned_m(self, local_ned_m: Vector3) -> Vector3:
         """From the vehicle's local NED to mission coordinates; the same before the origin is known."""
         return minus(local_ned_m, self.origin_ned_m or ZERO)
-
-
-class StateHandler(Protocol):
-    """A state's behaviour; one object is made each time the state is entered."""
-
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        """Do what is due now; returns a transition when the state is over."""
-        ...
-
-    def target(self, now_us: int) -> Target | None:
-        """The setpoint for now; None while none must be sent."""
-        ...
 
 
 class NoSetpoint:

@@ -2,10 +2,9 @@
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from companion.autopilot.known import defaults
-from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.context import FlightContext
 from companion.guard.config import GuardConfig
 from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks, Vector3
@@ -64,15 +63,3 @@ class GuardContext(FlightContext):
         latest, origin = self.vehicle.history.latest(), self.origin_ned_m
         if latest is not None and origin is not None:
             self.origin_ned_m = (origin[0], origin[1], latest.position_ned_m[2])
-
-
-class GuardStateHandler(Protocol):
-    """A state's behaviour; one object is made each time the state is entered."""
-
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        """Do what is due now; returns a transition when the state is over."""
-        ...
-
-    def target(self, now_us: int) -> Target | None:
-        """The setpoint for now; None while none must be sent."""
-        ...

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
@@ -10,7 +11,7 @@ from companion.flight.handlers.ending import LINK_RESTORED, Holder, Released, si
 from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.machine import StateMachine
 from companion.flight.states import State as FlightState
-from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
+from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.holding import GiveBack, GuardCrashed, Recovering, StandDown, TakeOver
 from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
@@ -45,6 +46,11 @@ _TO_HOLD = (
     Trigger.CROSSED,
 )
 
+# What is done in a state; one object is made each time the state is entered (see flight.machine).
+Handler: TypeAlias = (
+    GuardConnect | StandBy | Watching | TakeOver | Recovering | GiveBack | StandDown | GuardCrashed | Released
+)
+
 
 @dataclass
 class GuardMachine(StateMachine):
@@ -52,7 +58,7 @@ class GuardMachine(StateMachine):
 
     program = "guard"
     flight: GuardContext
-    handler: GuardStateHandler
+    handler: Handler
     state: State = State.CONNECTING
     outcome: str = ""  # why it ended
     judged: Asked | None = None  # the program's setpoint that was last looked at
@@ -195,7 +201,7 @@ class GuardMachine(StateMachine):
             guard.then_hold = transition.text or transition.trigger.value
         self.handler = self._begin(transition, now_us)
 
-    def _begin(self, transition: GuardTransition, now_us: int) -> GuardStateHandler:
+    def _begin(self, transition: GuardTransition, now_us: int) -> Handler:
         guard = self.flight
         if self.state not in HOLDING:
             guard.command_client.cancel()

@@ -2,7 +2,8 @@
 
 import math
 
-from companion.flight.context import FlightContext, Inputs, StateHandler, Target, Transition, as_text
+from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
+from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
 from companion.messages import SetArmed, Vector3
@@ -198,7 +199,7 @@ class TakeBack:
     A vehicle that does not take the mode goes on landing by itself, and is left to it.
     """
 
-    def __init__(self, flight: FlightContext, recovery: StateHandler, now_us: int) -> None:
+    def __init__(self, flight: FlightContext, recovery: Recover, now_us: int) -> None:
         self._recovery = recovery
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.
