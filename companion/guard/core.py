@@ -8,7 +8,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
-from companion.guard.watching import GuardConnect, observe, why_not
+from companion.guard.watching import GuardConnect, goes_down, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
@@ -18,12 +18,12 @@ from companion.reflex.reflex import start_reflex
 class GuardCore(Core[GuardContext, GuardMachine]):
     """`keeps_others_out`: see GuardContext."""
 
-    def __init__(self, config: GuardConfig, keeps_others_out: bool, now_us: int) -> None:
+    def __init__(self, config: GuardConfig, keeps_others_out: bool) -> None:
         mission = config.as_mission()
-        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, now_us)
+        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, 0)
         streams = StreamMonitor(config.companion.streams, tuple(reflex.monitor.detector.losses))
         guard = GuardContext(mission, Vehicle(), streams, reflex, config=config, keeps_others_out=keeps_others_out)
-        super().__init__(guard, GuardMachine(guard, GuardConnect(now_us)), now_us)
+        super().__init__(guard, GuardMachine(guard, GuardConnect()))
         self.is_enabled = False  # asked for, and not yet taken up
 
     @property
@@ -43,7 +43,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
     @property
     def _goes_down(self) -> bool:
         """Whoever flies, while the guard does not."""
-        return not self.machine.holds and self.flight.descent.is_meant(self.flight.vehicle, self.now_us)
+        return not self.machine.holds and goes_down(self.flight, self.now_us)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         if self.flight.keeps_others_out:
@@ -54,8 +54,6 @@ class GuardCore(Core[GuardContext, GuardMachine]):
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         guard = self.flight
         sticks = [sample for sample in samples if isinstance(sample, Sticks)]
-        if sticks:
-            guard.sticks_now, guard.sticks_us = sticks[-1], now_us
         if sticks and self.machine.state not in HOLDING:
             guard.sticks = sticks[-1]
         elif sticks and guard.sticks is None:
