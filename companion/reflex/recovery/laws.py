@@ -5,9 +5,12 @@ positive axes; read for any approach, gamma_i |v_ci| back along each horizontal 
 
 `normal`, eq. 3 along the normal: x_d = x(t_c) + gamma |v_c . n| n + tau, tau = 0 (tangential: damped) or gamma v_t.
 
-`adaptive`, where the vehicle comes to rest, off the obstacle by d_0 (clearance_m). From the motion x, v that follows the
-contact x_d = x + T v, T = WAY_S: the way of the attitude law (see attitude_law), whatever the attitude's lag. The recovery
-moves it clear of surfaces. Height x_3(t_c), unless the obstacle is steep or the vehicle fell by d_0.
+`adaptive`, where the vehicle comes to rest. From the motion x, v that follows the contact
+
+    x_d = x + T v,    T = WAY_S
+
+moved clear of all surfaces, by clearance_m off what was hit. T v is the way of the attitude law (see attitude_law),
+whatever the attitude's lag. The height is x_3(t_c), unless the obstacle is steep or the vehicle fell by clearance_m.
 """
 
 from collections.abc import Callable, Mapping

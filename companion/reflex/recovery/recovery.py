@@ -167,7 +167,7 @@ class Recovery:
         )
 
     def _goal(self, motion: MotionState) -> Vector3:
-        """The law's goal, moved clear of surfaces and into the fence. One that does not lean is clear of what was hit."""
+        """The law's goal, moved clear of surfaces and into the fence. Off what was hit eq. 3 is as far as it says."""
         goal = self.law.goal_ned_m(self._config, self._contact, motion)
         surfaces = self._surfaces if self.law.leans else self._surfaces[1:]
         goal = projected(goal, [(one.normal_ned, one.level_m) for one in surfaces])
