@@ -260,7 +260,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
         By itself it flies by the velocity that it believes. So until that is right it is told a tilt and its thrust.
         """
-        flight, latest, target = self.flight, self.flight.vehicle.history.latest(), self.flight.target
+        flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
         words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
         if not self._leans or latest is None or recovery is None or held_s is None:
             return ()
@@ -328,7 +328,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def status(self) -> Status:
         """The live line's content."""
         vehicle = self.flight.vehicle
-        latest = vehicle.history.latest()
+        latest = vehicle.history.latest
         return Status(
             state=self.machine.state.value,
             vehicle_mode=vehicle.mode_name,
@@ -410,7 +410,7 @@ class Limiter:
 
         Raises SetpointError for one that is not finite.
         """
-        latest = flight.vehicle.history.latest()
+        latest = flight.vehicle.history.latest
         around = Surroundings(
             vehicle_ned_m=None if latest is None else latest.position_ned_m,
             origin_ned_m=flight.origin_ned_m,

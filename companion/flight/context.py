@@ -193,9 +193,12 @@ class FlightContext:
 
     @property
     def height_m(self) -> float | None:
-        """Above the arming position; None before that, or without a position of late."""
-        latest, origin = self.vehicle.history.latest(), self.origin_ned_m
-        if latest is None or origin is None or self.vehicle.is_position_old:
+        """Above the arming position; None before that, or without a position of late, while other messages come: a
+        vehicle whose estimator fails sends none.
+        """
+        vehicle, origin = self.vehicle, self.origin_ned_m
+        latest, heard_us = vehicle.history.latest, vehicle.last_position_us
+        if latest is None or origin is None or heard_us is None or vehicle.last_received_us - heard_us >= OLD_NEWS_US:
             return None
         return origin[2] - latest.position_ned_m[2]
 

@@ -38,7 +38,7 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
     """
     refusal = update_vehicle(guard, samples, now_us)
     guard.descent.update(samples, now_us)
-    latest = guard.vehicle.history.latest()
+    latest = guard.vehicle.history.latest
     if guard.vehicle.armed is False:
         guard.hits, guard.program_elsewhere = 0, False
     # Not while the guard has the vehicle: one forged report would move the fence.
@@ -139,7 +139,7 @@ class Watching:
     def target(self, now_us: int) -> Target | None:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         guard, vehicle = self._guard, self._guard.vehicle
-        latest = vehicle.history.latest()
+        latest = vehicle.history.latest
         seen_us = guard.others_setpoint_us
         streams_elsewhere = seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US
         streams_elsewhere = streams_elsewhere or guard.program_elsewhere

@@ -121,7 +121,7 @@ def silent_position(flight: FlightContext) -> str | None:
 
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
     when, history = flight.mission.abort_when, flight.vehicle.history
-    latest = history.latest()
+    latest = history.latest
     earlier = None if latest is None else history.before(latest.time_boot_us)
     # Two positions in a row have to say so: one forged or broken packet ends no flight.
     if when.outside_fence_by_m is not None and latest is not None and earlier is not None:

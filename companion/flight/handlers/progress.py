@@ -57,7 +57,7 @@ class _OnTrajectory:
 
     def _arrived(self) -> bool:
         flight = self._flight
-        latest, goal = flight.vehicle.history.latest(), flight.local_ned_m(self._trajectory.target_m)
+        latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
         radius_m = flight.mission.companion.flight.acceptance_radius_m
         return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
 
@@ -182,7 +182,7 @@ class FlyItems(_OnTrajectory):
         if item.steady is None:
             flight.file_awaited = None if flight.file_is_there else flight.file_awaited
             return flight.file_is_there
-        latest, target = flight.vehicle.history.latest(), flight.target
+        latest, target = flight.vehicle.history.latest, flight.target
         assert latest is not None and target is not None, "the flight is in the air"
         is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
         if not (is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s):
