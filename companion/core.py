@@ -18,7 +18,7 @@ from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.states import FINAL_STATES, State
-from companion.flight.vehicle_update import landed, note_height, situation_of, update_vehicle
+from companion.flight.vehicle_update import note_height, situation_of, update_vehicle
 from companion.link.commands import CommandClient
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
@@ -86,16 +86,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
     @abstractmethod
     def _is_active(self) -> bool:
         """Whether the companion's own HEARTBEAT reports it as active."""
-
-    @property
-    @abstractmethod
-    def _off_state(self) -> str | None:
-        """Why hits are not detected in this state at any height; None in a state that detects."""
-
-    @property
-    def _goes_down(self) -> bool:
-        """Whether the vehicle descends to land."""
-        return False
 
     @property
     def _has_floor(self) -> bool:
@@ -176,13 +166,9 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         """Run the state machine; whether its state changed."""
 
+    @abstractmethod
     def situation(self) -> Situation:
-        """The detector's situation. The setpoints of others are not known."""
-        flight, goes_down, target = self.flight, self._goes_down, self.flight.target
-        if not self.machine.holds:
-            return situation_of(flight, self._off_state, goes_down, flight.vehicle.landed)
-        place = None if target is None or target.lean is not None else target.position_ned_m
-        return situation_of(flight, self._off_state, goes_down, landed(flight, goes_down), place)
+        """The detector's situation."""
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
         """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
@@ -359,16 +345,13 @@ class FlightCore(Core[FlightContext, Machine]):
         return self.machine.state not in FINAL_STATES and self.flight.armed_at_us is not None
 
     @property
-    def _off_state(self) -> str | None:
-        return None if self.machine.state in DETECTING_STATES else self.machine.state.value
-
-    @property
-    def _goes_down(self) -> bool:
-        return self.machine.state is State.LANDING
-
-    @property
     def _has_floor(self) -> bool:
         return self.machine.state in ON_THE_WAY
+
+    def situation(self) -> Situation:
+        state = self.machine.state
+        off_state = None if state in DETECTING_STATES else state.value
+        return situation_of(self.flight, off_state, state is State.LANDING, is_held=True)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in a local frame that does not jump when the estimator resets its position."""

@@ -236,12 +236,6 @@ class FlightContext:
         """Seconds since the last message of the vehicle."""
         return (now_us - self.vehicle.last_received_us) * 1e-6
 
-    @property
-    def position_silent_s(self) -> float:
-        """Seconds of messages without a position. The delay of a late step does not count."""
-        heard_us = self.vehicle.last_position_us
-        return 0.0 if heard_us is None else (self.vehicle.last_received_us - heard_us - self.missed_us) * 1e-6
-
     def is_silent(self, now_us: int) -> bool:
         """Whether an identified vehicle has been silent for longer than `link.silence_s`."""
         return self.vehicle.identity is not None and self.silent_s(now_us) > self.mission.companion.link.silence_s

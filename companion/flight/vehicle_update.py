@@ -8,7 +8,7 @@ from companion.flight.context import FlightContext
 from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
-from companion.messages import MessageId, Sample, Vector3
+from companion.messages import MessageId, Sample
 from companion.reflex.config import HELD_S
 from companion.reflex.detection.detector import NO_POSITION, Situation
 
@@ -120,33 +120,28 @@ def note_height(flight: FlightContext) -> None:
         flight.has_climbed = False
 
 
-def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
-    """The vehicle's landed state. A vehicle that has climbed, and is not sent down, has not landed.
+def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, is_held: bool) -> Situation:
+    """The detector's situation; `is_held`: the vehicle flies by this program's setpoints. Those of others are not known.
 
-    The report may be forged, and a detector is off on the ground.
+    A held vehicle that has climbed, and is not sent down, has not landed: the report may be forged, and a detector is
+    off on the ground.
     """
-    is_up = flight.has_climbed and not goes_down and flight.vehicle.landed is messages.LandedState.ON_GROUND
-    return messages.LandedState.UNDEFINED if is_up else flight.vehicle.landed
-
-
-def situation_of(
-    flight: FlightContext,
-    off_state: str | None,
-    goes_down: bool,
-    landed_state: messages.LandedState,
-    setpoint_ned_m: Vector3 | None = None,
-) -> Situation:
-    """The detector's situation; `landed_state` is the reported one of a vehicle that somebody else flies."""
+    landed, place, target = flight.vehicle.landed, None, flight.target
+    if is_held and flight.has_climbed and not goes_down and landed is messages.LandedState.ON_GROUND:
+        landed = messages.LandedState.UNDEFINED
+    if is_held and target is not None and target.lean is None:
+        place = target.position_ned_m
     height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m
-    # Lift-off, ground effect and skids shake and push.
-    below = NO_POSITION if height_m is None else f"below {least_m:g} m"
+    if off_state is None and not flight.has_climbed:
+        # Lift-off, ground effect and skids shake and push.
+        off_state = NO_POSITION if height_m is None else f"below {least_m:g} m"
     return Situation(
-        off_reason=off_state or (None if flight.has_climbed else below),
+        off_reason=off_state,
         armed=flight.vehicle.armed,
-        landed_state=landed_state,
+        landed_state=landed,
         height_m=height_m,
         descent_commanded=goes_down,
-        setpoint_position_ned_m=setpoint_ned_m,
+        setpoint_position_ned_m=place,
         flown_by_hand=flight.vehicle.pilot in (Pilot.STICKS, Pilot.HAND),
         has_climbed=flight.has_climbed,
         has_position=flight.has_position,

@@ -82,6 +82,7 @@ class Vehicle:
     attitude_parameters: dict[str, int | float] = field(default_factory=dict)  # see interface.Autopilot
     armed: bool | None = None
     mode: ModeReport | None = None
+    pilot: Pilot | None = None  # who moves it, where that mode says so
     failsafe: bool = False
     landed: messages.LandedState = messages.LandedState.UNDEFINED
     attitude: messages.Attitude | None = None
@@ -95,11 +96,6 @@ class Vehicle:
     is_disarm_unconfirmed: bool = False  # reported once, in the air
     is_disarm_unexplained: bool = False  # and not yet contradicted by a vehicle that says that it flies
     conflicts: int = 0
-
-    @property
-    def is_position_old(self) -> bool:
-        """Whether no position came lately, while other messages do; a vehicle whose estimator fails sends none."""
-        return self.last_position_us is not None and self.last_received_us - self.last_position_us >= OLD_NEWS_US
 
     @property
     def is_mode_known(self) -> bool:
@@ -149,7 +145,7 @@ class Vehicle:
         is_known = self.mode is None or report.custom_mode in (self.mode.custom_mode, *own_modes)
         if is_known or not own_modes or self.unconfirmed_mode is not None:
             self.conflicts += is_known and self.unconfirmed_mode is not None
-            self.mode, self.unconfirmed_mode = report, None
+            self.mode, self.pilot, self.unconfirmed_mode = report, self.autopilot.pilot(report.custom_mode), None
         else:
             self.unconfirmed_mode = report
 
@@ -171,11 +167,6 @@ class Vehicle:
     @property
     def mode_name(self) -> str:
         return "" if self.mode is None else self.autopilot.mode_name(self.mode.custom_mode)
-
-    @property
-    def pilot(self) -> Pilot | None:
-        """Who moves it, where the mode says so."""
-        return None if self.mode is None else self.autopilot.pilot(self.mode.custom_mode)
 
     @property
     def descends(self) -> bool:

@@ -69,7 +69,7 @@ class Circumstances:
         """Now."""
         guard = self._guard
         goes_down = guard.descent.is_meant(guard.vehicle, self._now_us)
-        return situation_of(guard, self._why_not(guard), goes_down, guard.vehicle.landed)
+        return situation_of(guard, self._why_not(guard), goes_down, is_held=False)
 
 
 @dataclass(slots=True)

@@ -59,7 +59,8 @@ ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
     descent = Descent()
     descent.update(samples, 0)
-    return descent.is_meant(Vehicle(mode=ModeReport(mode, None, False), landed=landed), now_us)
+    vehicle = Vehicle(mode=ModeReport(mode, None, False), pilot=PX4.pilot(mode), landed=landed)
+    return descent.is_meant(vehicle, now_us)
 
 
 def down(speed_m_s):

@@ -57,7 +57,9 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
     if flight.expected_mode is None or vehicle.mode is None:
         return None
-    holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
+    holder = Holder.COMPANION
+    if vehicle.mode.custom_mode != flight.expected_mode:
+        holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
     if holder is Holder.COMPANION:
         flight.foreign_mode_since_us = None
         return None
@@ -113,8 +115,9 @@ def silent_link(flight: FlightContext, now_us: int) -> str | None:
 
 
 def silent_position(flight: FlightContext) -> str | None:
-    """The same of positions, on a link that is alive."""
-    silent_s = flight.position_silent_s
+    """The same of positions, on a link that is alive. The delay of a late step does not count."""
+    vehicle, heard_us = flight.vehicle, flight.vehicle.last_position_us
+    silent_s = 0.0 if heard_us is None else (vehicle.last_received_us - heard_us - flight.missed_us) * 1e-6
     is_silent = silent_s > flight.mission.companion.link.position_silence_s
     return f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive" if is_silent else None
 
