@@ -25,6 +25,7 @@ from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
     LocalPosition,
+    MotorOutputs,
     OnboardHeartbeat,
     Outgoing,
     PositionSetpoint,
@@ -32,7 +33,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.mission.model import Mission
-from companion.motion.resets import Resets
+from companion.motion.resets import PLACES, Resets
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import HELD_S, LEAD_S, NOTICED_S
 from companion.reflex.detection.detector import Situation
@@ -100,16 +101,17 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
-        if self._law.busy or not self._is_met:
+        if self._law.pending is not None or not self._is_met:
             self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
         if now_us >= self._heartbeat_due_us:
             self._beat(now_us)
-        try:
-            self._inform(now_us)
-        except Exception as error:
-            self.fault(error, now_us)
         flight = self.flight
+        if flight.events or self._texts.waiting or now_us >= self._values_due_us:
+            try:
+                self._inform(now_us)
+            except Exception as error:
+                self.fault(error, now_us)
         if not flight.outbox and not flight.events:
             return NOTHING
         outputs = Outputs(tuple(flight.outbox), tuple(flight.events))
@@ -141,7 +143,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
-            note_motors(flight, samples, now_us)
+            if not flight.vehicle.armed or MotorOutputs in map(type, samples):
+                note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)
         return moved
@@ -175,11 +178,12 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
         An attitude is sent for each IMU sample.
         """
-        sample_us, target = self.reflex.sample_boot_us, self.flight.target
-        follows_imu = target is not None and target.lean is not None and sample_us != self._sample_boot_us
-        self._sample_boot_us = sample_us
+        target = self.flight.target
+        leans = target is not None and target.lean is not None
+        follows_imu = leans and self.reflex.sample_boot_us != self._sample_boot_us
         if not (moved or follows_imu) and now_us < self._setpoint_due_us:
             return
+        sample_us = self._sample_boot_us = self.reflex.sample_boot_us
         interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
         if not holds:
             self._change_law(None, now_us)
@@ -231,7 +235,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not self._is_met and self.flight.vehicle.identity is not None:
             self._is_met = True
             self._tell_law(now_us)
-        elif self._law.busy:
+        elif self._law.pending is not None:
             acks = [sample for sample in samples if isinstance(sample, CommandAck)]
             send, outcome = self._law.step(acks, False, now_us)
             if send is not None:
@@ -276,7 +280,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     @property
     def finished(self) -> bool:
         """Ended, and the vehicle has answered the last word, or does not."""
-        return self.machine.finished and not self._law.busy
+        return self.machine.finished and self._law.pending is None
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         """Note a setpoint that was sent while the companion has the vehicle."""
@@ -290,7 +294,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _inform(self, now_us: int) -> None:
         """Send the operator's texts with their events, and numbers at their rate, once a vehicle is connected."""
         flight, texts = self.flight, self._texts
-        if flight.vehicle.identity is None or not (flight.events or texts.waiting or now_us >= self._values_due_us):
+        if flight.vehicle.identity is None:
             return
         operator, hits = flight.mission.companion.operator, len(flight.collisions)
         if operator.status_texts:
@@ -356,7 +360,8 @@ class FlightCore(Core[FlightContext, Machine]):
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in a local frame that does not jump when the estimator resets its position."""
         before, most_m = self.resets.shift_ned_m, self.flight.mission.limits.max_step_m
-        samples = [self.resets.follow(sample, most_m) for sample in samples]
+        if not PLACES.isdisjoint(map(type, samples)):
+            samples = [self.resets.follow(sample, most_m) for sample in samples]
         if self.resets.shift_ned_m != before:
             jump_m = math.dist(self.resets.shift_ned_m, before)
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"

@@ -79,7 +79,7 @@ class Crashed(NoSetpoint):
         watch, client = flight.reflex.crash, flight.command_client
         if not watch.lies:
             client.cancel()
-        elif flight.mission.on_crash == "disarm" and not client.busy and now_us >= self._ask_us:
+        elif flight.mission.on_crash == "disarm" and client.pending is None and now_us >= self._ask_us:
             client.begin(SetArmed(False, self._is_forced))
         outcome = flight.command_outcome(inputs, False, now_us)
         if outcome is not None:
