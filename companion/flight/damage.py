@@ -1,10 +1,9 @@
-"""Detection of a motor damaged by a hit, and the mission's policy for it."""
+"""Detection of a motor damaged by a hit."""
 
 import math
 from collections.abc import Sequence
 
-from companion.flight.context import FlightContext, Transition
-from companion.flight.states import Trigger
+from companion.flight.context import FlightContext
 from companion.messages import LandedState, MotorOutputs, Sample
 from companion.motion.motors import ROTORS, MotorWatch
 
@@ -38,11 +37,3 @@ def _is_free(flight: FlightContext) -> bool:
     if record.settled_after_s is not None or latest is None or not record.is_over:
         return record.settled_after_s is not None
     return math.dist(latest.position_ned_m, record.contact.position_ned_m) > flight.mission.recovery.clearance_m
-
-
-def after_damage(flight: FlightContext) -> Transition | None:
-    """The transition that the mission wants for a damaged vehicle."""
-    damage, wanted = flight.motors.damage, flight.mission.on_damage
-    if damage is None or wanted == "tell":
-        return None
-    return Transition(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)

@@ -62,8 +62,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
     if was_known and not vehicle.is_mode_known:
         # PX4 answers within milliseconds; its next report by itself may take half a second.
         flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
-    if vehicle.identity is not None and (asked := flight.round_trip.ask(now_us)) is not None:
-        _measure_round_trip(flight, asked, now_us)
+    if vehicle.identity is not None and now_us >= flight.round_trip.due_us:
+        _measure_round_trip(flight, now_us)
     return None
 
 
@@ -79,11 +79,11 @@ def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
         flight.trajectory_us += now_us - before_us
 
 
-def _measure_round_trip(flight: FlightContext, asked: messages.TimeSyncAsk, now_us: int) -> None:
+def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
     """On the ground a long round trip is a reason not to begin; in the air it is reported. For how long the
     last setpoint is flown on is asked with it until it is answered.
     """
-    flight.outbox.append(asked)
+    flight.outbox.append(flight.round_trip.ask(now_us))
     if flight.reflex.loss_s is None:
         autopilot, told = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
         flight.outbox += [messages.ReadParameter(name) for name in autopilot.attitude_parameters if name not in told]
