@@ -121,7 +121,7 @@ def note_height(flight: FlightContext) -> None:
 
 
 def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, is_held: bool) -> Situation:
-    """The detector's situation; `is_held`: the vehicle flies by this program's setpoints. Those of others are not known.
+    """The detector's situation; `is_held`: the vehicle flies by this program's setpoints. Those of others are unknown.
 
     A held vehicle that has climbed, and is not sent down, has not landed: the report may be forged, and a detector is
     off on the ground.

@@ -73,13 +73,6 @@ class Situation(NamedTuple):
     is_wreck: bool = False
 
     @property
-    def why_off(self) -> str | None:
-        """The flight's reason, or the ground: feet that stand on it shake and push."""
-        if self.off_reason is not None:
-            return self.off_reason
-        return ON_THE_GROUND if self.landed_state is LandedState.ON_GROUND else None
-
-    @property
     def may_crash(self) -> bool:
         """Whether the vehicle is known to fly, be it unwatched."""
         return self.armed is True and self.landed_state is not LandedState.ON_GROUND
@@ -123,21 +116,11 @@ class Impact:
 class Innovation:
     """What free flight does not explain, in the newest test of one sign, and the limit from which it is a hit.
 
-    Of a force in m/s^2, of a velocity in m/s. EKF2 calls the square of `ratio` a test ratio.
+    Of a force in m/s^2, of a velocity in m/s. EKF2 calls the square of their ratio a test ratio.
     """
 
     value: float = 0.0
     limit: float = math.inf
-
-    def test(self, value: float, limit: float) -> float:
-        """Take a new test; its ratio."""
-        self.value, self.limit = value, limit
-        return value / limit
-
-    @property
-    def ratio(self) -> float:
-        """A hit from 1 on."""
-        return self.value / self.limit
 
 
 @dataclass(slots=True)

@@ -20,7 +20,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
+from companion.messages import (
+    AttitudeTarget,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    MessageId,
+    Odometry,
+    Sample,
+    Vector3,
+)
 from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
 from companion.motion.vector import ZERO, limited, minus
@@ -60,6 +69,8 @@ class FusedState(DetectorState):
     vertical: Innovation = field(default_factory=Innovation)
     velocity: Innovation = field(default_factory=Innovation)
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
+    vertical_threshold_m_s2: float = 0.0
+    """Beyond the force that propellers can make."""
     floor: ForceNoise = field(default_factory=ForceNoise)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
@@ -79,10 +90,6 @@ class FusedState(DetectorState):
         speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
         turning_rad_s = sum(map(abs, rates_frd_rad_s))
         return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, MEAN_MEMORY_S * turning_rad_s)
-
-    def vertical_threshold_m_s2(self, config: FusedConfig) -> float:
-        """Vertical threshold, m/s^2, beyond the force that propellers can make."""
-        return max(config.vertical_threshold_m_s2, config.noise_factor * self.floor.vertical_m_s2)
 
     def side_force(self, config: FusedConfig, force_frd_m_s2: Vector3) -> tuple[float, float, bool]:
         """Horizontal force, m/s^2; how many thresholds are a hit; whether it is that of two samples together.
@@ -135,7 +142,9 @@ class FusedDetector:
         self._averaging_us = averaging_interval_us
 
     def initial(self) -> FusedState:
-        return FusedState(threshold_m_s2=self._config.side_threshold_m_s2, jump=VelocityJump(self._averaging_us))
+        side, vertical = self._config.side_threshold_m_s2, self._config.vertical_threshold_m_s2
+        jump = VelocityJump(self._averaging_us)
+        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, jump=jump)
 
     def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
         if type(sample) is ImuSample:
@@ -154,7 +163,9 @@ class FusedDetector:
 
     def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
         config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
-        w, off = sample.angular_velocity_frd_rad_s, situation.why_off
+        w, off = sample.angular_velocity_frd_rad_s, situation.off_reason
+        if off is None and situation.landed_state is LandedState.ON_GROUND:
+            off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         s.last_sample_boot_us = now_us
         s.jump.imu(before_us, now_us, w)
@@ -162,10 +173,9 @@ class FusedDetector:
         if is_of_two:
             free_until_us = s.before_boot_us
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
-        ratio = max(
-            s.side.test(side, thresholds * s.side_threshold_m_s2(config, w)),
-            s.vertical.test(beyond, s.vertical_threshold_m_s2(config)),
-        )
+        s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
+        s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
+        ratio = max(side / s.side.limit, beyond / s.vertical.limit)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -209,7 +219,9 @@ class FusedDetector:
         # A sample after a gap or a reboot has the weight of the longest interval.
         elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
         s.floor.learn(f, elapsed_s)
-        s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
+        config = self._config
+        s.threshold_m_s2 = max(config.side_threshold_m_s2, config.noise_factor * s.floor.side_m_s2)
+        s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
@@ -251,7 +263,7 @@ class FusedDetector:
     def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
         time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, situation.strapdown
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
-        s.velocity.test(0.0, math.inf)
+        s.velocity.value, s.velocity.limit = 0.0, math.inf
         if hovers(v):
             s.hovered_boot_us = time_us
         if strapdown is None or not strapdown.has_new_fix:
@@ -269,7 +281,8 @@ class FusedDetector:
         caution = 1.0 if type(sample) is Odometry and validity.is_valid else 2.0
         size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
         corrected_m_s = validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
-        is_jump = s.velocity.test(size, least + corrected_m_s) > 1.0
+        s.velocity.value, s.velocity.limit = size, least + corrected_m_s
+        is_jump = size / s.velocity.limit > 1.0
         if is_jump or validity.is_valid:
             jump.learn(limited(step, least))
         if s.phase is not Phase.ARMED or not is_jump:
