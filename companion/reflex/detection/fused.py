@@ -43,7 +43,6 @@ from companion.reflex.config import (
     WORSE_AFTER_US,
     FusedConfig,
 )
-from companion.reflex.correction import VelocityValidity
 from companion.reflex.detection.classify import classified, hovers
 from companion.reflex.detection.detector import (
     ON_THE_GROUND,
@@ -52,6 +51,7 @@ from companion.reflex.detection.detector import (
     Impact,
     ImpactKind,
     Innovation,
+    Motion,
     Phase,
     Situation,
 )
@@ -146,22 +146,24 @@ class FusedDetector:
         jump = VelocityJump(self._averaging_us)
         return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, jump=jump)
 
-    def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
+    def step(
+        self, state: FusedState, sample: Sample, situation: Situation, motion: Motion
+    ) -> tuple[FusedState, Impact | None]:
         if type(sample) is ImuSample:
             before_us = state.last_sample_boot_us
-            impact = self._imu(state, sample, situation)
+            impact = self._imu(state, sample, situation, motion)
             state.before_boot_us, state.before_frd_m_s2 = before_us, state.last_frd_m_s2
             state.last_frd_m_s2 = sample.specific_force_frd_m_s2
             return state, impact
         if isinstance(sample, (LocalPosition, Odometry)):
-            return state, self._velocity(state, sample, situation)
+            return state, self._velocity(state, sample, situation, motion)
         if isinstance(sample, AttitudeTarget):
             state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         return state, None
 
     # --- force ------------------------------------------------------------------------------------------------
 
-    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
+    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation, motion: Motion) -> Impact | None:
         config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
         w, off = sample.angular_velocity_frd_rad_s, situation.off_reason
         if off is None and situation.landed_state is LandedState.ON_GROUND:
@@ -199,16 +201,16 @@ class FusedDetector:
         if s.phase is Phase.OFF:
             s.observed = None
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
-            return None if is_learnt else self._unwatched(s, situation, impact)
-        return self._loud(s, situation, impact, s.jumps(f))
+            return None if is_learnt else self._unwatched(s, situation, motion, impact)
+        return self._loud(s, situation, motion, impact, s.jumps(f))
 
-    def _unwatched(self, s: FusedState, situation: Situation, impact: Impact) -> Impact | None:
+    def _unwatched(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact | None:
         """A crash is reported where no hit is looked for, too: in a take-off, in a landing, under strong vibration."""
         since_us = impact.sample_time_boot_us - s.contact_began_boot_us
         is_known = s.kind is ImpactKind.CRASH and since_us <= 1e6 * self._config.longest_contact_s
         if is_known or not situation.may_crash:
             return None
-        if (impact := classified(impact, s.velocity_ned_m_s, situation)).kind is not ImpactKind.CRASH:
+        if (impact := classified(impact, s.velocity_ned_m_s, situation, motion)).kind is not ImpactKind.CRASH:
             return None
         s.contact_began_boot_us, s.peak_specific_force_m_s2 = impact.sample_time_boot_us, impact.size_m_s2
         s.kind = impact.kind
@@ -225,20 +227,22 @@ class FusedDetector:
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
-    def _loud(self, s: FusedState, situation: Situation, impact: Impact, has_jumped: bool) -> Impact | None:
+    def _loud(
+        self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, has_jumped: bool
+    ) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
                 is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
                 if is_another and size > 2.0 * s.peak_specific_force_m_s2:
-                    return self._fire(s, situation, impact)
+                    return self._fire(s, situation, motion, impact)
                 # A touch that tips the vehicle over becomes a crash.
                 if (
                     s.kind is not ImpactKind.CRASH
-                    and classified(impact, s.velocity_ned_m_s, situation).kind is ImpactKind.CRASH
+                    and classified(impact, s.velocity_ned_m_s, situation, motion).kind is ImpactKind.CRASH
                 ):
-                    return self._fire(s, situation, impact)
+                    return self._fire(s, situation, motion, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
         first = s.observed = s.observed or impact
@@ -247,11 +251,11 @@ class FusedDetector:
             if now_us - first.sample_time_boot_us < 1e6 * self._config.soft_wait_s:
                 return None
             impact = replace(impact, kind=ImpactKind.CONTACT)
-        return self._fire(s, situation, impact)
+        return self._fire(s, situation, motion, impact)
 
-    def _fire(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
+    def _fire(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact:
         """Begin the contact."""
-        impact = classified(impact, s.velocity_ned_m_s, situation)
+        impact = classified(impact, s.velocity_ned_m_s, situation, motion)
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
         s.peak_specific_force_m_s2 = impact.size_m_s2
@@ -260,13 +264,15 @@ class FusedDetector:
 
     # --- velocity ---------------------------------------------------------------------------------------------
 
-    def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
-        time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, situation.strapdown
+    def _velocity(
+        self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation, motion: Motion
+    ) -> Impact | None:
+        time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, motion.strapdown
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
         s.velocity.value, s.velocity.limit = 0.0, math.inf
         if hovers(v):
             s.hovered_boot_us = time_us
-        if strapdown is None or not strapdown.has_new_fix:
+        if not strapdown.has_new_fix:
             return None
         step = jump.step_m_s(strapdown.fixes)
         if time_us - s.last_loud_boot_us < SHOWN_US:
@@ -276,14 +282,13 @@ class FusedDetector:
             return None
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
         change_m_s2 = abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2])
-        validity = situation.validity or VelocityValidity()
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
-        caution = 1.0 if type(sample) is Odometry and validity.is_valid else 2.0
+        caution = 1.0 if type(sample) is Odometry and motion.validity.is_valid else 2.0
         size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
-        corrected_m_s = validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
+        corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         is_jump = size / s.velocity.limit > 1.0
-        if is_jump or validity.is_valid:
+        if is_jump or motion.validity.is_valid:
             jump.learn(limited(step, least))
         if s.phase is not Phase.ARMED or not is_jump:
             return None
@@ -297,4 +302,4 @@ class FusedDetector:
         impact = Impact(
             now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
         )
-        return self._fire(s, situation, impact)
+        return self._fire(s, situation, motion, impact)
