@@ -7,7 +7,7 @@ from companion.autopilot.interface import Pilot
 from companion.flight.context import FlightContext
 from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
-from companion.link.vehicle import identify, is_autopilot
+from companion.link.vehicle import OLD_NEWS_US, identify, is_autopilot
 from companion.messages import MessageId, Sample
 from companion.reflex.config import HELD_S
 from companion.reflex.detection.detector import NO_POSITION, Situation
@@ -16,8 +16,9 @@ from companion.reflex.detection.detector import NO_POSITION, Situation
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
-    mode, armed, conflicts, was_known = vehicle.mode, vehicle.armed, vehicle.conflicts, vehicle.is_mode_known
-    vehicle.note_silence(now_us)
+    mode, armed, conflicts = vehicle.mode, vehicle.armed, vehicle.conflicts
+    if vehicle.identity is not None and now_us - vehicle.last_received_us >= OLD_NEWS_US:
+        vehicle.unsure_since_us = now_us  # after a silence samples may be as old as the silence
     for sample in samples:
         if isinstance(sample, messages.ImuSample):
             # The most frequent of all: nothing of it is kept here.
@@ -59,7 +60,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         flight.report(now_us, "mode", f"mode {vehicle.mode_name}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.report(now_us, "disarmed", "disarmed")
-    if was_known and not vehicle.is_mode_known:
+    was_known, vehicle.was_mode_known = vehicle.was_mode_known, vehicle.is_mode_known
+    if was_known and not vehicle.was_mode_known:
         # PX4 answers within milliseconds; its next report by itself may take half a second.
         flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
     if vehicle.identity is not None and now_us >= flight.round_trip.due_us:

@@ -91,6 +91,7 @@ class Vehicle:
     last_received_us: int = 0
     last_position_us: int | None = None
     mode_received_us: int = 0
+    was_mode_known: bool = True  # at the end of the step before
     unsure_since_us: int = -1  # only a report of the mode that is newer than this says who has the vehicle
     unconfirmed_mode: ModeReport | None = None  # reported once, and not the companion's
     is_disarm_unconfirmed: bool = False  # reported once, in the air
@@ -102,11 +103,6 @@ class Vehicle:
         """Whether the vehicle may be commanded: its mode is new and not contradicted."""
         is_new = self.mode_received_us > self.unsure_since_us
         return is_new and self.unconfirmed_mode is None and not self.is_disarm_unexplained
-
-    def note_silence(self, now_us: int) -> None:
-        """Called before a step's samples: after a silence they may be as old as the silence."""
-        if self.identity is not None and now_us - self.last_received_us >= OLD_NEWS_US:
-            self.unsure_since_us = now_us
 
     def update(self, sample: object, now_us: int, own_modes: tuple[int | None, ...] = ()) -> None:
         """Take one sample of the identified vehicle. Without `own_modes` every mode is accepted at once."""
