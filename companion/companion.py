@@ -1,9 +1,8 @@
 """The companion as a step function: bytes and the time in, bytes and events out."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from companion.core import NOTHING, Core, FlightCore
 from companion.flight.obstacle_map import all_known
@@ -15,7 +14,7 @@ from companion.mavlink.readers import READERS, Reader
 from companion.memory.patch import Patch
 from companion.messages import ComputerStatus, Sample
 from companion.mission.model import Mission
-from companion.report import Event, ExpectationReport, FlightReport, Status
+from companion.report import Event, FlightReport, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,27 +32,21 @@ class StepResult:
 CoreT = TypeVar("CoreT", bound=Core[Any, Any])
 
 
-class Stepped(ABC, Generic[CoreT]):
+class Stepped(Generic[CoreT]):
     """Joins the codec with a pure core; holds no clock and no socket. Times are microseconds, any epoch."""
 
-    _first_state: ClassVar = State.CONNECT.value
-
-    def __init__(self, readers: Mapping[int, Reader] = READERS) -> None:
+    def __init__(self, core: CoreT, readers: Mapping[int, Reader] = READERS) -> None:
+        self.core = core
         self._decoder, self._encoder = Decoder(readers), Encoder()
-        self._is_addressed = False
-        self._core: CoreT | None = None
-        self._stop_reason: str | None = None
-
-    @abstractmethod
-    def _begun(self, now_us: int) -> CoreT:
-        """The core before its first step."""
+        self._has_begun = self._is_addressed = False
+        self.stop_reason: str | None = None  # of the last `stop`
 
     def step(self, received: bytes, now_us: int) -> StepResult:
         """Take the bytes received since the last call, or b"" when only time has passed."""
-        if self._core is None:
-            self._core = self._begun(now_us)
-            self._core.stop_reason = self._stop_reason
-        core = self._core
+        core = self.core
+        if not self._has_begun:
+            self._has_begun = True
+            core.begin(now_us)
         frames: list[bytes] = []
         samples: list[Sample] = []
         for frame, sample in self._decoder.feed(received) if received else ():
@@ -75,114 +68,87 @@ class Stepped(ABC, Generic[CoreT]):
 
     def last_words(self) -> list[tuple[float, bytes]]:
         """What the vehicle has to be told if this program dies now, each so many seconds later."""
-        words = () if self._core is None else self._core.last_words
+        words = self.core.last_words
         packets = {word: self._encoder.unsent(word) for word in {word for _, word in words}}
         return [(later_s, packets[word]) for later_s, word in words]
 
     def next_deadline_us(self) -> int:
         """When `step(b"", now)` is due if nothing arrives before; in the past when it is due at once."""
-        return 0 if self._core is None else self._core.next_deadline_us()
+        return self.core.next_deadline_us()
 
     def stop(self, reason: str) -> None:
         """End the flight: a vehicle under control is handed to hold or land first, one that recovers from a hit once it
         is clear or when this is called again. Done when `finished`.
         """
-        self._stop_reason = reason
-        if self._core is not None:
-            self._core.stop_reason = reason
-
-    @property
-    def stop_reason(self) -> str | None:
-        """The reason of the last `stop`; None before."""
-        return self._stop_reason
+        self.stop_reason = self.core.stop_reason = reason
 
     @property
     def stop_is_put_off(self) -> bool:
         """Whether that `stop` waits until the vehicle is clear of what it has hit; another does not."""
-        return self._core is not None and self._core.flight.stop_put_off is not None
-
-    @property
-    def core(self) -> CoreT | None:
-        """The core, for studies; None before the first step."""
-        return self._core
+        return self.core.flight.stop_put_off is not None
 
     def note(self, kind: str, text: str) -> None:
-        """Add an event of the surrounding program to the next step. Without effect before the first step."""
-        if self._core is not None:
-            self._core.flight.report(self._core.now_us, kind, text)
+        """Add an event of the surrounding program to the next step."""
+        self.core.flight.report(self.core.now_us, kind, text)
 
     def tell_computer(self, computer: ComputerStatus) -> None:
-        """Send this computer's load to the ground station with the next step. Without effect before the first step."""
-        if self._core is not None:
-            self._core.flight.outbox.append(computer)
+        """Send this computer's load to the ground station with the next step."""
+        self.core.flight.outbox.append(computer)
 
     @property
     def armed(self) -> bool | None:
         """Whether the vehicle reports that it is armed; None before its first report."""
-        return None if self._core is None else self._core.flight.vehicle.armed
+        is_armed: bool | None = self.core.flight.vehicle.armed
+        return is_armed
 
     @property
     def finished(self) -> bool:
         """Ended, and nothing left to send."""
-        return self._core is not None and self._core.finished
+        return self.core.finished
 
     def status(self) -> Status:
         """For the live line."""
-        if self._core is None:
-            return Status(self._first_state, "", False, None, None, "off", None)
-        return self._core.status()
+        return self.core.status()
 
 
 class Companion(Stepped[FlightCore]):
     """Of one flight of a mission."""
 
     def __init__(self, mission: Mission) -> None:
-        super().__init__()
-        self._mission = mission
-        self._confirmed = False
-
-    def _begun(self, now_us: int) -> FlightCore:
-        core = FlightCore(self._mission, now_us)
-        core.flight.plan_confirmed = self._confirmed
-        return core
+        super().__init__(FlightCore(mission))
 
     def confirm_plan(self) -> None:
         """Confirm the plan, also before the first step."""
-        self._confirmed = True
-        if self._core is not None:
-            self._core.flight.plan_confirmed = True
+        self.core.flight.plan_confirmed = True
 
     @property
     def plan_is_confirmed(self) -> bool:
-        return self._confirmed if self._core is None else self._core.flight.plan_confirmed
+        return self.core.flight.plan_confirmed
 
     def plan_is_ready(self) -> bool:
         """Connected, checked, waiting for nothing but the confirmation."""
-        return self._core is not None and self._core.machine.state is State.READY and not self.plan_is_confirmed
+        return self.core.machine.state is State.READY and not self.plan_is_confirmed
 
     def plan_text(self) -> str:
         """The plan for a person to agree to; complete once `plan_is_ready`."""
-        return "" if self._core is None else plan_text(self._core.flight)
+        return plan_text(self.core.flight)
 
     @property
     def file_awaited(self) -> str | None:
         """The file whose existence the mission waits for now; the companion itself opens none."""
-        return None if self._core is None else self._core.flight.file_awaited
+        return self.core.flight.file_awaited
 
     def file_is_there(self) -> None:
         """The file that is awaited exists."""
-        if self._core is not None:
-            self._core.flight.file_is_there = True
+        self.core.flight.file_is_there = True
 
     def obstacles(self) -> tuple[Patch, ...]:
         """What is known of the surroundings by now: from before, and from this flight's hits. Mission coordinates."""
-        return self._mission.obstacles.patches() if self._core is None else all_known(self._core.flight)
+        return all_known(self.core.flight)
 
     def report(self) -> FlightReport:
         """The flight so far, or the whole of it once `finished`."""
-        if self._core is None:
-            return FlightReport("failed", "not started", "", {}, (), None, 0, 0, None)
-        core, flight = self._core, self._core.flight
+        core, flight = self.core, self.core.flight
         return FlightReport(
             outcome=flight.outcome or "aborted",
             reason=flight.reason or f"still in state {core.machine.state.value}",
@@ -193,14 +159,12 @@ class Companion(Stepped[FlightCore]):
             started_at_us=core.started_at_us,
             ended_at_us=core.now_us if flight.ended_at_us is None else flight.ended_at_us,
             armed_at_us=flight.armed_at_us,
-            expectations=tuple(
-                [ExpectationReport(wish.label, wish.text, wish.met, wish.detail) for wish in flight.expectations]
-            ),
+            expectations=tuple(flight.expectations),
             obstacles=all_known(flight),
             unreachable=tuple(flight.unreachable),
             refused_messages=dict(flight.refusals.counts),
             unconfirmed=flight.unconfirmed,
-            round_trip=flight.round_trip.report(),
+            round_trip=flight.round_trip,
             promise=core.reflex.monitor.promise,
             crashed=flight.crashed,
         )

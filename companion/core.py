@@ -72,10 +72,10 @@ MachineT = TypeVar("MachineT", bound=StateMachine)
 class Core(ABC, Generic[FlightT, MachineT]):
     """The state between two steps, and the part of a step that a flight and a guard share."""
 
-    def __init__(self, flight: FlightT, machine: MachineT, now_us: int) -> None:
+    def __init__(self, flight: FlightT, machine: MachineT) -> None:
         self.flight, self.machine, self.reflex = flight, machine, flight.reflex
-        self.started_at_us = self.now_us = now_us
-        self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
+        self.started_at_us = self.now_us = 0
+        self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = 0
         self._sample_boot_us = 0
         self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
         # What the vehicle is told of it, until it has answered; and whether it is known.
@@ -96,6 +96,12 @@ class Core(ABC, Generic[FlightT, MachineT]):
     @property
     def _setpoint_hz(self) -> float:
         return self.flight.mission.companion.flight.setpoint_hz
+
+    def begin(self, now_us: int) -> None:
+        """Before the first step: times count from now on."""
+        self.started_at_us = self.now_us = now_us
+        self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
+        self.reflex.restart(now_us)
 
     def advance(self, samples: Sequence[Sample], now_us: int) -> Outputs:
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
@@ -337,12 +343,12 @@ class Core(ABC, Generic[FlightT, MachineT]):
 class FlightCore(Core[FlightContext, Machine]):
     """The core of one flight of a mission."""
 
-    def __init__(self, mission: Mission, now_us: int) -> None:
+    def __init__(self, mission: Mission) -> None:
         config = mission.companion
-        reflex = start_reflex(config, mission.recovery, config.settled, now_us)
+        reflex = start_reflex(config, mission.recovery, config.settled, 0)
         streams = StreamMonitor(config.streams, tuple(reflex.monitor.detector.losses))
         flight = FlightContext(mission, Vehicle(), streams, reflex)
-        super().__init__(flight, Machine(flight, Connect(now_us)), now_us)
+        super().__init__(flight, Machine(flight, Connect()))
 
     @property
     def _is_active(self) -> bool:

@@ -7,9 +7,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from companion import messages
 from companion.autopilot.known import NAMES
-from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, Sight, judged
+from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, judged
 from companion.link.round_trip import MOST_US as MOST_TRIP_US
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
@@ -74,7 +76,9 @@ class Survey:
 
     @property
     def setup(self) -> Setup:
-        identity, estimate = self.vehicle.identity, self.config.estimate
+        identity, estimate, fused = self.vehicle.identity, self.config.estimate, self.config.fused
+        imu_hz = self.streams.rates_hz().get("HIGHRES_IMU", 0.0)
+        per_h = 3600.0 * imu_hz * math.exp(-0.5 * (EXCESS * fused.noise_factor) ** 2)
         return Setup(
             parameters=self.parameters,
             line=self.line,
@@ -83,6 +87,9 @@ class Survey:
             guard_radius_m=estimate.guards.radius_m,
             imu_averaging_interval_s=estimate.imu_averaging_interval_s,
             most_held_s=MOST_HELD_S,
+            imu_hz=imu_hz,
+            threshold_m_s2=fused.side_threshold_m_s2,
+            false_alarms=f"at most {per_h:.2g} false alarms an hour by Gaussian vibration",
         )
 
     @property
@@ -171,11 +178,7 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
 
 def spread(vectors: Sequence[Vector3]) -> float:
     """Root mean squared distance from the mean."""
-    count = len(vectors)
-    if count == 0:
-        return 0.0
-    mean = [sum(vector[axis] for vector in vectors) / count for axis in range(3)]
-    return math.sqrt(sum((vector[axis] - mean[axis]) ** 2 for vector in vectors for axis in range(3)) / count)
+    return float(np.sqrt(np.var(vectors, axis=0).sum()))
 
 
 def findings(survey: Survey) -> list[PreflightItem]:
@@ -183,7 +186,8 @@ def findings(survey: Survey) -> list[PreflightItem]:
     autopilot, setup = survey.vehicle.autopilot, survey.setup
     found = [*autopilot.judge_vehicle(setup), *_delivery(survey), *_streams(survey)]
     found += autopilot.judge_parameters(setup)
-    return [*found, *_estimate(survey), *_vibration(survey), _time(survey), _battery(survey), *_sight(survey)]
+    found += [*_estimate(survey), *_vibration(survey), _time(survey), _battery(survey)]
+    return [*found, autopilot.sight(setup)] if setup.imu_hz else found
 
 
 def _delivery(survey: Survey) -> Iterator[PreflightItem]:
@@ -296,16 +300,6 @@ def _battery(survey: Survey) -> PreflightItem:
         return PreflightItem("battery", DOUBTFUL, "unknown", survey.vehicle.autopilot.remedies.no_battery)
     cases = ((percent < BAD_BATTERY, BAD, "charge it"), (percent < DOUBTFUL_BATTERY, DOUBTFUL, "charge it"))
     return judged("battery", f"{percent} %", *cases)
-
-
-def _sight(survey: Survey) -> Iterator[PreflightItem]:
-    rate_hz = survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
-    if rate_hz:
-        per_h = 3600.0 * rate_hz * math.exp(-0.5 * (EXCESS * survey.config.fused.noise_factor) ** 2)
-        noise = f"at most {per_h:.2g} false alarms an hour by Gaussian vibration"
-        config, autopilot = survey.config, survey.vehicle.autopilot
-        averaging_s, threshold_m_s2 = config.estimate.imu_averaging_interval_s, config.fused.side_threshold_m_s2
-        yield autopilot.sight(Sight(survey.parameters, rate_hz, averaging_s, threshold_m_s2, noise))
 
 
 class Preflight:

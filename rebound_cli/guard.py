@@ -35,7 +35,7 @@ def run_guard(options: Namespace) -> int:
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
         between = None
         if config.between:
-            between = Between(carried_bytes_s(options.connect), options.signing_key is not None)
+            between = Between(carried_bytes_s(options.connect))
 
         def shared(opened: Selectable) -> Connection:
             return opened if between is None else SharedConnection(opened, config.between, between)
@@ -85,23 +85,24 @@ def _recorded(
             )
     finally:
         recorder.close()
-        hits = [asdict(collision) for collision in guard.collisions()]
+        core, flight = guard.core, guard.core.flight
+        outcome, hits = core.machine.outcome, [asdict(collision) for collision in core.collisions()]
         summary = {
-            "outcome": guard.outcome or "goes on in the next folder",
+            "outcome": outcome or "goes on in the next folder",
             "collisions": hits,
-            "left_alone": guard.left_alone(),
-            "crashed": guard.crashed() or None,
+            "left_alone": flight.left_alone,
+            "crashed": flight.crashed or None,
             "kept_out": 0 if between is None else between.kept_out,
-            "round_trip_ms": guard.round_trip().summary(),
+            "round_trip_ms": flight.round_trip.summary(),
             **asdict(connection.counts),
             "refused_packets": refused_packets(connection),
         }
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
-    left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
+    left_alone = f", {flight.left_alone} left to the program that flies" if flight.left_alone else ""
     console.print(f"{summary['outcome']}; {len(hits)} hits{left_alone}; log in {folder}")
-    if guard.outcome:
+    if outcome:
         offer_page(folder, console)
-    return guard.outcome
+    return outcome
 
 
 def guard_config(options: Namespace) -> GuardConfig:

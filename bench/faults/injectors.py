@@ -181,9 +181,7 @@ def _break(part: Any, method: str, error: Exception) -> None:
 
 def break_step(air: Air, error: Exception | None = None) -> None:
     """What the flight does next raises, once."""
-    core = air.companion.core
-    assert core is not None, "it flies"
-    _break(core.machine, "step", error or _BrokenError("nobody thought of this"))
+    _break(air.companion.core.machine, "step", error or _BrokenError("nobody thought of this"))
 
 
 def break_encoder(air: Air) -> None:

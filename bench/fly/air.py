@@ -128,8 +128,7 @@ class Air:
     @property
     def state(self) -> str:
         """The companion's."""
-        core = self.companion.core
-        return "" if core is None else core.machine.state.value
+        return self.companion.core.machine.state.value
 
     # --- the clock and the connection of the loop
 
@@ -174,8 +173,7 @@ class Air:
         """There is nothing to close."""
 
     def send(self, frame: bytes) -> None:
-        core = self.companion.core
-        wrong = None if core is None else outside(core, frame)
+        wrong = outside(self.companion.core, frame)
         if wrong is not None:
             self.outside.append(f"{wrong} at {self.now_s:.2f} s")
         if self.is_told and _takes_control(frame):

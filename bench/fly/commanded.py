@@ -53,7 +53,8 @@ class Commanded(VirtualTime):
 
     @property
     def state(self) -> State:
-        return State.CONNECTING if self.guard.core is None else self.guard.core.machine.state
+        state: State = self.guard.core.machine.state
+        return state
 
     @property
     def mode(self) -> Any:
@@ -135,7 +136,7 @@ class BetweenFlight(Commanded):
         self.told_by_clients: list[Any] = []
 
     def _begin(self) -> None:
-        self.guard, self.between = Guard(self._config), Between(2_000_000, signs=False)
+        self.guard, self.between = Guard(self._config), Between(2_000_000)
         self._guards: list[bytes] = []
         self._clients: list[tuple[str, bytes]] = []
 
@@ -161,7 +162,7 @@ class BetweenFlight(Commanded):
 
     def _pass_on(self) -> None:
         for client, packet in self._clients:
-            self.between.hear(client, packet, self.now_us)
+            self.between.hear(client, packet)
         self._clients = []
         for sender, packets in (("guard", self._guards), ("program", self.between.to_vehicle(self.now_us))):
             for packet in packets:

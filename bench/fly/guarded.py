@@ -86,7 +86,7 @@ def to_rest(flight: Stepped, guard: Guard, patience_s: float) -> int | None:
         touches = hit_row[HIT_ACTIVE] == 1.0
         if touched_us is None and (touches or truth.hits):
             touched_us, until_us = now_us, now_us + round(1e6 * FOLLOWED_S)
-        if touched_us is not None and not is_answered and guard.collisions():
+        if touched_us is not None and not is_answered and guard.core.flight.collisions:
             is_answered, until_us = True, touched_us + round(1e6 * MOST_RECOVERY_S)
         if not is_answered or touches or math.hypot(*body[3:6].tolist()) > REST_M_S:
             rest_us = None

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from companion.autopilot.setup import PreflightItem, SerialLine, Setup, Sight
+from companion.autopilot.setup import PreflightItem, SerialLine, Setup
 from companion.messages import MessageId, SetMessageInterval, SetMode, VehicleCommand
 
 
@@ -18,6 +18,15 @@ class Pilot(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class Mode:
+    """`name`: as the autopilot's own tools print it. `is_guarded`: a guard may take it over by default."""
+
+    name: str
+    pilot: Pilot
+    is_guarded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Remedies:
     """Of what preflight finds by listening, for people."""
 
@@ -26,25 +35,6 @@ class Remedies:
     no_time: str
     no_battery: str
     no_estimator: str
-
-
-@dataclass(frozen=True, slots=True)
-class Defaults:
-    """How it flies unless a person has changed it: limits and patience of the companion follow from these."""
-
-    loss_us: int
-    """For so long the last setpoint is flown on."""
-    position_gain_per_s: float
-    """From a distance to the setpoint to the speed towards it."""
-    max_speed_m_s: float
-    max_yaw_rate_deg_s: float
-    turning_deg_s: float
-    """With which its own modes turn."""
-    landing_m_s: float
-    stick_deadzone: float
-    """Deflection around the middle that asks for no climb."""
-    stick_override: float
-    """Change of a deflection by which a pilot takes over."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +74,11 @@ class Autopilot:
     """The mode that a pilot who moved the sticks is given."""
     descents: frozenset[int]
     """Modes that end on the ground."""
-    mode_names: frozenset[str]
-    guarded_modes: tuple[str, ...]
-    """Names of the modes that a guard may take over by default."""
-    mode_name: Callable[[int], str]
-    """As the autopilot's own tools print it."""
-    pilot: Callable[[int], Pilot | None]
-    """None of a mode that is not known."""
-    set_mode: Callable[[int], SetMode]
+    modes: Mapping[int, Mode]
+    mode_mask: int
+    """Of a mode that is not listed the one with these bits alone counts, where it is."""
+    mode_parameters: Callable[[int], tuple[int, int]]
+    """The second and the third of the command that asks for it."""
     wire: Wire
     least_version: tuple[int, int, int]
     """Older ones are refused."""
@@ -120,7 +107,7 @@ class Autopilot:
     """For so many seconds the last setpoint is flown on."""
     rate_parameter: str
     """Of a link's share for streams, for people."""
-    sight: Callable[[Sight], PreflightItem]
+    sight: Callable[[Setup], PreflightItem]
     """The smallest hit that shows."""
     asked: Callable[[SerialLine | None], tuple[str, ...]]
     """Parameters that preflight reads."""
@@ -129,4 +116,23 @@ class Autopilot:
     remedies: Remedies
     loss_text: Callable[[Mapping[str, int | float]], str]
     """What the vehicle does when setpoints stop, for people."""
-    defaults: Defaults
+    stick_deadzone: float
+    """Deflection around the middle that asks for no climb, by default."""
+    stick_override: float
+    """Change of a deflection by which a pilot takes over, by default."""
+
+    def pilot(self, custom_mode: int) -> Pilot | None:
+        """None of a mode that is not known."""
+        mode = self._mode(custom_mode)
+        return None if mode is None else mode.pilot
+
+    def mode_name(self, custom_mode: int) -> str:
+        """For example OFFBOARD or AUTO.LAND."""
+        mode = self._mode(custom_mode)
+        return f"mode {self.mode_parameters(custom_mode)[0]}" if mode is None else mode.name
+
+    def set_mode(self, custom_mode: int) -> SetMode:
+        return SetMode(custom_mode, self.mode_name(custom_mode), self.mode_parameters(custom_mode))
+
+    def _mode(self, custom_mode: int) -> Mode | None:
+        return self.modes.get(custom_mode) or self.modes.get(custom_mode & self.mode_mask)

@@ -16,7 +16,7 @@ class SerialLine:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What an autopilot's parameters are judged by."""
+    """What an autopilot's parameters, and the smallest hit that the samples of the IMU show, are judged by."""
 
     parameters: Mapping[str, int | float]
     line: SerialLine | None
@@ -26,15 +26,7 @@ class Setup:
     imu_averaging_interval_s: float
     most_held_s: float
     """For so long an attitude is safe to hold, if the companion dies."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sight:
-    """What the smallest hit follows from that the samples of the IMU show."""
-
-    parameters: Mapping[str, int | float]
-    rate_hz: float
-    imu_averaging_interval_s: float
+    imu_hz: float
     threshold_m_s2: float
     false_alarms: str
     """By noise, for people."""
@@ -81,3 +73,14 @@ def judged_settings(
         value = setup.parameters.get(name)
         unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
         yield unread if value is None else judge(name, value, setup)
+
+
+def judged_loss(name: str, loss_s: float, setup: Setup, found: str, cost: str = "") -> PreflightItem:
+    """For how long the last attitude is flown on. `cost`: of less, for people."""
+    held_s = setup.most_held_s
+    case = (
+        round(loss_s, 3) > held_s,
+        DOUBTFUL,
+        f"{name} = {held_s:g}, or recoveries are flown by position alone{cost}",
+    )
+    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {held_s:g} s")

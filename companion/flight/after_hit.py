@@ -81,7 +81,7 @@ def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     if before is None or latest is None:
         return None
     flight.reflex.take_back()
-    flight.note_unconfirmed()
+    flight.unconfirmed += 1
     text = "not a hit: one message showed it, and nothing else did; going on"
     flight.report(now_us, "unconfirmed", text, count=flight.unconfirmed)
     flight.tally.hits, flight.tally.pace_factor = before.step_hits, before.pace_factor

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from companion.flight.states import State, Trigger
 from companion.link.commands import CommandClient, CommandOutcome
@@ -22,7 +22,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.mission.item_trajectory import SpeedLimits
-from companion.mission.items import ExpectItem, ReturnItem, Step
+from companion.mission.items import ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
 from companion.motion.vector import ZERO, minus, plus
@@ -30,7 +30,7 @@ from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.reflex import Reflex
-from companion.report import Event, JsonValue, Outcome
+from companion.report import Event, Expectation, JsonValue, Outcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,19 +109,6 @@ class BeforeHit:
     step_hits: int
     pace_factor: float
     after_recovery: AfterRecovery
-
-
-@dataclass(slots=True)
-class Expectation:
-    """An assertion of the mission's: pending until `met` is known."""
-
-    label: str  # of its step
-    text: str
-    item: ExpectItem
-    began_us: int
-    hits_before: int
-    met: bool | None = None
-    detail: str = ""
 
 
 @dataclass(slots=True)
@@ -207,9 +194,10 @@ class FlightContext:
         """All so far."""
         return self.reflex.hits
 
-    def note_unconfirmed(self) -> None:
-        """The newest hit was none."""
-        self.unconfirmed += 1
+    @property
+    def hits(self) -> list[CollisionRecord]:
+        """Those since it was armed."""
+        return self.reflex.hits[self.motors.earlier_hits :]
 
     def note_touchdown(self) -> None:
         """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""
@@ -285,18 +273,6 @@ class FlightContext:
     def mission_ned_m(self, local_ned_m: Vector3) -> Vector3:
         """From the vehicle's local NED to mission coordinates; the same before the origin is known."""
         return minus(local_ned_m, self.origin_ned_m or ZERO)
-
-
-class StateHandler(Protocol):
-    """A state's behaviour; one object is made each time the state is entered."""
-
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        """Do what is due now; returns a transition when the state is over."""
-        ...
-
-    def target(self, now_us: int) -> Target | None:
-        """The setpoint for now; None while none must be sent."""
-        ...
 
 
 class NoSetpoint:

@@ -17,7 +17,7 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
     rotors = 0 if vehicle.identity is None else ROTORS.get(vehicle.identity.vehicle_type, 0)
     if not rotors:
         return
-    hits = len(flight.collisions) - flight.motors.earlier_hits
+    hits = len(flight.hits)
     flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
     was_hit = hits > 0 if flies and (hits == 0 or _is_free(flight)) else None
     for sample in samples:

@@ -2,9 +2,10 @@
 
 import math
 
-from companion.flight.context import Expectation, FlightContext, as_text
+from companion.flight.context import FlightContext, as_text
 from companion.mission import items
 from companion.reflex.recovery.collision import CollisionReport
+from companion.report import Expectation
 
 
 def describe(item: items.ExpectItem) -> str:
@@ -26,8 +27,6 @@ def describe(item: items.ExpectItem) -> str:
             return f"within {within_m:g} m of {as_text(place)}"
         case items.ExpectHeight() as height:
             return f"height{_bounds(height.min_m, height.max_m, 'm')}"
-        case items.ExpectSpeed(max_m_s=max_m_s):
-            return f"speed at most {max_m_s:g} m/s"
         case items.ExpectFlightTime(at_most_s=at_most_s):
             return f"at most {at_most_s:g} s since arming"
 
@@ -57,9 +56,6 @@ def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int
             met, detail = math.dist(place, goal) <= within_m, as_text(place)
         case items.ExpectHeight() as height:
             met, detail = _is_within(-place[2], height.min_m or 0.0, height.max_m), f"{-place[2]:.2f} m"
-        case items.ExpectSpeed(max_m_s=max_m_s):
-            speed_m_s = math.hypot(*latest.velocity_ned_m_s)
-            met, detail = speed_m_s <= max_m_s, f"{speed_m_s:.2f} m/s"
     _decide(flight, expectation, met, detail, now_us)
 
 

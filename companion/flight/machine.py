@@ -4,11 +4,11 @@ import traceback
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 from companion.flight import expectations
 from companion.flight.after_hit import decide, lands_anyway, note_before
-from companion.flight.context import FlightContext, Inputs, StateHandler, Transition
+from companion.flight.context import FlightContext, Inputs, Transition
 from companion.flight.handlers.connecting import Connect, Ready
 from companion.flight.handlers.crash import Crashed, crashed
 from companion.flight.handlers.ending import ON_THE_GROUND, HandOver, Released, early_end
@@ -77,13 +77,19 @@ class StateMachine(ABC):
         return self.handler is not before
 
 
+# What is done in a state; one object is made each time the state is entered. `step` does what is due and returns a
+# transition when the state is over; `target` is the setpoint for now, None while none must be sent.
+OnTheWay: TypeAlias = TakeOff | FlyItems | Recover | TakeBack | HoldAfterRecovery | FlyHome | Land
+Handler: TypeAlias = Connect | Ready | OnTheWay | Crashed | Released | HandOver
+
+
 @dataclass
 class Machine(StateMachine):
     """The present state and what is being done in it."""
 
     program = "companion"
     flight: FlightContext
-    handler: StateHandler
+    handler: Handler
     state: State = State.CONNECT
 
     @property
@@ -136,7 +142,7 @@ class Machine(StateMachine):
         previous, self.state = self.state, TABLE.next_state(self.state, transition.trigger)
         self.handler = self._begin(previous, transition, now_us)
 
-    def _begin(self, previous: State, transition: Transition, now_us: int) -> StateHandler:
+    def _begin(self, previous: State, transition: Transition, now_us: int) -> Handler:
         flight = self.flight
         if previous is State.RECOVERING:
             # Of a hit that has just come nothing is known yet but its first sample.
@@ -145,7 +151,7 @@ class Machine(StateMachine):
             case State.CONNECT:
                 # A plan that has been shown is made anew, and agreed to anew.
                 flight.plan_confirmed &= previous is not State.READY
-                return Connect(now_us)
+                return Connect()
             case State.READY:
                 return Ready()
             case State.TAKEOFF:
@@ -174,7 +180,7 @@ class Machine(StateMachine):
             case State.ABORTED:
                 return self._aborted(previous, transition, now_us)
 
-    def _done(self, now_us: int) -> StateHandler:
+    def _done(self, now_us: int) -> Handler:
         flight = self.flight
         expectations.close(flight, now_us)
         failure = expectations.failure(flight)
@@ -185,7 +191,7 @@ class Machine(StateMachine):
         flight.report(now_us, "done", text, outcome=flight.outcome, reason=flight.reason)
         return Released()
 
-    def _aborted(self, previous: State, transition: Transition, now_us: int) -> StateHandler:
+    def _aborted(self, previous: State, transition: Transition, now_us: int) -> Handler:
         flight = self.flight
         flight.outcome = "failed" if transition.trigger is Trigger.REFUSED or flight.fault else "aborted"
         flight.reason = transition.text

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from companion.fence import Fence
 from companion.flight.context import FlightContext
 from companion.flight.envelope import KnownSurface, touched
 from companion.flight.states import Trigger
@@ -51,43 +50,37 @@ class FlightRoom:
         self._flight = flight
 
     def surfaces(self, contact: Contact) -> Sequence[Surface]:
-        return remembered_surfaces(self._flight, contact)
+        """What is known in front of a vehicle that has just been hit, besides what hit it.
+
+        Of each patch what counts is where the vehicle's centre would touch it, and that the margin is kept.
+        """
+        flight = self._flight
+        if not flight.patches:
+            return []
+        place, clearance_m = flight.mission_ned_m(contact.position_ned_m), _clearance_m(flight)
+        reach_m, normal = (
+            flight.mission.companion.estimate.reach_m,
+            Normal(contact.normal_ned, contact.normal_error_rad),
+        )
+        touch = touch_of(place, contact.velocity_ned_m_s, normal, reach_m, 0)
+        return [
+            Surface(_touching_ned_m(flight, patch), patch.normal_ned, flight.mission.obstacles.margin_m)
+            for patch in flight.patches
+            if patch.faces(place, clearance_m) and not (touch is not None and is_same(patch, touch, clearance_m))
+        ]
 
     def inside(self, contact_ned_m: Vector3, goal_ned_m: Vector3) -> Vector3:
-        origin = self._flight.origin_ned_m
+        """The goal inside the fence: where the line from the contact leaves it.
+
+        For a contact outside the fence it is the nearest position inside.
+        """
+        fence, origin = self._flight.mission.fence, self._flight.origin_ned_m
         assert origin is not None, "hits are detected only in flight"
-        return inside_fence(self._flight.mission.fence, origin, contact_ned_m, goal_ned_m)
-
-
-def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
-    """The setpoint inside a fence at that origin: where the line from the contact leaves it; local NED, metres.
-
-    For a contact outside the fence it is the nearest position inside.
-    """
-    (start_n, start_e, _), (end_n, end_e, end_d) = (
-        minus(place, origin_ned_m) for place in (contact_ned_m, setpoint_ned_m)
-    )
-    n, e = fence.nearest_inside(end_n, end_e)
-    if fence.contains(start_n, start_e):
-        n, e = fence.shortened((start_n, start_e), (end_n, end_e))
-    return plus((n, e, min(max(end_d, -fence.max_height_m), -fence.min_height_m)), 1.0, origin_ned_m)
-
-
-def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:
-    """What is known in front of a vehicle that has just been hit, besides what hit it. Local NED.
-
-    Of each patch what counts is where the vehicle's centre would touch it, and that the margin is kept.
-    """
-    if not flight.patches:
-        return []
-    place, clearance_m = flight.mission_ned_m(contact.position_ned_m), _clearance_m(flight)
-    reach_m = flight.mission.companion.estimate.reach_m
-    touch = touch_of(place, contact.velocity_ned_m_s, Normal(contact.normal_ned, contact.normal_error_rad), reach_m, 0)
-    return [
-        Surface(_touching_ned_m(flight, patch), patch.normal_ned, flight.mission.obstacles.margin_m)
-        for patch in flight.patches
-        if patch.faces(place, clearance_m) and not (touch is not None and is_same(patch, touch, clearance_m))
-    ]
+        (start_n, start_e, _), (end_n, end_e, end_d) = (minus(place, origin) for place in (contact_ned_m, goal_ned_m))
+        n, e = fence.nearest_inside(end_n, end_e)
+        if fence.contains(start_n, start_e):
+            n, e = fence.shortened((start_n, start_e), (end_n, end_e))
+        return plus((n, e, min(max(end_d, -fence.max_height_m), -fence.min_height_m)), 1.0, origin)
 
 
 def known_surfaces(flight: FlightContext) -> list[KnownSurface]:

@@ -8,12 +8,13 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
-from companion.messages import DebugVector, NamedValue, Severity, StatusText
+from companion.messages import DebugVector, NamedValue, Severity, StatusText, Vector3
 from companion.reflex.detection.detector import Phase
 from companion.reflex.detection.monitor import CollisionMonitor
 from companion.reflex.recovery.collision import CollisionRecord
-from companion.report import Event, JsonValue
+from companion.report import Event
 
 # Numbers for plots.
 _PHASE_NUMBER = {Phase.OFF: 0.0, Phase.QUIET: 1.0, Phase.ARMED: 2.0, Phase.CONTACT: 3.0}
@@ -72,12 +73,12 @@ _AS_THEY_STAND = dict.fromkeys(_WARNING, Severity.WARNING) | dict.fromkeys(_NOTI
 
 def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
     """The event in 50 characters or a little more, or None when it is not for the operator."""
-    data = event.data
+    data: Mapping[str, Any] = event.data
     match event.kind:
         case "armed":
             return StatusText(Severity.INFO, f"Mission {mission} begins")
         case "detection":
-            speed_m_s, force_m_s2 = _number(data, "impact_speed_m_s"), _number(data, "specific_force_m_s2")
+            speed_m_s, force_m_s2 = data["impact_speed_m_s"], data["specific_force_m_s2"]
             moving = speed_m_s >= _LEAST_SPEED_M_S
             towards = _direction(data["impact_velocity_ned_m_s" if moving else "normal_ned"])
             how = f"at {speed_m_s:.2f} m/s going {towards}" if moving else f"pushed {towards}"
@@ -85,8 +86,7 @@ def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
         case "recovered" if data.get("settled_after_s") is None:
             return StatusText(Severity.WARNING, "Not recovered in time, going on")
         case "recovered":
-            past_cm = 100.0 * _number(data, "overshoot_m")
-            settled_s = _number(data, "settled_after_s")
+            settled_s, past_cm = data["settled_after_s"], 100.0 * data["overshoot_m"]
             return StatusText(Severity.NOTICE, f"Recovered in {settled_s:.2f} s, {past_cm:.1f} cm too far")
         case "fault":
             return StatusText(Severity.ERROR, "Fault in the companion, vehicle handed over")
@@ -119,17 +119,9 @@ def values(
     return sent
 
 
-def _direction(vector: JsonValue) -> str:
-    """Of a NED vector, the nearest of eight points of the compass, or up or down."""
-    assert isinstance(vector, tuple)
-    north, east, down = vector
-    assert isinstance(north, float) and isinstance(east, float) and isinstance(down, float)
+def _direction(vector_ned: Vector3) -> str:
+    """The nearest of eight points of the compass, or up or down."""
+    north, east, down = vector_ned
     if abs(down) > math.hypot(north, east):
         return "down" if down > 0.0 else "up"
     return _COMPASS[round(math.atan2(east, north) / (math.tau / 8.0)) % 8]
-
-
-def _number(data: Mapping[str, JsonValue], key: str) -> float:
-    value = data[key]
-    assert isinstance(value, float | int)
-    return float(value)

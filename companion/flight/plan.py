@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.interface import Autopilot
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import ASSUMED, defaults
 from companion.fence import Fence
 from companion.flight.context import FlightContext, as_text
 from companion.flight.envelope import unattended_text
@@ -16,7 +16,7 @@ from companion.mission.policy import AbortWhen, OnCollision, OnDamage
 from companion.reflex.config import RecoveryConfig
 
 # The position gain asks for gamma * v_c of it backwards: above this gamma, for more than the impact speed.
-LARGE_GAMMA_S = round(1.0 / ASSUMED.defaults.position_gain_per_s, 2)
+LARGE_GAMMA_S = round(1.0 / defaults.POSITION_GAIN_PER_S, 2)
 
 
 def describe_item(action: items.Action) -> str:

@@ -42,7 +42,8 @@ class AttachedGuard:
     """
 
     def __init__(self, config: GuardConfig, system_id: int, now_us: int) -> None:
-        self.core = GuardCore(config, True, now_us)
+        self.core = GuardCore(config, True)
+        self.core.begin(now_us)
         self._source = (system_id, AUTOPILOT_COMPONENT_ID)
         self._encoder = Encoder()
         self._encoder.speak_to(*self._source)
@@ -91,10 +92,6 @@ class AttachedGuard:
             return True
         self.kept_out += 1
         return False
-
-    @property
-    def finished(self) -> bool:
-        return self.core.machine.finished
 
     def next_deadline_us(self) -> int:
         return self.core.next_deadline_us() if self._drained_us is None else self._drained_us

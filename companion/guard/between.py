@@ -5,15 +5,14 @@ All else passes unchanged and in the order of its sender. Packets of different s
 bytes come inside another's packet: an unfinished packet stays here, and so do bytes that begin none.
 """
 
-import struct
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import ASSUMED
 from companion.mavlink.decode import Decoder, checksum_holds
-from companion.mavlink.moves import SETPOINT_IDS, asked_by, interval_asked, would_move
-from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, has_signature, message_id_of, payload_of, source_of
+from companion.mavlink.moves import SETPOINT_IDS, asked_by, fields_of, interval_asked, would_move
+from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, message_id_of
 from companion.messages import Asked, SetMessageInterval
 
 # Of a client, still to be sent: a download of all parameters or a long mission is less.
@@ -25,14 +24,10 @@ BURST_S = 0.005
 LEAST_COST_BYTES = 64
 # The guard looks where a program's setpoint leads: at 2 m/s it moves on by 0.2 m in this time.
 TOLD_EVERY_US = 100_000
-# Senders with one number are two, and not one that has come back from another port, when both speak in this time.
-AT_ONCE_US = 1_000_000
 
 # Of the guard's own messages these are for people, who are behind it now.
 _FOR_PEOPLE = frozenset({250, 251, 253, 390})  # DEBUG_VECT, NAMED_VALUE_FLOAT, STATUSTEXT, ONBOARD_COMPUTER_STATUS
 _TIMESYNC = 111
-# When the vehicle answered, 0 in a question; and the stamp of the question.
-_TIMES = struct.Struct("<2q")
 # Questions of the guard's that may still be answered: one a second.
 _MOST_ASKED = 64
 
@@ -43,15 +38,14 @@ class _Client:
     waiting: deque[bytes] = field(default_factory=deque)
     waiting_bytes: int = 0
     is_flood_told: bool = False
-    is_signing_told: bool = False
     is_gone: bool = False
 
 
 class Between:
     """Clients are called by their addresses. Times are microseconds, any epoch."""
 
-    def __init__(self, bytes_per_s: float, signs: bool) -> None:
-        """`bytes_per_s`: what the link to the vehicle carries. `signs`: the guard has the vehicle's key."""
+    def __init__(self, bytes_per_s: float) -> None:
+        """`bytes_per_s`: what the link to the vehicle carries."""
         self.is_closed = True  # until the guard has met the vehicle
         self.awaits_choice = False  # setpoints are kept out until somebody asks for a mode
         self.autopilot = ASSUMED  # whose modes are told apart
@@ -59,10 +53,8 @@ class Between:
         self.intervals: list[SetMessageInterval] = []  # asked for by clients, and not yet told to the guard
         self._setpoint: Asked | None = None
         self._told_us = 0
-        self._rate, self._signs = bytes_per_s, signs
+        self._rate = bytes_per_s
         self._clients: dict[str, _Client] = {}
-        self._speakers: dict[tuple[int, int], tuple[str, int]] = {}  # client and time, by system and component
-        self._told: set[tuple[int, int]] = set()
         self._vehicle = Decoder({}, _is_whole)
         self._asked: deque[int] = deque(maxlen=_MOST_ASKED)
         self._news: deque[str] = deque()
@@ -77,7 +69,7 @@ class Between:
         """Whether there is something still to be sent to the vehicle."""
         return any(client.waiting for client in self._clients.values())
 
-    def hear(self, name: str, received: bytes, now_us: int) -> None:
+    def hear(self, name: str, received: bytes) -> None:
         """Bytes of a client's."""
         if name not in self._clients:
             self._clients[name] = _Client(Decoder({}, _is_whole))
@@ -91,7 +83,6 @@ class Between:
             if not isinstance(packet, Stray):
                 client.waiting.append(packet)
                 client.waiting_bytes += len(packet)
-                self._look_at(name, client, packet, now_us)
 
     def forget(self, name: str) -> None:
         """A client has gone; what it has said still goes."""
@@ -123,7 +114,7 @@ class Between:
         self._budget_bytes -= len(packet)
         message_id = message_id_of(packet)
         if message_id == _TIMESYNC:
-            self._asked.append(_times(packet)[1])
+            self._asked.append(fields_of(packet)["ts1"])
         return message_id in _FOR_PEOPLE
 
     def new_setpoint(self, now_us: int) -> Asked | None:
@@ -158,27 +149,13 @@ class Between:
             self.intervals.append(asked)
         return True
 
-    def _look_at(self, name: str, client: _Client, packet: bytes, now_us: int) -> None:
-        source = source_of(packet)
-        before, said_us = self._speakers.get(source, (name, now_us))
-        self._speakers[source] = name, now_us
-        if before != name and now_us - said_us < AT_ONCE_US and source not in self._told:
-            self._told.add(source)
-            text = f"{before} and {name} both speak as system {source[0]}, component {source[1]}"
-            self._news.append(f"{text}: each of them gets the answers to the other")
-        if has_signature(packet) != self._signs and not client.is_signing_told:
-            client.is_signing_told = True
-            if self._signs:
-                self._news.append(f"{name} does not sign what it sends: a vehicle that signs does not obey it")
-            else:
-                self._news.append(f"{name} signs, and the guard has no --signing-key: a vehicle may not obey the guard")
-
     def _is_answer_to_guard(self, packet: bytes) -> bool:
         """A program would take it for one to its own question, by another clock."""
         if isinstance(packet, Stray) or message_id_of(packet) != _TIMESYNC:
             return False
-        answered_ns, asked_ns = _times(packet)
-        return answered_ns != 0 and asked_ns in self._asked
+        times = fields_of(packet)
+        # A question says nothing of when it was answered.
+        return times["tc1"] != 0 and times["ts1"] in self._asked
 
 
 def datagrams(packets: Sequence[bytes], most_bytes: int) -> list[bytes]:
@@ -190,11 +167,6 @@ def datagrams(packets: Sequence[bytes], most_bytes: int) -> list[bytes]:
         else:
             grouped.append(packet)
     return grouped
-
-
-def _times(packet: bytes) -> tuple[int, int]:
-    answered_ns, asked_ns = _TIMES.unpack_from(payload_of(packet).ljust(_TIMES.size, b"\0"))
-    return answered_ns, asked_ns
 
 
 def _is_whole(data: bytes, start: int, length: int) -> bool:

@@ -2,18 +2,16 @@
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Protocol
 
-from companion.autopilot.known import ASSUMED
-from companion.flight.context import FlightContext, Inputs, Target
+from companion.autopilot.known import defaults
+from companion.flight.context import FlightContext
 from companion.guard.config import GuardConfig
-from companion.guard.descent import Descent
 from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks, Vector3
 from companion.motion.vector import minus
 
 # Setpoints are lost when there is none for so long.
-LONGEST_BETWEEN_S = ASSUMED.defaults.loss_us * 1e-6
+LONGEST_BETWEEN_S = defaults.LOSS_US * 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +35,14 @@ class GuardContext(FlightContext):
     previous_mode: int | None = None
     then_hold: str = ""
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
-    hits: int = 0  # since it was armed
     left_alone: int = 0  # hits told, and left to the program that flies
     others_setpoint_us: int | None = None  # when one was last seen on its way
     asked: Asked | None = None  # where it leads
     sticks: Sticks | None = None  # before the hit
     sticks_now: Sticks | None = None
     sticks_us: int | None = None  # when these were heard
-    descent: Descent = field(default_factory=Descent)
+    sinks_m_s: float = 0.0  # as its position control is asked for
+    sinks_us: int | None = None  # when that was heard
     # When, and to where; PX4 echoes no attitude.
     sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
 
@@ -59,25 +57,9 @@ class GuardContext(FlightContext):
             north, east, down = (part / since_s for part in minus(asked.place_ned_m, before.place_ned_m))
             self.asked = Asked(asked.place_ned_m, (north, east, down))
 
-    def note_unconfirmed(self) -> None:
-        FlightContext.note_unconfirmed(self)
-        self.hits -= 1
-
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""
         FlightContext.note_touchdown(self)
         latest, origin = self.vehicle.history.latest, self.origin_ned_m
         if latest is not None and origin is not None:
             self.origin_ned_m = (origin[0], origin[1], latest.position_ned_m[2])
-
-
-class GuardStateHandler(Protocol):
-    """A state's behaviour; one object is made each time the state is entered."""
-
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        """Do what is due now; returns a transition when the state is over."""
-        ...
-
-    def target(self, now_us: int) -> Target | None:
-        """The setpoint for now; None while none must be sent."""
-        ...

@@ -9,7 +9,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
-from companion.guard.watching import GuardConnect, observe, why_not
+from companion.guard.watching import GuardConnect, goes_down, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
@@ -20,12 +20,12 @@ from companion.reflex.reflex import start_reflex
 class GuardCore(Core[GuardContext, GuardMachine]):
     """`keeps_others_out`: see GuardContext."""
 
-    def __init__(self, config: GuardConfig, keeps_others_out: bool, now_us: int) -> None:
+    def __init__(self, config: GuardConfig, keeps_others_out: bool) -> None:
         mission = config.as_mission()
-        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, now_us)
+        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, 0)
         streams = StreamMonitor(config.companion.streams, tuple(reflex.monitor.detector.losses))
         guard = GuardContext(mission, Vehicle(), streams, reflex, config=config, keeps_others_out=keeps_others_out)
-        super().__init__(guard, GuardMachine(guard, GuardConnect(now_us)), now_us)
+        super().__init__(guard, GuardMachine(guard, GuardConnect()))
         self.is_enabled = False  # asked for, and not yet taken up
 
     @property
@@ -40,8 +40,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         """Ground, take-off and landing look like a hit. Whoever flies may go down, while the guard does not."""
         guard, state, holds = self.flight, self.machine.state, self.machine.holds
         off_state = None if state is State.WATCHING or state in HOLDING else why_not(guard) or state.value
-        goes_down = not holds and guard.descent.is_meant(guard.vehicle, self.now_us)
-        return situation_of(guard, off_state, goes_down, holds)
+        return situation_of(guard, off_state, not holds and goes_down(guard, self.now_us), holds)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         if self.flight.keeps_others_out:
@@ -52,8 +51,6 @@ class GuardCore(Core[GuardContext, GuardMachine]):
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         guard = self.flight
         sticks = [sample for sample in samples if isinstance(sample, Sticks)]
-        if sticks:
-            guard.sticks_now, guard.sticks_us = sticks[-1], now_us
         if sticks and self.machine.state not in HOLDING:
             guard.sticks = sticks[-1]
         elif sticks and guard.sticks is None:

@@ -2,51 +2,36 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any, ClassVar
+from typing import Any
 
 from companion.companion import Stepped
 from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
-from companion.guard.states import State
 from companion.guard.watching import GuardConnect, own_streams
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
-from companion.reflex.recovery.collision import CollisionReport
-from companion.report import RoundTripReport
 
 
 class Guard(Stepped[GuardCore]):
     """On a link of its own, or between the vehicle and its clients, whose packets pass it (see guard.between)."""
 
-    _first_state: ClassVar = State.CONNECTING.value
-
     def __init__(self, config: GuardConfig) -> None:
-        super().__init__(GUARD_READERS)
-        self._config = config
-
-    def _begun(self, now_us: int) -> GuardCore:
-        return GuardCore(self._config, bool(self._config.between), now_us)
-
-    @property
-    def holds(self) -> bool:
-        """Whether the vehicle flies by the guard's setpoints."""
-        return self._core is not None and self._core.machine.holds
+        super().__init__(GuardCore(config, bool(config.between)), GUARD_READERS)
 
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
-        if self._core is not None:
-            between.is_closed = self.holds
-            handler, vehicle = self._core.machine.handler, self._core.flight.vehicle
-            between.autopilot = vehicle.autopilot
-            begins = isinstance(handler, GuardConnect) and handler.begins
-            if vehicle.armed is False:
-                between.awaits_choice = False
-            elif begins and vehicle.landed is not LandedState.ON_GROUND:
-                # Whoever was behind a guard before a restart goes on, and nobody would notice a hit.
-                between.is_closed = True
-                if vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
-                    between.await_choice()
+        between.is_closed = self.core.machine.holds
+        handler, vehicle = self.core.machine.handler, self.core.flight.vehicle
+        between.autopilot = vehicle.autopilot
+        begins = isinstance(handler, GuardConnect) and handler.begins
+        if vehicle.armed is False:
+            between.awaits_choice = False
+        elif begins and vehicle.landed is not LandedState.ON_GROUND:
+            # Whoever was behind a guard before a restart goes on, and nobody would notice a hit.
+            between.is_closed = True
+            if vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
+                between.await_choice()
         if (setpoint := between.new_setpoint(now_us)) is not None:
             self.hear_setpoint(setpoint)
             yield "setpoint", asdict(setpoint)
@@ -57,35 +42,13 @@ class Guard(Stepped[GuardCore]):
 
     def hear_setpoint(self, asked: Asked) -> None:
         """A client's has been on its way since the last step."""
-        if self._core is not None:
-            self._core.flight.hear_setpoint(asked, self._core.now_us)
+        self.core.flight.hear_setpoint(asked, self.core.now_us)
 
     def hear_interval(self, asked: SetMessageInterval) -> None:
         """A client has asked the vehicle for a stream. What the guard needs more often it asks for again."""
-        if self._core is None:
-            return
-        flight = self._core.flight
+        flight = self.core.flight
         own = own_streams(flight.vehicle.autopilot)
         for request in (*[stream.request() for stream in flight.streams.streams], *own):
             is_enough = 0 < asked.interval_us <= request.interval_us
             if request.message_id == asked.message_id and not is_enough:
                 flight.outbox.append(SendCommand(request, 0))
-
-    @property
-    def outcome(self) -> str:
-        """Why it ended."""
-        return "" if self._core is None else self._core.machine.outcome
-
-    def collisions(self) -> tuple[CollisionReport, ...]:
-        return () if self._core is None else self._core.collisions()
-
-    def crashed(self) -> str:
-        """How, where the vehicle has; empty otherwise."""
-        return "" if self._core is None else self._core.flight.crashed
-
-    def left_alone(self) -> int:
-        """Hits that were told and left to the program that flies."""
-        return 0 if self._core is None else self._core.flight.left_alone
-
-    def round_trip(self) -> RoundTripReport:
-        return RoundTripReport() if self._core is None else self._core.flight.round_trip.report()

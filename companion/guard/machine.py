@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
@@ -10,12 +11,11 @@ from companion.flight.handlers.ending import LINK_RESTORED, Holder, Released, si
 from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.machine import StateMachine
 from companion.flight.states import State as FlightState
-from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
-from companion.guard.descent import THROTTLE
+from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.holding import GiveBack, GuardCrashed, Recovering, StandDown, TakeOver
 from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
-from companion.guard.watching import GuardConnect, StandBy, Watching
+from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down
 from companion.messages import Asked, Sticks
 from companion.motion.rotation import yaw_rad
 from companion.reflex.detection.detector import ImpactKind
@@ -46,6 +46,11 @@ _TO_HOLD = (
     Trigger.CROSSED,
 )
 
+# What is done in a state; one object is made each time the state is entered (see flight.machine).
+Handler: TypeAlias = (
+    GuardConnect | StandBy | Watching | TakeOver | Recovering | GiveBack | StandDown | GuardCrashed | Released
+)
+
 
 @dataclass
 class GuardMachine(StateMachine):
@@ -53,7 +58,7 @@ class GuardMachine(StateMachine):
 
     program = "guard"
     flight: GuardContext
-    handler: GuardStateHandler
+    handler: Handler
     state: State = State.CONNECTING
     outcome: str = ""  # why it ended
     judged: Asked | None = None  # the program's setpoint that was last looked at
@@ -70,7 +75,7 @@ class GuardMachine(StateMachine):
         before = self.handler
         self._take(self._from_outside(inputs, now_us), now_us)
         if self.state in MAY_CRASH:
-            meant = self.state not in HOLDING and self.flight.descent.is_meant(self.flight.vehicle, now_us)
+            meant = self.state not in HOLDING and goes_down(self.flight, now_us)
             if crashed(self.flight, meant, now_us) is not None:
                 self._take(GuardTransition(Trigger.CRASHED), now_us)
         for estimate in inputs.impacts:
@@ -81,8 +86,9 @@ class GuardMachine(StateMachine):
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
                 self.flight.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif TABLE.moves(self.state, Trigger.HIT):
-                self._remember_hit(now_us)
                 is_first = self.state is State.WATCHING
+                if is_first:
+                    self._remember_mode()
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
                 self._take(GuardTransition(Trigger.HIT), now_us)
@@ -122,11 +128,6 @@ class GuardMachine(StateMachine):
         guard.target = stop(guard)
         return GuardTransition(Trigger.LEADS_BACK, "taking over: the program's setpoints lead into what was hit")
 
-    def _remember_hit(self, now_us: int) -> None:
-        self.flight.hits += 1
-        if self.state is State.WATCHING:
-            self._remember_mode()
-
     def _remember_mode(self) -> None:
         guard = self.flight
         guard.previous_mode = guard.expected_mode = guard.vehicle.custom_mode
@@ -156,7 +157,7 @@ class GuardMachine(StateMachine):
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight
         report, expected = guard.vehicle.mode, guard.expected_mode
-        override = guard.vehicle.autopilot.defaults.stick_override
+        override = guard.vehicle.autopilot.stick_override
         if guard.sticks is not None and any(has_moved(guard.sticks, now, override) for now in inputs.sticks):
             return STICKS
         if report is None or expected is None:
@@ -200,7 +201,7 @@ class GuardMachine(StateMachine):
             guard.then_hold = transition.text or transition.trigger.value
         self.handler = self._begin(transition, now_us)
 
-    def _begin(self, transition: GuardTransition, now_us: int) -> GuardStateHandler:
+    def _begin(self, transition: GuardTransition, now_us: int) -> Handler:
         guard = self.flight
         if self.state not in HOLDING:
             guard.command_client.cancel()
@@ -209,7 +210,7 @@ class GuardMachine(StateMachine):
                 guard.collisions[-1].is_over = True
         match self.state:
             case State.CONNECTING:
-                return GuardConnect(now_us, is_first=False)
+                return GuardConnect(is_first=False)
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:
@@ -225,9 +226,9 @@ class GuardMachine(StateMachine):
                 assert isinstance(self.handler, TakeOver), "the table leads here from there alone"
                 return Recovering(self.handler.recover, now_us)
             case State.GIVING_BACK:
-                limit = guard.config.max_hits
-                if guard.hits >= limit and not guard.then_hold:
-                    guard.then_hold = f"hit {guard.hits} of at most {limit}"
+                limit, hits = guard.config.max_hits, len(guard.hits)
+                if hits >= limit and not guard.then_hold:
+                    guard.then_hold = f"hit {hits} of at most {limit}"
                 return GiveBack(guard, transition.trigger is Trigger.CROSSED, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)

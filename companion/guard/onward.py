@@ -32,7 +32,7 @@ def leads_into(guard: GuardContext, mode: int) -> str | None:
         return None
     contact = guard.collisions[-1].contact
     if autopilot.pilot(mode) is not Pilot.AUTOPILOT:
-        pushed = -along(_sticks_ned(guard), contact.normal_ned) > autopilot.defaults.stick_deadzone
+        pushed = -along(_sticks_ned(guard), contact.normal_ned) > autopilot.stick_deadzone
         return "the sticks push on into what was hit: release them" if pushed else None
     if -along(contact.velocity_ned_m_s, contact.normal_ned) < LEAST_SPEED_M_S:
         return None

@@ -2,20 +2,31 @@
 
 from collections.abc import Sequence
 
-from companion.autopilot.interface import Autopilot
+from companion.autopilot.interface import Autopilot, Pilot
 from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target
 from companion.flight.envelope import unattended_text
 from companion.flight.handlers.connecting import Meet
 from companion.flight.vehicle_update import update_vehicle
 from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
-from companion.messages import LandedState, MessageId, Sample, SetMessageInterval, VehicleCommand
+from companion.link.vehicle import OLD_NEWS_US
+from companion.messages import (
+    LandedState,
+    MessageId,
+    PositionTarget,
+    Sample,
+    SetMessageInterval,
+    Sticks,
+    VehicleCommand,
+)
+from companion.motion.config import SAME_M_S
 from companion.reflex.detection.detector import NO_POSITION, ON_THE_GROUND
 
 # Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
 ECHO_HZ = 50.0
 # The pilot is noticed within a twentieth of a second.
 STICKS_HZ = 20.0
+THROTTLE = 2
 # MAVSDK repeats its setpoint at 20 Hz, others at 2 Hz at least: after this somebody has stopped.
 OTHERS_STOPPED_US = 1_000_000
 # A vehicle that was restarted has forgotten what it was asked for; three of its heartbeats tell that it is up again.
@@ -37,10 +48,14 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
     frame is known, which is where its estimator began.
     """
     refusal = update_vehicle(guard, samples, now_us)
-    guard.descent.update(samples, now_us)
+    for sample in samples:
+        if isinstance(sample, PositionTarget):
+            guard.sinks_m_s, guard.sinks_us = sample.velocity_down_m_s or 0.0, now_us
+        elif isinstance(sample, Sticks):
+            guard.sticks_now, guard.sticks_us = sample, now_us
     latest = guard.vehicle.history.latest
     if guard.vehicle.armed is False:
-        guard.hits, guard.program_elsewhere = 0, False
+        guard.program_elsewhere = False
     # Not while the guard has the vehicle: one forged report would move the fence.
     stands = guard.vehicle.landed is LandedState.ON_GROUND and guard.expected_mode is None
     if guard.vehicle.armed is False or stands:
@@ -48,6 +63,22 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
     elif guard.origin_ned_m is None and latest is not None:
         guard.origin_ned_m = (latest.position_ned_m[0], latest.position_ned_m[1], 0.0)
     return refusal
+
+
+def goes_down(guard: GuardContext, now_us: int) -> bool:
+    """Whether the vehicle is meant to: by its mode, by what its position control is asked for, or by hand.
+
+    A pilot who flies by attitude or rates has the thrust in hand: what lets the vehicle down is meant. So it is where
+    the sticks ask for velocities, and nothing has ever told which.
+    """
+    vehicle, sticks, asked_us = guard.vehicle, guard.sticks_now, guard.sinks_us
+    if vehicle.landed is LandedState.LANDING or vehicle.descends or vehicle.pilot is Pilot.HAND:
+        return True
+    deadzone = vehicle.autopilot.stick_deadzone
+    sinks = asked_us is None if sticks is None else sticks.deflections[THROTTLE] < -deadzone
+    if vehicle.pilot is Pilot.STICKS and sinks:
+        return True
+    return asked_us is not None and now_us - asked_us < OLD_NEWS_US and guard.sinks_m_s > SAME_M_S
 
 
 def not_flying(guard: GuardContext) -> str | None:
@@ -77,8 +108,8 @@ class GuardConnect(Meet[GuardTransition]):
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
     """
 
-    def __init__(self, now_us: int, is_first: bool = True) -> None:
-        super().__init__(now_us)
+    def __init__(self, is_first: bool = True) -> None:
+        super().__init__()
         self._is_first = is_first
 
     @property

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, field
 
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import defaults
 from companion.messages import Refused
 
 # One broken packet is a matter for the count. For as long the last setpoint is flown on.
-LASTING_US = ASSUMED.defaults.loss_us
+LASTING_US = defaults.LOSS_US
 
 
 @dataclass(slots=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from companion import messages
 from companion.autopilot.interface import Autopilot, Pilot
-from companion.autopilot.known import ASSUMED, AUTOPILOTS, NAMES
+from companion.autopilot.known import ASSUMED, AUTOPILOTS, NAMES, defaults
 from companion.motion.history import MotionHistory
 
 # MAV_COMP_ID_AUTOPILOT1: gimbals, cameras and ground stations on the same link have other numbers.
@@ -65,7 +65,7 @@ class ModeReport:
 
 # After this silence the last reported mode is old: without setpoints the vehicle has left the mode that flies them. A
 # later setpoint would take the vehicle away from whoever has it then.
-OLD_NEWS_US = ASSUMED.defaults.loss_us
+OLD_NEWS_US = defaults.LOSS_US
 
 
 @dataclass(slots=True)

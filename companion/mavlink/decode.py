@@ -16,8 +16,10 @@ from companion.mavlink.packet import (
     MAGIC_V1,
     MAGIC_V2,
     Stray,
-    opened,
+    message_id_of,
     packet_length,
+    payload_of,
+    source_of,
 )
 from companion.mavlink.readers import ARDUPILOT_READERS, READERS, EkfStatusReport, Reader
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
@@ -85,13 +87,14 @@ class Decoder:
         return frames
 
     def _sample(self, packet: bytes) -> Sample | None:
-        message_id, source, payload = opened(packet)
+        message_id = message_id_of(packet)
         reader = self._readers.get(message_id)
         if reader is None:
             return None
+        source = source_of(packet)
         if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
             return None
-        sample = reader.from_payload(payload, source)
+        sample = reader.from_payload(payload_of(packet), source)
         if isinstance(sample, ImuSample):
             if message_id == dialect.MAVLINK_MSG_ID_HIGHRES_IMU:
                 self._has_highres_imu = True

@@ -26,14 +26,6 @@ def packet_length(data: bytes, start: int = 0) -> int:
     return 0
 
 
-def opened(packet: bytes) -> tuple[int, tuple[int, int], bytes]:
-    """Of a whole packet: message id, the system and component that sent it, and the payload."""
-    if packet[0] == MAGIC_V2:
-        message_id = packet[7] | packet[8] << 8 | packet[9] << 16
-        return message_id, (packet[5], packet[6]), packet[HEADER_V2 : HEADER_V2 + packet[1]]
-    return packet[5], (packet[3], packet[4]), packet[HEADER_V1 : HEADER_V1 + packet[1]]
-
-
 def source_of(packet: bytes) -> tuple[int, int]:
     """System and component that sent a whole packet."""
     return (packet[5], packet[6]) if packet[0] == MAGIC_V2 else (packet[3], packet[4])

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import ConfigDict, Field, model_validator
 
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import defaults
 from companion.mission.policy import OnCollision, OnTimeout
 from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel, with_bare_keys
 
@@ -84,13 +84,6 @@ class ExpectHeight(StrictModel):
         return self
 
 
-class ExpectSpeed(StrictModel):
-    """The vehicle's speed now."""
-
-    max_m_s: Positive
-    """At most."""
-
-
 class ExpectFlightTime(StrictModel):
     """Time since arming, now."""
 
@@ -99,14 +92,7 @@ class ExpectFlightTime(StrictModel):
 
 
 Check: TypeAlias = (
-    ExpectHit
-    | ExpectNoHit
-    | ExpectHits
-    | ExpectRecovered
-    | ExpectPosition
-    | ExpectHeight
-    | ExpectSpeed
-    | ExpectFlightTime
+    ExpectHit | ExpectNoHit | ExpectHits | ExpectRecovered | ExpectPosition | ExpectHeight | ExpectFlightTime
 )
 
 
@@ -121,7 +107,6 @@ class ExpectItem(StrictModel):
     recovered: ExpectRecovered | None = None
     position: ExpectPosition | None = None
     height: ExpectHeight | None = None
-    speed: ExpectSpeed | None = None
     flight_time: ExpectFlightTime | None = None
 
     @model_validator(mode="before")
@@ -143,11 +128,11 @@ class ExpectItem(StrictModel):
 
 
 # PX4 flies no faster: a larger wish is a slip of the pen.
-MAX_SPEED_M_S = ASSUMED.defaults.max_speed_m_s
+MAX_SPEED_M_S = defaults.MAX_SPEED_M_S
 # One g sideways is a tilt of 45 degrees, PX4's default limit.
 MAX_ACCELERATION_M_S2 = 9.81
 # Nor does it turn faster.
-MAX_YAW_RATE_DEG_S = ASSUMED.defaults.max_yaw_rate_deg_s
+MAX_YAW_RATE_DEG_S = defaults.MAX_YAW_RATE_DEG_S
 
 Speed = Annotated[Positive, Field(le=MAX_SPEED_M_S)]
 Acceleration = Annotated[Positive, Field(le=MAX_ACCELERATION_M_S2)]

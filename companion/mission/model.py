@@ -10,7 +10,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import defaults
 from companion.fence import Fence
 from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
@@ -98,7 +98,7 @@ _MOST_LOOKS = 20_000
 # A point on the boundary, computed, may lie outside by a rounding error.
 _ROUNDING_M = 1e-6
 # The second and two that it takes to be sure and to disarm come on top.
-LANDING_SPEED_M_S = ASSUMED.defaults.landing_m_s
+LANDING_SPEED_M_S = defaults.LANDING_M_S
 LANDING_EXTRA_S = 3.0
 
 

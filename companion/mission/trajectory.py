@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -20,27 +20,6 @@ Motion: TypeAlias = tuple[Vector3, Vector3, Vector3]
 # On a curve the acceleration is shared: 0.8 of the limit turns, 0.6 changes the speed; 0.8^2 + 0.6^2 = 1.
 TURNING_SHARE = 0.8
 SPEEDING_SHARE = 0.6
-
-
-class Trajectory(Protocol):
-    """Where to be when. Starts and ends at rest."""
-
-    @property
-    def duration_s(self) -> float: ...
-
-    @property
-    def distance_m(self) -> float:
-        """Length of the way."""
-        ...
-
-    @property
-    def target_m(self) -> Vector3:
-        """Where it ends."""
-        ...
-
-    def at(self, elapsed_s: float) -> Motion:
-        """Before the start at rest there, after the end at rest at the target."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -172,7 +151,7 @@ class CircleProfile:
 class Chain:
     """One trajectory after the other; each begins where the one before it ends."""
 
-    parts: Sequence[Trajectory]
+    parts: Sequence["Trajectory"]
 
     @cached_property
     def distance_m(self) -> float:
@@ -278,6 +257,11 @@ class CurveProfile:
         velocity = tangent * speed[:, None]
         acceleration = tangent * change[:, None] + bend * speed[:, None] ** 2
         self._table = list(zip(_tuples(spline(place)), _tuples(velocity), _tuples(acceleration), strict=True))
+
+
+# Where to be when, from rest to rest: how long the way is, how long it takes, where it ends, and the motion at a time.
+# Before the start that is at rest there, after the end at rest at the target.
+Trajectory: TypeAlias = LineProfile | CircleProfile | Chain | CurveProfile
 
 
 class _Spline:

@@ -9,7 +9,6 @@ import threading
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Any, Self
 
 from companion.guard.attached import AttachedGuard, AttachedStep
@@ -90,7 +89,7 @@ class CollisionGuard:
         with self._changed:
             self._guard.core.stop_reason = "stopped by the program"
             self._changed.notify_all()
-            self._changed.wait_for(lambda: self._guard.finished or self._is_over, GIVING_BACK_US * 1e-6)
+            self._changed.wait_for(lambda: self._guard.core.machine.finished or self._is_over, GIVING_BACK_US * 1e-6)
             self._is_over = True
             self._changed.notify_all()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
@@ -152,18 +151,14 @@ class CollisionGuard:
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     async def __aenter__(self) -> Self:
         await asyncio.get_running_loop().run_in_executor(None, self.start)
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await asyncio.get_running_loop().run_in_executor(None, self.stop)
 
     def _incoming(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
@@ -242,7 +237,7 @@ class CollisionGuard:
 
     def _end_after_a_fault(self) -> None:
         until_us = self._faulty_until_us
-        if until_us is not None and (self._guard.finished or self._clock.now_us() >= until_us):
+        if until_us is not None and (self._guard.core.machine.finished or self._clock.now_us() >= until_us):
             # From here on the program's own setpoints pass.
             self._is_over = True
             self._changed.notify_all()

@@ -268,13 +268,12 @@ class Loop:
 
 def fly_realtime(companion: Companion, loop: Loop, confirmation: ConfirmAtOnce | AskPerson) -> None:
     """Run the companion's loop until it has finished; after the first interrupt it finishes by itself."""
-    recorder, started_us = loop.recorder, loop.clock.now_us()
+    recorder = loop.recorder
 
     def beside(now_us: int, result: StepResult) -> None:
         if result.events:
             recorder.record_obstacles(companion.obstacles())
-            began_us = started_us if companion.core is None else companion.core.started_at_us
-            loop.console.events(result.events, began_us)
+            loop.console.events(result.events, companion.core.started_at_us)
         confirmation.poll(companion)
         look_for_file(companion, recorder, now_us)
         recorder.record_confirmation(now_us, companion.plan_is_confirmed)

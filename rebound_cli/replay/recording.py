@@ -19,7 +19,6 @@ from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.messages import Asked, ComputerStatus, SetMessageInterval, Vector3
 from companion.mission.model import Mission
-from companion.reflex.detection.detector import Situation
 from companion.reflex.detection.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
 from rebound_cli.inputs.documents import load_document, validated
@@ -149,9 +148,8 @@ class Followed:
     def step(self, stepped: Companion | Guard, received: bytes, now_us: int) -> StepResult:
         """The companion's own."""
         # What the flight knew when the packets came; they may move it on.
-        known = Situation(off_reason="connect") if stepped.core is None else stepped.core.situation()
+        known = stepped.core.situation()
         result = stepped.step(received, now_us)
-        assert stepped.core is not None, "the first step begins it"
         monitor = stepped.core.reflex.monitor
         if monitor is not self._watch:
             self.findings.listener.listen(monitor)

@@ -9,7 +9,7 @@ from companion.core import POLL_INTERVAL_US
 from companion.flight.vehicle_update import note_height, situation_of
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
-from companion.guard.watching import not_flying, observe, why_not
+from companion.guard.watching import goes_down, not_flying, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.mission.config import CompanionConfig
@@ -68,8 +68,7 @@ class Circumstances:
     def situation(self) -> Situation:
         """Now."""
         guard = self._guard
-        goes_down = guard.descent.is_meant(guard.vehicle, self._now_us)
-        return situation_of(guard, self._why_not(guard), goes_down, is_held=False)
+        return situation_of(guard, self._why_not(guard), goes_down(guard, self._now_us), is_held=False)
 
 
 @dataclass(slots=True)

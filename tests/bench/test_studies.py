@@ -51,7 +51,6 @@ def test_every_group_has_rows_and_there_are_as_many_as_promised() -> None:
 )
 def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong: str | None) -> None:
     core = flying_in("mission").companion.core
-    assert core is not None
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
 
 

@@ -28,7 +28,7 @@ class Bench:
         self.vehicle.settimeout(2.0)
         self.ports = [free_port(socket.SOCK_STREAM if "tcp" in scheme else socket.SOCK_DGRAM) for scheme in schemes]
         urls = [f"{scheme}://{LOOPBACK}:{port}" for scheme, port in zip(schemes, self.ports, strict=True)]
-        self.between = Between(carried_bytes_s("udpout://127.0.0.1:1"), signs=False)
+        self.between = Between(carried_bytes_s("udpout://127.0.0.1:1"))
         self._ends: list[socket.socket] = [self.vehicle]
         remote = udp_out(LOOPBACK, self.vehicle.getsockname()[1])
         self.shared = SharedConnection(remote, urls, self.between)
@@ -173,7 +173,7 @@ def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
 def test_an_address_that_is_none_for_clients_is_one_sentence(url, says):
     vehicle = udp_out(LOOPBACK, 1)
     with pytest.raises(AddressError, match=says.replace("?", "[?]")):
-        SharedConnection(vehicle, [url], Between(1.0, signs=False))
+        SharedConnection(vehicle, [url], Between(1.0))
 
 
 def test_what_a_serial_line_carries_follows_from_its_baud_rate():

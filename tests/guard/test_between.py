@@ -16,7 +16,6 @@ from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS, would_move
 from companion.mavlink.packet import message_id_of, packet_length
-from companion.mavlink.signing import Signing
 from tests.guard.flying import BetweenFlight
 
 TOO_LATE_S = 0.15
@@ -47,7 +46,7 @@ def hit(flies: Callable[[BetweenFlight], None], parameters: dict[str, float] | N
     air = BetweenFlight(GuardConfig(**changes), parameters)
     air.take_off()
     flies(air)
-    air.run_until(lambda: air.guard.holds, 20.0)
+    air.run_until(lambda: air.guard.core.machine.holds, 20.0)
     return air
 
 
@@ -249,7 +248,7 @@ def test_the_vehicles_questions_of_the_time_are_the_programs_to_answer_and_the_g
     assert sent and all(message.tc1 == 0 for message in sent), "the guard asks, and does not answer"
     assert {message.ts1 for message in heard if message.tc1} == {theirs}
     assert any(message.tc1 == 0 for message in heard)
-    assert air.guard.round_trip().median_us is not None
+    assert air.guard.core.flight.round_trip.median_us is not None
 
 
 # --- the table
@@ -327,7 +326,7 @@ def test_packets_of_every_message_pass_both_ways_byte_by_byte_in_each_senders_or
     # Given two clients and a vehicle, each with its own packets, cut anywhere
     chance = random.Random(1)
     said = {name: [random_packet(chance) for _ in range(10_000)] for name in ("a", "b", "vehicle")}
-    between, now_us = Between(LINK_BYTES_S, signs=False), 0
+    between, now_us = Between(LINK_BYTES_S), 0
     between.is_closed = False
     passed, heard = list[bytes](), list[bytes]()
     cut = {name: iter(pieces(b"".join(packets), chance)) for name, packets in said.items()}
@@ -341,7 +340,7 @@ def test_packets_of_every_message_pass_both_ways_byte_by_byte_in_each_senders_or
             elif name == "vehicle":
                 heard += between.to_clients(piece)
             else:
-                between.hear(name, piece, now_us)
+                between.hear(name, piece)
         passed += between.to_vehicle(now_us)
     # Then every byte is there, and a packet is never begun before another is at its end
     assert heard == said["vehicle"]
@@ -360,13 +359,13 @@ def test_packets_of_every_message_pass_both_ways_byte_by_byte_in_each_senders_or
 
 def test_hostile_bytes_break_nothing_and_no_setpoint_passes_while_it_is_closed():
     chance = random.Random(3)
-    between = Between(LINK_BYTES_S, signs=False)
+    between = Between(LINK_BYTES_S)
     for number in range(5_000):
         packet = bytearray(random_packet(chance))
         if chance.random() < 0.5:
             packet[chance.randrange(len(packet))] ^= 1 << chance.randrange(8)
         cut = bytes(packet[: chance.randrange(1, len(packet) + 1)]) if chance.random() < 0.2 else bytes(packet)
-        between.hear("hostile", cut, 2_000 * number)
+        between.hear("hostile", cut)
         between.to_clients(cut)
         for passed in between.to_vehicle(2_000 * number):
             assert packet_length(passed) == len(passed), "whole, as PX4 frames it"
@@ -379,15 +378,15 @@ def test_hostile_bytes_break_nothing_and_no_setpoint_passes_while_it_is_closed()
 
 def test_a_client_that_floods_takes_no_turn_from_another_and_is_named():
     # Given a UART of 921,600 baud, and a client that sends a hundred times as much
-    between, flood = Between(92_160, signs=False), long(400, 1) * 30
+    between, flood = Between(92_160), long(400, 1) * 30
     between.is_closed = False
     quiet = packet_of(ANY_STICKS, (1, 191))
     passed, waited_us, said_us = list[bytes](), list[int](), 0
     for now_us in range(0, 3_000_000, 1_000):
         for _ in range(8):
-            between.hear("flood", flood, now_us)
+            between.hear("flood", flood)
         if now_us % 50_000 == 0:
-            between.hear("quiet", quiet, now_us)
+            between.hear("quiet", quiet)
             said_us = now_us
         going = between.to_vehicle(now_us)
         if quiet in going:
@@ -402,29 +401,3 @@ def test_a_client_that_floods_takes_no_turn_from_another_and_is_named():
     for now_us in range(3_000_000, 5_000_000, 1_000):
         between.to_vehicle(now_us)
     assert not between.waits and between.has_room("flood")
-
-
-def test_two_clients_that_speak_as_one_are_told_of_once_and_one_that_comes_back_is_not():
-    between, packet = Between(LINK_BYTES_S, signs=False), packet_of(ANY_STICKS)
-    between.hear("a", packet, 0)
-    between.hear("b", packet, 2_000_000)
-    assert between.news() is None
-    between.hear("a", packet, 2_100_000)
-    between.hear("b", packet, 2_200_000)
-    assert (
-        between.news() == "b and a both speak as system 255, component 190: each of them gets the answers to the other"
-    )
-    assert between.news() is None
-
-
-@pytest.mark.parametrize(("signs", "says"), [(True, "does not sign"), (False, "has no --signing-key")])
-def test_a_client_that_signs_alone_and_one_that_does_not_are_told_of(signs, says):
-    between, plain = Between(LINK_BYTES_S, signs), packet_of(ANY_STICKS)
-    signed = Signing(b"k" * 32, 1).signed(plain, 0)
-    for time_us in range(0, 6_000_000, 2_000_000):
-        between.hear("a", plain if signs else signed, time_us)
-        between.hear("b", signed if signs else plain, time_us + 1_000_000)
-    news = between.news()
-    assert news is not None and news.startswith("a ") and says in news
-    assert between.news() is None
-    assert len(between.to_vehicle(6_000_000)) == 6, "they pass all the same"

@@ -4,10 +4,12 @@ import pytest
 
 from companion.autopilot.px4.firmware import PX4
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
-from companion.guard.descent import Descent
+from companion.guard.config import GuardConfig
+from companion.guard.core import GuardCore
 from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.link.vehicle import ModeReport, Vehicle
+from companion.guard.watching import goes_down, observe
+from companion.link.vehicle import ModeReport
 from companion.messages import LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
 
@@ -49,7 +51,7 @@ def test_a_hit_is_answered_where_the_guard_watches_and_never_takes_the_vehicle_b
     ],
 )
 def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
-    assert has_moved(Sticks(before), Sticks(now), PX4.defaults.stick_override) is counts
+    assert has_moved(Sticks(before), Sticks(now), PX4.stick_override) is counts
 
 
 SECOND = 1_000_000
@@ -57,10 +59,11 @@ ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 
 
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
-    descent = Descent()
-    descent.update(samples, 0)
-    vehicle = Vehicle(mode=ModeReport(mode, None, False), pilot=PX4.pilot(mode), landed=landed)
-    return descent.is_meant(vehicle, now_us)
+    guard = GuardCore(GuardConfig(), keeps_others_out=False).flight
+    guard.vehicle.mode, guard.vehicle.landed = ModeReport(mode, None, False), landed
+    guard.vehicle.pilot = PX4.pilot(mode)
+    observe(guard, samples, 0)
+    return goes_down(guard, now_us)
 
 
 def down(speed_m_s):
@@ -85,8 +88,8 @@ def throttle(deflection):
         (POSCTL, (down(None),), False),
         (AUTO_LOITER, (down(2.0), down(0.0)), False),
         # A throttle below its middle, where sticks ask for velocities
-        (POSCTL, (throttle(-1.5 * PX4.defaults.stick_deadzone),), True),
-        (ALTCTL, (throttle(-0.9 * PX4.defaults.stick_deadzone),), False),
+        (POSCTL, (throttle(-1.5 * PX4.stick_deadzone),), True),
+        (ALTCTL, (throttle(-0.9 * PX4.stick_deadzone),), False),
         (AUTO_LOITER, (throttle(-1.0),), False),
     ],
 )

@@ -69,8 +69,7 @@ class Pilot:
         if self._next == self._vigorous:
             self._tilts_deg.append(flight.tilt_deg)
         for guard in self._guards:
-            if guard.core is not None:
-                guard.core.flight.program_elsewhere = True  # a hit is reported, and nobody takes the vehicle over
+            guard.core.flight.program_elsewhere = True  # a hit is reported, and nobody takes the vehicle over
         return self._next()
 
     def _idle(self) -> Sticks:

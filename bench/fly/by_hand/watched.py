@@ -125,10 +125,7 @@ class GuardedFlight(Stepped):
             self.hardest_m_s2, self.hardest_us = force_m_s2, now_us
 
     def _note_impact(self, watcher: Watcher) -> None:
-        core = watcher.program.core
-        if core is None:
-            return
-        monitor = core.reflex.monitor
+        monitor = watcher.program.core.reflex.monitor
         if monitor.state.phase is not Phase.OFF:
             watcher.watched_s += 1e-6 * self.vehicle.interval_us
         estimate = monitor.estimator.estimate

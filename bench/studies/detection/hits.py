@@ -47,7 +47,7 @@ def work_out_flown(case: HitCase) -> Json:
     began_s = process_time()
     vehicle, guard, rest_us = fly(case)
     processor_s = round(process_time() - began_s, 4)
-    return {"processor_s": processor_s, **judged(vehicle, guard.collisions(), rest_us)}
+    return {"processor_s": processor_s, **judged(vehicle, guard.core.collisions(), rest_us)}
 
 
 def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:

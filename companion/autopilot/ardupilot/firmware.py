@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.ardupilot import modes, setup
-from companion.autopilot.interface import Autopilot, Defaults, LastWords, Remedies, Wire
+from companion.autopilot.interface import Autopilot, LastWords, Remedies, Wire
 from companion.messages import MessageId, SetAuxFunction, SetMessageInterval, VehicleCommand
 
 # RC_Channel.h: while FORCEFLYING is high, neither the crash check nor the land detector stops the motors. A recovery
@@ -26,11 +26,9 @@ ARDUPILOT = Autopilot(
     land=modes.LAND,
     sticks=modes.LOITER,
     descents=frozenset({modes.LAND}),
-    mode_names=modes.MODE_NAMES,
-    guarded_modes=modes.GUARDED,
-    mode_name=modes.mode_name,
-    pilot=modes.pilot,
-    set_mode=modes.set_mode,
+    modes=modes.MODES,
+    mode_mask=-1,
+    mode_parameters=lambda mode: (mode, 0),
     # All three rates or none: with one that is left out alone Copter stops where it is.
     wire=Wire(casts_whole_numbers=True, attitude_mask=0),
     least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
@@ -67,14 +65,6 @@ ARDUPILOT = Autopilot(
         no_estimator="look at EKF in Mission Planner",
     ),
     loss_text=setup.loss_text,
-    defaults=Defaults(
-        loss_us=3_000_000,  # GUID_TIMEOUT
-        position_gain_per_s=1.0,  # PSC_NE_POS_P
-        max_speed_m_s=10.0,  # WP_SPD
-        max_yaw_rate_deg_s=202.5,  # PILOT_Y_RATE
-        turning_deg_s=60.0,  # ATC_RATE_WPY_MAX
-        landing_m_s=0.5,  # LAND_SPD_MS
-        stick_deadzone=0.2,  # THR_DZ, of 500 from the middle
-        stick_override=math.inf,  # sticks end no mode
-    ),
+    stick_deadzone=0.2,  # THR_DZ, of 500 from the middle
+    stick_override=math.inf,  # sticks end no mode
 )

@@ -9,9 +9,9 @@ from companion.autopilot.setup import (
     PreflightItem,
     SerialLine,
     Setup,
-    Sight,
     Verdict,
     judged,
+    judged_loss,
     judged_settings,
 )
 
@@ -79,9 +79,7 @@ def _port(setup: Setup) -> Iterator[PreflightItem]:
 
 def _timeout(name: str, timeout_s: float, setup: Setup) -> PreflightItem:
     found = f"{timeout_s:g} s until Copter levels out, or stops, when the companion has died"
-    held_s = setup.most_held_s
-    case = (round(timeout_s, 3) > held_s, DOUBTFUL, f"{name} = {held_s:g}, or recoveries are flown by position alone")
-    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {held_s:g} s")
+    return judged_loss(name, timeout_s, setup, found)
 
 
 def _options(name: str, bits: float, setup: Setup) -> PreflightItem:
@@ -177,13 +175,13 @@ def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
         yield from judged_settings({YAW: _yaw}, setup)
 
 
-def sight(seen: Sight) -> PreflightItem:
+def sight(setup: Setup) -> PreflightItem:
     """A filtered pulse is 18 ms wide: no hit falls between two samples."""
-    edge_hz = float(seen.parameters.get(FILTER) or LEAST_FILTER_HZ)
-    slowest_m_s = seen.threshold_m_s2 / (PULSE_PER_M_S_HZ * edge_hz)
+    edge_hz = float(setup.parameters.get(FILTER) or LEAST_FILTER_HZ)
+    slowest_m_s = setup.threshold_m_s2 / (PULSE_PER_M_S_HZ * edge_hz)
     remedy = "a faster HIGHRES_IMU (see above): a pulse is 18 ms wide, and shows in two samples from 100 Hz on"
-    found = f"from {slowest_m_s:.2f} m/s on through a filter of {edge_hz:g} Hz; {seen.false_alarms}"
-    return judged("smallest hit", found, (seen.rate_hz < 100.0, DOUBTFUL, remedy))
+    found = f"from {slowest_m_s:.2f} m/s on through a filter of {edge_hz:g} Hz; {setup.false_alarms}"
+    return judged("smallest hit", found, (setup.imu_hz < 100.0, DOUBTFUL, remedy))
 
 
 def attitude_held_s(told: Mapping[str, int | float]) -> float:

@@ -1,6 +1,6 @@
 """PX4 behind the interface of autopilots."""
 
-from companion.autopilot.interface import Autopilot, Defaults, LastWords, Remedies, Wire
+from companion.autopilot.interface import Autopilot, LastWords, Remedies, Wire
 from companion.autopilot.px4 import modes, setup
 from companion.messages import MessageId, RunChecks, VehicleCommand
 
@@ -25,11 +25,9 @@ PX4 = Autopilot(
     land=modes.AUTO_LAND,
     sticks=modes.POSCTL,
     descents=frozenset({modes.AUTO_LAND, modes.AUTO_PRECLAND}),
-    mode_names=modes.MODE_NAMES,
-    guarded_modes=modes.GUARDED,
-    mode_name=modes.mode_name,
-    pilot=modes.pilot,
-    set_mode=modes.set_mode,
+    modes=modes.MODES,
+    mode_mask=modes.MAIN,
+    mode_parameters=modes.parts,
     wire=Wire(casts_whole_numbers=False, attitude_mask=_IGNORE_ROLL_AND_PITCH_RATE),
     least_version=(0, 0, 0),
     streams=(),
@@ -58,14 +56,6 @@ PX4 = Autopilot(
         no_estimator="look at EKF2 in QGroundControl",
     ),
     loss_text=setup.loss_text,
-    defaults=Defaults(
-        loss_us=1_000_000,  # COM_OF_LOSS_T
-        position_gain_per_s=0.95,  # MPC_XY_P
-        max_speed_m_s=12.0,  # MPC_XY_VEL_MAX
-        max_yaw_rate_deg_s=200.0,  # MC_YAWRATE_MAX
-        turning_deg_s=45.0,  # MPC_YAWRAUTO_MAX
-        landing_m_s=0.7,  # MPC_LAND_SPEED
-        stick_deadzone=0.1,  # MPC_HOLD_DZ
-        stick_override=0.3,  # COM_RC_STICK_OV
-    ),
+    stick_deadzone=0.1,  # MPC_HOLD_DZ
+    stick_override=0.3,  # COM_RC_STICK_OV
 )

@@ -9,9 +9,9 @@ from companion.autopilot.setup import (
     PreflightItem,
     SerialLine,
     Setup,
-    Sight,
     Verdict,
     judged,
+    judged_loss,
     judged_settings,
 )
 from companion.motion.config import GRAVITY_M_S2
@@ -122,11 +122,8 @@ def _integration(name: str, rate_hz: float, setup: Setup) -> PreflightItem:
 
 def _offboard_loss_time(name: str, loss_s: float, setup: Setup) -> PreflightItem:
     found = f"{loss_s:g} s until PX4 acts when the companion has died"
-    held_s = setup.most_held_s
-    slow = "a program that streams at less than 4 Hz then loses OFFBOARD"
-    remedy = f"{name} = {held_s:g}, or recoveries are flown by position alone; {slow}"
-    case = (round(loss_s, 3) > held_s, DOUBTFUL, remedy)
-    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {held_s:g} s")
+    cost = "; a program that streams at less than 4 Hz then loses OFFBOARD"
+    return judged_loss(name, loss_s, setup, found, cost)
 
 
 def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
@@ -199,14 +196,14 @@ def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
     return judged_settings(_SETTINGS, setup)
 
 
-def sight(seen: Sight) -> PreflightItem:
+def sight(setup: Setup) -> PreflightItem:
     """By force alone and in the quiet of standing: a flight's vibration is `rebound tune`'s to judge."""
-    integ_hz = seen.parameters.get(INTEGRATION) or 1.0 / seen.imu_averaging_interval_s
-    share = min(1.0, seen.rate_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
-    folding = f"arms that fold: from {seen.threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
+    integ_hz = setup.parameters.get(INTEGRATION) or 1.0 / setup.imu_averaging_interval_s
+    share = min(1.0, setup.imu_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
+    folding = f"arms that fold: from {setup.threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
     stiff = f"stiff frames: {100 * share:.0f} % of 1 ms contacts fall into a sample"
     remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
-    return judged("smallest hit", f"{folding}; {stiff}; {seen.false_alarms}", (share <= 0.9, DOUBTFUL, remedy))
+    return judged("smallest hit", f"{folding}; {stiff}; {setup.false_alarms}", (share <= 0.9, DOUBTFUL, remedy))
 
 
 def loss_text(parameters: Mapping[str, int | float]) -> str:

@@ -17,8 +17,8 @@ MoveT = TypeVar("MoveT")
 class Meet(NoSetpoint, ABC, Generic[MoveT]):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
 
-    def __init__(self, now_us: int) -> None:
-        self._started_us = now_us
+    def __init__(self) -> None:
+        self._started_us: int | None = None
         self._requests: Iterator[VehicleCommand] | None = None
         self._asked: VehicleCommand | None = None  # last
         self._measuring_since_us: int | None = None
@@ -41,6 +41,7 @@ class Meet(NoSetpoint, ABC, Generic[MoveT]):
         identity, companion = flight.vehicle.identity, flight.mission.companion
         if identity is None:
             wait_s = companion.link.heartbeat_wait_s
+            self._started_us = now_us if self._started_us is None else self._started_us
             if self._is_told or now_us - self._started_us < wait_s * 1e6:
                 return None
             text = f"no HEARTBEAT from an autopilot within {wait_s:g} s"

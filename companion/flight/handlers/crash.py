@@ -15,7 +15,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
     watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest, flight.vehicle.attitude
     if latest is None or attitude is None or not flight.vehicle.armed:
         return None
-    hits = flight.reflex.hits[flight.motors.earlier_hits :]
+    hits = flight.hits
     has_unsettled = bool(hits) and hits[-1].settled_after_s is None
     if watch.is_tipped:
         how = "tipped over"

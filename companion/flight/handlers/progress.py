@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import defaults
 from companion.flight import expectations
 from companion.flight.context import FlightContext, Inputs, StepTally, Target, Transition
 from companion.flight.obstacle_map import surroundings
@@ -230,7 +230,7 @@ class HoldAfterRecovery:
 
 
 # As the autopilot's own modes turn: the vehicle can follow.
-YAW_RATE_RAD_S = math.radians(ASSUMED.defaults.turning_deg_s)
+YAW_RATE_RAD_S = math.radians(defaults.TURNING_DEG_S)
 # Slower, or nearer, than this there is no direction that noise in the last digits could not have made.
 _LEAST_SPEED_M_S = 0.05
 _LEAST_DISTANCE_M = 0.05

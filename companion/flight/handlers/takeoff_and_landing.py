@@ -2,8 +2,10 @@
 
 import math
 
-from companion.flight.context import FlightContext, Inputs, StateHandler, Target, Transition, as_text
+from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
+from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
+from companion.memory.patch import mean_of
 from companion.messages import SetArmed, Vector3
 from companion.messages import TakeOff as TakeOffCommand
 from companion.mission.items import TakeoffItem
@@ -147,8 +149,7 @@ def mean_position(flight: FlightContext) -> Vector3:
     latest = flight.vehicle.history.latest
     assert latest is not None, "a flight begins only with positions arriving"
     samples = flight.vehicle.history.between(latest.time_boot_us - ORIGIN_MEAN_US, latest.time_boot_us + 1)
-    n, e, d = (sum(s.position_ned_m[axis] for s in samples) / len(samples) for axis in range(3))
-    return (n, e, d)
+    return mean_of([sample.position_ned_m for sample in samples])
 
 
 # From 12 m at PX4's 0.7 m/s it takes under 30 s with detection and disarming. This allows for its
@@ -198,7 +199,7 @@ class TakeBack:
     A vehicle that does not take the mode goes on landing by itself, and is left to it.
     """
 
-    def __init__(self, flight: FlightContext, recovery: StateHandler, now_us: int) -> None:
+    def __init__(self, flight: FlightContext, recovery: Recover, now_us: int) -> None:
         self._recovery = recovery
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.

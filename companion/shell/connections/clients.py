@@ -8,7 +8,7 @@ import socket
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any
 
 from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
@@ -33,22 +33,8 @@ BITS_A_BYTE, NETWORK_BYTES_S = 10, 2_000_000
 LOOK_S, TURN_S = 0.02, 0.001
 
 
-class Port(Protocol):
-    """An address of --between and whoever is there."""
-
-    def sources(self) -> list[socket.socket]:
-        """What may be read."""
-
-    def receive(self, now_us: int) -> None:
-        """Hand over what has come."""
-
-    def send(self, packets: Sequence[bytes]) -> None: ...
-
-    def close(self) -> None: ...
-
-
 class UdpPort:
-    """Whoever sends there, or for udpout the one host that is sent to first."""
+    """An address of --between: whoever sends there, or for udpout the one host that is sent to first."""
 
     def __init__(self, opened: socket.socket, remote: Any, between: Between) -> None:
         opened.setblocking(False)
@@ -57,9 +43,11 @@ class UdpPort:
         self._is_full = False
 
     def sources(self) -> list[socket.socket]:
+        """What may be read."""
         return [self._socket]
 
     def receive(self, now_us: int) -> None:
+        """Hand over what has come."""
         for sender, heard_us in [*self._heard_us.items()]:
             if sender != self._remote and now_us - heard_us > FORGOTTEN_US:
                 del self._heard_us[sender]
@@ -69,7 +57,7 @@ class UdpPort:
                 content, sender = self._socket.recvfrom(READ_BYTES)
                 if sender in self._heard_us or (self._remote is None and len(self._heard_us) < MOST_CLIENTS):
                     self._heard_us[sender] = now_us
-                    self._between.hear(_name(sender), content, now_us)
+                    self._between.hear(_name(sender), content)
                 elif not self._is_full:
                     self._is_full = True
                     self._between.note(f"{_name(sender)} sends to the clients' port, too; it is not listened to")
@@ -84,7 +72,7 @@ class UdpPort:
 
 
 class TcpPort:
-    """A server; what a client has not read yet waits here, whole packets of it."""
+    """The same over TCP, a server; what a client has not read yet waits here, whole packets of it."""
 
     def __init__(self, listener: socket.socket, between: Between) -> None:
         listener.listen()
@@ -104,7 +92,7 @@ class TcpPort:
             if source is self._listener:
                 self._accept()
             elif content := _received(source):
-                self._between.hear(self._names[source], content, now_us)
+                self._between.hear(self._names[source], content)
             else:
                 source.close()
                 del self._unread[source]
@@ -150,7 +138,7 @@ class SharedConnection:
     def __init__(self, vehicle: Selectable, clients: Sequence[str], between: Between) -> None:
         """`clients`: their addresses. Raises AddressError, ConnectionSetupError."""
         self._vehicle, self._between = vehicle, between
-        self._ports: list[Port] = []
+        self._ports: list[UdpPort | TcpPort] = []
         try:
             for client in clients:
                 self._ports.append(_open(client, between))
@@ -217,7 +205,7 @@ def carried_bytes_s(url: str) -> float:
     return NETWORK_BYTES_S if serial is None else serial[1] / BITS_A_BYTE
 
 
-def _open(url: str, between: Between) -> Port:
+def _open(url: str, between: Between) -> UdpPort | TcpPort:
     scheme, rest = scheme_and_rest(url)
     if scheme not in ("udpin", "udpout", "tcpin"):
         forms = "udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"

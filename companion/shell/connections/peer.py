@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import TypeAlias
 
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import defaults
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.decode import KNOWN_IDS, checksum_holds
 from companion.mavlink.packet import message_id_of, packet_length, source_of
@@ -24,7 +24,7 @@ Address: TypeAlias = tuple[str, int]
 
 # Half of the time for which the last setpoint is flown on, for the silence: a vehicle that has moved is answered within
 # the other half, and streams that fly one come twenty times as often.
-RELEASED_US = ASSUMED.defaults.loss_us // 2
+RELEASED_US = defaults.LOSS_US // 2
 HEARTBEAT = 0
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
-from companion.autopilot.known import ASSUMED
+from companion.autopilot.known import defaults
 from companion.errors import ConnectionSetupError
 from companion.mavlink.packet import packet_length
 from companion.shell.connections.connection import READ_SIZE, LinkCounts, Way, bound_socket, plain, readable
@@ -29,7 +29,7 @@ RETRY_S = 0.2
 # The round trip of a telemetry radio stays below half a second; a SYN without an answer by then was lost.
 ATTEMPT_S = 0.5
 # What no host has acknowledged while the last setpoint is flown on is old: the other end has gone without a word.
-UNACKNOWLEDGED_MS = ASSUMED.defaults.loss_us // 1000
+UNACKNOWLEDGED_MS = defaults.LOSS_US // 1000
 # A send that blocks longer than this would stall the setpoints, 20 to 50 a second; the packet is dropped instead.
 SEND_TIMEOUT_S = 0.02
 # Where udev names serial devices by maker, model and serial number.

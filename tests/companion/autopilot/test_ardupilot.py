@@ -240,9 +240,11 @@ def test_a_thrust_below_none_is_none(thrust, heard_as):
 
 def test_modes_have_copters_names_and_numbers():
     theirs = {entry.name.removeprefix("COPTER_MODE_"): number for number, entry in COPTER_MODES.items()}
-    assert {modes.mode_name(theirs[name]) for name in modes.MODE_NAMES} == modes.MODE_NAMES
-    assert modes.mode_name(99) == "mode 99" and modes.pilot(99) is None
-    flown_by = {name: modes.pilot(theirs[name]) for name in ("STABILIZE", "AUTO", "LOITER", "GUIDED")}
+    assert {number: mode.name for number, mode in modes.MODES.items()}.items() <= {
+        (number, name) for name, number in theirs.items()
+    }
+    assert ARDUPILOT.mode_name(99) == "mode 99" and ARDUPILOT.pilot(99) is None
+    flown_by = {name: ARDUPILOT.pilot(theirs[name]) for name in ("STABILIZE", "AUTO", "LOITER", "GUIDED")}
     assert [*flown_by.values()] == [Pilot.HAND, Pilot.AUTOPILOT, Pilot.STICKS, Pilot.SETPOINTS]
 
 
@@ -301,7 +303,7 @@ def test_a_guard_meets_a_copter_and_hears_its_sticks_as_pulses():
 
 
 def test_a_guard_refuses_a_copter_that_is_too_old():
-    assert guarded(FakeCopter(flight_version=OLD), lambda _: False).outcome == TOO_OLD
+    assert guarded(FakeCopter(flight_version=OLD), lambda _: False).core.machine.outcome == TOO_OLD
 
 
 def test_a_switch_that_is_not_answered_is_set_again():
@@ -360,7 +362,7 @@ ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
 
 
 def judged(parameters, line=None):
-    told = VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3)
+    told = VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3, 250.0, 5.0, "")
     return {item.item: item for item in (*setup.judge_vehicle(told), *setup.judge_parameters(told))}
 
 

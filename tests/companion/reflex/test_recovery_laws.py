@@ -2,13 +2,15 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.fence import Fence
-from companion.flight.obstacle_map import inside_fence
+from companion.flight.obstacle_map import FlightRoom
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus
@@ -119,7 +121,8 @@ ROOM = Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4)
 
 def in_room(surfaces, contact_m, goal_m):
     goal_m = projected(goal_m, [(surface.normal_ned, surface.level_m) for surface in surfaces])
-    return inside_fence(ROOM, ZERO, contact_m, goal_m)
+    flight: Any = SimpleNamespace(mission=SimpleNamespace(fence=ROOM), origin_ned_m=ZERO)
+    return FlightRoom(flight).inside(contact_m, goal_m)
 
 
 def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
