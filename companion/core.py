@@ -18,13 +18,14 @@ from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.states import FINAL_STATES, State
-from companion.flight.vehicle_update import landed, note_height, situation_of, update_vehicle
+from companion.flight.vehicle_update import note_height, situation_of, update_vehicle
 from companion.link.commands import CommandClient
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
     LocalPosition,
+    MotorOutputs,
     OnboardHeartbeat,
     Outgoing,
     PositionSetpoint,
@@ -32,7 +33,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.mission.model import Mission
-from companion.motion.resets import Resets
+from companion.motion.resets import PLACES, Resets
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import HELD_S, LEAD_S, NOTICED_S
 from companion.reflex.detection.detector import Situation
@@ -88,16 +89,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """Whether the companion's own HEARTBEAT reports it as active."""
 
     @property
-    @abstractmethod
-    def _off_state(self) -> str | None:
-        """Why hits are not detected in this state at any height; None in a state that detects."""
-
-    @property
-    def _goes_down(self) -> bool:
-        """Whether the vehicle descends to land."""
-        return False
-
-    @property
     def _has_floor(self) -> bool:
         """Whether the fence's floor counts."""
         return True
@@ -116,16 +107,17 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
-        if self._law.busy or not self._is_met:
+        if self._law.pending is not None or not self._is_met:
             self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
         if now_us >= self._heartbeat_due_us:
             self._beat(now_us)
-        try:
-            self._inform(now_us)
-        except Exception as error:
-            self.fault(error, now_us)
         flight = self.flight
+        if flight.events or self._texts.waiting or now_us >= self._values_due_us:
+            try:
+                self._inform(now_us)
+            except Exception as error:
+                self.fault(error, now_us)
         if not flight.outbox and not flight.events:
             return NOTHING
         outputs = Outputs(tuple(flight.outbox), tuple(flight.events))
@@ -157,7 +149,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
-            note_motors(flight, samples, now_us)
+            if not flight.vehicle.armed or MotorOutputs in map(type, samples):
+                note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)
         return moved
@@ -182,24 +175,21 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         """Run the state machine; whether its state changed."""
 
+    @abstractmethod
     def situation(self) -> Situation:
-        """The detector's situation. The setpoints of others are not known."""
-        flight, goes_down, target = self.flight, self._goes_down, self.flight.target
-        if not self.machine.holds:
-            return situation_of(flight, self._off_state, goes_down, flight.vehicle.landed)
-        place = None if target is None or target.lean is not None else target.position_ned_m
-        return situation_of(flight, self._off_state, goes_down, landed(flight, goes_down), place)
+        """The detector's situation."""
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
         """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
 
         An attitude is sent for each IMU sample.
         """
-        sample_us, target = self.reflex.sample_boot_us, self.flight.target
-        follows_imu = target is not None and target.lean is not None and sample_us != self._sample_boot_us
-        self._sample_boot_us = sample_us
+        target = self.flight.target
+        leans = target is not None and target.lean is not None
+        follows_imu = leans and self.reflex.sample_boot_us != self._sample_boot_us
         if not (moved or follows_imu) and now_us < self._setpoint_due_us:
             return
+        sample_us = self._sample_boot_us = self.reflex.sample_boot_us
         interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
         if not holds:
             self._change_law(None, now_us)
@@ -251,7 +241,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not self._is_met and self.flight.vehicle.identity is not None:
             self._is_met = True
             self._tell_law(now_us)
-        elif self._law.busy:
+        elif self._law.pending is not None:
             acks = [sample for sample in samples if isinstance(sample, CommandAck)]
             send, outcome = self._law.step(acks, False, now_us)
             if send is not None:
@@ -266,7 +256,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
         By itself it flies by the velocity that it believes. So until that is right it is told a tilt and its thrust.
         """
-        flight, latest, target = self.flight, self.flight.vehicle.history.latest(), self.flight.target
+        flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
         words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
         if not self._leans or latest is None or recovery is None or held_s is None:
             return ()
@@ -296,7 +286,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     @property
     def finished(self) -> bool:
         """Ended, and the vehicle has answered the last word, or does not."""
-        return self.machine.finished and not self._law.busy
+        return self.machine.finished and self._law.pending is None
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         """Note a setpoint that was sent while the companion has the vehicle."""
@@ -310,7 +300,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _inform(self, now_us: int) -> None:
         """Send the operator's texts with their events, and numbers at their rate, once a vehicle is connected."""
         flight, texts = self.flight, self._texts
-        if flight.vehicle.identity is None or not (flight.events or texts.waiting or now_us >= self._values_due_us):
+        if flight.vehicle.identity is None:
             return
         operator, hits = flight.mission.companion.operator, len(flight.collisions)
         if operator.status_texts:
@@ -334,7 +324,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def status(self) -> Status:
         """The live line's content."""
         vehicle = self.flight.vehicle
-        latest = vehicle.history.latest()
+        latest = vehicle.history.latest
         return Status(
             state=self.machine.state.value,
             vehicle_mode=vehicle.mode_name,
@@ -365,21 +355,19 @@ class FlightCore(Core[FlightContext, Machine]):
         return self.machine.state not in FINAL_STATES and self.flight.armed_at_us is not None
 
     @property
-    def _off_state(self) -> str | None:
-        return None if self.machine.state in DETECTING_STATES else self.machine.state.value
-
-    @property
-    def _goes_down(self) -> bool:
-        return self.machine.state is State.LANDING
-
-    @property
     def _has_floor(self) -> bool:
         return self.machine.state in ON_THE_WAY
+
+    def situation(self) -> Situation:
+        state = self.machine.state
+        off_state = None if state in DETECTING_STATES else state.value
+        return situation_of(self.flight, off_state, state is State.LANDING, is_held=True)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in a local frame that does not jump when the estimator resets its position."""
         before, most_m = self.resets.shift_ned_m, self.flight.mission.limits.max_step_m
-        samples = [self.resets.follow(sample, most_m) for sample in samples]
+        if not PLACES.isdisjoint(map(type, samples)):
+            samples = [self.resets.follow(sample, most_m) for sample in samples]
         if self.resets.shift_ned_m != before:
             jump_m = math.dist(self.resets.shift_ned_m, before)
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
@@ -416,7 +404,7 @@ class Limiter:
 
         Raises SetpointError for one that is not finite.
         """
-        latest = flight.vehicle.history.latest()
+        latest = flight.vehicle.history.latest
         around = Surroundings(
             vehicle_ned_m=None if latest is None else latest.position_ned_m,
             origin_ned_m=flight.origin_ned_m,

@@ -159,8 +159,8 @@ def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> 
 
 
 def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
-    asked = survey.round_trip.ask(survey.now_us)
-    outgoing += [] if asked is None else [asked]
+    if survey.now_us >= survey.round_trip.due_us:
+        outgoing.append(survey.round_trip.ask(survey.now_us))
     if survey.now_us < survey.ask_due_us:
         return
     survey.ask_due_us = survey.now_us + ASK_AGAIN_US

@@ -16,7 +16,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.motion.strapdown import LEVEL
-from companion.reflex.detection.detector import DetectorState, Impact, Phase, Situation
+from companion.reflex.detection.detector import DetectorState, Impact, Motion, Phase, Situation
 from companion.strict_model import Positive, StrictModel
 
 # A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
@@ -59,7 +59,7 @@ class Baseline(ABC):
     def initial(self) -> Any:
         return self.state(threshold_m_s2=self._least_m_s2)
 
-    def step(self, state: Any, sample: Sample, situation: Situation) -> tuple[Any, Impact | None]:
+    def step(self, state: Any, sample: Sample, situation: Situation, motion: Motion) -> tuple[Any, Impact | None]:
         if isinstance(sample, Attitude):
             state.attitude_wxyz = sample.attitude_wxyz
         elif isinstance(sample, AttitudeTarget):

@@ -10,7 +10,7 @@ from companion.messages import ImuSample, LocalPosition, MessageId, Sample, Vect
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.vector import ZERO, along, minus, plus, towards
-from companion.reflex.detection.detector import Impact, Phase, Situation
+from companion.reflex.detection.detector import Impact, Motion, Phase, Situation
 
 # Drag changes within a second; the model's error in seconds. So does the lag behind a setpoint, with the speed.
 MEAN_MEMORY_S = 1.0
@@ -64,12 +64,14 @@ class MomentumDetector(Baseline):
         MessageId.ATTITUDE_TARGET: "thrust is taken for the accelerometer's mean, so that manoeuvres look like pushes"
     }
 
-    def step(self, state: MomentumState, sample: Sample, situation: Situation) -> tuple[MomentumState, Impact | None]:
+    def step(
+        self, state: MomentumState, sample: Sample, situation: Situation, motion: Motion
+    ) -> tuple[MomentumState, Impact | None]:
         if isinstance(sample, ImuSample):
             elapsed_s = min(max(sample.time_boot_us - state.imu_boot_us, 0), 50_000) * 1e-6
             state.imu_boot_us = sample.time_boot_us
             state.thrust.learn(sample.time_boot_us, -sample.specific_force_frd_m_s2[2], elapsed_s)
-        return super().step(state, sample, situation)
+        return super().step(state, sample, situation, motion)
 
     def look(self, s: MomentumState, sample: LocalPosition, situation: Situation) -> Reading | None:
         """One step of the observer with one velocity."""

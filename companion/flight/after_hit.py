@@ -77,7 +77,7 @@ def note_before(flight: FlightContext, state: State) -> None:
 
 def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     """Remove the rejected newest hit, and go on with what it interrupted; None within another hit's recovery."""
-    before, latest = flight.before_hit, flight.vehicle.history.latest()
+    before, latest = flight.before_hit, flight.vehicle.history.latest
     if before is None or latest is None:
         return None
     flight.reflex.take_back()

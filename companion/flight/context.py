@@ -180,9 +180,12 @@ class FlightContext:
 
     @property
     def height_m(self) -> float | None:
-        """Above the arming position; None before that, or without a position of late."""
-        latest, origin = self.vehicle.history.latest(), self.origin_ned_m
-        if latest is None or origin is None or self.vehicle.is_position_old:
+        """Above the arming position; None before that, or without a position of late, while other messages come: a
+        vehicle whose estimator fails sends none.
+        """
+        vehicle, origin = self.vehicle, self.origin_ned_m
+        latest, heard_us = vehicle.history.latest, vehicle.last_position_us
+        if latest is None or origin is None or heard_us is None or vehicle.last_received_us - heard_us >= OLD_NEWS_US:
             return None
         return origin[2] - latest.position_ned_m[2]
 
@@ -220,12 +223,6 @@ class FlightContext:
     def silent_s(self, now_us: int) -> float:
         """Seconds since the last message of the vehicle."""
         return (now_us - self.vehicle.last_received_us) * 1e-6
-
-    @property
-    def position_silent_s(self) -> float:
-        """Seconds of messages without a position. The delay of a late step does not count."""
-        heard_us = self.vehicle.last_position_us
-        return 0.0 if heard_us is None else (self.vehicle.last_received_us - heard_us - self.missed_us) * 1e-6
 
     def is_silent(self, now_us: int) -> bool:
         """Whether an identified vehicle has been silent for longer than `link.silence_s`."""

@@ -1,10 +1,9 @@
-"""Detection of a motor damaged by a hit, and the mission's policy for it."""
+"""Detection of a motor damaged by a hit."""
 
 import math
 from collections.abc import Sequence
 
-from companion.flight.context import FlightContext, Transition
-from companion.flight.states import Trigger
+from companion.flight.context import FlightContext
 from companion.messages import LandedState, MotorOutputs, Sample
 from companion.motion.motors import ROTORS, MotorWatch
 
@@ -34,15 +33,7 @@ def _is_free(flight: FlightContext) -> bool:
     """Whether it has rested since the hit, or flown off. A vehicle that has not may hang on the obstacle, or lie on the
     ground: that also loads a motor more. One that has lost a motor rests badly, and flies all the same.
     """
-    record, latest = flight.collisions[-1], flight.vehicle.history.latest()
+    record, latest = flight.collisions[-1], flight.vehicle.history.latest
     if record.settled_after_s is not None or latest is None or not record.is_over:
         return record.settled_after_s is not None
     return math.dist(latest.position_ned_m, record.contact.position_ned_m) > flight.mission.recovery.clearance_m
-
-
-def after_damage(flight: FlightContext) -> Transition | None:
-    """The transition that the mission wants for a damaged vehicle."""
-    damage, wanted = flight.motors.damage, flight.mission.on_damage
-    if damage is None or wanted == "tell":
-        return None
-    return Transition(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)

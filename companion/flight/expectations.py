@@ -35,7 +35,7 @@ def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int
     """Take up an expectation; what can be said at once is said."""
     expectation = Expectation(label, describe(item), item, now_us, len(flight.collisions))
     flight.expectations.append(expectation)
-    latest = flight.vehicle.history.latest()
+    latest = flight.vehicle.history.latest
     assert latest is not None, "the flight is in the air"
     place = flight.mission_ned_m(latest.position_ned_m)
     match item.check:

@@ -7,8 +7,8 @@ from companion.autopilot.interface import Pilot
 from companion.flight.context import FlightContext
 from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
-from companion.link.vehicle import identify, is_autopilot
-from companion.messages import MessageId, Sample, Vector3
+from companion.link.vehicle import OLD_NEWS_US, identify, is_autopilot
+from companion.messages import MessageId, Sample
 from companion.reflex.config import HELD_S
 from companion.reflex.detection.detector import NO_POSITION, Situation
 
@@ -16,8 +16,9 @@ from companion.reflex.detection.detector import NO_POSITION, Situation
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
-    mode, armed, conflicts, was_known = vehicle.mode, vehicle.armed, vehicle.conflicts, vehicle.is_mode_known
-    vehicle.note_silence(now_us)
+    mode, armed, conflicts = vehicle.mode, vehicle.armed, vehicle.conflicts
+    if vehicle.identity is not None and now_us - vehicle.last_received_us >= OLD_NEWS_US:
+        vehicle.unsure_since_us = now_us  # after a silence samples may be as old as the silence
     for sample in samples:
         if isinstance(sample, messages.ImuSample):
             # The most frequent of all: nothing of it is kept here.
@@ -59,11 +60,12 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         flight.report(now_us, "mode", f"mode {vehicle.mode_name}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.report(now_us, "disarmed", "disarmed")
-    if was_known and not vehicle.is_mode_known:
+    was_known, vehicle.was_mode_known = vehicle.was_mode_known, vehicle.is_mode_known
+    if was_known and not vehicle.was_mode_known:
         # PX4 answers within milliseconds; its next report by itself may take half a second.
         flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
-    if vehicle.identity is not None and (asked := flight.round_trip.ask(now_us)) is not None:
-        _measure_round_trip(flight, asked, now_us)
+    if vehicle.identity is not None and now_us >= flight.round_trip.due_us:
+        _measure_round_trip(flight, now_us)
     return None
 
 
@@ -79,11 +81,11 @@ def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
         flight.trajectory_us += now_us - before_us
 
 
-def _measure_round_trip(flight: FlightContext, asked: messages.TimeSyncAsk, now_us: int) -> None:
+def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
     """On the ground a long round trip is a reason not to begin; in the air it is reported. For how long the
     last setpoint is flown on is asked with it until it is answered.
     """
-    flight.outbox.append(asked)
+    flight.outbox.append(flight.round_trip.ask(now_us))
     if flight.reflex.loss_s is None:
         autopilot, told = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
         flight.outbox += [messages.ReadParameter(name) for name in autopilot.attitude_parameters if name not in told]
@@ -120,33 +122,28 @@ def note_height(flight: FlightContext) -> None:
         flight.has_climbed = False
 
 
-def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
-    """The vehicle's landed state. A vehicle that has climbed, and is not sent down, has not landed.
+def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, is_held: bool) -> Situation:
+    """The detector's situation; `is_held`: the vehicle flies by this program's setpoints. Those of others are unknown.
 
-    The report may be forged, and a detector is off on the ground.
+    A held vehicle that has climbed, and is not sent down, has not landed: the report may be forged, and a detector is
+    off on the ground.
     """
-    is_up = flight.has_climbed and not goes_down and flight.vehicle.landed is messages.LandedState.ON_GROUND
-    return messages.LandedState.UNDEFINED if is_up else flight.vehicle.landed
-
-
-def situation_of(
-    flight: FlightContext,
-    off_state: str | None,
-    goes_down: bool,
-    landed_state: messages.LandedState,
-    setpoint_ned_m: Vector3 | None = None,
-) -> Situation:
-    """The detector's situation; `landed_state` is the reported one of a vehicle that somebody else flies."""
+    landed, place, target = flight.vehicle.landed, None, flight.target
+    if is_held and flight.has_climbed and not goes_down and landed is messages.LandedState.ON_GROUND:
+        landed = messages.LandedState.UNDEFINED
+    if is_held and target is not None and target.lean is None:
+        place = target.position_ned_m
     height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m
-    # Lift-off, ground effect and skids shake and push.
-    below = NO_POSITION if height_m is None else f"below {least_m:g} m"
+    if off_state is None and not flight.has_climbed:
+        # Lift-off, ground effect and skids shake and push.
+        off_state = NO_POSITION if height_m is None else f"below {least_m:g} m"
     return Situation(
-        off_reason=off_state or (None if flight.has_climbed else below),
+        off_reason=off_state,
         armed=flight.vehicle.armed,
-        landed_state=landed_state,
+        landed_state=landed,
         height_m=height_m,
         descent_commanded=goes_down,
-        setpoint_position_ned_m=setpoint_ned_m,
+        setpoint_position_ned_m=place,
         flown_by_hand=flight.vehicle.pilot in (Pilot.STICKS, Pilot.HAND),
         has_climbed=flight.has_climbed,
         has_position=flight.has_position,

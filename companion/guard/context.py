@@ -60,6 +60,6 @@ class GuardContext(FlightContext):
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""
         FlightContext.note_touchdown(self)
-        latest, origin = self.vehicle.history.latest(), self.origin_ned_m
+        latest, origin = self.vehicle.history.latest, self.origin_ned_m
         if latest is not None and origin is not None:
             self.origin_ned_m = (origin[0], origin[1], latest.position_ned_m[2])

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from companion.core import Core
 from companion.flight.context import Inputs, Target
+from companion.flight.vehicle_update import situation_of
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
@@ -12,6 +13,7 @@ from companion.guard.watching import GuardConnect, goes_down, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
+from companion.reflex.detection.detector import Situation
 from companion.reflex.reflex import start_reflex
 
 
@@ -31,19 +33,14 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         return self.machine.state is not State.CONNECTING
 
     @property
-    def _off_state(self) -> str | None:
-        """Ground, take-off and landing look like a hit."""
-        state = self.machine.state
-        return None if state is State.WATCHING or state in HOLDING else why_not(self.flight) or state.value
-
-    @property
     def _setpoint_hz(self) -> float:
         return super()._setpoint_hz if self.machine.holds else self.flight.config.lead_hz
 
-    @property
-    def _goes_down(self) -> bool:
-        """Whoever flies, while the guard does not."""
-        return not self.machine.holds and goes_down(self.flight, self.now_us)
+    def situation(self) -> Situation:
+        """Ground, take-off and landing look like a hit. Whoever flies may go down, while the guard does not."""
+        guard, state, holds = self.flight, self.machine.state, self.machine.holds
+        off_state = None if state is State.WATCHING or state in HOLDING else why_not(guard) or state.value
+        return situation_of(guard, off_state, not holds and goes_down(guard, self.now_us), holds)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         if self.flight.keeps_others_out:

@@ -63,7 +63,7 @@ def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> boo
 
     With `deviations` also where a surface would have to bend towards them by so many standard deviations.
     """
-    latest = guard.vehicle.history.latest()
+    latest = guard.vehicle.history.latest
     if latest is None or (asked.place_ned_m is None and asked.velocity_ned_m_s is None):
         return None
     velocity = asked.velocity_ned_m_s or ZERO
@@ -84,7 +84,7 @@ def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> boo
 
 def stop(guard: GuardContext) -> Target | None:
     """Where the vehicle comes to rest when it brakes now."""
-    latest = guard.vehicle.history.latest()
+    latest = guard.vehicle.history.latest
     if latest is None:
         return None
     brakes_s = math.hypot(*latest.velocity_ned_m_s) / (2.0 * BRAKES_M_S2)

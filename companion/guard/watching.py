@@ -53,7 +53,7 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
             guard.sinks_m_s, guard.sinks_us = sample.velocity_down_m_s or 0.0, now_us
         elif isinstance(sample, Sticks):
             guard.sticks_now, guard.sticks_us = sample, now_us
-    latest = guard.vehicle.history.latest()
+    latest = guard.vehicle.history.latest
     if guard.vehicle.armed is False:
         guard.program_elsewhere = False
     # Not while the guard has the vehicle: one forged report would move the fence.
@@ -170,7 +170,7 @@ class Watching:
     def target(self, now_us: int) -> Target | None:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         guard, vehicle = self._guard, self._guard.vehicle
-        latest = vehicle.history.latest()
+        latest = vehicle.history.latest
         seen_us = guard.others_setpoint_us
         streams_elsewhere = seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US
         streams_elsewhere = streams_elsewhere or guard.program_elsewhere

@@ -77,29 +77,25 @@ class CommandClient:
     """Holds at most one command. `begin`, then `step` with what has arrived until it returns an outcome."""
 
     def __init__(self) -> None:
-        self._pending: Pending | None = None
-
-    @property
-    def busy(self) -> bool:
-        return self._pending is not None
+        self.pending: Pending | None = None
 
     @property
     def requested_mode(self) -> int | None:
         """The requested mode that is not confirmed yet."""
-        command = None if self._pending is None else self._pending.command
+        command = None if self.pending is None else self.pending.command
         return command.custom_mode if isinstance(command, messages.SetMode) else None
 
     @property
     def is_unsaid(self) -> bool:
         """Whether there is a command that has not been sent yet."""
-        return self._pending is not None and self._pending.attempts == 0
+        return self.pending is not None and self.pending.attempts == 0
 
     def begin(self, command: messages.VehicleCommand) -> None:
         """Take up a command, dropping any other; it goes out in the next `step`."""
-        self._pending = Pending(command)
+        self.pending = Pending(command)
 
     def cancel(self) -> None:
-        self._pending = None
+        self.pending = None
 
     def step(
         self, acks: Sequence[messages.CommandAck], seen: bool, now_us: int, may_send: bool = True
@@ -109,7 +105,7 @@ class CommandClient:
         Returns what to send now, and the outcome once there is one. An attempt that `may_send` forbids counts as sent
         and lost.
         """
-        pending = self._pending
+        pending = self.pending
         if pending is None:
             return None, None
         is_confirmed_by_state = needs_confirmation(pending.command)
@@ -132,7 +128,7 @@ class CommandClient:
         return messages.SendCommand(pending.command, attempt) if may_send else None, None
 
     def _end(self, pending: Pending, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
-        self._pending = None
+        self.pending = None
         refused = not succeeded and pending.last_result is not None and pending.last_result not in TAKEN_UP
         return None, CommandOutcome(succeeded, f"{describe(pending.command)}: {text}", refused)
 

@@ -28,17 +28,15 @@ class RoundTrip:
 
     worst_us: int | None = None
     ignored: int = 0
+    due_us: int = 0  # of the next request
     _recent_us: deque[int] = field(default_factory=lambda: deque(maxlen=RECENT))
     _all_us: Counter[int] = field(default_factory=Counter)
     _asked_ns: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_ON_THE_WAY))  # not yet answered
-    _due_us: int | None = None
     _is_told: bool = False
 
-    def ask(self, now_us: int) -> TimeSyncAsk | None:
-        """The next request, when it is due."""
-        if self._due_us is not None and now_us < self._due_us:
-            return None
-        self._due_us = now_us + (INTERVAL_US if self._recent_us else FIRST_INTERVAL_US)
+    def ask(self, now_us: int) -> TimeSyncAsk:
+        """The next request."""
+        self.due_us = now_us + (INTERVAL_US if self._recent_us else FIRST_INTERVAL_US)
         self._asked_ns.append(now_us * 1000)
         return TimeSyncAsk(now_us * 1000)
 

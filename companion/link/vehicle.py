@@ -82,6 +82,7 @@ class Vehicle:
     attitude_parameters: dict[str, int | float] = field(default_factory=dict)  # see interface.Autopilot
     armed: bool | None = None
     mode: ModeReport | None = None
+    pilot: Pilot | None = None  # who moves it, where that mode says so
     failsafe: bool = False
     landed: messages.LandedState = messages.LandedState.UNDEFINED
     attitude: messages.Attitude | None = None
@@ -90,6 +91,7 @@ class Vehicle:
     last_received_us: int = 0
     last_position_us: int | None = None
     mode_received_us: int = 0
+    was_mode_known: bool = True  # at the end of the step before
     unsure_since_us: int = -1  # only a report of the mode that is newer than this says who has the vehicle
     unconfirmed_mode: ModeReport | None = None  # reported once, and not the companion's
     is_disarm_unconfirmed: bool = False  # reported once, in the air
@@ -97,20 +99,10 @@ class Vehicle:
     conflicts: int = 0
 
     @property
-    def is_position_old(self) -> bool:
-        """Whether no position came lately, while other messages do; a vehicle whose estimator fails sends none."""
-        return self.last_position_us is not None and self.last_received_us - self.last_position_us >= OLD_NEWS_US
-
-    @property
     def is_mode_known(self) -> bool:
         """Whether the vehicle may be commanded: its mode is new and not contradicted."""
         is_new = self.mode_received_us > self.unsure_since_us
         return is_new and self.unconfirmed_mode is None and not self.is_disarm_unexplained
-
-    def note_silence(self, now_us: int) -> None:
-        """Called before a step's samples: after a silence they may be as old as the silence."""
-        if self.identity is not None and now_us - self.last_received_us >= OLD_NEWS_US:
-            self.unsure_since_us = now_us
 
     def update(self, sample: object, now_us: int, own_modes: tuple[int | None, ...] = ()) -> None:
         """Take one sample of the identified vehicle. Without `own_modes` every mode is accepted at once."""
@@ -149,7 +141,7 @@ class Vehicle:
         is_known = self.mode is None or report.custom_mode in (self.mode.custom_mode, *own_modes)
         if is_known or not own_modes or self.unconfirmed_mode is not None:
             self.conflicts += is_known and self.unconfirmed_mode is not None
-            self.mode, self.unconfirmed_mode = report, None
+            self.mode, self.pilot, self.unconfirmed_mode = report, self.autopilot.pilot(report.custom_mode), None
         else:
             self.unconfirmed_mode = report
 
@@ -171,11 +163,6 @@ class Vehicle:
     @property
     def mode_name(self) -> str:
         return "" if self.mode is None else self.autopilot.mode_name(self.mode.custom_mode)
-
-    @property
-    def pilot(self) -> Pilot | None:
-        """Who moves it, where the mode says so."""
-        return None if self.mode is None else self.autopilot.pilot(self.mode.custom_mode)
 
     @property
     def descends(self) -> bool:

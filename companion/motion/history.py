@@ -11,23 +11,22 @@ from companion.motion.config import KEPT_US
 class MotionHistory:
     """Positions and velocities in the order of their time stamps; late packets are dropped."""
 
+    latest: LocalPosition | None = None
     _samples: deque[LocalPosition] = field(default_factory=deque)
 
     def add(self, sample: LocalPosition) -> bool:
         """Remember a sample; False when it is older than what is known and was dropped."""
         samples, time_us = self._samples, sample.time_boot_us
-        late_us = samples[-1].time_boot_us - time_us if samples else -1
+        late_us = -1 if self.latest is None else self.latest.time_boot_us - time_us
         if 0 <= late_us < KEPT_US:
             return False
         if late_us >= KEPT_US:
             samples.clear()
+        self.latest = sample
         samples.append(sample)
         while samples[0].time_boot_us < time_us - KEPT_US:
             samples.popleft()
         return True
-
-    def latest(self) -> LocalPosition | None:
-        return self._samples[-1] if self._samples else None
 
     def before(self, time_boot_us: int) -> LocalPosition | None:
         """The latest one before a time."""

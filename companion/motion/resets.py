@@ -22,6 +22,9 @@ from companion.messages import (
 from companion.motion.config import CURRENT_US, STAMP_RESOLUTION_US
 from companion.motion.vector import ZERO, minus, plus
 
+# Samples that have a place; no other changes by a reset, or counts one.
+PLACES = frozenset((LocalPosition, Odometry, PositionTarget))
+
 
 @dataclass(slots=True)
 class Resets:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.messages import ImuSample, LocalPosition, MessageId, Odometry, Sample
-from companion.reflex.detection.detector import Detector, DetectorState, Evidence, Impact, Phase, Situation
+from companion.reflex.detection.detector import Detector, DetectorState, Evidence, Impact, Motion, Phase, Situation
 from companion.reflex.detection.fused import FusedState
 from companion.reflex.detection.monitor import CollisionMonitor
 
@@ -108,9 +108,11 @@ class _ListenedTo:
         state: DetectorState = self._detector.initial()
         return state
 
-    def step(self, state: DetectorState, sample: Sample, situation: Situation) -> tuple[DetectorState, Impact | None]:
+    def step(
+        self, state: DetectorState, sample: Sample, situation: Situation, motion: Motion
+    ) -> tuple[DetectorState, Impact | None]:
         phase = _NUMBERS[state.phase]
-        state, impact = self._detector.step(state, sample, situation)
+        state, impact = self._detector.step(state, sample, situation, motion)
         if isinstance(sample, ImuSample):
             self._listener.forces.numbers.extend((sample.time_boot_us, phase, *_forces(state)))
         elif isinstance(sample, LocalPosition | Odometry) and isinstance(state, FusedState):

@@ -68,7 +68,7 @@ class Circumstances:
     def situation(self) -> Situation:
         """Now."""
         guard = self._guard
-        return situation_of(guard, self._why_not(guard), goes_down(guard, self._now_us), guard.vehicle.landed)
+        return situation_of(guard, self._why_not(guard), goes_down(guard, self._now_us), is_held=False)
 
 
 @dataclass(slots=True)

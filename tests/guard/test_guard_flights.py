@@ -282,7 +282,7 @@ def test_a_report_of_the_ground_moves_heights_and_fence_only_while_somebody_else
     air = Air()
     air.take_off()
     guard = air.guard.core.flight
-    origin, here = guard.origin_ned_m, guard.vehicle.history.latest().position_ned_m
+    origin, here = guard.origin_ned_m, guard.vehicle.history.latest.position_ned_m
     guard.vehicle.landed, guard.expected_mode = LandedState.ON_GROUND, 1
     observe(guard, (), air.guard.core.now_us)
     assert guard.origin_ned_m == origin

@@ -61,6 +61,7 @@ ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
     guard = GuardCore(GuardConfig(), keeps_others_out=False).flight
     guard.vehicle.mode, guard.vehicle.landed = ModeReport(mode, None, False), landed
+    guard.vehicle.pilot = PX4.pilot(mode)
     observe(guard, samples, 0)
     return goes_down(guard, now_us)
 

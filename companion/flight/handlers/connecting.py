@@ -64,11 +64,11 @@ class Meet(NoSetpoint, ABC, Generic[MoveT]):
 
     def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
-        if flight.command_client.busy:
+        if flight.command_client.pending is not None:
             outcome = flight.command_outcome(inputs, False, now_us)
             if outcome is not None and outcome.refused:
                 requests = self._requests = chain(self._in_its_place(flight), requests)
-        if flight.command_client.busy:
+        if flight.command_client.pending is not None:
             return
         self._asked = request = next(requests, None)
         if request is not None:

@@ -12,7 +12,7 @@ from companion.motion.vector import along, minus
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
     """How, told with what is known; None of a vehicle that flies."""
-    watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest(), flight.vehicle.attitude
+    watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest, flight.vehicle.attitude
     if latest is None or attitude is None or not flight.vehicle.armed:
         return None
     hits = flight.hits
@@ -66,7 +66,7 @@ class Crashed(NoSetpoint):
     def __init__(self, flight: FlightContext) -> None:
         flight.command_client.cancel()
         flight.expected_mode, flight.is_wreck = None, True
-        latest = flight.vehicle.history.latest()
+        latest = flight.vehicle.history.latest
         self._place_ned_m = None if latest is None else latest.position_ned_m
         self._ask_us, self._is_forced = 0, False
 
@@ -79,7 +79,7 @@ class Crashed(NoSetpoint):
         watch, client = flight.reflex.crash, flight.command_client
         if not watch.lies:
             client.cancel()
-        elif flight.mission.on_crash == "disarm" and not client.busy and now_us >= self._ask_us:
+        elif flight.mission.on_crash == "disarm" and client.pending is None and now_us >= self._ask_us:
             client.begin(SetArmed(False, self._is_forced))
         outcome = flight.command_outcome(inputs, False, now_us)
         if outcome is not None:
@@ -88,7 +88,7 @@ class Crashed(NoSetpoint):
 
     def _flies_again(self, flight: FlightContext) -> bool:
         """Whether it is upright, above the ground, and somewhere else."""
-        latest, height_m = flight.vehicle.history.latest(), flight.height_m
+        latest, height_m = flight.vehicle.history.latest, flight.height_m
         tips = flight.reflex.crash.tipped.since_us is not None
         if latest is None or height_m is None or self._place_ned_m is None or tips:
             return False

@@ -57,7 +57,9 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
     if flight.expected_mode is None or vehicle.mode is None:
         return None
-    holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
+    holder = Holder.COMPANION
+    if vehicle.mode.custom_mode != flight.expected_mode:
+        holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
     if holder is Holder.COMPANION:
         flight.foreign_mode_since_us = None
         return None
@@ -113,15 +115,16 @@ def silent_link(flight: FlightContext, now_us: int) -> str | None:
 
 
 def silent_position(flight: FlightContext) -> str | None:
-    """The same of positions, on a link that is alive."""
-    silent_s = flight.position_silent_s
+    """The same of positions, on a link that is alive. The delay of a late step does not count."""
+    vehicle, heard_us = flight.vehicle, flight.vehicle.last_position_us
+    silent_s = 0.0 if heard_us is None else (vehicle.last_received_us - heard_us - flight.missed_us) * 1e-6
     is_silent = silent_s > flight.mission.companion.link.position_silence_s
     return f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive" if is_silent else None
 
 
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
     when, history = flight.mission.abort_when, flight.vehicle.history
-    latest = history.latest()
+    latest = history.latest
     earlier = None if latest is None else history.before(latest.time_boot_us)
     # Two positions in a row have to say so: one forged or broken packet ends no flight.
     if when.outside_fence_by_m is not None and latest is not None and earlier is not None:

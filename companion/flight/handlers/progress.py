@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from companion.autopilot.known import defaults
 from companion.flight import expectations
 from companion.flight.context import FlightContext, Inputs, StepTally, Target, Transition
-from companion.flight.damage import after_damage
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
@@ -57,7 +56,7 @@ class _OnTrajectory:
 
     def _arrived(self) -> bool:
         flight = self._flight
-        latest, goal = flight.vehicle.history.latest(), flight.local_ned_m(self._trajectory.target_m)
+        latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
         radius_m = flight.mission.companion.flight.acceptance_radius_m
         return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
 
@@ -74,7 +73,7 @@ class FlyItems(_OnTrajectory):
         if flight.tally.index != flight.step_index or flight.tally.began_us is None:
             flight.tally = StepTally(flight.step_index, now_us)
         step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
-        self._flight, self._action = flight, step.action
+        self._flight, self._step, self._action = flight, step, step.action
         self._started_us, self._trajectory_began_us = now_us, flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
@@ -132,8 +131,9 @@ class FlyItems(_OnTrajectory):
         return self._heading.turn(motion[0], motion[1], now_us)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        if (hurt := after_damage(flight)) is not None:
-            return hurt
+        damage, wanted = flight.motors.damage, flight.mission.on_damage
+        if damage is not None and wanted != "tell":
+            return Transition(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)
         while True:
             if isinstance(self._action, items.ReturnItem):
                 flight.returning_as = self._action
@@ -182,7 +182,7 @@ class FlyItems(_OnTrajectory):
         if item.steady is None:
             flight.file_awaited = None if flight.file_is_there else flight.file_awaited
             return flight.file_is_there
-        latest, target = flight.vehicle.history.latest(), flight.target
+        latest, target = flight.vehicle.history.latest, flight.target
         assert latest is not None and target is not None, "the flight is in the air"
         is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
         if not (is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s):
@@ -197,11 +197,11 @@ class FlyItems(_OnTrajectory):
         return self._heading.is_reached
 
     def _overdue(self, flight: FlightContext, now_us: int) -> Transition | None:
-        item, began_us = flight.step.item, flight.tally.began_us
+        item, began_us = self._step.item, flight.tally.began_us
         assert began_us is not None
         if item.timeout_s is not None and now_us - began_us > item.timeout_s * 1e6:
             text = f"not done within {item.timeout_s:g} s: {describe_item(self._action)}"
-            flight.report(now_us, "timeout", f"item {flight.step.label} {text}; then: {item.on_timeout}")
+            flight.report(now_us, "timeout", f"item {self._step.label} {text}; then: {item.on_timeout}")
             if item.on_timeout == "continue":
                 self._leave(flight, now_us)
                 return self.step(flight, Inputs(), now_us)

@@ -89,7 +89,7 @@ class TakeOff:
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us
         self._ground_ned_m = mean_position(flight)
-        latest = flight.vehicle.history.latest()
+        latest = flight.vehicle.history.latest
         assert latest is not None, "a flight begins only with positions arriving"
         flight.origin_ned_m = origin_of(flight, self._ground_ned_m, latest.time_boot_us, now_us)
         limits = flight.mission.companion.flight
@@ -110,7 +110,7 @@ class TakeOff:
         return None
 
     def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        profile, latest = self._profile, flight.vehicle.history.latest()
+        profile, latest = self._profile, flight.vehicle.history.latest
         assert profile is not None
         limits = flight.mission.companion.flight
         if latest is not None and latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
@@ -146,7 +146,7 @@ def origin_of(flight: FlightContext, ground_ned_m: Vector3, boot_us: int, now_us
 
 def mean_position(flight: FlightContext) -> Vector3:
     """Mean of the last second's positions, local NED."""
-    latest = flight.vehicle.history.latest()
+    latest = flight.vehicle.history.latest
     assert latest is not None, "a flight begins only with positions arriving"
     samples = flight.vehicle.history.between(latest.time_boot_us - ORIGIN_MEAN_US, latest.time_boot_us + 1)
     return mean_of([sample.position_ned_m for sample in samples])

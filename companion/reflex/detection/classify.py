@@ -8,10 +8,9 @@ from companion.messages import Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S, SHOWN_US
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, tilt_rad
-from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
 from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
-from companion.reflex.detection.detector import Impact, ImpactKind, Situation
+from companion.reflex.detection.detector import Impact, ImpactKind, Motion, Situation
 
 # The speed of a fall from half of the height in which the ground may be: 3.1 m/s. PX4 lands at up to 1.5 m/s
 # (MPC_Z_V_AUTO_DN) and ArduPilot, too (WPNAV_SPEED_DN).
@@ -145,30 +144,29 @@ def kind_of(
     return next(row.kind for row in TABLE if row.applies(touch))
 
 
-def classified(impact: Impact, velocity_ned_m_s: Vector3 | None, situation: Situation) -> Impact:
+def classified(impact: Impact, velocity_ned_m_s: Vector3 | None, situation: Situation, motion: Motion) -> Impact:
     """The impact with its kind where that is unknown. `velocity_ned_m_s` is the newest."""
     if impact.kind is not ImpactKind.UNKNOWN:
         return impact
-    strapdown, free_us = situation.strapdown, impact.contact_free_until_boot_us
-    attitude, fixes = (LEVEL, ()) if strapdown is None else (strapdown.valid_wxyz, strapdown.fixes)
+    attitude, free_us = motion.strapdown.valid_wxyz, impact.contact_free_until_boot_us
     # The newest velocity may contain a part of the contact already.
-    before = next((fix for fix in reversed(fixes) if fix.time_boot_us <= free_us), None)
+    before = next((fix for fix in reversed(motion.strapdown.fixes) if fix.time_boot_us <= free_us), None)
     velocity, until_us = velocity_ned_m_s, impact.sample_time_boot_us
     if before is not None:
         velocity, until_us = before.velocity_ned_m_s, before.time_boot_us
     force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
-    kind = kind_of(force_ned, velocity, attitude, situation, _sinking_m_s(situation.history, until_us))
+    kind = kind_of(force_ned, velocity, attitude, situation, _sinking_m_s(motion.history, until_us))
     return replace(impact, kind=kind)
 
 
-def _sinking_m_s(history: MotionHistory | None, time_boot_us: int) -> float | None:
+def _sinking_m_s(history: MotionHistory, time_boot_us: int) -> float | None:
     """By the reported heights of SHOWN_US until a time; None without two of them.
 
     They give the mean of that time. A vehicle that falls is faster at its end, by half of what its reported velocity
     has gained.
     """
-    last = None if history is None else history.before(time_boot_us + 1)
-    first = None if history is None or last is None else history.before(last.time_boot_us - SHOWN_US)
+    last = history.before(time_boot_us + 1)
+    first = None if last is None else history.before(last.time_boot_us - SHOWN_US)
     if last is None or first is None:
         return None
     mean_m_s = (last.position_ned_m[2] - first.position_ned_m[2]) * 1e6 / (last.time_boot_us - first.time_boot_us)

@@ -54,8 +54,7 @@ class Situation(NamedTuple):
     setpoint is the place last sent, local NED, where one is flown to. `descent_commanded`: the vehicle goes down
     because it was told to, or by the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`:
     by a pilot's sticks. `has_position`: one came of late. `is_wreck`: it has crashed and not flown since; that it
-    bounces and is picked up is not told. The monitor fills in `validity` of the vehicle's velocity, which lacks a part
-    of a hit that was clipped, `strapdown` and `history`. All have heard the sample already.
+    bounces and is picked up is not told.
     """
 
     off_reason: str | None = None
@@ -64,25 +63,25 @@ class Situation(NamedTuple):
     height_m: float | None = None
     descent_commanded: bool = False
     setpoint_position_ned_m: Vector3 | None = None
-    validity: VelocityValidity | None = None
-    strapdown: Strapdown | None = None
     flown_by_hand: bool = False
     has_climbed: bool = True
-    history: MotionHistory | None = None
     has_position: bool = True
     is_wreck: bool = False
-
-    @property
-    def why_off(self) -> str | None:
-        """The flight's reason, or the ground: feet that stand on it shake and push."""
-        if self.off_reason is not None:
-            return self.off_reason
-        return ON_THE_GROUND if self.landed_state is LandedState.ON_GROUND else None
 
     @property
     def may_crash(self) -> bool:
         """Whether the vehicle is known to fly, be it unwatched."""
         return self.armed is True and self.landed_state is not LandedState.ON_GROUND
+
+
+class Motion(Protocol):
+    """What the samples add up to. All have heard the newest already. A velocity that is not valid lacks a part of a hit
+    that was clipped.
+    """
+
+    history: MotionHistory
+    strapdown: Strapdown
+    validity: VelocityValidity
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,21 +122,11 @@ class Impact:
 class Innovation:
     """What free flight does not explain, in the newest test of one sign, and the limit from which it is a hit.
 
-    Of a force in m/s^2, of a velocity in m/s. EKF2 calls the square of `ratio` a test ratio.
+    Of a force in m/s^2, of a velocity in m/s. EKF2 calls the square of their ratio a test ratio.
     """
 
     value: float = 0.0
     limit: float = math.inf
-
-    def test(self, value: float, limit: float) -> float:
-        """Take a new test; its ratio."""
-        self.value, self.limit = value, limit
-        return value / limit
-
-    @property
-    def ratio(self) -> float:
-        """A hit from 1 on."""
-        return self.value / self.limit
 
 
 @dataclass(slots=True)
@@ -177,7 +166,7 @@ class Detector(Protocol[StateT]):
 
     def initial(self) -> StateT: ...
 
-    def step(self, state: StateT, sample: Sample, situation: Situation) -> tuple[StateT, Impact | None]:
+    def step(self, state: StateT, sample: Sample, situation: Situation, motion: Motion) -> tuple[StateT, Impact | None]:
         """Take one sample of any kind, in the order heard; IMU samples come in the order of their stamps.
 
         The state given may be changed and returned; whoever wants to keep an old one copies it.

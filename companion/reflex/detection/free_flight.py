@@ -53,6 +53,8 @@ class ThrustGain:
     fraction_boot_us: int = -CURRENT_US
     full_m_s2: float = 0.0
     known_s: float = 0.0
+    most_m_s2: float = STRONGEST_M_S2
+    """Largest upward specific force that thrust can explain."""
 
     def set_fraction(self, time_us: int, fraction: float) -> None:
         self.fraction, self.fraction_boot_us = fraction, time_us
@@ -73,11 +75,8 @@ class ThrustGain:
         if self.is_commanded(time_us) and thrust_m_s2 > 0.0 and elapsed_s > 0.0:
             self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
             self.full_m_s2 += (thrust_m_s2 / self.fraction - self.full_m_s2) * elapsed_s / self.known_s
-
-    @property
-    def most_m_s2(self) -> float:
-        """Largest upward specific force that thrust can explain, m/s^2."""
-        return MARGIN * self.full_m_s2 if self.is_known else STRONGEST_M_S2
+            if self.known_s >= GAIN_MEMORY_S:
+                self.most_m_s2 = MARGIN * self.full_m_s2
 
     def expected_m_s2(self, time_us: int, mean_m_s2: float) -> float:
         """Expected f_z in free air: from the commanded thrust, else its recent mean."""

@@ -20,7 +20,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
+from companion.messages import (
+    AttitudeTarget,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    MessageId,
+    Odometry,
+    Sample,
+    Vector3,
+)
 from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
 from companion.motion.vector import ZERO, limited, minus
@@ -34,7 +43,6 @@ from companion.reflex.config import (
     WORSE_AFTER_US,
     FusedConfig,
 )
-from companion.reflex.correction import VelocityValidity
 from companion.reflex.detection.classify import classified, hovers
 from companion.reflex.detection.detector import (
     ON_THE_GROUND,
@@ -43,6 +51,7 @@ from companion.reflex.detection.detector import (
     Impact,
     ImpactKind,
     Innovation,
+    Motion,
     Phase,
     Situation,
 )
@@ -60,6 +69,8 @@ class FusedState(DetectorState):
     vertical: Innovation = field(default_factory=Innovation)
     velocity: Innovation = field(default_factory=Innovation)
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
+    vertical_threshold_m_s2: float = 0.0
+    """Beyond the force that propellers can make."""
     floor: ForceNoise = field(default_factory=ForceNoise)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
@@ -79,10 +90,6 @@ class FusedState(DetectorState):
         speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
         turning_rad_s = sum(map(abs, rates_frd_rad_s))
         return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, MEAN_MEMORY_S * turning_rad_s)
-
-    def vertical_threshold_m_s2(self, config: FusedConfig) -> float:
-        """Vertical threshold, m/s^2, beyond the force that propellers can make."""
-        return max(config.vertical_threshold_m_s2, config.noise_factor * self.floor.vertical_m_s2)
 
     def side_force(self, config: FusedConfig, force_frd_m_s2: Vector3) -> tuple[float, float, bool]:
         """Horizontal force, m/s^2; how many thresholds are a hit; whether it is that of two samples together.
@@ -135,26 +142,32 @@ class FusedDetector:
         self._averaging_us = averaging_interval_us
 
     def initial(self) -> FusedState:
-        return FusedState(threshold_m_s2=self._config.side_threshold_m_s2, jump=VelocityJump(self._averaging_us))
+        side, vertical = self._config.side_threshold_m_s2, self._config.vertical_threshold_m_s2
+        jump = VelocityJump(self._averaging_us)
+        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, jump=jump)
 
-    def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
+    def step(
+        self, state: FusedState, sample: Sample, situation: Situation, motion: Motion
+    ) -> tuple[FusedState, Impact | None]:
         if type(sample) is ImuSample:
             before_us = state.last_sample_boot_us
-            impact = self._imu(state, sample, situation)
+            impact = self._imu(state, sample, situation, motion)
             state.before_boot_us, state.before_frd_m_s2 = before_us, state.last_frd_m_s2
             state.last_frd_m_s2 = sample.specific_force_frd_m_s2
             return state, impact
         if isinstance(sample, (LocalPosition, Odometry)):
-            return state, self._velocity(state, sample, situation)
+            return state, self._velocity(state, sample, situation, motion)
         if isinstance(sample, AttitudeTarget):
             state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         return state, None
 
     # --- force ------------------------------------------------------------------------------------------------
 
-    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
+    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation, motion: Motion) -> Impact | None:
         config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
-        w, off = sample.angular_velocity_frd_rad_s, situation.why_off
+        w, off = sample.angular_velocity_frd_rad_s, situation.off_reason
+        if off is None and situation.landed_state is LandedState.ON_GROUND:
+            off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         s.last_sample_boot_us = now_us
         s.jump.imu(before_us, now_us, w)
@@ -162,10 +175,9 @@ class FusedDetector:
         if is_of_two:
             free_until_us = s.before_boot_us
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
-        ratio = max(
-            s.side.test(side, thresholds * s.side_threshold_m_s2(config, w)),
-            s.vertical.test(beyond, s.vertical_threshold_m_s2(config)),
-        )
+        s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
+        s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
+        ratio = max(side / s.side.limit, beyond / s.vertical.limit)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -189,16 +201,16 @@ class FusedDetector:
         if s.phase is Phase.OFF:
             s.observed = None
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
-            return None if is_learnt else self._unwatched(s, situation, impact)
-        return self._loud(s, situation, impact, s.jumps(f))
+            return None if is_learnt else self._unwatched(s, situation, motion, impact)
+        return self._loud(s, situation, motion, impact, s.jumps(f))
 
-    def _unwatched(self, s: FusedState, situation: Situation, impact: Impact) -> Impact | None:
+    def _unwatched(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact | None:
         """A crash is reported where no hit is looked for, too: in a take-off, in a landing, under strong vibration."""
         since_us = impact.sample_time_boot_us - s.contact_began_boot_us
         is_known = s.kind is ImpactKind.CRASH and since_us <= 1e6 * self._config.longest_contact_s
         if is_known or not situation.may_crash:
             return None
-        if (impact := classified(impact, s.velocity_ned_m_s, situation)).kind is not ImpactKind.CRASH:
+        if (impact := classified(impact, s.velocity_ned_m_s, situation, motion)).kind is not ImpactKind.CRASH:
             return None
         s.contact_began_boot_us, s.peak_specific_force_m_s2 = impact.sample_time_boot_us, impact.size_m_s2
         s.kind = impact.kind
@@ -209,24 +221,28 @@ class FusedDetector:
         # A sample after a gap or a reboot has the weight of the longest interval.
         elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
         s.floor.learn(f, elapsed_s)
-        s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
+        config = self._config
+        s.threshold_m_s2 = max(config.side_threshold_m_s2, config.noise_factor * s.floor.side_m_s2)
+        s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
-    def _loud(self, s: FusedState, situation: Situation, impact: Impact, has_jumped: bool) -> Impact | None:
+    def _loud(
+        self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, has_jumped: bool
+    ) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
                 is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
                 if is_another and size > 2.0 * s.peak_specific_force_m_s2:
-                    return self._fire(s, situation, impact)
+                    return self._fire(s, situation, motion, impact)
                 # A touch that tips the vehicle over becomes a crash.
                 if (
                     s.kind is not ImpactKind.CRASH
-                    and classified(impact, s.velocity_ned_m_s, situation).kind is ImpactKind.CRASH
+                    and classified(impact, s.velocity_ned_m_s, situation, motion).kind is ImpactKind.CRASH
                 ):
-                    return self._fire(s, situation, impact)
+                    return self._fire(s, situation, motion, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
         first = s.observed = s.observed or impact
@@ -235,11 +251,11 @@ class FusedDetector:
             if now_us - first.sample_time_boot_us < 1e6 * self._config.soft_wait_s:
                 return None
             impact = replace(impact, kind=ImpactKind.CONTACT)
-        return self._fire(s, situation, impact)
+        return self._fire(s, situation, motion, impact)
 
-    def _fire(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
+    def _fire(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact:
         """Begin the contact."""
-        impact = classified(impact, s.velocity_ned_m_s, situation)
+        impact = classified(impact, s.velocity_ned_m_s, situation, motion)
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
         s.peak_specific_force_m_s2 = impact.size_m_s2
@@ -248,13 +264,15 @@ class FusedDetector:
 
     # --- velocity ---------------------------------------------------------------------------------------------
 
-    def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
-        time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, situation.strapdown
+    def _velocity(
+        self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation, motion: Motion
+    ) -> Impact | None:
+        time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, motion.strapdown
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
-        s.velocity.test(0.0, math.inf)
+        s.velocity.value, s.velocity.limit = 0.0, math.inf
         if hovers(v):
             s.hovered_boot_us = time_us
-        if strapdown is None or not strapdown.has_new_fix:
+        if not strapdown.has_new_fix:
             return None
         step = jump.step_m_s(strapdown.fixes)
         if time_us - s.last_loud_boot_us < SHOWN_US:
@@ -264,13 +282,13 @@ class FusedDetector:
             return None
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
         change_m_s2 = abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2])
-        validity = situation.validity or VelocityValidity()
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
-        caution = 1.0 if type(sample) is Odometry and validity.is_valid else 2.0
+        caution = 1.0 if type(sample) is Odometry and motion.validity.is_valid else 2.0
         size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
-        corrected_m_s = validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
-        is_jump = s.velocity.test(size, least + corrected_m_s) > 1.0
-        if is_jump or validity.is_valid:
+        corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
+        s.velocity.value, s.velocity.limit = size, least + corrected_m_s
+        is_jump = size / s.velocity.limit > 1.0
+        if is_jump or motion.validity.is_valid:
             jump.learn(limited(step, least))
         if s.phase is not Phase.ARMED or not is_jump:
             return None
@@ -284,4 +302,4 @@ class FusedDetector:
         impact = Impact(
             now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
         )
-        return self._fire(s, situation, impact)
+        return self._fire(s, situation, motion, impact)

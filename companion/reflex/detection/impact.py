@@ -160,15 +160,12 @@ class ImpactEstimator:
         )
         return estimate
 
-    def follow(self, sample: ImuSample, state: DetectorState) -> ImpactEstimate | None:
-        """Take each IMU sample, and the detector's state after it.
+    def follow(self, estimate: ImpactEstimate, sample: ImuSample, state: DetectorState) -> ImpactEstimate | None:
+        """Take each IMU sample while the latest estimate is not final, and the detector's state after it.
 
         Returns the final estimate, once: when the contact is over.
         """
-        estimate, contact = self.estimate, self.contact
-        if estimate is None or estimate.is_final:
-            return None
-        is_over = state.phase is not Phase.CONTACT
+        contact, is_over = self.contact, state.phase is not Phase.CONTACT
         if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
             contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
             # With each sample: arms may meet their stop, and clip the sensor, late in the contact.

@@ -14,7 +14,7 @@ from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, O
 from companion.motion.config import KEPT_US
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
 from companion.reflex.detection.classify import classified
-from companion.reflex.detection.detector import Detector, DetectorState, Impact, ImpactKind, Phase, Situation
+from companion.reflex.detection.detector import Detector, DetectorState, Impact, ImpactKind, Motion, Phase, Situation
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import Promise, SampleGate, StreamHealth, promise_of
 from companion.reflex.detection.impact import ImpactEstimate, ImpactEstimator
@@ -73,17 +73,12 @@ class CollisionMonitor:
     """Why an armed detector could miss a hit; None while the streams are healthy."""
     gate: SampleGate = field(default_factory=SampleGate)
     imu_fault: str | None = None  # what was wrong with the newest IMU message
+    is_attitude_old: bool = False  # too old to integrate the accelerometer
     is_introduced: bool = False  # threshold and losses have been reported
     invalidity_reported: bool = False
     promise: Promise | None = None  # while it was last armed
     promised_us: int = 0
     heard: set[MessageId] = field(default_factory=set)
-
-    @property
-    def is_attitude_old(self) -> bool:
-        """Whether the attitude is too old to integrate the accelerometer."""
-        latest, newest_us = self.gate.latest, self.estimator.strapdown.time_boot_us
-        return latest is not None and newest_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
 
     def reject(self) -> None:
         """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
@@ -106,6 +101,9 @@ class MonitorResult(NamedTuple):
     notices: Sequence[Notice]
 
 
+NOTHING_SEEN = MonitorResult((), (), ())
+
+
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
     """A monitor before its first sample; ``now_us`` is on the clock of `advance`."""
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
@@ -119,13 +117,9 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     """Take the samples received since the last call, in order. Call it without samples, too: that shows a silence."""
     impacts: list[ImpactEstimate] = []
     finished: list[ImpactEstimate] = []
-    imu_samples, is_on = 0, situation.off_reason is None
-    situation = situation._replace(
-        off_reason=situation.off_reason or _vibration(monitor),
-        strapdown=monitor.estimator.strapdown,
-        validity=monitor.estimator.validity,
-        history=monitor.estimator.history,
-    )
+    imu_samples, is_on, sight, estimator = 0, situation.off_reason is None, monitor.config.sight, monitor.estimator
+    if is_on and monitor.state.threshold_m_s2 > sight.max_threshold_m_s2:
+        situation = situation._replace(off_reason=_vibration(monitor.state))
     for sample in samples:
         if type(sample) is ImuSample:
             if not monitor.gate.imu(sample):
@@ -133,7 +127,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
                 continue
             monitor.imu_fault = None
             imu_samples += 1
-            if 0 <= monitor.estimator.strapdown.time_boot_us - sample.time_boot_us < KEPT_US:
+            if 0 <= estimator.strapdown.time_boot_us - sample.time_boot_us < KEPT_US:
                 continue
         elif type(sample) is Attitude:
             if not monitor.gate.attitude(sample):
@@ -144,42 +138,44 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             continue
         elif type(sample) in OPTIONAL_STREAMS:
             monitor.heard.add(OPTIONAL_STREAMS[type(sample)])
-        monitor.estimator.update(sample)
+        estimator.update(sample)
+        attitude, newest_us = monitor.gate.latest, estimator.strapdown.time_boot_us
+        monitor.is_attitude_old = attitude is not None and newest_us - attitude.time_boot_us > sight.silence_s * 1e6
         if monitor.is_attitude_old:
-            monitor.estimator.strapdown.fixes.clear()
-        monitor.state, impact = monitor.detector.step(monitor.state, sample, situation)
+            estimator.strapdown.fixes.clear()
+        monitor.state, impact = monitor.detector.step(monitor.state, sample, situation, estimator)
         if impact is not None:
-            impacts.append(monitor.estimator.begin(_on_ground(impact, situation)))
-        elif type(sample) is ImuSample:
-            final = monitor.estimator.follow(sample, monitor.state)
+            impacts.append(estimator.begin(_on_ground(impact, situation, estimator)))
+        elif type(sample) is ImuSample and estimator.estimate is not None and not estimator.estimate.is_final:
+            final = estimator.follow(estimator.estimate, sample, monitor.state)
             if final is not None:
                 finished.append(final)
-    monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
-    _promise(monitor, now_us)
-    return MonitorResult(impacts, finished, _notices(monitor, is_on, now_us))
+    monitor.stream_health.imu(imu_samples, sight, now_us)
+    if now_us - monitor.promised_us >= 1e6:
+        _promise(monitor, now_us)
+    notices = _notices(monitor, is_on, now_us)
+    return MonitorResult(impacts, finished, notices) if impacts or finished or notices else NOTHING_SEEN
 
 
-def _on_ground(impact: Impact, situation: Situation) -> Impact:
+def _on_ground(impact: Impact, situation: Situation, motion: Motion) -> Impact:
     """A landing of a detector that does not classify: the ground is no hit."""
-    named = classified(impact, None, situation)
+    named = classified(impact, None, situation, motion)
     return named if named.kind is ImpactKind.LANDING else impact
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:
     """Once a second, of an armed detector whose noise is known."""
     state = monitor.state
-    if isinstance(state, FusedState) and state.phase is Phase.ARMED and now_us - monitor.promised_us >= 1e6:
+    if isinstance(state, FusedState) and state.phase is Phase.ARMED:
         fixes, imu_hz = monitor.estimator.strapdown.fixes, len(monitor.stream_health.arrivals_us)
         counted = MessageId.ODOMETRY in monitor.heard
         monitor.promise = promise_of(state, monitor.config.fused, fixes, imu_hz, counted)
         monitor.promised_us = now_us
 
 
-def _vibration(monitor: CollisionMonitor) -> str | None:
+def _vibration(state: DetectorState) -> str:
     """Why nothing but a crash is reported now: vibration has grown until only a crash would exceed the threshold."""
-    threshold_m_s2 = monitor.state.threshold_m_s2
-    is_hidden = threshold_m_s2 > monitor.config.sight.max_threshold_m_s2
-    return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2" if is_hidden else None
+    return f"vibration hides hits below {state.threshold_m_s2:.0f} m/s^2"
 
 
 def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
@@ -188,8 +184,8 @@ def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
     fault = monitor.stream_health.fault(config, now_us)
     if fault is not None:
         return monitor.imu_fault or fault
-    if (vibration := _vibration(monitor)) is not None:
-        return vibration
+    if monitor.state.threshold_m_s2 > config.max_threshold_m_s2:
+        return _vibration(monitor.state)
     return f"no ATTITUDE_QUATERNION for {round(config.silence_s * 1e3)} ms" if monitor.is_attitude_old else None
 
 

@@ -294,7 +294,7 @@ def test_a_flights_setpoints_keep_off_what_it_has_just_hit_and_off_what_it_remem
         f.run_to(state)
         (wall,) = known_surfaces(flown)
         assert wall.surface.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.05)
-        asked = Target(flown.vehicle.history.latest().position_ned_m, 0.0, (2.0, 0.5, 0.0), REST)
+        asked = Target(flown.vehicle.history.latest.position_ned_m, 0.0, (2.0, 0.5, 0.0), REST)
         sent = Limiter().passed(flown, asked, has_floor=True, moved=True, now_us=f.now_us)
         # Then it is held back
         assert sent.velocity_ned_m_s is None or sent.velocity_ned_m_s[0] < 1.9

@@ -31,7 +31,7 @@ def test_history_keeps_two_seconds_drops_late_packets_and_starts_anew_after_a_re
     assert kept[-1] is samples[-1]
     assert 1.95 <= (kept[-1].time_boot_us - kept[0].time_boot_us) * 1e-6 <= 2.0
     assert not history.add(samples[-2])
-    assert history.latest() is samples[-1]
+    assert history.latest is samples[-1]
     rebooted = LocalPosition(1000, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     assert history.add(rebooted)
     assert history.between(0, CONTACT_US) == [rebooted]

@@ -9,12 +9,13 @@ from typing import Any
 import pytest
 
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
-from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, plus
-from companion.reflex.config import EXCESS, FusedConfig
+from companion.reflex.config import EXCESS, EstimateConfig, FusedConfig
 from companion.reflex.detection.detector import Evidence, ImpactKind, Phase, Situation
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import promise_of
+from companion.reflex.detection.impact import ImpactEstimator
 
 TICK_US = 1_000
 WINDOW_US = 4_000
@@ -75,20 +76,12 @@ class Flight:
 
     def fly(self, until_us=4_000_000, **config):
         detector = FusedDetector(FusedConfig(**config), WINDOW_US)
-        self.state, impacts, strapdown = detector.initial(), [], Strapdown()
+        self.state, impacts, motion = detector.initial(), [], ImpactEstimator(EstimateConfig())
         for t, sample in self.samples(until_us):
             if not isinstance(sample, ImuSample) and not isinstance(sample, self.heard):
                 continue
-            match sample:
-                case ImuSample():
-                    f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-                    strapdown.imu(sample.time_boot_us, f, w)
-                case Attitude():
-                    strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
-                case LocalPosition() | Odometry():
-                    strapdown.velocity(sample)
-            known = self.situation(t)._replace(strapdown=strapdown)
-            self.state, impact = detector.step(self.state, sample, known)
+            motion.update(sample)
+            self.state, impact = detector.step(self.state, sample, self.situation(t), motion)
             if impact is not None:
                 impacts.append(impact)
         return impacts

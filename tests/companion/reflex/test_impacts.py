@@ -2,13 +2,11 @@
 
 import math
 import random
-from collections import deque
 
 import pytest
 
 from companion.messages import ImuSample, LocalPosition, Odometry
-from companion.motion.history import MotionHistory
-from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.motion.strapdown import VelocityFix
 from companion.reflex.config import CHANGE_RAD, GROUND_M, IMPULSE_RAD, EstimateConfig
 from companion.reflex.detection.classify import FASTEST_LANDING_M_S, classified, kind_of
 from companion.reflex.detection.detector import Impact, ImpactKind, Situation
@@ -230,14 +228,15 @@ def test_a_wall_met_at_a_steep_tilt_high_up_is_no_crash():
 
 def test_a_fall_is_as_fast_as_at_its_end_and_not_as_its_heights_were_in_the_mean():
     # Given heights of a fall from rest whose last report shows the bounce already
-    history, touch_us = MotionHistory(), 400_000
+    motion, touch_us = ImpactEstimator(EstimateConfig()), 400_000
     for time_us in range(0, touch_us, 20_000):
         since_s = 1e-6 * time_us
-        history.add(LocalPosition(time_us, (0.0, 0.0, 0.5 * 9.81 * since_s**2 - 0.8), (0.0, 0.0, 9.81 * since_s)))
-    history.add(LocalPosition(touch_us, (0.0, 0.0, 0.0), (0.0, 0.0, -1.5)))
-    before = VelocityFix(touch_us - 20_000, (0.0, 0.0, 3.7), (0.0, 0.0, 0.0))
-    situation = Situation(armed=True, height_m=0.1, history=history, strapdown=Strapdown(fixes=deque([before])))
+        place = (0.0, 0.0, 0.5 * 9.81 * since_s**2 - 0.8)
+        motion.history.add(LocalPosition(time_us, place, (0.0, 0.0, 9.81 * since_s)))
+    motion.history.add(LocalPosition(touch_us, (0.0, 0.0, 0.0), (0.0, 0.0, -1.5)))
+    motion.strapdown.fixes.append(VelocityFix(touch_us - 20_000, (0.0, 0.0, 3.7), (0.0, 0.0, 0.0)))
+    situation = Situation(armed=True, height_m=0.1)
     # When it meets the ground at 3.7 m/s, whose mean over the last tenths of a second was 2.9 m/s
     impact = Impact(touch_us, touch_us - 10_000, (0.0, 0.0, -100.0))
     # Then it has crashed
-    assert classified(impact, (0.0, 0.0, -1.5), situation).kind is ImpactKind.CRASH
+    assert classified(impact, (0.0, 0.0, -1.5), situation, motion).kind is ImpactKind.CRASH
