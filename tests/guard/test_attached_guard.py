@@ -14,10 +14,11 @@ from companion.core import POLL_INTERVAL_US
 from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
 from companion.guard.holding import is_foreign
+from companion.guard.onward import stop
 from companion.guard.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.readers import GUARD_READERS, sample_from
-from companion.messages import PositionTarget, Refused
+from companion.messages import LocalPosition, PositionTarget, Refused
 from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
 from sim_vehicle.airframe import load_built_in
@@ -124,6 +125,12 @@ def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
     assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]
     # Nor does it have places of the guard's while the guard flies it by attitude
     assert is_foreign(guard, there, 1_600_000)
+
+
+def test_it_is_stopped_where_it_comes_to_rest_by_the_two_metres_a_second_squared_of_the_manual():
+    guard = AttachedFlight().guard.core.flight
+    guard.vehicle.history.add(LocalPosition(1_000_000, (1.0, 0.0, -2.0), (2.0, 0.0, 0.0)))
+    assert stop(guard).position_ned_m == (2.0, 0.0, -2.0)
 
 
 # --- names and fields

@@ -14,7 +14,7 @@ from companion.autopilot.ardupilot import modes, setup
 from companion.autopilot.ardupilot.firmware import ARDUPILOT
 from companion.autopilot.interface import Pilot
 from companion.autopilot.known import MODE_NAMES
-from companion.autopilot.setup import SerialLine, Verdict
+from companion.autopilot.setup import SerialLine, Sight, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
@@ -411,6 +411,12 @@ def test_what_was_not_told_is_doubtful_and_what_is_asked_is_judged():
     assert {item.verdict for item in found.values()} == {Verdict.DOUBTFUL}
     older = {"PSC_JERK_XY", "ANGLE_MAX", "ARMING_CHECK"}
     assert {*setup.asked(None)} == {*HEALTHY} | older and {*ON_SERIAL2} <= {*setup.asked(UART)}
+
+
+def test_the_slowest_hit_that_shows_follows_from_the_filter():
+    # A jump of 1 m/s is a pulse of 2.86 m/s² for each Hz; a filter that was not told is the default
+    for told, found in (({setup.FILTER: 40}, "0.05 m/s on through a filter of 40 Hz"), ({}, "0.10 m/s")):
+        assert found in setup.sight(Sight(told, 200.0, 0.0, 5.7, "")).found
 
 
 def test_what_happens_in_a_silence_is_told():

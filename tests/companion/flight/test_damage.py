@@ -5,8 +5,9 @@ import random
 
 import pytest
 
+from companion.flight.damage import note_motors
 from companion.flight.plan import mission_lines
-from companion.messages import ImuSample, LandedState, LocalPosition, Sample
+from companion.messages import ImuSample, LandedState, LocalPosition, MotorOutputs, Sample
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.motors import Damage, MotorWatch
 from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
@@ -222,6 +223,19 @@ def test_a_recovery_says_nothing_and_what_came_before_it_counts_anew():
     assert flown.fly(20.0, None, HURT) == []
     assert flown.fly(1.4, True, HURT) == [] and flown.fly(0.5, None) == []
     assert len(flown.fly(20.0, True, HURT)) == 1
+
+
+def test_what_loads_a_motor_while_it_may_hang_on_the_wall_is_no_damage():
+    # Given four motors that worked evenly until the hit, of which one works harder in the recovery
+    context = flying_in("recovering").companion.core.flight
+    for number in range(50):
+        context.motors.take((1500.0,) * 4, False, number * SAMPLE_US)
+    # Then it is named when the vehicle rests, and not before
+    for began, settled_after_s in ((50, None), (150, 0.5)):
+        context.collisions[-1].settled_after_s = settled_after_s
+        for number in range(began, began + 100):
+            note_motors(context, [MotorOutputs((1500.0, 1500.0, 1600.0, 1500.0))], number * SAMPLE_US)
+        assert (context.motors.damage is None) == (settled_after_s is None)
 
 
 @pytest.mark.parametrize(("policy", "state"), [("tell", "mission"), ("land", "landing"), ("return", "returning")])

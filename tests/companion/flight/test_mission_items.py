@@ -152,6 +152,7 @@ def test_items_that_cannot_be_flown(items, words):
 
 
 GO_TO = {"position_ned_m": [2, 0, -1.5]}
+HOLD = {"hold": {"duration_s": 1}}
 
 
 @pytest.mark.parametrize(
@@ -164,10 +165,11 @@ GO_TO = {"position_ned_m": [2, 0, -1.5]}
         ({"items": [TAKEOFF, {"go_to": {"position_ned_m": [1, 2]}}, LANDING]}, "required"),
         ({"items": [TAKEOFF, {"hold": {"duration_s": math.nan}}, LANDING]}, "finite"),
         ({"items": [TAKEOFF, {}, LANDING]}, "exactly one key"),
-        ({"items": [TAKEOFF, {"hold": {"duration_s": 1}, **LANDING}, LANDING]}, "exactly one key"),
+        ({"items": [TAKEOFF, {**HOLD, **LANDING}, LANDING]}, "exactly one key"),
         ({"items": [LANDING, LANDING]}, "first item must be takeoff"),
-        ({"items": [TAKEOFF, {"hold": {"duration_s": 1}}]}, "last item must be land or return"),
+        ({"items": [TAKEOFF, HOLD]}, "last item must be land or return"),
         ({"items": [TAKEOFF, LANDING, LANDING]}, "item 2 is land"),
+        ({"items": [TAKEOFF, HOLD, {"return": {"speed_m_s": 9}}], "limits": {"max_speed_m_s": 5}}, "flies at 9 m/s"),
         ({"items": [TAKEOFF, {"go_to": {"position_ned_m": [2, 0, 1.5]}}, LANDING]}, "up is negative"),
         ({"fence": {"max_height_m": 1}}, r"item 1 \(takeoff\) lies .* above fence.max_height_m"),
         ({"on_interrupt": "dance"}, "'hold' or 'land'"),

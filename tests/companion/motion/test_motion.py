@@ -117,6 +117,15 @@ class Air:
         return sample
 
 
+def test_between_two_reports_the_gyroscope_turns_the_attitude():
+    # Half of the 2 rad/s that a turn from rest has after 0.1 s, for that time
+    for p, q, r in ((0.08, 0.0, 0.0), (0.0, 0.08, 0.0), (0.0, 0.0, 0.08)):
+        strapdown = Strapdown()
+        for number in range(1, 26):
+            strapdown.imu(4_000 * number, (0.0, 0.0, -G), (p * number, q * number, r * number))
+        assert 2.0 * math.asin(sum(strapdown.valid_wxyz[1:])) == pytest.approx(0.1, abs=1e-4)
+
+
 @pytest.mark.parametrize("late_s", [0.012, 0.06, 0.2])
 def test_the_delay_is_learnt_where_the_vehicle_speeds_up_and_brakes(late_s):
     # Given a receiver that is late by another time than most, and a flight that speeds up and brakes for half a minute

@@ -12,7 +12,6 @@ from sim_vehicle.airframe import load_built_in
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator import strapdown
 from sim_vehicle.estimator.optics import distance_below
-from sim_vehicle.estimator.samples import NO_QUALITY
 from sim_vehicle.estimator.sensors import FlowSensor
 from sim_vehicle.estimator.strapdown import ERROR_ROWS, SAMPLE_COLUMNS, advance, down_range, heading, predict_now
 from sim_vehicle.physics.rotation import matrix_from_quaternion
@@ -133,8 +132,9 @@ def test_flow_is_speed_over_distance_and_turns_are_in_both_flow_and_gyroscope():
     ids=["too near", "too far", "too fast", "turns too fast", "upside down"],
 )
 def test_flow_that_cannot_be_seen_has_no_quality(state):
-    assert {sample.quality for sample in flow_samples(state)} == {NO_QUALITY}
-    assert NO_QUALITY not in {sample.quality for sample in flow_samples(body())}
+    # By OPTICAL_FLOW_RAD 0 is none and 255 the best
+    assert {sample.quality for sample in flow_samples(state)} == {0}
+    assert {sample.quality for sample in flow_samples(body())} == {255}
 
 
 def distance(state, faces=GROUND) -> float:

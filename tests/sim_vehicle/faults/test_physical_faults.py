@@ -123,7 +123,8 @@ def raw_rms(plant: Plant) -> np.ndarray:
 def test_vibration_has_the_strength_that_was_asked_for_at_hover(motor: int | None) -> None:
     asked = {"kind": "vibration", "at_s": 0, "accelerometer_rms_m_s2": 20, "gyroscope_rms_rad_s": 0.5, "motor": motor}
     plant = hover(asked)
-    fly(plant, 0.1)
+    # It shows in the samples, and in what their means leave of it
+    assert np.ptp([sample.specific_force_frd_m_s2 for sample in fly(plant, 0.1)], axis=0).min() > 1.0
     # Four rotors that turn at nearly the same speed beat; their powers add up in the long run.
     spread = 0.05 if motor is not None else 0.75
     assert raw_rms(plant) == pytest.approx([20, 20, 20, 0.5, 0.5, 0.5], rel=spread)
@@ -185,6 +186,7 @@ def test_faults_repeat_for_a_seed_and_leave_the_rest_of_the_noise_alone() -> Non
         ({"kind": "gust", "at_s": 1, "velocity_ned_m_s": [1, 0, 0]}, "give between_s"),
         ({"kind": "gust", "between_s": [1, 1.5], "velocity_ned_m_s": [1, 0, 0]}, "no room to rise"),
         ({"kind": "free_fall"}, "give at_s"),
+        ({"kind": "payload_drop", "between_s": [1, 2], "mass_kg": 0.1}, "give at_s, the moment"),
         ({"kind": "free_fall", "at_s": 1, "between_s": [1, 2]}, "not both"),
         ({"kind": "push", "between_s": [2, 1], "force_ned_n": [1, 0, 0]}, "ends before it begins"),
         ({"kind": "motor_failure", "motor": 8, "at_s": 0}, "less than 8"),

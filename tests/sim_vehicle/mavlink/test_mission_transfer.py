@@ -227,6 +227,12 @@ def test_items_that_px4_refuses(item, result):
     assert exchange.store.mission == () and exchange.transfer.state is TransferState.IDLE
 
 
+def test_a_fence_has_three_corners_at_least():
+    for corners, result in ((2, MissionResult.ERROR), (3, MissionResult.ACCEPTED)):
+        fence = [wire_item(i, commands.FENCE_POLYGON_INCLUSION, params=(corners, 0, 0, 0)) for i in range(corners)]
+        assert Exchange().upload(fence, MissionType.FENCE) == result
+
+
 @pytest.mark.parametrize(
     ("sent", "stored"),
     [

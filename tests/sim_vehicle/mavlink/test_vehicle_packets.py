@@ -164,15 +164,15 @@ ARMED = StatusText(Severity.INFO, "Armed by external command")
 
 
 def test_a_long_text_comes_in_pieces():
-    link = TextLink()
-    link.heard_us = 0
-    link.add(ARMED, 0)
+    link, heard_us = TextLink(), 60_000_000
+    link.heard_us = heard_us
+    link.add(ARMED, heard_us)
     long = StatusText(Severity.CRITICAL, "SET_POSITION_TARGET_LOCAL_NED coordinate frame 9 unsupported")
-    link.add(long, 0)
-    assert len(list(link.due(0))) == 1
+    link.add(long, heard_us)
+    assert len(list(link.due(heard_us))) == 1
     # The next text not before 50 ms
-    assert list(link.due(48_000)) == []
-    pieces = [read_back(message) for message in link.due(52_000)]
+    assert list(link.due(heard_us + 48_000)) == []
+    pieces = [read_back(message) for message in link.due(heard_us + 52_000)]
     assert [(piece.id, piece.chunk_seq, piece.severity) for piece in pieces] == [(1, 0, 2), (1, 1, 2)]
     assert "".join(piece.text.rstrip("\0") for piece in pieces) == long.text + "\t"
     assert len(pieces[0].text) == 50

@@ -62,6 +62,13 @@ def test_a_poles_normal_is_radial_where_the_guard_touches_it(offset_m: float) ->
     assert np.abs(guard - centre) == pytest.approx(np.array([arm_m, arm_m]), abs=2e-4)
 
 
+def test_what_is_round_is_solid_however_thick_it_is() -> None:
+    for radius_m in (0.005, 2.0, 100.0):
+        silo = {"poles": [{"point_ned_m": [2.0 + radius_m, 0, 0], "radius_m": radius_m, "height_m": 300}]}
+        (hit, *_) = thrown(smooth("rigid"), silo).truth.hits
+        assert hit.contact_point_ned_m[0] == pytest.approx(2.0, abs=0.02)
+
+
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("name", ["foldable", "rigid"])
 def test_no_obstacle_returns_more_energy_than_it_took(name: str, scene: str) -> None:
@@ -131,16 +138,17 @@ def test_from_rim_to_face_nothing_jumps() -> None:
 @pytest.mark.parametrize("kind", ["walls", "poles"])
 def test_a_moving_obstacle_hits_as_a_standing_one_is_hit(name: str, kind: str) -> None:
     """Seen from the obstacle a hit is the same whichever of the two moves; only the fall differs by none."""
-    moving = {"motion": {"velocity_ned_m_s": [-2, 0, 0], "from_s": 0.0, "until_s": 5.0}}
+    moves_m_s = np.array([-2.0, 0.3, -0.2])
+    moving = {"motion": {"velocity_ned_m_s": moves_m_s.tolist(), "from_s": 0.0, "until_s": 5.0}}
     obstacle = {
         "walls": {"point_ned_m": [2, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]},
         "poles": {"point_ned_m": [2, 0.03, 0], "radius_m": 0.1, "height_m": 30},
     }[kind]
-    standing = thrown(smooth(name), {kind: [obstacle]}, velocity=(2.0, 0.0, 0.0), duration_s=0.3)
+    standing = thrown(smooth(name), {kind: [obstacle]}, velocity=-moves_m_s, duration_s=0.3)
     hovering = thrown(smooth(name), {kind: [obstacle | moving]}, velocity=(0.0, 0.0, 0.0), duration_s=0.3)
     (at_rest, *_), (run_over, *_) = standing.truth.hits, hovering.truth.hits
-    assert run_over.surface_velocity_ned_m_s == pytest.approx((-2.0, 0.0, 0.0), abs=1e-9)
-    assert np.array(hovering.state.body[3:6]) - [-2, 0, 0] == pytest.approx(standing.state.body[3:6], abs=0.01)
+    assert run_over.surface_velocity_ned_m_s == pytest.approx(moves_m_s, abs=1e-9)
+    assert np.array(hovering.state.body[3:6]) - moves_m_s == pytest.approx(standing.state.body[3:6], abs=0.01)
     assert run_over.contact_at_boot_us == pytest.approx(at_rest.contact_at_boot_us, abs=30)
     assert run_over.energy_after_j / run_over.energy_before_j == pytest.approx(
         at_rest.energy_after_j / at_rest.energy_before_j, rel=0.01
