@@ -10,7 +10,7 @@ positive axes; read for any approach, gamma_i |v_ci| back along each horizontal 
     x_d = x + T v,    T = WAY_S
 
 moved clear of all surfaces, by clearance_m off what was hit. T v is the way of the attitude law (see attitude_law),
-whatever the attitude's lag. The height is x_3(t_c), unless the obstacle is steep or the vehicle fell by clearance_m.
+whatever the attitude's lag. The height is x_3(t_c), unless the obstacle is steep.
 """
 
 from collections.abc import Callable, Mapping
@@ -77,10 +77,7 @@ def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> 
     goal, normal = plus(motion.position_ned_m, WAY_S, motion.velocity_ned_m_s), contact.normal_ned
     if config.tangential == "kept":
         goal = plus(goal, config.gamma_per_axis[0], split(motion.velocity_ned_m_s, normal)[1])
-    if normal[2] != 0.0:
-        return goal
-    down_m, here_m = contact.position_ned_m[2], motion.position_ned_m[2]
-    return (goal[0], goal[1], here_m if abs(here_m - down_m) > config.clearance_m else down_m)
+    return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])
 
 
 RECOVERY_LAWS: Mapping[str, Law] = {

@@ -162,6 +162,9 @@ class Recovery:
             place = here
         elif self._has_passed and off_m < self._config.clearance_m:
             place = plus(here, -self._config.clearance_m, normal.direction_ned)
+        if normal.direction_ned[2] == 0.0:
+            # After a fall it comes to rest before it climbs back.
+            place = (place[0], place[1], max(place[2], here[2] - self._config.clearance_m))
         self._contact = replace(
             self._contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad
         )

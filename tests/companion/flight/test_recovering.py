@@ -54,8 +54,10 @@ def recover_in(flight: FlightContext) -> Recover:
     return Recover(flight, reflex.recovery)
 
 
-def hears(flight: FlightContext, recover: Recover, since_us: int, north_m: float, north_m_s: float):
-    sample = LocalPosition(HIT_US + since_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
+def hears(
+    flight: FlightContext, recover: Recover, since_us: int, north_m: float, north_m_s: float, down_m: float = -2.0
+):
+    sample = LocalPosition(HIT_US + since_us, (north_m, 0.0, down_m), (north_m_s, 0.0, 0.0))
     recover.step(flight, Inputs(positions=[sample]), since_us)
     target = recover.target(since_us)
     assert target is not None
@@ -84,6 +86,16 @@ def test_who_has_passed_the_end_of_an_obstacle_is_not_driven_back_before_it():
         # Past a pole's middle and on, at 1 m/s: there is no wall there
         hears(flight, recover, since_us, 3.3 + 1e-6 * since_us, 1.0)
     assert flight.collisions[-1].setpoint_ned_m[0] > 4.1
+
+
+@pytest.mark.parametrize(("fallen_m", "climbs_m"), [(0.2, 0.2), (0.8, 0.35)])
+def test_after_a_fall_it_climbs_back_by_its_clearance_at_most(fallen_m, climbs_m):
+    flight = flight_with()
+    recover = recover_in(flight)
+    hears(flight, recover, 100_000, 2.8, -0.5, -2.0 + fallen_m)
+    # Then the place to rest at stays, also where the vehicle rises again
+    hears(flight, recover, 120_000, 2.8, -0.5, -2.0 + fallen_m - 0.1)
+    assert flight.collisions[-1].setpoint_ned_m[2] == pytest.approx(-2.0 + fallen_m - climbs_m, abs=1e-6)
 
 
 def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_when_it_rested():

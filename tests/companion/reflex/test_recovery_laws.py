@@ -16,7 +16,7 @@ from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex.config import LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S, WAY_S, RecoveryConfig
 from companion.reflex.recovery.attitude_law import Belief, Lean, attitude_and_thrust, held_off, tilted, wanted
-from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact, MotionState
+from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact
 from companion.reflex.surface import Surface, projected
 
 AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)
@@ -84,13 +84,6 @@ def test_adaptive_keeps_the_guards_clear_by_the_distance_asked_for(speed):
     # a stiff airframe that needs more room to stop gets it
     stiff = goal_of("adaptive", touched, touched.rebound(0.9))
     assert off_m(touched, stiff) == pytest.approx(max(0.35, 0.9 * speed * WAY_S))
-
-
-@pytest.mark.parametrize(("fallen_m", "rests_down_m"), [(0.2, AT[2]), (0.5, AT[2] + 0.5)])
-def test_after_a_fall_deeper_than_its_clearance_a_vehicle_rests_where_it_is(fallen_m, rests_down_m):
-    touched = hit(2.0)
-    fallen = MotionState((AT[0] - 0.5, AT[1], AT[2] + fallen_m), (0.0, 0.0, 1.0))
-    assert goal_of("adaptive", touched, fallen)[2] == pytest.approx(rests_down_m)
 
 
 @pytest.mark.parametrize("name", ["adaptive", "normal"])
