@@ -14,7 +14,7 @@ from companion.autopilot.ardupilot import modes, setup
 from companion.autopilot.ardupilot.firmware import ARDUPILOT
 from companion.autopilot.interface import Pilot
 from companion.autopilot.known import MODE_NAMES
-from companion.autopilot.setup import SerialLine, Sight, Verdict
+from companion.autopilot.setup import SerialLine, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
@@ -361,8 +361,12 @@ UART = SerialLine(921_600)
 ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
 
 
+def setup_of(parameters, line=None):
+    return VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3, 250.0, 5.7, "")
+
+
 def judged(parameters, line=None):
-    told = VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3, 250.0, 5.0, "")
+    told = setup_of(parameters, line)
     return {item.item: item for item in (*setup.judge_vehicle(told), *setup.judge_parameters(told))}
 
 
@@ -416,7 +420,7 @@ def test_what_was_not_told_is_doubtful_and_what_is_asked_is_judged():
 def test_the_slowest_hit_that_shows_follows_from_the_filter():
     # A jump of 1 m/s is a pulse of 2.86 m/s² for each Hz; a filter that was not told is the default
     for told, found in (({setup.FILTER: 40}, "0.05 m/s on through a filter of 40 Hz"), ({}, "0.10 m/s")):
-        assert found in setup.sight(Sight(told, 200.0, 0.0, 5.7, "")).found
+        assert found in setup.sight(setup_of(told)).found
 
 
 def test_what_happens_in_a_silence_is_told():
