@@ -119,6 +119,8 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     margin = reflex.TURN_MARGIN if turns_rad_s > reflex.BRAKED_RAD_S else reflex.HOVER_MARGIN
     least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), margin * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
+    # One that turns by more than a radian within its attitude's lag does not get the tilt that is asked for.
+    most_m_s2 /= max(1.0, turns_rad_s * reflex.LEAD_S)
     n, e, _ = limited((n, e, 0.0), most_m_s2)
     force = (n, e, d - GRAVITY_M_S2)
     up = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0))

@@ -14,7 +14,7 @@ from companion.flight.obstacle_map import FlightRoom
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus
-from companion.reflex.config import LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S, WAY_S, RecoveryConfig
+from companion.reflex.config import LEAD_S, LEAST_THRUST, MOST_HELD_S, MOST_TILT_RAD, NOTICED_S, WAY_S, RecoveryConfig
 from companion.reflex.recovery.attitude_law import Belief, Lean, attitude_and_thrust, held_off, tilted, wanted
 from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact
 from companion.reflex.surface import Surface, projected
@@ -225,6 +225,13 @@ def test_a_vehicle_that_turns_leans_by_what_px4_leaves_of_its_thrust_for_the_tur
     belief = Belief(HERE, ZERO, yaw_rate_rad_s=4.0)
     attitude, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=full_m_s2))
     assert -up_of(attitude)[2] == pytest.approx(upright)
+
+
+def test_a_vehicle_that_turns_by_two_radians_within_its_attitudes_lag_leans_half_as_much():
+    belief = Belief(HERE, ZERO, yaw_rate_rad_s=-2.0 / LEAD_S)
+    attitude, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=30.0))
+    up = up_of(attitude)
+    assert up[0] / -up[2] == pytest.approx(0.5 * math.tan(MOST_TILT_RAD))
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 1.0, -3.0])
