@@ -4,10 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from companion.link.round_trip import RoundTrip
 from companion.memory.patch import Patch
 from companion.messages import Vector3
-from companion.mission.items import ExpectItem
 from companion.reflex.detection.health import Promise
 from companion.reflex.recovery.collision import CollisionReport
 
@@ -39,17 +37,28 @@ class Status:
     round_trip_us: int | None
 
 
-@dataclass(slots=True)
-class Expectation:
-    """An assertion of the mission's: pending until `met` is known. `detail` is what was found."""
+@dataclass(frozen=True, slots=True)
+class RoundTripReport:
+    """To the vehicle and back by TIMESYNC; None without an answer. `ignored` counts answers to no question of ours."""
 
-    label: str  # its item's number
+    median_us: int | None = None
+    worst_us: int | None = None
+    ignored: int = 0
+
+    def summary(self) -> dict[str, float | int | None]:
+        """As summary.json has it, in milliseconds."""
+        median_ms, worst_ms = (None if us is None else us / 1e3 for us in (self.median_us, self.worst_us))
+        return {"median": median_ms, "worst": worst_ms, "ignored": self.ignored}
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectationReport:
+    """An assertion of the mission's: `label` is its item's number, `detail` what was found."""
+
+    label: str
     text: str
-    item: ExpectItem
-    began_us: int
-    hits_before: int
-    met: bool | None = None
-    detail: str = ""
+    met: bool | None  # None: the flight is not over
+    detail: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +84,11 @@ class FlightReport:
     started_at_us: int
     ended_at_us: int
     armed_at_us: int | None
-    expectations: tuple[Expectation, ...] = ()
+    expectations: tuple[ExpectationReport, ...] = ()
     obstacles: tuple[Patch, ...] = ()
     unreachable: tuple[str, ...] = ()
     refused_messages: Mapping[str, int] = field(default_factory=dict)
     unconfirmed: int = 0
-    round_trip: RoundTrip = field(default_factory=RoundTrip)
+    round_trip: RoundTripReport = RoundTripReport()
     promise: Promise | None = None
     crashed: str = ""

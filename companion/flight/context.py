@@ -22,7 +22,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.mission.item_trajectory import SpeedLimits
-from companion.mission.items import ReturnItem, Step
+from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
 from companion.motion.vector import ZERO, minus, plus
@@ -30,7 +30,7 @@ from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.reflex import Reflex
-from companion.report import Event, Expectation, JsonValue, Outcome
+from companion.report import Event, JsonValue, Outcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +109,19 @@ class BeforeHit:
     step_hits: int
     pace_factor: float
     after_recovery: AfterRecovery
+
+
+@dataclass(slots=True)
+class Expectation:
+    """An assertion of the mission's: pending until `met` is known."""
+
+    label: str  # of its step
+    text: str
+    item: ExpectItem
+    began_us: int
+    hits_before: int
+    met: bool | None = None
+    detail: str = ""
 
 
 @dataclass(slots=True)

@@ -2,10 +2,9 @@
 
 import math
 
-from companion.flight.context import FlightContext, as_text
+from companion.flight.context import Expectation, FlightContext, as_text
 from companion.mission import items
 from companion.reflex.recovery.collision import CollisionReport
-from companion.report import Expectation
 
 
 def describe(item: items.ExpectItem) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from statistics import median_low
 
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
+from companion.report import RoundTripReport
 
 # Until a first answer as often as PX4 asks by itself (its TIMESYNC stream has 10 Hz): a lost packet delays nothing, and
 # a slow link is judged by several answers at once. Then as often as a HEARTBEAT.
@@ -24,7 +25,7 @@ _RESOLUTION_US = 100
 
 @dataclass(slots=True)
 class RoundTrip:
-    """Sends TIMESYNC, matches the answers, and measures. An answer to no request of ours is counted as ignored."""
+    """Sends TIMESYNC, matches the answers, and measures. An answer without a request is only counted."""
 
     worst_us: int | None = None
     ignored: int = 0
@@ -62,10 +63,8 @@ class RoundTrip:
         """Of all answers."""
         return median_low(self._all_us.elements()) if self._all_us else None
 
-    def summary(self) -> dict[str, float | int | None]:
-        """As summary.json has it, in milliseconds."""
-        median_ms, worst_ms = (None if us is None else us / 1e3 for us in (self.median_us, self.worst_us))
-        return {"median": median_ms, "worst": worst_ms, "ignored": self.ignored}
+    def report(self) -> RoundTripReport:
+        return RoundTripReport(self.median_us, self.worst_us, self.ignored)
 
     def complaint(self) -> str | None:
         """One sentence when the round trip is too long to begin; None before the first answer."""

@@ -7,6 +7,7 @@ import pytest
 from bench.fly.virtual_time import EPOCH_US
 from companion.link.round_trip import RoundTrip
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
+from companion.report import RoundTripReport
 from rebound_cli.live.console import state_fields
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.flight.test_companion_authority import heartbeat
@@ -270,7 +271,7 @@ def test_an_answer_to_nobodys_question_and_a_second_answer_are_counted_and_no_mo
     trip.update(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 3_000)
     trip.update(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 900_000)
     # Then one counts
-    assert (trip.present_us, trip.summary()) == (3_000, {"median": 3.0, "worst": 3.0, "ignored": 2})
+    assert (trip.present_us, trip.report()) == (3_000, RoundTripReport(3_000, 3_000, 2))
 
 
 def test_the_alarm_is_given_once_while_it_lasts_and_again_after_five_short_ones():
@@ -287,16 +288,16 @@ def test_the_alarm_is_given_once_while_it_lasts_and_again_after_five_short_ones(
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "in_the_plan", "in_the_line", "trip_ms"),
+    ("vehicle", "in_the_plan", "in_the_line", "report"),
     [
-        (FakeVehicle(round_trip_us=20_000), "round trip 20.0 ms", "20 ms", 20.0),
+        (FakeVehicle(round_trip_us=20_000), "round trip 20.0 ms", "20 ms", RoundTripReport(20_000, 20_000, 0)),
         # One that answers no TIMESYNC may be flown
-        (FakeVehicle(does_answer_time=False), "round trip unknown: TIMESYNC is not answered", None, None),
+        (FakeVehicle(does_answer_time=False), "round trip unknown: TIMESYNC is not answered", None, RoundTripReport()),
     ],
     ids=["answers", "does not"],
 )
 def test_a_flight_tells_its_round_trip_in_the_plan_the_live_line_and_the_report(
-    vehicle, in_the_plan, in_the_line, trip_ms
+    vehicle, in_the_plan, in_the_line, report
 ):
     f = flight(vehicle, confirmed=False)
     f.run_to("ready")
@@ -305,8 +306,7 @@ def test_a_flight_tells_its_round_trip_in_the_plan_the_live_line_and_the_report(
     f.run_to("mission")
     assert dict(state_fields(f.companion.status(), 1.0)).get("round trip") == in_the_line
     f.run_to_end()
-    assert f.report.outcome == "completed"
-    assert f.report.round_trip.summary() == {"median": trip_ms, "worst": trip_ms, "ignored": 0}
+    assert (f.report.outcome, f.report.round_trip) == ("completed", report)
     assert "round_trip" not in f.kinds()
 
 
