@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import tilt_rad
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, towards
 from companion.reflex.config import (
     CARRIED_SHARE,
     LIES_US,
@@ -62,10 +62,8 @@ class CrashWatch:
         for sample in samples:
             match sample:
                 case ImuSample():
-                    (x, y, z), (p, q, r), share = self.force_frd_m_s2, self.rates_frd_rad_s, LYING_SHARE
-                    (a, b, c), (u, v, w) = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-                    self.force_frd_m_s2 = (x + share * (a - x), y + share * (b - y), z + share * (c - z))
-                    self.rates_frd_rad_s = (p + share * (u - p), q + share * (v - q), r + share * (w - r))
+                    self.force_frd_m_s2 = towards(self.force_frd_m_s2, sample.specific_force_frd_m_s2, LYING_SHARE)
+                    self.rates_frd_rad_s = towards(self.rates_frd_rad_s, sample.angular_velocity_frd_rad_s, LYING_SHARE)
                 case Attitude():
                     self.tipped.update(tilt_rad(sample.attitude_wxyz) > TIPPED_RAD, sample.time_boot_us)
                 case LocalPosition():
