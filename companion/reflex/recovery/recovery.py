@@ -155,19 +155,25 @@ class Recovery:
         off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)
         self._has_left = (self._has_left or off_m_s > 0.0) and not is_touched
         here, place = estimator.motion.position_ned_m, self._contact.position_ned_m
-        off_m = along(minus(here, place), normal.direction_ned)
-        # Where the vehicle is behind a surface, that has an end.
-        self._has_passed = not is_touched and (self._has_passed or off_m < -reflex.BEHIND_M)
         if is_touched:
-            place = here
-        elif self._has_passed and off_m < self._config.clearance_m:
-            place = plus(here, -self._config.clearance_m, normal.direction_ned)
-        if normal.direction_ned[2] == 0.0:
-            # After a fall it comes to rest before it climbs back.
-            place = (place[0], place[1], max(place[2], here[2] - self._config.clearance_m))
+            place, self._has_passed = here, False
+        elif self.law.leans:
+            place = self._behind(here)
         self._contact = replace(
             self._contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad
         )
+
+    def _behind(self, here_ned_m: Vector3) -> Vector3:
+        """Where the surface counts for a vehicle that does not touch it: not where the vehicle has passed its end, nor
+        far above one that has fallen, which comes to rest before it climbs back.
+        """
+        place, normal = self._contact.position_ned_m, self.record.normal.direction_ned
+        off_m, clearance_m = along(minus(here_ned_m, place), normal), self._config.clearance_m
+        self._has_passed = self._has_passed or off_m < -reflex.BEHIND_M
+        if self._has_passed and off_m < clearance_m:
+            place = plus(here_ned_m, -clearance_m, normal)
+        n, e, d = place
+        return (n, e, max(d, here_ned_m[2] - clearance_m)) if normal[2] == 0.0 else place
 
     def _goal(self, motion: MotionState) -> Vector3:
         """The law's goal, moved clear of surfaces and into the fence. Off what was hit eq. 3 is as far as it says."""

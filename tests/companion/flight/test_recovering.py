@@ -29,10 +29,10 @@ MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
 def flight_with(
-    loss_s: float | None = 0.3, learnt_s: float = 2.0, estimator: MotionEstimator | None = None
+    loss_s: float | None = 0.3, learnt_s: float = 2.0, estimator: MotionEstimator | None = None, law: str = "adaptive"
 ) -> FlightContext:
     """A flight that has just hit a wall in the north, at 2 m/s and measured whole unless told otherwise."""
-    mission = Mission.model_validate(MISSION)
+    mission = Mission.model_validate(MISSION | {"recovery": {"law": law}})
     config = mission.companion
     reflex = start_reflex(config, mission.recovery, config.settled, 0)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams), reflex)
@@ -88,9 +88,11 @@ def test_who_has_passed_the_end_of_an_obstacle_is_not_driven_back_before_it():
     assert flight.collisions[-1].setpoint_ned_m[0] > 4.1
 
 
-@pytest.mark.parametrize(("fallen_m", "climbs_m"), [(0.2, 0.2), (0.8, 0.35)])
-def test_after_a_fall_it_climbs_back_by_its_clearance_at_most(fallen_m, climbs_m):
-    flight = flight_with()
+@pytest.mark.parametrize(
+    ("law", "fallen_m", "climbs_m"), [("adaptive", 0.2, 0.2), ("adaptive", 0.8, 0.35), ("normal", 0.8, 0.8)]
+)
+def test_after_a_fall_it_climbs_back_by_its_clearance_at_most_and_by_eq_3_all_of_it(law, fallen_m, climbs_m):
+    flight = flight_with(law=law)
     recover = recover_in(flight)
     hears(flight, recover, 100_000, 2.8, -0.5, -2.0 + fallen_m)
     # Then the place to rest at stays, also where the vehicle rises again
