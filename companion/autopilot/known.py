@@ -5,7 +5,7 @@ from companion.autopilot.px4 import defaults as defaults
 from companion.autopilot.px4.firmware import PX4
 
 AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in (PX4, ARDUPILOT)}
-# Of a vehicle that has not announced itself yet; the same one's are `defaults`.
+# Of a vehicle that has not announced itself yet. `defaults` are its, too: only this file knows which one that is.
 ASSUMED = PX4
 NAMES = " or ".join(autopilot.name for autopilot in AUTOPILOTS.values())
 _MODES = [mode for autopilot in AUTOPILOTS.values() for mode in autopilot.modes.values()]

@@ -193,7 +193,7 @@ class FlightContext:
 
     @property
     def height_m(self) -> float | None:
-        """Above the arming position; None before that, or without a position of late, while other messages come: a
+        """Above the arming position. None before that, and where other messages come and no position does of late: a
         vehicle whose estimator fails sends none.
         """
         vehicle, origin = self.vehicle, self.origin_ned_m

@@ -58,10 +58,8 @@ class FlightRoom:
         if not flight.patches:
             return []
         place, clearance_m = flight.mission_ned_m(contact.position_ned_m), _clearance_m(flight)
-        reach_m, normal = (
-            flight.mission.companion.estimate.reach_m,
-            Normal(contact.normal_ned, contact.normal_error_rad),
-        )
+        reach_m = flight.mission.companion.estimate.reach_m
+        normal = Normal(contact.normal_ned, contact.normal_error_rad)
         touch = touch_of(place, contact.velocity_ned_m_s, normal, reach_m, 0)
         return [
             Surface(_touching_ned_m(flight, patch), patch.normal_ned, flight.mission.obstacles.margin_m)

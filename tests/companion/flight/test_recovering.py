@@ -28,10 +28,8 @@ AT = (3.0, 0.0, -2.0)
 MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
-def flight_with(
-    loss_s: float | None = 0.3, learnt_s: float = 2.0, estimator: MotionEstimator | None = None, law: str = "adaptive"
-) -> FlightContext:
-    """A flight that has just hit a wall in the north, at 2 m/s and measured whole unless told otherwise."""
+def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_m_s=2.0) -> FlightContext:
+    """A flight that has just hit a wall in the north, measured whole unless an estimator says otherwise."""
     mission = Mission.model_validate(MISSION | {"recovery": {"law": law}})
     config = mission.companion
     reflex = start_reflex(config, mission.recovery, config.settled, 0)
@@ -40,7 +38,7 @@ def flight_with(
     flight.vehicle.attitude = reflex.monitor.gate.latest = Attitude(HIT_US, LEVEL)
     reflex.thrust.full_m_s2, reflex.thrust.known_s = 16.0, learnt_s
     if estimator is None:
-        contact = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH, 0.2)
+        contact = Contact(HIT_US, AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal)
     flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator))
@@ -85,7 +83,20 @@ def test_who_has_passed_the_end_of_an_obstacle_is_not_driven_back_before_it():
     for since_us in range(100_000, 900_000, 20_000):
         # Past a pole's middle and on, at 1 m/s: there is no wall there
         hears(flight, recover, since_us, 3.3 + 1e-6 * since_us, 1.0)
-    assert flight.collisions[-1].setpoint_ned_m[0] > 4.1
+    record = flight.collisions[-1]
+    assert record.setpoint_ned_m[0] > 4.1
+    # But where it is touched again it is there again
+    record.estimator.note_contact(True, HIT_US + 900_000, record.estimator.normal)
+    for since_us in (900_000, 1_000_000):
+        hears(flight, recover, since_us, 4.2, 0.0)
+    assert record.setpoint_ned_m[0] == pytest.approx(4.2 - 0.35, abs=0.05)
+
+
+@pytest.mark.parametrize("law", ["normal", "paper"])
+def test_the_papers_goal_is_as_near_to_what_was_hit_as_eq_3_says(law):
+    flight = flight_with(law=law, north_m_s=0.4)
+    recover_in(flight)
+    assert flight.collisions[-1].setpoint_ned_m == pytest.approx((AT[0] - 0.5 * 0.4, *AT[1:]))
 
 
 @pytest.mark.parametrize(
