@@ -16,8 +16,9 @@ from companion.reflex.detection.detector import NO_POSITION, Situation
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
-    mode, armed, conflicts = vehicle.mode, vehicle.armed, vehicle.conflicts
+    mode, armed, conflicts, is_mode_lost = vehicle.mode, vehicle.armed, vehicle.conflicts, False
     if vehicle.identity is not None and now_us - vehicle.last_received_us >= OLD_NEWS_US:
+        is_mode_lost = vehicle.is_mode_known
         vehicle.unsure_since_us = now_us  # after a silence samples may be as old as the silence
     for sample in samples:
         if isinstance(sample, messages.ImuSample):
@@ -51,7 +52,9 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, messages.TimeSyncAnswer):
             flight.round_trip.update(sample, now_us)
+        was_known = vehicle.is_mode_known
         vehicle.update(sample, now_us, flight.own_modes)
+        is_mode_lost |= was_known and not vehicle.is_mode_known
         streams.count(type(sample), now_us)
     _advance_trajectory_time(flight, now_us)
     if vehicle.conflicts > conflicts:
@@ -60,8 +63,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         flight.report(now_us, "mode", f"mode {vehicle.mode_name}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.report(now_us, "disarmed", "disarmed")
-    was_known, vehicle.was_mode_known = vehicle.was_mode_known, vehicle.is_mode_known
-    if was_known and not vehicle.was_mode_known:
+    if is_mode_lost and not vehicle.is_mode_known:
         # PX4 answers within milliseconds; its next report by itself may take half a second.
         flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
     if vehicle.identity is not None and now_us >= flight.round_trip.due_us:

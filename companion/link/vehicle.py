@@ -91,7 +91,6 @@ class Vehicle:
     last_received_us: int = 0
     last_position_us: int | None = None
     mode_received_us: int = 0
-    was_mode_known: bool = True  # at the end of the step before
     unsure_since_us: int = -1  # only a report of the mode that is newer than this says who has the vehicle
     unconfirmed_mode: ModeReport | None = None  # reported once, and not the companion's
     is_disarm_unconfirmed: bool = False  # reported once, in the air

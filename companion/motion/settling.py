@@ -8,7 +8,10 @@ from companion.motion.vector import ZERO
 
 
 class SettlingMonitor:
-    """Within a distance of the place and below a low-pass filtered speed, without a break, for a duration."""
+    """Within a distance of the place and below a low-pass filtered speed, without a break, for a duration.
+
+    A speed that is not certain is above the limit where it is by more than its standard deviation.
+    """
 
     __slots__ = ("_config", "_since_us", "_time_us", "_velocity")
 
@@ -17,12 +20,14 @@ class SettlingMonitor:
         self._velocity, self._time_us = ZERO, 0
         self._since_us: int | None = None
 
-    def settled_since(self, time_boot_us: int, distance_m: float, velocity_m_s: Vector3) -> int | None:
+    def settled_since(
+        self, time_boot_us: int, distance_m: float, velocity_m_s: Vector3, spread_m_s: float
+    ) -> int | None:
         """Take the present motion; the start (boot time) of an interval that is by now long enough, or None."""
         config, elapsed_s = self._config, max(1e-6, 1e-6 * (time_boot_us - self._time_us))
         (u, v, w), (n, e, d), share = self._velocity, velocity_m_s, elapsed_s / (config.smoothing_s + elapsed_s)
         self._velocity, self._time_us = (u + share * (n - u), v + share * (e - v), w + share * (d - w)), time_boot_us
-        if distance_m > config.distance_m or math.hypot(*self._velocity) >= config.speed_m_s:
+        if distance_m > config.distance_m or math.hypot(*self._velocity) >= config.speed_m_s + spread_m_s:
             self._since_us = None
         elif self._since_us is None:
             self._since_us = time_boot_us

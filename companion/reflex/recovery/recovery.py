@@ -104,7 +104,8 @@ class Recovery:
             record.follow_recovery(corrected)
             right = right if self.leans else corrected
         distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
-        since_us = self._monitor.settled_since(now_us, distance_m, right.velocity_ned_m_s)
+        spread_m_s = record.estimator.spread_m_s
+        since_us = self._monitor.settled_since(now_us, distance_m, right.velocity_ned_m_s, spread_m_s)
         is_held = not self.leans and now_us - self._held_since_us >= 1e6 * self._settled.duration_s
         if since_us is None or not is_held or not self._is_known:
             return None
