@@ -40,11 +40,6 @@ def test_in_the_air_whoever_takes_control_has_it_and_every_hit_is_recovered_from
     assert TABLE.next_state(state, Trigger.CRASHED) is State.CRASHED
 
 
-def test_a_crash_ends_with_a_disarm_or_in_other_hands_and_no_hit_or_mode_brings_the_flight_back():
-    assert set(TABLE.rows[State.CRASHED]) == {Trigger.INTERRUPTED, Trigger.DISARMED, Trigger.FLIES_AGAIN}
-    assert set(TABLE.rows[State.CRASHED].values()) == {State.ABORTED}
-
-
 @pytest.mark.parametrize("state", [state for state in State if state not in IN_THE_AIR])
 def test_before_and_after_a_flight_there_is_no_hit_to_answer(state):
     assert TABLE.next_state(state, Trigger.COLLISION) is state

@@ -7,11 +7,12 @@ import pytest
 
 from companion.mavlink.readers import sample_from
 from companion.messages import GpsVelocity, LocalPosition, Refused
-from companion.motion.config import FINEST_DOPPLER_M_S, LATEST_S, SAME_M_S
+from companion.motion.config import FINEST_DOPPLER_M_S, LATEST_S, SAME_M_S, SettledConfig
 from companion.motion.delay import RECEIVER, Delay
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, yaw_rad
+from companion.motion.settling import SettlingMonitor
 from companion.motion.strapdown import Strapdown
 from companion.reflex.config import EstimateConfig
 from companion.reflex.recovery.laws import Contact
@@ -325,3 +326,10 @@ def test_gps_raw_int_is_read_as_a_velocity():
     for unknown in ({"fix_type": 2}, {"vel": 0xFFFF}, {"cog": 0xFFFF}):
         assert gps(**unknown) is None
     assert isinstance(gps(vel=10_100), Refused)
+
+
+@pytest.mark.parametrize(("spread_m_s", "rests"), [(0.0, False), (0.04, False), (0.06, True)])
+def test_a_vehicle_rests_where_its_speed_is_above_the_limit_by_no_more_than_is_uncertain(spread_m_s, rests):
+    monitor = SettlingMonitor(SettledConfig(speed_m_s=0.1, duration_s=0.5))
+    found = [monitor.settled_since(t_us, 0.0, (0.15, 0.0, 0.0), spread_m_s) for t_us in range(0, 2_000_000, 20_000)]
+    assert (found[-1] is not None) is rests
