@@ -198,15 +198,15 @@ def test_what_is_held_is_safe_by_what_is_certain_of_the_speed_away_from_a_surfac
 
 
 def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():
-    # Given a vehicle that leans by 40 degrees into the wall that it touches
+    # Given a vehicle below its height that leans by 40 degrees into the wall that it touches
     into = tilted((math.sin(math.radians(40.0)), 0.0, -math.cos(math.radians(40.0))), 0.0)
     belief = Belief(HERE, ZERO, attitude_wxyz=into)
     near = Surface(HERE, SOUTH, 0.25)
-    asked = wanted(belief, [near], HERE[2])
+    asked = wanted(belief, [near], HERE[2] - 1.0)
     _, pressing = attitude_and_thrust(asked, lean(belief, [near]))
     _, lifting = attitude_and_thrust(asked, lean(belief, [FAR]))
-    # Then its thrust is the projection of the wanted force, not what would carry it
-    force = plus(asked, -GRAVITY_M_S2, (0.0, 0.0, 1.0))
+    # Then its thrust is the projection of the force that is wanted off it, not what would carry it, or climb
+    force = (*asked[:2], -GRAVITY_M_S2)
     assert pressing == pytest.approx(max(LEAST_THRUST, along(force, up_of(into)) / FULL_M_S2))
     assert pressing < 0.75 * lifting
 
