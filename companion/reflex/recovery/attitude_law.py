@@ -125,10 +125,10 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     up, place = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0)), belief.position_ned_m
     leant_on = [surface for surface in lean.surfaces if along(up, surface.normal_ned) < 0.0]
     presses = any(surface.off_m(place) < surface.distance_m for surface in leant_on)
-    # One that lies on a surface does not climb: the thrust for that presses it on.
-    climbs_d = max(d, 0.0) if any(surface.off_m(place) <= 0.0 for surface in leant_on) else d
+    lies = any(surface.off_m(place) <= 0.0 for surface in leant_on)
     upright = -up[2]
-    by_axis = along((n, e, climbs_d - GRAVITY_M_S2), up)
+    # One that lies on a surface does not climb: the thrust for that presses it on.
+    by_axis = along((n, e, (max(d, 0.0) if lies else d) - GRAVITY_M_S2), up)
     thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
     thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
     asked = minus((n, e, -lifts_m_s2), belief.level_m_s2)
