@@ -16,7 +16,8 @@ from companion.messages import (
     Vector3,
 )
 from companion.motion.strapdown import LEVEL
-from companion.reflex.detection.detector import DetectorState, Impact, Motion, Phase, Situation
+from companion.reflex.detection.classify import classified
+from companion.reflex.detection.detector import DetectorState, Impact, ImpactKind, Motion, Phase, Situation
 from companion.strict_model import Positive, StrictModel
 
 # A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
@@ -67,7 +68,8 @@ class Baseline(ABC):
         elif isinstance(sample, self.looks_at):
             reading = self.look(state, sample, situation)
             if reading is not None:
-                return state, judge(state, sample.time_boot_us, reading, situation.off_reason)
+                impact = judge(state, sample.time_boot_us, reading, situation.off_reason)
+                return state, None if impact is None else _on_ground(impact, situation, motion)
         return state, None
 
     @abstractmethod
@@ -77,6 +79,12 @@ class Baseline(ABC):
     def free_until_us(self, s: DetectorState, now_us: int) -> int:
         """Before the sample's averaging window, or the gap before it."""
         return min(now_us - self._averaging_us, s.last_sample_boot_us)
+
+
+def _on_ground(impact: Impact, situation: Situation, motion: Motion) -> Impact:
+    """A baseline does not classify, but for a landing: the ground is no hit."""
+    named = classified(impact, None, situation, motion)
+    return named if named.kind is ImpactKind.LANDING else impact
 
 
 def judge(state: DetectorState, time_us: int, reading: Reading, off_reason: str | None) -> Impact | None:

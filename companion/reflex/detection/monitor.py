@@ -13,8 +13,7 @@ from pydantic import field_validator
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vector3
 from companion.motion.config import KEPT_US
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
-from companion.reflex.detection.classify import classified
-from companion.reflex.detection.detector import Detector, DetectorState, Impact, ImpactKind, Motion, Phase, Situation
+from companion.reflex.detection.detector import Detector, DetectorState, Phase, Situation
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import Promise, SampleGate, StreamHealth, promise_of
 from companion.reflex.detection.impact import ImpactEstimate, ImpactEstimator
@@ -145,7 +144,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             estimator.strapdown.fixes.clear()
         monitor.state, impact = monitor.detector.step(monitor.state, sample, situation, estimator)
         if impact is not None:
-            impacts.append(estimator.begin(_on_ground(impact, situation, estimator)))
+            impacts.append(estimator.begin(impact))
         elif type(sample) is ImuSample and estimator.estimate is not None and not estimator.estimate.is_final:
             final = estimator.follow(estimator.estimate, sample, monitor.state)
             if final is not None:
@@ -155,12 +154,6 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         _promise(monitor, now_us)
     notices = _notices(monitor, is_on, now_us)
     return MonitorResult(impacts, finished, notices) if impacts or finished or notices else NOTHING_SEEN
-
-
-def _on_ground(impact: Impact, situation: Situation, motion: Motion) -> Impact:
-    """A landing of a detector that does not classify: the ground is no hit."""
-    named = classified(impact, None, situation, motion)
-    return named if named.kind is ImpactKind.LANDING else impact
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:
