@@ -69,7 +69,7 @@ class Case:
     speed_m_s: float = 0.0
     slant_deg: float = 0.0
     program: str = ""
-    loss_s: float = 0.0
+    loss_s: float = LOSS_S[1]
 
 
 def run_kills(options: Namespace) -> int:
@@ -90,6 +90,7 @@ def cases(kills: int, first_seed: int, of_guard: bool = False) -> list[Case]:
             speed_m_s, slant_deg = draw.uniform(*SPEEDS_M_S), draw.uniform(-MOST_SLANT_DEG, MOST_SLANT_DEG)
             how = {"airframe": AIRFRAMES[number % 2], "imu_hz": IMU_HZ[number // 2 % 2]}
             how |= {"speed_m_s": round(speed_m_s, 3), "slant_deg": round(slant_deg, 1)}
+            how["loss_s"] = LOSS_S[number // 4 % 2]
         count = min(KILLS_A_FLIGHT, kills - KILLS_A_FLIGHT * number)
         instants_s = sorted(round(draw.uniform(*KILLED_S), 3) for _ in range(count))
         found.append(Case(first_seed + number, tuple(instants_s), **how))
@@ -109,7 +110,8 @@ def begun(case: Case) -> Flight:
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": case.airframe, "seed": case.seed})
     companion = Companion(mission)
     companion.confirm_plan()
-    return Stepped(SimulatedVehicle(airframe, scene, case.seed), companion)
+    vehicle = SimulatedVehicle(airframe, scene, case.seed, parameters={"COM_OF_LOSS_T": case.loss_s})
+    return Stepped(vehicle, companion)
 
 
 def work_out(case: Case) -> Json:
@@ -195,7 +197,7 @@ def kills_table(kills: pd.DataFrame) -> str:
         for when, span in SPANS_S.items():
             some = group[group["kill_s"].between(*span, inclusive="left")]
             modes = ", ".join(f"{mode} {count}" for mode, count in some["mode"].value_counts().items() if mode) or "–"
-            who = {"who flies": program or "the companion", "COM_OF_LOSS_T [s]": f"{loss_s:g}" if program else "1"}
+            who = {"who flies": program or "the companion", "COM_OF_LOSS_T [s]": f"{loss_s:g}"}
             rows.append({**who, "killed": when, **cells(some), "mode then": modes})
     return table(rows)
 
