@@ -177,11 +177,12 @@ class FusedDetector:
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
         s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
         s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
+        ratio = max(side / s.side.limit, beyond / s.vertical.limit)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
             s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
-        if side < s.side.limit and beyond < s.vertical.limit:
+        if ratio < 1.0:
             s.observed = None
             self._learn(s, f, before_us)
             is_quiet = s.floor.known_s >= LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
@@ -196,7 +197,7 @@ class FusedDetector:
         if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
             self._learn(s, f, before_us)  # a shaking that stays
         free_until_us = min(now_us - self._averaging_us, free_until_us)
-        impact = Impact(now_us, free_until_us, force)
+        impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio))
         if s.phase is Phase.OFF:
             s.observed = None
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
@@ -298,5 +299,7 @@ class FusedDetector:
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(strapdown.valid_wxyz, push)
         s.velocity_ned_m_s = minus(v, step)
-        impact = Impact(now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP)
+        impact = Impact(
+            now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
+        )
         return self._fire(s, situation, motion, impact)
