@@ -251,19 +251,22 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     @property
     def last_words(self) -> tuple[tuple[float, Outgoing], ...]:
-        """For a vehicle that would go astray if this program died now, each so many seconds later: an attitude, again
-        and again, and for one that does not brake by itself at last a place off what it has hit.
+        """For a vehicle that would go astray if this program died now, each so many seconds later: an attitude or a
+        place, again and again, and for one that does not brake by itself at last a place off what it has hit.
 
-        By itself it flies by the velocity that it believes. So until that is right it is told a tilt and its thrust.
+        By itself it flies by the velocity that it believes. So until that is right it is told a tilt and its thrust, or
+        where it goes by a position that.
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
         words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
-        if not self._leans or latest is None or recovery is None or held_s is None:
+        if self._leans is None or latest is None or target is None or recovery is None or recovery.record.is_over:
             return ()
-        if target is None or target.lean is None:
-            return ()  # it goes by a position from the next setpoint on
         since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.sample_time_boot_us)
         left_s, lean, now_us = words.misled_s - since_s, target.lean, self.now_us - self.started_at_us
+        if lean is None or held_s is None:
+            # By a position from now on. An autopilot that brakes by itself is told it again until it flies well.
+            again = self.resets.sent(target.at_rest().setpoint(now_us))
+            return self._repeated(again, held_s or HELD_S, left_s if words.away_m is None else 0.0)
         # It brakes by itself when it has noticed the silence; another place takes a new tilt.
         until_s = left_s - held_s - NOTICED_S if words.away_m is None else max(0.0, left_s) + LEAD_S
         if until_s <= 0.0:
@@ -272,16 +275,18 @@ class Core(ABC, Generic[FlightT, MachineT]):
         brakes = braked(lean.belief, (north, east, 0.0), left_s) if words.away_m is None else ZERO
         asked = plus(brakes, words.away_m_s2, (north, east, 0.0))
         tilt = self.resets.sent(lean.tilted_by(asked).setpoint(now_us, asked))
-        # Twice as often as it has to be: a lost word ends nothing.
-        every_s = max(0.5 * held_s, 1.0 / self._setpoint_hz)
-        times = [every_s * count for count in range(math.ceil(until_s / every_s))]
-        tilts = [(at_s, tilt) for at_s in times]
+        tilts = self._repeated(tilt, held_s, until_s)
         if words.away_m is None:
-            return tuple(tilts)
+            return tilts
         n, e, _ = plus(latest.position_ned_m, words.away_m, (north, east, 0.0))
         place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
         kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
         return (*tilts, (until_s, self.resets.sent(PositionSetpoint(now_us, kept.position_ned_m, None))))
+
+    def _repeated(self, word: Outgoing, held_s: float, until_s: float) -> tuple[tuple[float, Outgoing], ...]:
+        """Twice as often as it has to be: a lost word ends nothing."""
+        every_s = max(0.5 * held_s, 1.0 / self._setpoint_hz)
+        return tuple((every_s * count, word) for count in range(max(0, math.ceil(until_s / every_s))))
 
     @property
     def finished(self) -> bool:

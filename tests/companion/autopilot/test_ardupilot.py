@@ -131,12 +131,6 @@ def test_a_vehicle_that_holds_no_attitude_for_any_time_is_told_one_as_often_as_a
     assert second[0] - first[0] == pytest.approx(0.02)
 
 
-def test_later_in_a_recovery_the_place_is_said_soon():
-    f = leaning(FakeCopter(wall_north_m=3.0))
-    f.companion.core.reflex.hits[-1].sample_time_boot_us -= 1_000_000
-    assert [later_s for later_s, _ in f.companion.last_words()] == pytest.approx([0.0, 0.15])
-
-
 def test_to_a_px4_the_last_words_are_a_lean_that_brakes_until_its_own_velocity_is_right():
     # Given a PX4 that leaves the wall at 4 m/s when its companion dies, 0.1 s after the hit
     f = leaning(FakeVehicle(wall_north_m=3.0, loss_s=0.3))
@@ -153,10 +147,18 @@ def test_to_a_px4_the_last_words_are_a_lean_that_brakes_until_its_own_velocity_i
     assert tilt_deg == pytest.approx(math.degrees(math.atan((1.5 - 3.9 / 1.3) / 9.81)), abs=0.5)
 
 
-def test_no_word_is_left_once_a_px4_flies_well_by_itself():
-    f = leaning(FakeVehicle(wall_north_m=3.0, loss_s=0.3))
-    f.companion.core.reflex.hits[-1].sample_time_boot_us -= 1_000_000
-    assert f.companion.last_words() == []
+@pytest.mark.parametrize(
+    ("vehicle", "later_s", "said_s"),
+    [
+        (lambda: FakeCopter(wall_north_m=3.0), 1.0, [0.0, 0.15]),  # the place is said soon
+        (lambda: FakeVehicle(wall_north_m=3.0, loss_s=0.3), 1.0, []),  # a PX4 flies well by itself
+        (lambda: FakeVehicle(wall_north_m=3.0, loss_s=1.0), 0.0, [0.0, 0.5, 1.0]),  # by position: the place again
+    ],
+)
+def test_words_are_left_until_a_vehicle_flies_well_by_itself(vehicle, later_s, said_s):
+    f = leaning(vehicle())
+    f.companion.core.reflex.hits[-1].sample_time_boot_us -= round(1e6 * later_s)
+    assert [at_s for at_s, _ in f.companion.last_words()] == pytest.approx(said_s)
 
 
 def test_no_word_is_left_before_a_hit():
@@ -168,9 +170,7 @@ def test_no_word_is_left_before_a_hit():
 def test_no_word_is_left_where_the_next_setpoint_is_a_place():
     # Given a hit that is taken back while the mode is not known: no setpoint has followed yet
     f = leaning(FakeCopter(wall_north_m=3.0))
-    shared = f.companion.core.flight
-    shared.target = shared.target.at_rest()
-    # Then nothing is said, and nothing fails
+    f.companion.core.flight.target = f.companion.core.flight.target.at_rest()
     assert f.companion.last_words() == []
 
 
