@@ -120,7 +120,7 @@ def note_height(flight: FlightContext) -> None:
     height_m = flight.height_m
     if height_m is not None and height_m >= flight.mission.companion.min_detection_height_m:
         flight.has_climbed = True
-    elif height_m is None or flight.vehicle.landed is messages.LandedState.ON_GROUND:
+    elif height_m is None or flight.vehicle.stands:
         flight.has_climbed = False
 
 

@@ -57,7 +57,7 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
     if guard.vehicle.armed is False:
         guard.program_elsewhere = False
     # Not while the guard has the vehicle: one forged report would move the fence.
-    stands = guard.vehicle.landed is LandedState.ON_GROUND and guard.expected_mode is None
+    stands = guard.vehicle.stands and guard.expected_mode is None
     if guard.vehicle.armed is False or stands:
         guard.origin_ned_m = None if latest is None else latest.position_ned_m
     elif guard.origin_ned_m is None and latest is not None:

@@ -66,6 +66,9 @@ class ModeReport:
 # After this silence the last reported mode is old: without setpoints the vehicle has left the mode that flies them. A
 # later setpoint would take the vehicle away from whoever has it then.
 OLD_NEWS_US = defaults.LOSS_US
+# As long as PX4's own land detector waits (LNDMC_TRIG_TIME, 1 s). One whose estimator failed said for 0.14 s, 11 m up,
+# that it had landed.
+STANDS_US = 1_000_000
 
 
 @dataclass(slots=True)
@@ -85,6 +88,7 @@ class Vehicle:
     pilot: Pilot | None = None  # who moves it, where that mode says so
     failsafe: bool = False
     landed: messages.LandedState = messages.LandedState.UNDEFINED
+    landed_us: int = 0  # when it began to say so
     attitude: messages.Attitude | None = None
     battery_percent: int | None = None
     history: MotionHistory = field(default_factory=MotionHistory)
@@ -122,6 +126,7 @@ class Vehicle:
                 report = ModeReport(sample.custom_mode, sample.intended_custom_mode, failsafe)
                 self._update_mode(report, own_modes, now_us)
             case messages.ExtendedState():
+                self.landed_us = self.landed_us if sample.landed_state is self.landed else now_us
                 self.landed = sample.landed_state
                 if self.is_disarm_unconfirmed and self.landed is messages.LandedState.ON_GROUND:
                     self._accept_armed(False)
@@ -154,6 +159,12 @@ class Vehicle:
 
     def _accept_armed(self, armed: bool) -> None:
         self.armed, self.is_disarm_unconfirmed, self.is_disarm_unexplained = armed, False, False
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is on the ground, and has said so for a while: a land detector may be wrong in the air."""
+        said_us = self.last_received_us - self.landed_us
+        return self.landed is messages.LandedState.ON_GROUND and said_us >= STANDS_US
 
     @property
     def custom_mode(self) -> int | None:

@@ -6,6 +6,8 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from companion.messages import POSITION_M
+
 Floats = npt.NDArray[np.float64]
 
 
@@ -37,15 +39,14 @@ class Topic:
         return self.vector(*(f"{name}[{index}]" for index in range(length)))
 
     def rows(self, values: Floats | None) -> Iterator[tuple[int, int, list[float]]]:
-        """Number, time and values of each sample whose values are finite."""
+        """Number, time and values of each sample that is whole: a damaged one has values of any size, or none."""
         if values is not None:
-            for index in np.flatnonzero(np.isfinite(values).all(axis=1)).tolist():
+            for index in np.flatnonzero((np.abs(values) <= POSITION_M).all(axis=1)).tolist():
                 yield index, int(self.time_us[index]), values[index].tolist()
 
     def rate_hz(self) -> float:
         """Samples a second; gaps count for nothing."""
-        intervals_us = np.diff(self.time_us)
-        intervals_us = intervals_us[intervals_us > 0]
+        intervals_us = np.diff(np.unique(self.time_us))
         return 1e6 / float(np.median(intervals_us)) if len(intervals_us) else 0.0
 
     def held(self, values: Floats, at_us: npt.NDArray[np.int64]) -> tuple[Floats, npt.NDArray[np.bool_]]:

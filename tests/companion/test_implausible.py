@@ -114,18 +114,19 @@ def test_a_jump_of_the_velocity_that_fades_is_a_hit_where_one_velocity_shows_hal
     assert hit.is_rejected([*was, *came], MotionHistory(), 0.03) is is_none
 
 
-@pytest.mark.parametrize(("height_m", "state"), [(1.5, "recovering"), (0.3, "mission")])
-def test_a_landing_counts_where_the_height_does_not_speak_against_it(height_m, state):
-    # Given a vehicle on its way to its goal, when it is said five times to stand on the ground
+@pytest.mark.parametrize(("height_m", "said_s", "answers"), [(1.5, 1, True), (0.3, 1, False), (0.3, 0, True)])
+def test_a_landing_counts_once_it_lasts_and_where_the_height_does_not_speak_against_it(height_m, said_s, answers):
+    # Given a vehicle on its way to its goal, when it is said for so long to stand on the ground
     f = flying_in("mission")
     f.run_for(0.5)
     for _ in range(10):
         f.vehicle.position[2] = -height_m
         attacked(f, [made("EXTENDED_SYS_STATE", {"landed_state": LandedState.ON_GROUND})])
+    f.companion.core.flight.vehicle.landed_us -= round(1e6 * said_s)
     # Then a hit of that moment is answered up in the air, and not below the height from which hits count
     f.vehicle.push_m_s2 = (-60.0, 0.0)
     f.step()
-    assert f.state == state
+    assert (f.state == "recovering") is answers
 
 
 # --- silence

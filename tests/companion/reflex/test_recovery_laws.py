@@ -206,8 +206,7 @@ def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it():
     _, pressing = attitude_and_thrust(asked, lean(belief, [near]))
     _, lifting = attitude_and_thrust(asked, lean(belief, [FAR]))
     # Then its thrust is the projection of the force that is wanted off it, not what would carry it, or climb
-    force = (*asked[:2], -GRAVITY_M_S2)
-    assert pressing == pytest.approx(max(LEAST_THRUST, along(force, up_of(into)) / FULL_M_S2))
+    assert pressing == pytest.approx(max(LEAST_THRUST, along((*asked[:2], -GRAVITY_M_S2), up_of(into)) / FULL_M_S2))
     assert pressing < 0.75 * lifting
 
 

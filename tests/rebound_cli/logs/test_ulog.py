@@ -91,9 +91,8 @@ def test_sensor_combined_is_the_mean_over_the_interval_that_ends_at_its_time(tmp
 def test_vehicle_imu_is_increments_over_the_time_they_took(tmp_path):
     # Given a log of vehicle_imu at full rate, as a logging profile for high rates has it, and sensor_combined beside it
     fields = "timestamp_sample delta_angle delta_velocity delta_angle_dt delta_velocity_dt delta_velocity_clipping"
-    rows = [
-        (t + 700, t, (0.0005, 0.0, 0.0), (0.01, 0.0, -0.049), 2500, 5000, 0) for t in every(5000, START, START + 50_000)
-    ]
+    pushes = [(t, 0.01) for t in every(5000, START, START + 50_000)] + [(START + 50_000, 6e14)]  # the last damaged
+    rows = [(t + 700, t, (0.0005, 0.0, 0.0), (push, 0.0, -0.049), 2500, 5000, 0) for t, push in pushes]
     slow = sensor_combined(every(20_000, START, START + 50_000))
     log = read(tmp_path, {"vehicle_imu": (fields, rows), "sensor_combined": slow})
     # Then the faster one is taken: force = velocity / time, rate = angle / time, stamped with the sample's time
