@@ -58,14 +58,14 @@ def test_a_hit_alone_is_judged_as_the_hit_of_a_whole_mission(airframe, speed_m_s
     outcome, whole = flown_whole(airframe, speed_m_s)
     # When the same hit is flown alone
     alone = judged(HitCase(1, airframe, "wall", speed_m_s, imu_hz=250))
-    # Then both were found, neither came back or fell, and both came to rest: by the truth before the estimate shows it
+    # Then both were found, neither came back or fell, and both came to rest: by the truth, and by the belief
     assert outcome == "completed" and alone["found"] and not alone["false"]
     assert alone["closing_m_s"] == pytest.approx(speed_m_s, abs=0.15)
     assert alone["again"] == whole["returned"] == 0
     assert max(alone["lost_m"], whole["lost_m"]) < 0.05
     # As far from its setpoint as a vehicle that has settled may be (SettledConfig.distance_m).
     assert whole["past_m"] < 0.1
-    assert 0.3 * whole["settled_s"] < alone["rest_s"] < whole["settled_s"]
+    assert 0.3 * whole["settled_s"] < alone["rest_s"] < 1.2 * whole["settled_s"]
 
 
 def test_the_same_seed_gives_the_same_hit():
