@@ -254,8 +254,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """For a vehicle that would go astray if this program died now, each so many seconds later: an attitude or a
         place, again and again, and for one that does not brake by itself at last a place off what it has hit.
 
-        By itself it flies by the velocity that it believes. So until that is right it is told a tilt and its thrust, or
-        where it goes by a position that.
+        By itself it flies by the velocity that it believes. Until that is right it receives a tilt and its thrust, or
+        in a recovery by position its place.
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
         words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
@@ -264,7 +264,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.sample_time_boot_us)
         left_s, lean, now_us = words.misled_s - since_s, target.lean, self.now_us - self.started_at_us
         if lean is None or held_s is None:
-            # By a position from now on. An autopilot that brakes by itself is told it again until it flies well.
+            # By a position from now on. An autopilot that brakes by itself receives it again until it flies well.
             again = self.resets.sent(target.at_rest().setpoint(now_us))
             return self._repeated(again, held_s or HELD_S, left_s if words.away_m is None else 0.0)
         # It brakes by itself when it has noticed the silence; another place takes a new tilt.

@@ -66,8 +66,8 @@ class ModeReport:
 # After this silence the last reported mode is old: without setpoints the vehicle has left the mode that flies them. A
 # later setpoint would take the vehicle away from whoever has it then.
 OLD_NEWS_US = defaults.LOSS_US
-# As long as PX4's own land detector waits (LNDMC_TRIG_TIME, 1 s). One whose estimator failed said for 0.14 s, 11 m up,
-# that it had landed.
+# As long as PX4's own land detector takes (MulticopterLandDetector.cpp, land_detection_time, 1 s in three stages). One
+# whose estimator failed said for 0.14 s, 11 m up, that it had landed.
 STANDS_US = 1_000_000
 
 

@@ -10,7 +10,8 @@ from companion.motion.vector import ZERO
 class SettlingMonitor:
     """Within a distance of the place and below a low-pass filtered speed, without a break, for a duration.
 
-    A speed that is not certain is above the limit where it is by more than its standard deviation.
+    A speed that is not certain is above the limit where it is by more than its standard deviation, and by more than as
+    much again: one of which nothing is known is no rest.
     """
 
     __slots__ = ("_config", "_since_us", "_time_us", "_velocity")
@@ -27,7 +28,8 @@ class SettlingMonitor:
         config, elapsed_s = self._config, max(1e-6, 1e-6 * (time_boot_us - self._time_us))
         (u, v, w), (n, e, d), share = self._velocity, velocity_m_s, elapsed_s / (config.smoothing_s + elapsed_s)
         self._velocity, self._time_us = (u + share * (n - u), v + share * (e - v), w + share * (d - w)), time_boot_us
-        if distance_m > config.distance_m or math.hypot(*self._velocity) >= config.speed_m_s + spread_m_s:
+        most_m_s = config.speed_m_s + min(spread_m_s, config.speed_m_s)
+        if distance_m > config.distance_m or math.hypot(*self._velocity) >= most_m_s:
             self._since_us = None
         elif self._since_us is None:
             self._since_us = time_boot_us

@@ -328,8 +328,8 @@ def test_gps_raw_int_is_read_as_a_velocity():
     assert isinstance(gps(vel=10_100), Refused)
 
 
-@pytest.mark.parametrize(("spread_m_s", "rests"), [(0.0, False), (0.04, False), (0.06, True)])
-def test_a_vehicle_rests_where_its_speed_is_above_the_limit_by_no_more_than_is_uncertain(spread_m_s, rests):
+@pytest.mark.parametrize(("m_s", "spread_m_s", "rests"), [(0.15, 0.04, False), (0.15, 0.06, True), (0.25, 2.0, False)])
+def test_a_vehicle_rests_where_its_speed_is_above_the_limit_by_no_more_than_is_uncertain(m_s, spread_m_s, rests):
     monitor = SettlingMonitor(SettledConfig(speed_m_s=0.1, duration_s=0.5))
-    found = [monitor.settled_since(t_us, 0.0, (0.15, 0.0, 0.0), spread_m_s) for t_us in range(0, 2_000_000, 20_000)]
+    found = [monitor.settled_since(t_us, 0.0, (m_s, 0.0, 0.0), spread_m_s) for t_us in range(0, 2_000_000, 20_000)]
     assert (found[-1] is not None) is rests
