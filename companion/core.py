@@ -259,7 +259,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
         words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
-        if self._leans is None or latest is None or target is None or recovery is None or recovery.record.is_over:
+        if self._leans is None or latest is None or target is None or recovery is None:
             return ()
         since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.sample_time_boot_us)
         left_s, lean, now_us = words.misled_s - since_s, target.lean, self.now_us - self.started_at_us
