@@ -30,8 +30,7 @@ _TOLD = ("mode", "disarmed", "implausible")
 class Circumstances:
     """What a guard would have known at each moment of a foreign log, by the guard's own code.
 
-    Takes every sample; `situation` is what they add up to. `modes` are those in which the guard may take over; None:
-    it watches whoever flies.
+    Takes every sample; `situation` is what they add up to. The guard may take over in `modes`; None: in all.
     """
 
     def __init__(self, config: CompanionConfig, modes: Sequence[str] | None = None) -> None:
@@ -183,6 +182,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in log.heard if isinstance(item.sample, messages.ImuSample))
     monitor = start_monitor(_sampled_as(log, config), start_us)
+    monitor.estimator.hides_clipping = log.low_pass_hz is not None
     findings.listener.listen(monitor)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:

@@ -12,7 +12,7 @@ from bench.cases.hits import draw_case, vehicle_of_hit
 from bench.detectors.config import BaselineConfig
 from bench.fly.wire import ASKED_HZ, VehicleRecording, fly_hit, heard, streams_asked_hz
 from bench.main import main
-from bench.studies.detection.detectors import first_possible, samples_late, work_out_hit
+from bench.studies.detection.detectors import first_possible, samples_late
 from bench.studies.detection.flights import Event, events, mistakes
 from companion.mavlink.decode import Decoder
 from companion.messages import Attitude, AttitudeTarget, ExtendedState, ImuSample, LandedState, LocalPosition, Sample
@@ -88,25 +88,6 @@ def test_a_climb_with_its_thrust_told_is_no_hit(detector):
         return 9.81 + 3.0 * max(0.0, math.sin((t - PUSHED_US) * 4e-6)) if PUSHED_US < t < PUSHED_US + 785_000 else 9.81
 
     assert fly(detector, lift=climb) == []
-
-
-def test_the_fixed_threshold_takes_gravity_off_the_body_z_axis():
-    (impact,) = fly("threshold", pushed((0.0, 0.0, 25.0), 8_000))
-    assert impact.impact.specific_force_frd_m_s2[2] == pytest.approx(25.0, abs=0.01)
-
-
-def test_the_fixed_threshold_tells_its_windows_largest_push_eleven_samples_after_the_first():
-    """Five samples from 25 to 60 and back to 30 m/s^2."""
-    pushes = (25.0, 40.0, 60.0, 45.0, 30.0)
-
-    def growing(t):
-        index = (t - PUSHED_US) // TICK_US
-        return (-pushes[index], 0.0, 0.0) if 0 <= index < len(pushes) else (0.0, 0.0, 0.0)
-
-    (impact,) = fly("threshold", growing)
-    assert impact.impact.sample_time_boot_us == PUSHED_US + 11 * TICK_US
-    assert impact.impact.specific_force_frd_m_s2[0] == pytest.approx(-60.0, abs=0.2)
-    assert impact.impact.contact_free_until_boot_us == PUSHED_US - 5_000  # the first sample's averaging
 
 
 def twice(gap_us):
@@ -219,13 +200,6 @@ def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
     assert first_us[50] - hit.contact_at_boot_us <= 24_000
     # And where no force reaches the floor, the hit fell between the samples
     assert first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1e6)[0] is None
-
-
-def test_the_default_detector_finds_a_hit_at_every_rate_with_no_alarm_before_it():
-    rows = [row for row in work_out_hit(draw_case(1, False))["rows"] if row["detector"] == "fused"]
-    assert len(rows) == len(ASKED_HZ)
-    for row in rows:
-        assert row["latency_ms"] is not None and row["false"] == 0
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """Studies, each flown and judged as stated: the table of faults, ablations, flights by hand and to the ground."""
 
-import importlib
 import math
 import random
 import re
@@ -13,7 +12,7 @@ from bench.faults.injectors import simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.by_hand.ways_down import FALLS, FALLS_FROM_M, LANDINGS, GroundCase
 from bench.fly.packets import ARM, SET_MODE, made, outside
-from bench.studies.ablation import RULES, Rule, flights_table, switched
+from bench.studies.ablation import Rule, flights_table, switched
 from bench.studies.detection.hand import HandCase, fly_by_hand, text_of
 from bench.studies.detection.landings import fly_to_the_ground, judged
 from bench.studies.faults import FaultCase, flown_with, work_out_fault
@@ -174,15 +173,6 @@ def test_a_copy_that_fails_is_told():
         surface.plus((0, 0, 0), 1.0, (1, 0, 0))
         copies.leave(failing)
     assert "ValueError" in copies.found["away"]["error"]
-
-
-@pytest.mark.parametrize("rule", RULES, ids=[rule.name for rule in RULES])
-def test_every_rule_is_a_function_of_the_companion(rule):
-    module, _, path = rule.place.partition(":")
-    found = importlib.import_module(f"companion.{module}")
-    for name in path.split("."):
-        found = getattr(found, name)
-    assert callable(found) or isinstance(found, property)
 
 
 def test_the_table_counts_what_is_lost_without_a_rule():

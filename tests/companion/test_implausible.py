@@ -1,6 +1,7 @@
 """What a vehicle says that cannot be: places, attitudes and forces that contradict each other cost a twitch at most."""
 
 import math
+import random
 
 import pytest
 
@@ -10,6 +11,7 @@ from companion.messages import ImuSample, LandedState, LocalPosition, Odometry, 
 from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
+from companion.motion.vector import plus
 from companion.reflex.detection.confirmation import Hypothesis
 from tests.companion.fake_vehicle import LOITER, flying_in, hovering
 from tests.companion.hostile import attacked
@@ -94,12 +96,21 @@ def fixes(changes_by_m_s):
     ]
 
 
-@pytest.mark.parametrize(("changed_m_s", "is_none"), [(0.0, True), (0.16, False)])
-def test_a_weak_force_of_one_sample_is_a_hit_only_where_the_velocity_shows_what_a_hit_leaves(changed_m_s, is_none):
-    # 7 m/s^2 for 5 ms are 0.035 m/s, which no velocity shows
-    earlier = ImuSample(996_000, (0.0, 0.0, -9.8), STILL)
-    hypothesis = Hypothesis(1_000_000, 996_000, 0.035, (1.0, 0.0, 0.0), 7.0, earlier, later_boot_us=1_004_000)
-    assert hypothesis.is_rejected(fixes(changed_m_s), MotionHistory(), 0.03) is is_none
+@pytest.mark.parametrize(
+    ("force_m_s2", "noise_m_s", "changed_m_s", "is_none"),
+    [(14.0, 0.0, 0.0, True), (14.0, 0.0, 0.04, False), (14.0, 0.1, 0.0, False), (140.0, 0.1, 0.0, True)],
+)
+def test_velocities_reject_one_sample_whose_impulse_they_would_show(force_m_s2, noise_m_s, changed_m_s, is_none):
+    # 14 m/s^2 for 5 ms are 0.07 m/s; beside a noise of 0.1 m/s velocities say nothing of that, and of 0.7 m/s they do
+    earlier, noise = ImuSample(996_000, (0.0, 0.0, -9.8), STILL), random.Random(1)
+    heard = [
+        VelocityFix(fix.time_boot_us, plus(fix.velocity_ned_m_s, noise.gauss(0.0, noise_m_s), (1.0, 0.0, 0.0)), STILL)
+        for fix in fixes(changed_m_s - 0.004 * force_m_s2)
+    ]
+    hypothesis = Hypothesis(
+        1_000_000, 996_000, 0.005 * force_m_s2, (1.0, 0.0, 0.0), force_m_s2, earlier, later_boot_us=1_004_000
+    )
+    assert hypothesis.is_rejected(heard, MotionHistory(), 0.03) is is_none
 
 
 @pytest.mark.parametrize(("shown_m_s", "is_none"), [(0.3, False), (0.2, True)])

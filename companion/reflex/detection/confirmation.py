@@ -2,7 +2,8 @@
 
 The first piece of evidence is one IMU sample, or one velocity that has jumped. The second is another sample of the
 contact's force, or a rate jump that no motor makes, or the vehicle's own velocity and position. A true impulse must
-change them. A broken or forged packet does not: the next rates, velocities and positions reject it.
+change them. A broken or forged packet does not: the next rates, velocities and positions reject it. An impulse that is
+small beside their noise they neither confirm nor reject.
 """
 
 import math
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from statistics import median, stdev
 
 from companion.messages import ImuSample, LocalPosition, Vector3
-from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2, SAME_M_S
+from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, minus, plus, split
@@ -65,7 +66,7 @@ class Hypothesis:
         change = plus(minus(_median(came), _median(was)), in_sum_m_s, self.away)
         shown = max if self.earlier is None else median
         shown_m_s, was_m_s = shown(self._along(came)), median(self._along(was))
-        least_m_s = 0.5 * max(self.change_m_s, SAME_M_S)
+        least_m_s = 0.5 * self.change_m_s
         is_unmoved = shown_m_s - was_m_s + in_sum_m_s < least_m_s
         is_clear = least_m_s > sure * stdev(self._along(was))
         # A stuck axis shows no force along itself.

@@ -76,12 +76,13 @@ class Situation(NamedTuple):
 
 class Motion(Protocol):
     """What the samples add up to. All have heard the newest already. A velocity that is not valid lacks a part of a hit
-    that was clipped.
+    that was clipped; samples behind a filter hide clipping.
     """
 
     history: MotionHistory
     strapdown: Strapdown
     validity: VelocityValidity
+    hides_clipping: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,7 +74,9 @@ class FusedState(DetectorState):
     floor: ForceNoise = field(default_factory=ForceNoise)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
+    moved_boot_us: int = 0
     hovered_boot_us: int | None = None
+    """When it last hovered, and had for a while: one that only turns back is slow for a moment, too."""
     contact_began_boot_us: int = 0
     kind: ImpactKind = ImpactKind.UNKNOWN
     """Of the present contact, or the latest one."""
@@ -270,9 +272,12 @@ class FusedDetector:
         time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, motion.strapdown
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
         s.velocity.value, s.velocity.limit = 0.0, math.inf
-        if hovers(v):
+        if not hovers(v):
+            s.moved_boot_us = time_us
+        elif time_us - s.moved_boot_us >= CURRENT_US:
             s.hovered_boot_us = time_us
-        if not strapdown.has_new_fix:
+        # A filter makes a pulse of a contact, of which samples hold a part. A jump beside them is the estimator's own.
+        if not strapdown.has_new_fix or motion.hides_clipping:
             return None
         step = jump.step_m_s(strapdown.fixes)
         if time_us - s.last_loud_boot_us < SHOWN_US:
@@ -288,9 +293,10 @@ class FusedDetector:
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         is_jump = size / s.velocity.limit > 1.0
-        if is_jump or motion.validity.is_valid:
-            jump.learn(limited(step, least))
         if s.phase is not Phase.ARMED or not is_jump:
+            # What is told as a hit is no noise.
+            if is_jump or motion.validity.is_valid:
+                jump.learn(limited(step, least))
             return None
         jump.since_us = time_us
         now_us = max(time_us, s.last_sample_boot_us)
