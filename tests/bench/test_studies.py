@@ -165,16 +165,6 @@ def test_where_a_rule_changes_nothing_there_is_no_copy():
     assert copies.found == {}
 
 
-def test_a_copy_that_fails_is_told():
-    def failing():
-        raise ValueError
-
-    with switched([RULE]) as copies:
-        surface.plus((0, 0, 0), 1.0, (1, 0, 0))
-        copies.leave(failing)
-    assert "ValueError" in copies.found["away"]["error"]
-
-
 def test_the_table_counts_what_is_lost_without_a_rule():
     well = {"ends": True, "hits": [RECOVERED]}
     lost = [{"ends": ends, "hits": [RECOVERED | NOT_RECOVERED]} for ends in (False, True)]

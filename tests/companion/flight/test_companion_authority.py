@@ -214,6 +214,13 @@ def test_a_pilot_who_took_over_while_the_link_was_cut_keeps_the_vehicle(state):
     assert f.companion.finished
 
 
+def test_a_vehicle_that_has_fallen_silent_is_asked_who_has_it():
+    f = flying_in("mission")
+    f.vehicle.silent, since_us = True, f.vehicle.time_us
+    f.run_for(1.1)
+    assert [(m.command, m.param1) for at_us, m in f.vehicle.commands if at_us >= since_us] == [(512, 0)]
+
+
 def test_a_cut_link_that_comes_back_in_the_companions_mode_is_handed_over():
     f = flying_in("mission")
     f.vehicle.silent = f.vehicle.deaf = True
