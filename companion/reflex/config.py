@@ -221,7 +221,8 @@ CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 TILT_PER_S = 0.5
 # Error of this model on those hits, RMS over 3 s, as a share of the clipped velocity.
 MODEL_ERROR = 0.03
-# A receiver's velocity and the reported one agree once they have for so long: five of a receiver's at 10 Hz.
+# The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
+# 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
 COMPARED_S = 0.5
 # PX4's EKF2_ABL_LIM: more than this its estimator takes for no bias of the accelerometer.
 MOST_BIAS_M_S2 = 0.4

@@ -63,7 +63,6 @@ class MotionEstimator:
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
-    velocity_error_m_s: Vector3 = ZERO  # and of the reported velocity
     after_ned_m_s: Vector3 | None = None  # the velocity just after the contact, by when it was known best
     after_error_m_s: float = math.inf  # its standard deviation
     _bank: FilterBank | None = None  # from the first report on
@@ -72,12 +71,14 @@ class MotionEstimator:
     _at_boot_us: int = 0  # the bank's time
     _moved_m_s: Vector3 = ZERO  # the integral up to that time
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
+    _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
+    _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
     _has_agreed: bool = False  # with the measured one, by itself
     # Since when the reported velocity, less its mean error and as it is, is the measured one.
     _agrees_since_boot_us: tuple[int | None, int | None] = (None, None)
-    _newest_boot_us: int | None = None  # of the newest report since convergence
+    _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
     def __post_init__(self) -> None:
         self.motion, self.pushed_boot_us = self.start, self.hit_boot_us
@@ -86,10 +87,10 @@ class MotionEstimator:
 
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
-        self._newest_boot_us, self._measured, self._agrees_since_boot_us = None, None, (None, None)
+        self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
         self.has_converged = self._has_agreed = self._was_odd = False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
-        self.position_error_m = self.velocity_error_m_s = ZERO
+        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
@@ -268,7 +269,7 @@ class MotionEstimator:
             n, e, _ = bank.mean_error(0, way_s)
             self.position_error_m = (n, e, 0.0)
             if self._measured is None:
-                self.velocity_error_m_s = error_m_s
+                self._hidden_error_m_s = error_m_s
 
     def _compare(
         self, reported_m_s: Vector3, climb_error_m_s: float, elapsed_s: float, is_known: bool, time_boot_us: int
@@ -280,7 +281,7 @@ class MotionEstimator:
         """
         off = minus(reported_m_s, self.motion.velocity_ned_m_s)
         share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
-        n, e, _ = error = towards(self.velocity_error_m_s, off, share)
+        n, e, _ = error = towards(self._hidden_error_m_s, off, share)
         steady_us, same_us = self._agrees_since_boot_us
         steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)
         same_us = _since(_differs_m_s(off, ZERO) <= SAME_M_S, same_us, time_boot_us)
@@ -288,7 +289,7 @@ class MotionEstimator:
         is_steady = self.fits_models and steady_us is not None and time_boot_us - steady_us > SHOWN_US
         self._has_agreed = same_us is not None and time_boot_us - same_us > 1e6 * reflex.COMPARED_S
         self.has_converged = self.has_converged or is_steady or self._has_agreed
-        self.velocity_error_m_s = ZERO if self._has_agreed else (n, e, climb_error_m_s)
+        self._hidden_error_m_s = ZERO if self._has_agreed else (n, e, climb_error_m_s)
 
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter.
@@ -296,16 +297,22 @@ class MotionEstimator:
         A velocity that is measured apart stays.
         """
         measured = self.corrected(sample)
-        was, share, before_us = self.motion, 1.0, self._newest_boot_us
-        self._newest_boot_us = sample.time_boot_us
-        if before_us is not None:
-            elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before_us))
+        was, share, before, self._newest = self.motion, 1.0, self._newest, measured
+        if before is not None:
+            elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
             share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
+            if 0.0 < elapsed_s < reflex.COMPARED_S and not self.is_measured_apart:
+                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
         place, velocity = towards(was.position_ned_m, measured.position_ned_m, share), was.velocity_ned_m_s
         if not self.is_measured_apart:
             velocity, self.spread_m_s = towards(velocity, measured.velocity_ned_m_s, share), 0.0
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
         self._look_back()
+
+    @property
+    def velocity_error_m_s(self) -> Vector3:
+        """Remaining error of the reported velocity, m/s, NED."""
+        return plus(self._hidden_error_m_s, 1.0, self._rate_error_m_s)
 
     def corrected(self, sample: LocalPosition) -> LocalPosition:
         """The report without its known errors."""
@@ -322,6 +329,17 @@ def _since(is_so: bool, since_us: int | None, time_boot_us: int) -> int | None:
 def _differs_m_s(velocity_m_s: Vector3, other_m_s: Vector3) -> float:
     """Horizontally."""
     return math.dist(velocity_m_s[:2], other_m_s[:2])
+
+
+def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
+    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited.
+
+    The errors of positions are shorter than those of velocities. The reports are without the error so far.
+    """
+    half_s = 0.5 * elapsed_s
+    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
+    further_m = minus(led, measured.position_ned_m)
+    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
 
 
 def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:

@@ -197,7 +197,7 @@ def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_
     # Given an estimate whose known errors no vehicle has
     flight = flight_with()
     estimator = flight.collisions[0].estimator
-    estimator.has_converged, estimator.velocity_error_m_s = True, (0.0, wrong_m_s, 0.0)
+    estimator.has_converged, estimator._hidden_error_m_s = True, (0.0, wrong_m_s, 0.0)
     estimator.position_error_m = estimator.level_m_s2 = (wrong_m_s, wrong_m_s, 0.0)
     asked, hit_us = Target((1.0, 2.0, -3.0), 0.5), flight.collisions[0].sample_time_boot_us
 

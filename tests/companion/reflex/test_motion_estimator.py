@@ -242,6 +242,20 @@ def recovering():
     return flight, flight.collisions[0], recover_in(flight)
 
 
+def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
+    # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
+    flight, record, recover = recovering()
+    record.estimator.note_contact(True, HIT_US, record.estimator.normal)
+    for at_us in range(100_000, 5_000_000, 20_000):
+        recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
+        if record.is_over:
+            break
+    # Then the recovery is over although 0.15 m/s is told
+    assert record.setpoint_ned_m[0] == pytest.approx(2.38, abs=0.05)
+    assert record.estimator.velocity_error_m_s[0] == pytest.approx(0.15, abs=0.05)
+    assert record.is_over and record.settled_after_s < 3.5
+
+
 @pytest.mark.parametrize(
     ("heading_deg", "asked_deg"), [(10.0, 0.0), (-15.0, 0.0), (-120.0, -104.0), (120.0, 104.0), (350.0, 0.0)]
 )
