@@ -92,9 +92,9 @@ def _options(name: str, bits: float, setup: Setup) -> PreflightItem:
 
 def _filter(name: str, edge_hz: float, setup: Setup) -> PreflightItem:
     delay_ms = 1e3 / (math.sqrt(2.0) * math.pi * edge_hz) if edge_hz > 0.0 else 0.0
-    found = f"{edge_hz:g} Hz: a hit shows about {delay_ms:.0f} ms late" if edge_hz > 0.0 else "off"
+    found = f"{edge_hz:g} Hz: a hit shows about {delay_ms:.0f} ms late" if edge_hz > 0.0 else "off: hits are missed"
     remedy = f"{name} = {LEAST_FILTER_HZ:g}"
-    return judged(name, found, (0.0 < edge_hz < LEAST_FILTER_HZ, DOUBTFUL, remedy), mended=LEAST_FILTER_HZ)
+    return judged(name, found, (edge_hz < LEAST_FILTER_HZ, DOUBTFUL, remedy), mended=LEAST_FILTER_HZ)
 
 
 def _shaping(name: str, enabled: float, setup: Setup) -> PreflightItem:

@@ -382,6 +382,7 @@ def test_a_healthy_copter_has_nothing_to_mend():
         ({"GUID_TIMEOUT": 3.0}, None, "GUID_TIMEOUT", "GUID_TIMEOUT = 0.3"),
         ({"GUID_OPTIONS": 4}, None, "GUID_OPTIONS", "GUID_OPTIONS = 12"),
         ({"INS_ACCEL_FILTER": 10}, None, "INS_ACCEL_FILTER", "INS_ACCEL_FILTER = 20"),
+        ({"INS_ACCEL_FILTER": 0}, None, "INS_ACCEL_FILTER", "INS_ACCEL_FILTER = 20"),
         ({"FENCE_ENABLE": 1}, None, "FENCE_ENABLE", "FENCE_ENABLE = 0"),
         ({"FS_CRASH_CHECK": 0}, None, "FS_CRASH_CHECK", "FS_CRASH_CHECK = 1"),
         ({"ATC_RATE_FF_ENAB": 1}, None, "ATC_RATE_FF_ENAB", "ATC_RATE_FF_ENAB = 0"),
