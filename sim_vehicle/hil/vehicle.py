@@ -16,14 +16,18 @@ from sim_vehicle.scene import Scene
 # PX4 integrates samples by the trapezoidal rule: at 4 ms every HIGHRES_IMU would be the mean of two of them
 # and show a hit a sample late. A quarter of its interval comes near the 8 kHz of a real sensor.
 SAMPLE_INTERVAL_US = 1_000
+# Of PX4's first simulated sensor: 16 bits for +-16 g and +-2000 deg/s, in which what is larger wraps round
+# (SimulatorMavlink.cpp). Its largest numbers.
+RANGE_M_S2, RANGE_RAD_S = 16 * 9.80665 * 32_767 / 32_768, math.radians(2000) * 32_767 / 32_768
 
 
 def sampled_every(airframe: Airframe, interval_us: int) -> Airframe:
-    """The airframe with an inertial sensor that is read out so often, its noise as white as before."""
+    """The airframe with an inertial sensor that is read out so often, its noise as white as before, in PX4's range."""
     imu = airframe.imu
     factor = math.sqrt(imu.integration_interval_us / interval_us)
     values = imu.model_dump() | {
         "integration_interval_us": interval_us,
+        "accelerometer_range_m_s2": min(imu.accelerometer_range_m_s2, RANGE_M_S2),
         "accelerometer_noise_m_s2": factor * imu.accelerometer_noise_m_s2,
         "gyroscope_noise_rad_s": factor * imu.gyroscope_noise_rad_s,
     }
@@ -69,8 +73,8 @@ class HilVehicle:
             field = self._magnetometer.sample((qw, qx, qy, qz))
         if self._is_due(sensors.BAROMETER_PERIOD_US):
             air = air_at(self._origin.place.altitude_m - pz, self._rng.gauss(0, sensors.BAROMETER_NOISE_PA))
-        inertial = output.specific_force_frd_m_s2, output.angular_velocity_frd_rad_s
-        messages.append(HilSensor(now_us, *inertial, field, air))
+        p, q, r = (min(max(rate, -RANGE_RAD_S), RANGE_RAD_S) for rate in output.angular_velocity_frd_rad_s)
+        messages.append(HilSensor(now_us, output.specific_force_frd_m_s2, (p, q, r), field, air))
         return tuple(messages)
 
     def _is_due(self, period_us: int) -> bool:
