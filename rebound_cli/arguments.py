@@ -58,12 +58,6 @@ def _expected(text: str) -> int:
     return 0 if text == "none" else int(text)
 
 
-def _export_format(text: str) -> str:
-    if text == "ulg":
-        raise argparse.ArgumentTypeError("ulg is gone: give mcap, which Foxglove and PlotJuggler read")
-    return text
-
-
 def speeds_m_s(text: str) -> list[float]:
     """`1..4` in whole steps, or a list."""
     first, dots, last = text.partition("..")
@@ -82,7 +76,6 @@ TYPES: Mapping[str, Callable[[str], Any]] = {
     "address": host_and_port,
     "collisions": _expected,
     "count": number(int, 1, math.inf, "a count: give a whole number from 1 on"),
-    "export format": _export_format,
     # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
     "instance": number(int, 0, 9, "an instance: give a number from 0 to 9"),
     "integer": int,

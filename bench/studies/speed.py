@@ -161,7 +161,7 @@ def timed(flight: Recorded, times: int) -> Iterator[float | None]:
 
 @contextlib.contextmanager
 def beside(run: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """A process of the same priority, killed in the end; not forked: that copies each page that it is first to touch."""
+    """A process of the same priority, killed in the end. A fork would copy each page that it writes to first."""
     child = multiprocessing.get_context("spawn").Process(target=run, args=arguments)
     child.start()
     try:

@@ -6,14 +6,17 @@ from itertools import groupby
 
 from companion import messages
 from companion.core import POLL_INTERVAL_US
+from companion.flight.context import Inputs
+from companion.flight.handlers.crash import Crashed, crashed
 from companion.flight.vehicle_update import note_height, situation_of
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
+from companion.guard.states import State
 from companion.guard.watching import goes_down, not_flying, observe, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.mission.config import CompanionConfig
-from companion.reflex.detection.detector import ImpactKind, Situation
+from companion.reflex.detection.detector import Impact, ImpactKind, Situation
 from companion.reflex.detection.health import Promise
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.detection.monitor import CollisionMonitor, advance, start_monitor
@@ -24,7 +27,7 @@ from rebound_cli.replay.listening import Listener
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
 _MOST_POLLS = 20
 # Of the guard's own events these tell what the vehicle did.
-_TOLD = ("mode", "disarmed", "implausible")
+_TOLD = ("mode", "disarmed", "implausible", "crashed")
 
 
 class Circumstances:
@@ -41,6 +44,7 @@ class Circumstances:
         reflex = start_reflex(config, mission.recovery, config.settled, 0)
         self._guard = GuardContext(mission, Vehicle(), streams, reflex, config=settings, keeps_others_out=False)
         self._now_us = 0
+        self._wreck: Crashed | None = None
 
     def hear(self, told: Sequence[messages.Sample], now_us: int) -> Sequence[str]:
         """Take-offs, landings, arming and modes, as the samples report them."""
@@ -49,6 +53,11 @@ class Circumstances:
         armed, landed = vehicle.armed, vehicle.landed
         observe(guard, told, now_us)
         note_height(guard)
+        guard.reflex.crash.update(told, guard.height_m, vehicle.landed)
+        if self._wreck is not None:
+            self._wreck = None if self._wreck.step(guard, Inputs(), now_us) else self._wreck
+        elif crashed(guard, goes_down(guard, now_us), now_us) is not None:
+            self._wreck = Crashed(guard)
         happened = [event.text for event in guard.events if event.kind in _TOLD]
         if vehicle.armed and armed is not True:
             happened.append("armed")
@@ -67,7 +76,8 @@ class Circumstances:
     def situation(self) -> Situation:
         """Now."""
         guard = self._guard
-        return situation_of(guard, self._why_not(guard), goes_down(guard, self._now_us), is_held=False)
+        off = self._why_not(guard) or (None if self._wreck is None else State.CRASHED.value)
+        return situation_of(guard, off, goes_down(guard, self._now_us), is_held=False)
 
 
 @dataclass(slots=True)
@@ -117,6 +127,7 @@ class Findings:
     is_flying: bool = False  # armed and in the air at the end
     listener: Listener = field(default_factory=Listener)
     _open: dict[str, tuple[int, str]] = field(default_factory=dict)
+    _latest: Impact | None = None
     _noted_us: int | None = None
 
     @property
@@ -142,9 +153,11 @@ class Findings:
     def note(self, monitor: CollisionMonitor, situation: Situation, at_us: int) -> None:
         """After each step: what the watch knows of the latest impact, and whether it sees."""
         estimate, off = monitor.estimator.estimate, situation.off_reason
-        if estimate is not None:
-            if not self.impacts or self.impacts[-1].first.impact is not estimate.impact:
+        if estimate is not None and estimate.impact is not self._latest:
+            self._latest = estimate.impact
+            if not situation.is_wreck:
                 self.impacts.append(Finding(at_us, monitor.state.threshold_m_s2, situation, estimate, estimate))
+        if estimate is not None and self.impacts and self.impacts[-1].first.impact is estimate.impact:
             self.impacts[-1].final = estimate
         self._note_span("blind", monitor.no_data_reason, at_us)
         if off != self._open.get("off", (0, None))[1]:

@@ -39,7 +39,8 @@ def live_page(flight: ShownFlight) -> str:
 def assembled(data: dict[str, Any], ours: Sequence[str], may: str = "") -> str:
     data["libraries"] = libraries()
     scripts = [file_text(f"assets/{name}") for name in LIBRARIES] + [file_text(name) for name in ours]
-    hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
+    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
+    hashes = " ".join(f"'sha256-{digest}'" for digest in digests)
     return file_text("shell.html").format(
         policy=f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:{may}",
         title=html.escape(f"{data['name']}: {data['sentence']}"),
@@ -59,10 +60,6 @@ def libraries() -> list[dict[str, Any]]:
 def file_text(name: str) -> str:
     """Of a file of the page's own, to the byte."""
     return (resources.files(__package__) / "web" / name).read_bytes().decode("utf-8")
-
-
-def _digest(script: str) -> str:
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
 def run_report(options: Namespace) -> int:

@@ -110,7 +110,6 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
         (("sim", "--autopilot", "apm"), "--autopilot"),
         (("replay", "run", "--rate", "50"), "rebound replay: --rate is gone: a log is searched as it was recorded.\n"),
         (("replay", "run", "--expect", "some"), "'some' is not a number of collisions"),
-        (("logs", "export", "--format", "ulg"), "ulg is gone: give mcap, which Foxglove and PlotJuggler read"),
     ],
 )
 def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):

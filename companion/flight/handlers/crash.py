@@ -29,7 +29,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
     speed_m_s = hits[-1].report().impact_speed_m_s if hits else math.hypot(*latest.velocity_ned_m_s)
     damage, height_m = flight.motors.damage, -flight.mission_ned_m(latest.position_ned_m)[2]
     flight.crashed = f"crashed: {how}, tilted by {tilt_deg:.0f} degrees"
-    text = f"{flight.crashed}, {height_m:.1f} m up, last hit at {speed_m_s:.1f} m/s"
+    text = f"{flight.crashed}, {height_m:.1f} m up, {'last hit' if hits else 'moving'} at {speed_m_s:.1f} m/s"
     text += "" if damage is None else f"; {damage.text}"
     flight.report(
         now_us,
