@@ -161,8 +161,8 @@ def timed(flight: Recorded, times: int) -> Iterator[float | None]:
 
 @contextlib.contextmanager
 def beside(run: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """A process of the same priority, killed in the end. A fork would copy each page that it writes to first."""
-    child = multiprocessing.get_context("spawn").Process(target=run, args=arguments)
+    """A process of the same priority, killed in the end."""
+    child = multiprocessing.get_context("fork").Process(target=run, args=arguments)
     child.start()
     try:
         yield
@@ -172,7 +172,7 @@ def beside(run: Callable[..., None], *arguments: Any) -> Iterator[None]:
 
 
 def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
-    """The child: the loop of real flights, log and all. It flies to there itself."""
+    """The child: the loop of real flights, log and all. It flies to there itself, in memory that is its own."""
     companion, start = Companion(flight.mission), flight.hit - LEAD
     companion.confirm_plan()
     for interval in range(start):
