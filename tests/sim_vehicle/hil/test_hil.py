@@ -230,7 +230,7 @@ def test_what_px4s_sixteen_bits_cannot_hold_is_clipped_and_does_not_wrap():
     # Given a sensor of a larger range than PX4's simulated one, far off on an axis at least
     off = {"accelerometer_range_m_s2": 400.0, "accelerometer_bias_m_s2": 500.0, "gyroscope_bias_rad_s": 100.0}
     vehicle = HilVehicle(quiet(FOLDABLE, **{f"imu__{name}": value for name, value in off.items()}), Scene(), 1)
-    (sample,) = of_kind(vehicle.step(MOTORS_STOPPED), HilSensor)
+    (sample,) = of_kind(list(vehicle.step(MOTORS_STOPPED)), HilSensor)
     # Then the largest is the largest number of the driver, g / 2048 and 2000 deg/s / 32768 apart
     assert max(map(abs, sample.specific_force_frd_m_s2)) == pytest.approx(32_767 * 9.80665 / 2048, rel=1e-6)
     assert max(map(abs, sample.angular_velocity_frd_rad_s)) == pytest.approx(32_767 * math.radians(2000 / 32_768))
