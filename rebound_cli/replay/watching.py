@@ -54,8 +54,8 @@ class Circumstances:
         observe(guard, told, now_us)
         note_height(guard)
         guard.reflex.crash.update(told, guard.height_m, vehicle.landed)
-        if self._wreck is not None:
-            self._wreck = None if self._wreck.step(guard, Inputs(), now_us) else self._wreck
+        if self._wreck is not None and guard.is_wreck:
+            self._wreck.step(guard, Inputs(), now_us)
         elif crashed(guard, goes_down(guard, now_us), now_us) is not None:
             self._wreck = Crashed(guard)
         happened = [event.text for event in guard.events if event.kind in _TOLD]
@@ -76,7 +76,7 @@ class Circumstances:
     def situation(self) -> Situation:
         """Now."""
         guard = self._guard
-        off = self._why_not(guard) or (None if self._wreck is None else State.CRASHED.value)
+        off = self._why_not(guard) or (State.CRASHED.value if guard.is_wreck else None)
         return situation_of(guard, off, goes_down(guard, self._now_us), is_held=False)
 
 

@@ -41,15 +41,12 @@ def watched_page(folder: Path, console: Console, is_to_open: bool) -> Iterator[N
             address = server.stdout.readline().removeprefix(f"{folder}: ").split(" ")[0]
             console.print(f"Run folder {folder}/; the flight in a browser: {address}")
             # One in the terminal would take that from the flight; and some are waited for until they are closed.
-            if has_window():
+            has_desktop = not {"DISPLAY", "WAYLAND_DISPLAY"}.isdisjoint(os.environ)
+            if has_desktop or sys.platform in ("darwin", "win32"):
                 Thread(target=webbrowser.open, args=(address,), daemon=True).start()
             yield
         finally:
             server.terminate()
-
-
-def has_window() -> bool:
-    return sys.platform in ("darwin", "win32") or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
 
 
 def offer_page(folder: Path, console: Console) -> None:

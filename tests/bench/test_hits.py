@@ -71,6 +71,12 @@ def test_a_hit_alone_is_judged_as_the_hit_of_a_whole_mission(airframe, speed_m_s
 def test_the_same_seed_gives_the_same_hit():
     case = draw_flown(20, True)
     assert judged(case) == judged(case)
+    assert judged(case) != judged(draw_flown(28, True))
+
+
+def test_a_touch_too_soft_for_the_detector_is_missed():
+    touched = judged(HitCase(5, "rigid", "wall", 0.1, imu_hz=50))
+    assert not touched["found"] and touched["rest_s"] is None
 
 
 @pytest.mark.parametrize(("events", "of", "share"), [(0, 300, 0.00994), (1, 300, 0.01572), (0, 0, 1.0), (5, 5, 1.0)])

@@ -57,13 +57,9 @@ def test_a_rigid_pulse_is_a_millisecond_and_a_foldable_one_is_fifty_times_longer
     assert foldable["width_s"] == pytest.approx(0.0372, abs=0.0005)
 
 
-def hit_between(start_us, end_us):
-    (template,) = [single.head_on(load_built_in("rigid"), 1.0).hit]
-    return dataclasses.replace(template, contact_at_boot_us=start_us, ended_at_boot_us=end_us)
-
-
 def test_the_share_of_a_hit_that_was_received():
-    hit = hit_between(1000.0, 2000.0)
+    hit = single.head_on(load_built_in("rigid"), 1.0).hit
+    hit = dataclasses.replace(hit, contact_at_boot_us=1000.0, ended_at_boot_us=2000.0)
     assert share_received(np.array([4000.0]), 4000, hit) == pytest.approx(1.0)
     assert share_received(np.array([1500.0, 5500.0]), 4000, hit) == pytest.approx(1.0)
     assert share_received(np.array([1250.0, 9250.0]), 4000, hit) == pytest.approx(0.25)

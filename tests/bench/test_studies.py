@@ -158,6 +158,13 @@ def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
     assert copies.found == {"away": {"steps": [["first"], [9, 9, 9], [9, 9, 9]]}}
 
 
+def test_where_a_rule_changes_nothing_there_is_no_copy():
+    same = Rule("same", "", "reflex.surface:plus", says=[1.0, 0.0, 0.0])
+    with switched([same]) as copies:
+        assert surface.plus((0, 0, 0), 1.0, (1, 0, 0)) == (1.0, 0.0, 0.0)
+    assert copies.found == {}
+
+
 def test_the_table_counts_what_is_lost_without_a_rule():
     well = {"ends": True, "hits": [RECOVERED]}
     lost = [{"ends": ends, "hits": [RECOVERED | NOT_RECOVERED]} for ends in (False, True)]
@@ -201,12 +208,6 @@ TOUCHED_S = 5.0
 LANDED, FALLEN = False, True
 
 
-def verdict_on(is_fall, reported):
-    """On impacts of these kinds, so many seconds after the touch; the hardest moment is 0.05 s after it."""
-    rows = [{"kind": kind, "sample_s": TOUCHED_S + after_s} for kind, after_s in reported]
-    return judged(is_fall, round(1e6 * TOUCHED_S), round(1e6 * TOUCHED_S) + 50_000, rows)
-
-
 @pytest.mark.parametrize(
     ("is_fall", "reported", "outcome", "wrong"),
     [
@@ -224,7 +225,11 @@ def verdict_on(is_fall, reported):
     ],
 )
 def test_a_way_to_the_ground_is_judged_by_all_that_was_reported(is_fall, reported, outcome, wrong):
-    assert verdict_on(is_fall, reported) == (outcome, wrong)
+    # Given impacts of these kinds, so many seconds after the touch, whose hardest moment is 0.05 s after it
+    rows = [{"kind": kind, "sample_s": TOUCHED_S + after_s} for kind, after_s in reported]
+    assert judged(is_fall, round(1e6 * TOUCHED_S), round(1e6 * TOUCHED_S) + 50_000, rows) == (outcome, wrong)
+    # And one that never touches the ground shows nothing
+    assert judged(is_fall, None, None, rows) == ("not there", "the ground was not reached")
 
 
 @pytest.mark.slow

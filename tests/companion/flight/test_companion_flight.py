@@ -304,15 +304,11 @@ def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_t
     assert phases[-1][0] <= f.report.ended_at_us
 
 
-def warning(text):
-    return StatusText(Severity.WARNING, text)
-
-
 def spoken(steps):
     """What is sent when, in tenths of a second, of texts about a subject that are told then."""
     texts, heard = Texts(), []
     for tenth in range(40):
-        told = [(subject, warning(text)) for at, subject, text in steps if at == tenth]
+        told = [(subject, StatusText(Severity.WARNING, text)) for at, subject, text in steps if at == tenth]
         heard += [(tenth, text.text) for text in texts.due(told, False, EPOCH_US + tenth * 100_000)]
     return heard
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from companion.mavlink.packet import message_id_of
-from companion.messages import Attitude, ExtendedState, LandedState, LocalPosition, MessageId, PositionTarget
+from companion.messages import Attitude, ExtendedState, ImuSample, LandedState, LocalPosition, MessageId, PositionTarget
 from companion.mission.config import CompanionConfig
 from companion.reflex.detection.detector import ImpactKind, Situation
 from companion.shell.tlog import read_tlog
@@ -249,14 +249,18 @@ def test_a_replay_watches_where_the_guard_would(modes, failsafe, reason):
 
 
 def test_of_a_vehicle_that_lies_on_its_back_a_replay_tells_its_crash_and_no_hit():
-    # Given a log with a hit, whose vehicle turned over 2 s before
-    log, over = flight(), range(HIT_US - 2 * SECOND, 10 * SECOND, SECOND // 20)
-    turned = [LoggedSample(us, Attitude(us, (0.0, 1.0, 0.0, 0.0))) for us in over]
-    findings = watch_log(replace(log, heard=tuple(sorted([*log.heard, *turned], key=lambda item: item.at_us))), LATERAL)
-    # Then that is told, and of the wreck nothing
-    assert findings.impacts == []
+    # Given a log with a hard hit, whose vehicle lies tipped over since 2 s before, and is disarmed in the end
+    log, fell_us = flight(push_m_s2=60.0), HIT_US - 2 * SECOND
+    heard = [item for item in log.heard if item.at_us < fell_us or isinstance(item.sample, ImuSample)]
+    for us in range(fell_us, 9 * SECOND, SECOND // 20):
+        heard += [LoggedSample(us, Attitude(us, (0.0, 1.0, 0.0, 0.0))), LoggedSample(us, position(us, 0.2))]
+    heard += [LoggedSample(us, beat(False)) for us in (9 * SECOND, 9 * SECOND + SECOND // 2)]
+    log = replace(log, heard=tuple(sorted(heard, key=lambda item: item.at_us)))
+    findings = watch_log(log, CompanionConfig())
+    # Then that is told, and of the wreck nothing, which is not watched
+    assert findings.impacts == [] and "crashed" in [span.reason for span in findings.off]
     (crash,) = [text for _, text in findings.happenings if text.startswith("crashed")]
-    assert crash == "crashed: tipped over, tilted by 180 degrees, 1.5 m up, moving at 1.0 m/s"
+    assert crash == "crashed: tipped over, tilted by 180 degrees, 0.2 m up, moving at 0.0 m/s"
 
 
 def test_a_margin_is_the_largest_sign_of_a_hit_over_the_threshold():
