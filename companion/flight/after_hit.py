@@ -4,6 +4,7 @@ from companion.flight.context import AfterRecovery, BeforeHit, FlightContext, Ta
 from companion.flight.states import State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem
 from companion.mission.policy import OnCollision
+from companion.reflex.recovery.collision import recoveries_from
 
 # After these the interrupted step is over.
 _STEP_LEFT = ("hold", "continue")
@@ -20,7 +21,7 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     step = flight.steps[flight.tally.index]
     own = step.item.on_collision
     policy = own or flight.mission.on_collision
-    hits = flight.tally.hits if own else len(flight.collisions)
+    hits = recoveries_from(flight.collisions[-flight.tally.hits :] if own else flight.collisions)
     then, reason = _verdict(flight, policy, hits)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
@@ -41,7 +42,7 @@ def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str
     if hits >= policy.max_hits:
         # With obstacles on the way home the vehicle lands.
         then = "land" if flight.going_home or flight.is_landing else policy.after_max_hits
-        return then, f"hit {hits} of at most {policy.max_hits}"
+        return then, f"recovery {hits} of at most {policy.max_hits}"
     if flight.is_landing:
         return "land", ""
     return "return" if flight.going_home else policy.then, ""
@@ -49,7 +50,7 @@ def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str
 
 def lands_anyway(flight: FlightContext) -> bool:
     """Whether so many hits have been met that a landing is not interrupted for another one."""
-    return flight.is_landing and len(flight.collisions) >= flight.mission.on_collision.max_hits
+    return flight.is_landing and recoveries_from(flight.collisions) >= flight.mission.on_collision.max_hits
 
 
 def afterwards(flight: FlightContext) -> Transition:

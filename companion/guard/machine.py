@@ -19,6 +19,7 @@ from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, 
 from companion.messages import Asked, Sticks
 from companion.motion.rotation import yaw_rad
 from companion.reflex.detection.detector import ImpactKind
+from companion.reflex.recovery.collision import recoveries_from
 
 # What is told of a move that has a story.
 _KINDS = {
@@ -226,9 +227,11 @@ class GuardMachine(StateMachine):
                 assert isinstance(self.handler, TakeOver), "the table leads here from there alone"
                 return Recovering(self.handler.recover, now_us)
             case State.GIVING_BACK:
-                limit, hits = guard.config.max_hits, len(guard.hits)
+                limit, hits = guard.config.max_hits, recoveries_from(guard.hits)
                 if hits >= limit and not guard.then_hold:
-                    guard.then_hold = f"hit {hits} of at most {limit}"
+                    guard.then_hold = f"recovery {hits} of at most {limit}"
+                    if guard.config.then == "previous":
+                        guard.report(now_us, "not_back", f"not given back: {guard.then_hold}")
                 return GiveBack(guard, transition.trigger is Trigger.CROSSED, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)

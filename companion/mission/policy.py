@@ -13,7 +13,8 @@ OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
 
 
 class OnCollision(StrictModel):
-    """After the recovery. `max_hits` counts the hits of the flight; in an item's own policy, those of the item."""
+    """After the recovery. `max_hits` counts the hits of the flight; in an item's own policy, those of the item. What is
+    touched again before the vehicle has settled is the same hit."""
 
     then: Literal["hold", "continue", "retry", "detour", "return", "land"] = "hold"
     """hold: for `hold_s`, then the next item; continue: the next item at once; retry: the same item again, slower;

@@ -128,3 +128,8 @@ class CollisionRecord:
             overshoot_m=self.overshoot_m,
             rebound_speed_m_s=self.rebound_speed_m_s,
         )
+
+
+def recoveries_from(hits: Sequence[CollisionRecord]) -> int:
+    """How many recoveries they began: what is touched again before the vehicle has settled is the same hit."""
+    return sum(hit.is_over for hit in hits[:-1]) + bool(hits)

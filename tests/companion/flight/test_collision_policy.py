@@ -46,20 +46,24 @@ def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     assert items_flown(f) == [2, 2, 2], "the rest of the mission is not flown"
     assert speeds_m_s(f) == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
     assert "at 49% of the speed" in f.event("item", 2).text
-    assert "hit 3 of at most 3; after the recovery: return" in f.event("policy").text
+    assert "recovery 3 of at most 3; after the recovery: return" in f.event("policy").text
     report = f.report
     assert report.outcome == "completed" and "not flown from item 2 on" in report.reason
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.3)
 
 
-def test_a_hit_while_it_recovers_makes_the_next_try_no_slower():
-    f = at_wall({**INTO_WALL, "on_collision": {"then": "retry", "max_hits": 3}})
+@pytest.mark.parametrize("whose", ["the item's", "the mission's"])
+def test_what_is_touched_again_while_it_recovers_is_the_same_hit_and_makes_the_next_try_no_slower(whose):
+    policy = {"on_collision": {"then": "retry", "max_hits": 2}}
+    f = at_wall({**INTO_WALL, **policy}) if whose == "the item's" else at_wall(INTO_WALL, **policy)
     f.run_to("recovering")
     f.run_for(0.4)
     strike(f)
     f.run_to("mission")
-    assert len(f.report.collisions) == 2
+    assert len(f.report.collisions) == 2 and "policy" not in f.kinds()
     assert "at 50% of the speed" in f.event("item", 1).text
+    f.run_to("recovering")
+    assert "recovery 2 of at most 2" in f.event("policy").text
 
 
 def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
