@@ -40,8 +40,7 @@ def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     on_collision = {"then": "retry", "retry_speed_factor": 0.7, "max_hits": 3, "after_max_hits": "return"}
     # The way back to the wall is short.
     flying = {"flight": {"speeding_up_m_s2": 2.0}}
-    near = {"clearance_s": 0.27}
-    f = at_wall(INTO_WALL, ASIDE, on_collision=on_collision, companion=flying, recovery=near)
+    f = at_wall(INTO_WALL, ASIDE, on_collision=on_collision, companion=flying)
     f.run_to_end(200)
     assert items_flown(f) == [2, 2, 2], "the rest of the mission is not flown"
     assert speeds_m_s(f) == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
