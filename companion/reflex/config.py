@@ -164,9 +164,8 @@ BRAKED_RAD_S = 1.0
 LEAST_THRUST = 0.12
 # The thrust gain is good enough to fly by after so long: 15 reports of the thrust at 30 Hz.
 THRUST_LEARNT_S = 0.5
-# Rest, by the belief: as slow as a hovering vehicle wanders by a poor estimate, for so long, and this share of the
-# clearance off all surfaces.
-RESTS_M_S, RESTS_S, CLEAR_SHARE = 0.2, 0.1, 0.7
+# Rest, by the belief: as slow as a hovering vehicle wanders by a poor estimate, for so long.
+RESTS_M_S, RESTS_S = 0.2, 0.1
 # Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
 # A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
 YAW_LEAD_RAD = 0.28

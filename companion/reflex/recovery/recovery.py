@@ -137,12 +137,12 @@ class Recovery:
         return rested_s, along(state.velocity_ned_m_s, self._contact.normal_ned)
 
     def _rests(self, sample: LocalPosition) -> bool:
-        """Whether it rests, clear of all surfaces, and the errors of the vehicle's own estimate are known."""
+        """Whether it rests as clear of all surfaces as its goal is, and the errors of the vehicle's own estimate are
+        known.
+        """
         estimator, motion = self.record.estimator, self.record.estimator.motion
-        is_clear = all(
-            one.off_m(motion.position_ned_m) >= reflex.CLEAR_SHARE * one.distance_m for one in self._surfaces
-        )
-        if not estimator.has_converged or not is_clear or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
+        is_there = math.dist(motion.position_ned_m, self.record.setpoint_ned_m) <= self._settled.distance_m
+        if not estimator.has_converged or not is_there or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
             self._slow_since_us = None
             return False
         self._slow_since_us = self._slow_since_us or sample.time_boot_us

@@ -21,7 +21,7 @@ from companion.reflex.recovery.laws import Contact
 from companion.reflex.recovery.motion_estimator import MotionEstimator
 from companion.reflex.recovery.recovery import Recovery
 from companion.reflex.reflex import start_reflex
-from companion.reflex.surface import Normal
+from companion.reflex.surface import Normal, Surface
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -45,10 +45,10 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
     return flight
 
 
-def recover_in(flight: FlightContext) -> Recover:
-    reflex, settled = flight.reflex, flight.mission.companion.settled
+def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
+    reflex, settled, places = flight.reflex, flight.mission.companion.settled, flight.vehicle.history
     record, room = flight.collisions[-1], FlightRoom(flight)
-    reflex.recovery = Recovery(record, reflex.law, flight.mission.recovery, settled, room, (), flight.vehicle.history)
+    reflex.recovery = Recovery(record, reflex.law, flight.mission.recovery, settled, room, earlier, places)
     return Recover(flight, reflex.recovery)
 
 
@@ -149,6 +149,14 @@ def test_the_way_off_follows_the_normal_as_it_becomes_known():
     estimator.note_contact(True, HIT_US, Normal((-0.8, 0.6, 0.0), 0.1))
     hears(flight, recover, 120_000, 2.95, 0.0)
     assert straight_m == pytest.approx(0.0, abs=0.02) and flight.collisions[0].setpoint_ned_m[1] > 0.1
+
+
+def test_between_surfaces_that_it_cannot_be_clear_of_it_is_handed_over_in_the_middle():
+    flight = flight_with()
+    recover = recover_in(flight, Surface((2.96, 0.0, -2.0), (1.0, 0.0, 0.0), 0.35))
+    for since_us in range(100_000, 400_000, 20_000):
+        _, sent = hears(flight, recover, since_us, 2.995, 0.0)
+    assert isinstance(sent, PositionSetpoint) and sent.position_ned_m[0] == pytest.approx(2.98)
 
 
 def test_it_is_not_handed_over_on_the_obstacle():
