@@ -47,12 +47,10 @@ def _statements(node: ast.AST) -> Iterator[ast.AST]:
 
 def module_imports(root: Path) -> dict[str, set[str]]:
     """Every module of the project below ``root``, and those of them that it imports."""
-    paths = {_module(path.relative_to(root)): path for name in PACKAGES for path in (root / name).rglob("*.py")}
+    files = [path for name in PACKAGES for path in (root / name).rglob("*.py")]
+    names = [".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__") for path in files]
+    paths = dict(zip(names, files, strict=True))
     return {module: {name for name in imported_names(path) if name in paths} for module, path in paths.items()}
-
-
-def _module(path: Path) -> str:
-    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
 
 
 ROOT = Path(__file__).parent.parent

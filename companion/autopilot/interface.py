@@ -98,6 +98,8 @@ class Autopilot:
     """It takes the mode that flies them only while they come."""
     changed_law: Callable[[bool | None], VehicleCommand | None]
     """What it is told when it is flown by attitude from now on (True), by position (False), or no more (None)."""
+    keeps_trim: bool
+    """Its position control begins with the tilt that was asked for last, as what wind and a wrong tilt take."""
     attitude_parameters: tuple[str, ...]
     """Read before it is flown by attitude."""
     attitude_held_s: Callable[[Mapping[str, int | float]], float]

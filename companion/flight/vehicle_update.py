@@ -35,6 +35,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                     return identity
                 vehicle.identity, vehicle.autopilot = identity, identity.autopilot
                 flight.reflex.monitor.estimator.hides_clipping = identity.autopilot.filters_imu
+                flight.reflex.keeps_trim = identity.autopilot.keeps_trim
             if sample.system_id != vehicle.identity.system_id:
                 continue
             if identify(sample) != vehicle.identity:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from companion.messages import AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample, Vector3
 from companion.motion.config import KEPT_US, SettledConfig
 from companion.motion.rotation import body_to_ned, tilt_rad
-from companion.motion.vector import plus
+from companion.motion.vector import ZERO, plus
 from companion.reflex import config as numbers
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
@@ -62,6 +62,7 @@ class Reflex:
     hits: list[CollisionRecord] = field(default_factory=list)
     recovery: Recovery | None = None  # of the newest
     loss_s: float | None = None  # for so long the vehicle flies its last setpoint on; infinite: it takes no thrust
+    keeps_trim: bool = False  # see interface.Autopilot
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     crash: CrashWatch = field(default_factory=CrashWatch)
 
@@ -158,7 +159,7 @@ class Reflex:
             if each.contact.time_boot_us < contact.time_boot_us
         ]
         places = self.monitor.estimator.history
-        self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, places)
+        self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, places, self.keeps_trim)
         self.hits.append(record)
         return record
 
@@ -194,7 +195,7 @@ class Reflex:
         if left_us <= 0:
             return None
         estimator, share = record.estimator, min(1.0, left_us / (numbers.FADED_US - numbers.FADES_FROM_US))
-        pushed = plus(estimator.wind_m_s2, 1.0, estimator.tilted_m_s2)
+        pushed = ZERO if self.keeps_trim else plus(estimator.wind_m_s2, 1.0, estimator.tilted_m_s2)
         return LeftWrong(share, estimator.position_error_m, estimator.velocity_error_m_s, pushed)
 
     # --- by which law

@@ -139,7 +139,6 @@ def test_a_pilot_who_takes_over_in_the_climb_is_left_alone() -> None:
 
 
 RULE = Rule("away", "away from what was hit", "reflex.surface:plus", says=[9, 9, 9])
-NOT_RECOVERED = {"recovered": False}
 RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "rest_s": 1.2, "normal_deg": 5.0, "recovered": True}
 
 
@@ -167,7 +166,7 @@ def test_where_a_rule_changes_nothing_there_is_no_copy():
 
 def test_the_table_counts_what_is_lost_without_a_rule():
     well = {"ends": True, "hits": [RECOVERED]}
-    lost = [{"ends": ends, "hits": [RECOVERED | NOT_RECOVERED]} for ends in (False, True)]
+    lost = [{"ends": ends, "hits": [RECOVERED | {"recovered": False}]} for ends in (False, True)]
     flights = [{"with": well, "without": {"trust": without}} for without in lost]
     lines = flights_table(flights).splitlines()
     trust = next(line for line in lines if line.startswith("| trust"))

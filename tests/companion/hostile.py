@@ -74,9 +74,5 @@ def attacked(f: Flight, packets: Iterable[bytes]) -> None:
     sent = len(f.sent)
     f.step(b"".join(packets))
     for _, frame in f.sent[sent:]:
-        assert_inside(f, frame)
-
-
-def assert_inside(f: Flight, frame: bytes) -> None:
-    """What a setpoint asks for is finite, inside the fence, and within the limits; whatever it is not asked is NaN."""
-    assert outside(f.companion.core, frame) is None, str(decoded(frame))
+        # What a setpoint asks for is finite, inside the fence, and within the limits; whatever it is not asked is NaN.
+        assert outside(f.companion.core, frame) is None, str(decoded(frame))

@@ -41,10 +41,6 @@ def words(sentence):
 
 
 def lengths(text):
-    """Of its sentences, in words."""
-    return [len(words(sentence)) for sentence in sentences(without_tables(text))]
-
-
-def without_tables(text):
-    """Cells are short and would make the mean look better than the prose is."""
-    return "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("|"))
+    """Of its sentences, in words. A table's cells are short and would make the mean look better than the prose is."""
+    prose = "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("|"))
+    return [len(words(sentence)) for sentence in sentences(prose)]

@@ -83,7 +83,6 @@ def test_a_mission_is_not_given_back_to_that_would_go_on_into_what_was_hit():
 def test_after_the_most_hits_of_a_flight_the_vehicle_is_given_back_to_hold():
     air = recovering(then="previous", max_hits=1)
     air.run_to(State.WATCHING, 10.0)
-    air.run_for(1.0)
     assert air.mode == "AUTO.LOITER" and air.told("not_back") == ["not given back: recovery 1 of at most 1"]
 
 

@@ -41,6 +41,7 @@ ARDUPILOT = Autopilot(
     is_told_to_take_off=True,
     wants_setpoints_first=False,
     changed_law=_changed_law,
+    keeps_trim=True,  # AC_PosControl: NE_init_controller
     attitude_parameters=(setup.LOSS, setup.OPTIONS),
     attitude_held_s=setup.attitude_held_s,
     last_words=LastWords(

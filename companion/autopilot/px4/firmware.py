@@ -38,6 +38,7 @@ PX4 = Autopilot(
     is_told_to_take_off=False,
     wants_setpoints_first=True,
     changed_law=_changed_law,
+    keeps_trim=False,
     attitude_parameters=(setup.LOSS,),
     attitude_held_s=lambda told: told[setup.LOSS],
     # Of a real one, by motion capture: its velocity is wrong by up to 7 m/s, and then its tilt by 8 degrees.

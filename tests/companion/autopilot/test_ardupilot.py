@@ -33,8 +33,6 @@ from companion.messages import (
 from tests.companion.autopilot.fake_copter import ARM, AUX_FUNCTION, COPTER_LAND, GUIDED, SET_MODE, TAKE_OFF, FakeCopter
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, FakeVehicle, flight
 
-COPTER_MODES = ardupilotmega.enums["COPTER_MODE"]
-
 
 def commanded(f, number):
     return [(t, message) for t, message in f.vehicle.commands if message.command == number]
@@ -239,7 +237,8 @@ def test_a_thrust_below_none_is_none(thrust, heard_as):
 
 
 def test_modes_have_copters_names_and_numbers():
-    theirs = {entry.name.removeprefix("COPTER_MODE_"): number for number, entry in COPTER_MODES.items()}
+    copter_modes = ardupilotmega.enums["COPTER_MODE"]
+    theirs = {entry.name.removeprefix("COPTER_MODE_"): number for number, entry in copter_modes.items()}
     assert {number: mode.name for number, mode in modes.MODES.items()}.items() <= {
         (number, name) for name, number in theirs.items()
     }

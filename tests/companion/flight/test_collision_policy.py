@@ -46,8 +46,7 @@ def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     assert speeds_m_s(f) == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
     assert "at 49% of the speed" in f.event("item", 2).text
     assert "recovery 3 of at most 3; after the recovery: return" in f.event("policy").text
-    report = f.report
-    assert report.outcome == "completed" and "not flown from item 2 on" in report.reason
+    assert f.report.outcome == "completed" and "not flown from item 2 on" in f.report.reason
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.3)
 
 

@@ -17,7 +17,6 @@ from tests.flying import Flight
 from tests.simulated import flown, wall
 
 ON_ITS_SIDE, ON_ITS_BACK, UPRIGHT = (0.0, GRAVITY_M_S2, 0.0), (0.0, 0.0, GRAVITY_M_S2), (0.0, 0.0, -GRAVITY_M_S2)
-NOTHING = (0.0, 0.0, 0.0)
 DISARM, FORCE, REFUSED, ACCEPTED = 400, 21196.0, 1, 0
 
 
@@ -139,7 +138,7 @@ def watched(force_frd, height_m=0.1, speed_m_s=0.0, rate_rad_s=0.0, landed=Lande
     for time_us in range(0, 3_000_000, 4_000):
         samples: list[Sample] = [ImuSample(time_us, force_frd, (rate_rad_s, 0.0, 0.0))]
         if time_us % 20_000 == 0:
-            samples.append(LocalPosition(time_us, NOTHING, (0.0, 0.0, speed_m_s)))
+            samples.append(LocalPosition(time_us, (0.0, 0.0, 0.0), (0.0, 0.0, speed_m_s)))
         watch.update(samples, height_m, landed)
     return watch
 

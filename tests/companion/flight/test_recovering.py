@@ -46,10 +46,11 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
 
 
 def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
-    reflex, settled, places = flight.reflex, flight.mission.companion.settled, flight.vehicle.history
-    record, room = flight.collisions[-1], FlightRoom(flight)
-    reflex.recovery = Recovery(record, reflex.law, flight.mission.recovery, settled, room, earlier, places)
-    return Recover(flight, reflex.recovery)
+    reflex, mission, places = flight.reflex, flight.mission, flight.vehicle.history
+    how = reflex.law, mission.recovery, mission.companion.settled
+    recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, places, reflex.keeps_trim)
+    reflex.recovery = recovery
+    return Recover(flight, recovery)
 
 
 def hears(
@@ -111,15 +112,17 @@ def test_after_a_fall_it_climbs_back_by_its_clearance_at_most_and_by_eq_3_all_of
     assert flight.collisions[-1].setpoint_ned_m[2] == pytest.approx(-2.0 + fallen_m - climbs_m, abs=1e-6)
 
 
-def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_when_it_rested():
+@pytest.mark.parametrize(("keeps_trim", "rests_us"), [(False, 100_000), (True, 500_000)])
+def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_when_it_rested(keeps_trim, rests_us):
     # Given a vehicle that rests, clear of the obstacle, from the first report on
     flight, handed_us, over_us = flight_with(), 0, 0
+    flight.reflex.keeps_trim = keeps_trim
     recover, record = recover_in(flight), flight.collisions[0]
     for since_us in range(100_000, 1_600_000, 20_000):
         _, sent = hears(flight, recover, since_us, 2.4, 0.0)
         handed_us = handed_us or (since_us if type(sent) is PositionSetpoint else 0)
         over_us = over_us or (since_us if record.settled_after_s is not None else 0)
-    assert handed_us == 200_000 and over_us == handed_us + 500_000
+    assert handed_us == 100_000 + rests_us and over_us == handed_us + 500_000
     assert record.settled_after_s == pytest.approx(0.1, abs=0.01)
 
 
@@ -198,6 +201,14 @@ def test_a_surface_goes_along_while_it_pushes():
         hears(flight, recover, since_us, 3.0 - 0.8e-6 * since_us, -0.8)
     # Then its goal stays ahead of it
     assert flight.collisions[0].setpoint_ned_m[0] < 3.0 - 0.8 * 0.58 - 0.3
+
+
+@pytest.mark.parametrize(("keeps_trim", "wind_m_s2"), [(False, 1.0), (True, 0.0)])
+def test_the_wind_is_told_to_a_position_control_that_begins_without_it(keeps_trim, wind_m_s2):
+    flight = flight_with()
+    flight.reflex.keeps_trim, estimator = keeps_trim, flight.collisions[0].estimator
+    estimator.has_converged, estimator.external_m_s2 = True, (0.0, 1.0, 0.0)
+    assert flight.reflex.left_wrong(HIT_US + 1_000_000).pushed_m_s2 == (0.0, wind_m_s2, 0.0)
 
 
 @pytest.mark.parametrize("wrong_m_s", [40.0, math.nan])

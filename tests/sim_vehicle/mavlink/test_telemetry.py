@@ -209,11 +209,6 @@ def asked(message_id: int, interval_us: float) -> tuple[Client, list[int]]:
     return client, client.results(SET_INTERVAL)
 
 
-def gaps_ms(client: Client, kind: str) -> list[int]:
-    times_s = [time_s for time_s, message in client.received if message.get_type() == kind]
-    return [round(1e3 * (b - a)) for a, b in pairwise(times_s)]
-
-
 @pytest.fixture
 def on_time(monkeypatch):
     """No loop of the link comes too late."""
@@ -237,7 +232,8 @@ def on_time(monkeypatch):
 def test_asked_and_received(on_time, kind, asked_hz, received_hz, gaps):
     client, _ = asked(NUMBERS[kind], 1e6 / asked_hz)
     assert client.rate_hz(kind, 8.0) == pytest.approx(received_hz, rel=0.005)
-    assert set(gaps_ms(client, kind)) == gaps
+    times_s = [time_s for time_s, message in client.received if message.get_type() == kind]
+    assert {round(1e3 * (b - a)) for a, b in pairwise(times_s)} == gaps
 
 
 def test_minus_one_stops_and_zero_restores():
