@@ -254,12 +254,9 @@ DERIVED = {
 # A damaged motor decides no hit and no recovery.
 OTHERS = {"motors.py"}
 FLIGHT = ("after_hit", "damage", "handlers/recovering")
-
-
-def sources_with_numbers() -> Iterator[Path]:
-    for room in ("motion", "reflex"):
-        yield from (path for path in sorted((COMPANION / room).rglob("*.py")) if path not in CONFIGS)
-    yield from (COMPANION / "flight" / f"{name}.py" for name in FLIGHT)
+HEART = [path for room in ("motion", "reflex") for path in sorted((COMPANION / room).rglob("*.py"))]
+HEART += [COMPANION / "flight" / f"{name}.py" for name in FLIGHT]
+WITH_NUMBERS = [path for path in HEART if path not in CONFIGS and path.name not in OTHERS]
 
 
 def numbers(path: Path) -> set[float]:
@@ -267,9 +264,7 @@ def numbers(path: Path) -> set[float]:
     return {value for value in constants if type(value) in (int, float)}
 
 
-@pytest.mark.parametrize(
-    "path", [path for path in sources_with_numbers() if path.name not in OTHERS], ids=lambda path: path.stem
-)
+@pytest.mark.parametrize("path", WITH_NUMBERS, ids=lambda path: path.stem)
 def test_a_number_outside_the_two_files_is_a_unit_or_is_derived(path: Path) -> None:
     derived = DERIVED.get(path.relative_to(COMPANION).as_posix(), set())
     assert numbers(path) - FREE == derived

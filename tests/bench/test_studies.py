@@ -138,7 +138,6 @@ def test_a_pilot_who_takes_over_in_the_climb_is_left_alone() -> None:
     assert result["outcome"] == "aborted" and result["complaints"] == [] and result["after_told"] == 0
 
 
-RULE = Rule("away", "away from what was hit", "reflex.surface:plus", says=[9, 9, 9])
 RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "rest_s": 1.2, "normal_deg": 5.0, "recovered": True}
 
 
@@ -150,7 +149,7 @@ def flown(copies):
 
 
 def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
-    with switched([RULE]) as copies:
+    with switched([Rule("away", "away from what was hit", "reflex.surface:plus", says=[9, 9, 9])]) as copies:
         steps = flown(copies)
     assert steps == [("first",), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
     # In the copy the rule is off from its first answer on, in every module that asks it.

@@ -80,10 +80,14 @@ def test_a_mission_is_not_given_back_to_that_would_go_on_into_what_was_hit():
     assert "not given back: AUTO.MISSION goes on into what was hit" in air.told("not_back")[0]
 
 
-def test_after_the_most_hits_of_a_flight_the_vehicle_is_given_back_to_hold():
-    air = recovering(then="previous", max_hits=1)
+@pytest.mark.parametrize(("max_hits", "mode"), [(1, "AUTO.LOITER"), (2, "POSCTL")])
+def test_after_the_most_hits_of_a_flight_the_vehicle_is_given_back_to_hold(max_hits, mode):
+    air = recovering(then="previous", max_hits=max_hits)
+    # Of one recovery, as of what is touched twice
+    hits = air.guard.core.flight.reflex.hits
+    hits.insert(0, replace(hits[0]))
     air.run_to(State.WATCHING, 10.0)
-    assert air.mode == "AUTO.LOITER" and air.told("not_back") == ["not given back: recovery 1 of at most 1"]
+    assert air.mode == mode and air.told("not_back") == ["not given back: recovery 1 of at most 1"][max_hits - 1 :]
 
 
 def test_sticks_that_push_on_into_what_was_hit_are_waited_for():

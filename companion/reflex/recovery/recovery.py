@@ -64,7 +64,7 @@ class Recovery:
         self._config, self._settled, self._room = config, settled, room
         self._earlier, self._places = earlier, places
         # Where a tilt that still brakes would be kept, none is left by then.
-        self._rests_s = settled.duration_s if keeps_trim else reflex.RESTS_S
+        self.rests_s = settled.duration_s if keeps_trim else reflex.RESTS_S
         self._contact = record.contact  # as known now, at the vehicle's place while the obstacle goes along
         self._surfaces = self._around(self._contact)
         expected = record.contact.rebound(config.restitution)
@@ -149,7 +149,7 @@ class Recovery:
             self._slow_since_us = None
             return False
         self._slow_since_us = self._slow_since_us or sample.time_boot_us
-        return sample.time_boot_us - self._slow_since_us >= 1e6 * self._rests_s
+        return sample.time_boot_us - self._slow_since_us >= 1e6 * self.rests_s
 
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. While it is touched it is where the vehicle is: frames and arms fold, obstacles move."""

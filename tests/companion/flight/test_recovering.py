@@ -48,9 +48,8 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
 def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
     reflex, mission, places = flight.reflex, flight.mission, flight.vehicle.history
     how = reflex.law, mission.recovery, mission.companion.settled
-    recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, places, reflex.keeps_trim)
-    reflex.recovery = recovery
-    return Recover(flight, recovery)
+    reflex.recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, places, reflex.keeps_trim)
+    return Recover(flight, reflex.recovery)
 
 
 def hears(

@@ -12,8 +12,6 @@ from rebound_cli.live.console import state_fields
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.flight.test_companion_authority import heartbeat
 
-SET_MESSAGE_INTERVAL = 511
-
 
 def failed(vehicle: FakeVehicle, limit_s: float = 40.0, **changes):
     f = flight(vehicle, **changes)
@@ -173,7 +171,7 @@ def test_a_silent_link_hands_over_all_the_same_and_is_reported(on_interrupt, mod
 
 
 def requests(f):
-    return [m.param1 for _, m in f.vehicle.commands if m.command == SET_MESSAGE_INTERVAL]
+    return [m.param1 for _, m in f.vehicle.commands if m.command == 511]  # SET_MESSAGE_INTERVAL
 
 
 def test_a_vehicle_that_restarts_while_the_plan_is_read_has_it_made_and_agreed_to_anew():

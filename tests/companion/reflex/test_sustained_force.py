@@ -15,12 +15,6 @@ from tests.simulated import SimulatedFlight, flown, wall
 EVERY_S = 0.02
 
 
-def leaning_north(acceleration_m_s2):
-    """The attitude, nose north, of a vehicle whose thrust carries it and gives that acceleration."""
-    half = -0.5 * math.atan(acceleration_m_s2 / 9.80665)
-    return (math.cos(half), 0.0, math.sin(half), 0.0)
-
-
 def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True):
     """The first time at which something is found in the way of a vehicle that leans north, and what.
 
@@ -35,7 +29,9 @@ def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True
         monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
         ahead_n, ahead_e = goal_ahead_m
         goal = (north_m + ahead_n, east_m + ahead_e, -1.5) if goes else (ahead_n, ahead_e, -1.5)
-        held = monitor.step(sample, leaning_north(tilt_m_s2(t)), goal)
+        # Nose north, of a vehicle whose thrust carries it and gives that acceleration
+        half = -0.5 * math.atan(tilt_m_s2(t) / 9.80665)
+        held = monitor.step(sample, (math.cos(half), 0.0, math.sin(half), 0.0), goal)
         if held is not None:
             return t, held
     return None

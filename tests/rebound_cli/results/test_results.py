@@ -218,12 +218,6 @@ def read_mcap(content):
     return topics
 
 
-def mcap_of(flight, log):
-    content = BytesIO()
-    write_mcap(replace(flight, truth=None), log, content)
-    return read_mcap(content.getvalue())
-
-
 def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(topics, flight):
     shown, log = flight
     schemas = {topic: rows[0][0] for topic, rows in topics.items()}
@@ -267,7 +261,9 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     heard = (replace(attitude, sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
     imu, end_us = LoggedSample(*log.imu()[0]), log.heard[-1].at_us
     here = LoggedSample(end_us, GlobalPosition(47.397742, 8.545594, 488.0))
-    topics = mcap_of(shown, replace(log, heard=(imu, *heard, LoggedSample(end_us, moved), here)))
+    content, log = BytesIO(), replace(log, heard=(imu, *heard, LoggedSample(end_us, moved), here))
+    write_mcap(replace(shown, truth=None), log, content)
+    topics = read_mcap(content.getvalue())
     ((_, _, found),) = topics["/pose"]
     assert found["pose"]["position"] == {"x": 2.0, "y": 3.0, "z": 1.0}
     assert [found["pose"]["orientation"][axis] for axis in "wxyz"] == pytest.approx(flu_to_enu)
