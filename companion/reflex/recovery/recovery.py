@@ -144,7 +144,7 @@ class Recovery:
         known.
         """
         estimator, motion = self.record.estimator, self.record.estimator.motion
-        is_there = math.dist(motion.position_ned_m, self.record.setpoint_ned_m) <= self._settled.distance_m
+        is_there = math.dist(motion.position_ned_m, self.record.setpoint_ned_m) <= reflex.PLACE_SPREAD_M
         if not estimator.has_converged or not is_there or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
             self._slow_since_us = None
             return False

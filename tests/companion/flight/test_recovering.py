@@ -28,9 +28,9 @@ AT = (3.0, 0.0, -2.0)
 MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
-def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_m_s=2.0) -> FlightContext:
+def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_m_s=2.0, **keys) -> FlightContext:
     """A flight that has just hit a wall in the north, measured whole unless an estimator says otherwise."""
-    mission = Mission.model_validate(MISSION | {"recovery": {"law": law}})
+    mission = Mission.model_validate(MISSION | {"recovery": {"law": law}} | keys)
     config = mission.companion
     reflex = start_reflex(config, mission.recovery, config.settled, 0)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams), reflex)
@@ -162,7 +162,7 @@ def test_between_surfaces_that_it_cannot_be_clear_of_it_is_handed_over_in_the_mi
 
 
 def test_it_is_not_handed_over_on_the_obstacle():
-    flight = flight_with()
+    flight = flight_with(companion={"settled": {"distance_m": 0.5}})
     recover = recover_in(flight)
     for since_us in range(100_000, 1_600_000, 20_000):
         target, sent = hears(flight, recover, since_us, 2.95, 0.0)
