@@ -203,7 +203,7 @@ def test_a_surface_goes_along_while_it_pushes():
 
 
 @pytest.mark.parametrize(("keeps_trim", "wind_m_s2"), [(False, 1.0), (True, 0.0)])
-def test_the_wind_is_told_to_a_position_control_that_begins_without_it(keeps_trim, wind_m_s2):
+def test_the_wind_is_sent_to_a_position_control_that_begins_without_it(keeps_trim, wind_m_s2):
     flight = flight_with()
     flight.reflex.keeps_trim, estimator = keeps_trim, flight.collisions[0].estimator
     estimator.has_converged, estimator.external_m_s2 = True, (0.0, 1.0, 0.0)
