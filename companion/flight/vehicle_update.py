@@ -7,9 +7,9 @@ from companion.autopilot.interface import Pilot
 from companion.flight.context import FlightContext
 from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
-from companion.link.vehicle import OLD_NEWS_US, identify, is_autopilot
+from companion.link.vehicle import OLD_NEWS_US, Vehicle, identify, is_autopilot
 from companion.messages import MessageId, Sample
-from companion.reflex.config import HELD_S
+from companion.reflex.config import HELD_S, LEAST_FRACTION
 from companion.reflex.detection.detector import NO_POSITION, Situation
 
 
@@ -117,12 +117,21 @@ def _report_conflict(flight: FlightContext, now_us: int) -> None:
 
 
 def note_height(flight: FlightContext) -> None:
-    """Note whether the vehicle has left the ground. A hit that pushes it down again does not undo that."""
+    """Note whether the vehicle has left the ground, and flies. A hit that pushes it down again does not undo that."""
     height_m = flight.height_m
     if height_m is not None and height_m >= flight.mission.companion.min_detection_height_m:
         flight.has_climbed = True
     elif height_m is None or flight.vehicle.stands:
         flight.has_climbed = False
+    if _flies(flight.vehicle) and not flight.is_wreck:
+        flight.flew_us = flight.stepped_us
+
+
+def _flies(vehicle: Vehicle) -> bool:
+    """Whether it is armed, and off the ground or about to be: not one that is carried while its motors idle."""
+    if vehicle.thrust_fraction is None or vehicle.landed > messages.LandedState.ON_GROUND:
+        return vehicle.is_airborne
+    return vehicle.armed is True and vehicle.thrust_fraction >= LEAST_FRACTION
 
 
 def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, is_held: bool) -> Situation:
@@ -142,7 +151,7 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, 
         off_state = NO_POSITION if height_m is None else f"below {least_m:g} m"
     return Situation(
         off_reason=off_state,
-        armed=flight.vehicle.armed,
+        may_crash=flight.may_crash,
         landed_state=landed,
         height_m=height_m,
         descent_commanded=goes_down,

@@ -90,6 +90,7 @@ class Vehicle:
     landed: messages.LandedState = messages.LandedState.UNDEFINED
     landed_us: int = 0  # when it began to say so
     attitude: messages.Attitude | None = None
+    thrust_fraction: float | None = None  # as last commanded
     battery_percent: int | None = None
     history: MotionHistory = field(default_factory=MotionHistory)
     last_received_us: int = 0
@@ -116,6 +117,8 @@ class Vehicle:
                     self.last_position_us = now_us
             case messages.Attitude():
                 self.attitude = sample
+            case messages.AttitudeTarget():
+                self.thrust_fraction = sample.thrust_fraction
             case messages.Heartbeat():
                 self._update_armed(sample.armed)
                 self.failsafe = sample.system_status >= FAILSAFE_STATUS
@@ -159,6 +162,11 @@ class Vehicle:
 
     def _accept_armed(self, armed: bool) -> None:
         self.armed, self.is_disarm_unconfirmed, self.is_disarm_unexplained = armed, False, False
+
+    @property
+    def is_airborne(self) -> bool:
+        """Whether it is armed, and does not say that it is on the ground."""
+        return self.armed is True and self.landed is not messages.LandedState.ON_GROUND
 
     @property
     def stands(self) -> bool:

@@ -158,7 +158,7 @@ class Followed:
             self.findings.tell(event.time_us, event.text)
         # A step in which nothing came or went is in no recording.
         if received or result.sent_frames:
-            self.findings.note(monitor, known, now_us)
+            self.findings.note(monitor, known, stepped.core.flight.vehicle.is_airborne, now_us)
             self.started_at_us, self.ended_at_us = self.started_at_us or now_us, now_us
         return result
 

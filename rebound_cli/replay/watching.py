@@ -73,6 +73,10 @@ class Circumstances:
             self._guard.note_touchdown()
 
     @property
+    def is_flying(self) -> bool:
+        return self._guard.vehicle.is_airborne
+
+    @property
     def situation(self) -> Situation:
         """Now."""
         guard = self._guard
@@ -150,7 +154,7 @@ class Findings:
         """Touches that are no collisions: landings, hands."""
         return [finding for finding in self.impacts if not finding.is_collision]
 
-    def note(self, monitor: CollisionMonitor, situation: Situation, at_us: int) -> None:
+    def note(self, monitor: CollisionMonitor, situation: Situation, is_flying: bool, at_us: int) -> None:
         """After each step: what the watch knows of the latest impact, and whether it sees."""
         estimate, off = monitor.estimator.estimate, situation.off_reason
         if estimate is not None and estimate.impact is not self._latest:
@@ -165,7 +169,7 @@ class Findings:
         self._note_span("off", off, at_us)
         elapsed_us = 0 if self._noted_us is None else at_us - self._noted_us
         self._noted_us = at_us
-        self.is_flying = situation.may_crash
+        self.is_flying = is_flying
         if self.is_flying:
             self.flown_us += elapsed_us
             if off is None and monitor.no_data_reason is None:
@@ -203,7 +207,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
         result = advance(monitor, samples, situation, now_us)
         for notice in result.notices:
             findings.tell(now_us, notice.text)
-        findings.note(monitor, situation, now_us)
+        findings.note(monitor, situation, circumstances.is_flying, now_us)
         circumstances.note(result.impacts)
 
     for at_us, group in groupby(log.heard, key=lambda item: max(item.at_us, start_us)):

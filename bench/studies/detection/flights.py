@@ -22,7 +22,7 @@ from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.report import Replay, replay_log
-from rebound_cli.replay.watching import Finding
+from rebound_cli.replay.watching import Findings
 from rebound_cli.report import page as report_page
 from rebound_cli.report.shown_flight import replayed_flight
 
@@ -34,6 +34,7 @@ ONE_EVENT_US = 2_000_000
 LABEL_S = 1.0
 # The label of what was told where nothing was, with the reason above it.
 NOTHING = "nothing"
+WORST_FIRST = ("crash", "collision", "touchdown")
 COLUMNS = ["log", "vehicle", "flown_h", "watched_h", "imu_hz"]
 COLUMNS += ["collisions", "touchdowns", "crashes", "promised", "wrong"]
 
@@ -45,30 +46,41 @@ class Event:
     """
 
     at_s: float
+    until_s: float
     told: str
-    findings: Sequence[Finding]
     late_s: float | None = None
 
 
 def events(replay: Replay) -> Iterator[Event]:
-    groups: list[list[Finding]] = []
-    for finding in replay.findings.impacts:
-        if groups and finding.at_us - groups[-1][-1].at_us < ONE_EVENT_US:
-            groups[-1].append(finding)
+    groups: list[list[tuple[int, str]]] = []
+    for at_us, told in sorted(_told(replay.findings)):
+        if groups and at_us - groups[-1][-1][0] < ONE_EVENT_US:
+            groups[-1].append((at_us, told))
         else:
-            groups.append([finding])
+            groups.append([(at_us, told)])
     for group in groups:
-        is_crash, is_hit = any(f.is_crash for f in group), any(f.is_collision for f in group)
-        told = "crash" if is_crash else "collision" if is_hit else "touchdown"
-        late_s = _late_s(replay, group) if is_crash else None
-        yield Event(replay.log.seconds(group[0].at_us), told, group, late_s)
+        told = min((told for _, told in group), key=WORST_FIRST.index)
+        late_s = _late_s(replay, group) if told == WORST_FIRST[0] else None
+        (first_us, _), (last_us, _) = group[0], group[-1]
+        yield Event(replay.log.seconds(first_us), replay.log.seconds(last_us), told, late_s)
 
 
-def _late_s(replay: Replay, group: Sequence[Finding]) -> float:
-    first_us, last_us = group[0].at_us - 1e6 * LABEL_S, group[-1].at_us + 1e6 * LABEL_S
-    samples = [(at_us, sample) for at_us, sample in replay.log.imu() if first_us <= at_us <= last_us]
+def _told(findings: Findings) -> Iterator[tuple[int, str]]:
+    """By its impact, or by what follows."""
+    for finding in findings.impacts:
+        is_known = (finding.is_crash, finding.is_collision, True)
+        yield finding.at_us, WORST_FIRST[is_known.index(True)]
+    for at_us, text in findings.happenings:
+        if text.startswith("crashed"):
+            yield at_us, WORST_FIRST[0]
+
+
+def _late_s(replay: Replay, group: Sequence[tuple[int, str]]) -> float:
+    (first_us, _), (last_us, _) = group[0], group[-1]
+    around = (first_us - 1e6 * LABEL_S, last_us + 1e6 * LABEL_S)
+    samples = [(at_us, sample) for at_us, sample in replay.log.imu() if around[0] <= at_us <= around[1]]
     hardest_us, _ = max(samples, key=lambda item: math.hypot(*item[1].specific_force_frd_m_s2))
-    return 1e-6 * (next(finding.at_us for finding in group if finding.is_crash) - hardest_us)
+    return 1e-6 * (next(at_us for at_us, told in group if told == WORST_FIRST[0]) - hardest_us)
 
 
 def mistakes(found: Sequence[Event], labels: Mapping[float, str]) -> Iterator[str]:
@@ -88,8 +100,7 @@ def mistakes(found: Sequence[Event], labels: Mapping[float, str]) -> Iterator[st
 
 
 def _is_near(event: Event, at_s: float) -> bool:
-    last_s = event.at_s + (event.findings[-1].at_us - event.findings[0].at_us) * 1e-6
-    return event.at_s - LABEL_S <= at_s <= last_s + LABEL_S
+    return event.at_s - LABEL_S <= at_s <= event.until_s + LABEL_S
 
 
 def row_of(name: str, replay: Replay, labels: Mapping[float, str]) -> Json:

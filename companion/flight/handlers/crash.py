@@ -11,9 +11,9 @@ from companion.motion.vector import along, minus
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
-    """How, told with what is known; None of a vehicle that flies."""
+    """How, told with what is known; None of a vehicle that flies, or stands."""
     watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest, flight.vehicle.attitude
-    if latest is None or attitude is None or not flight.vehicle.armed:
+    if latest is None or attitude is None or not flight.may_crash:
         return None
     hits = flight.hits
     has_unsettled = bool(hits) and hits[-1].settled_after_s is None
@@ -28,8 +28,9 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
     tilt_deg = math.degrees(tilt_rad(attitude.attitude_wxyz))
     speed_m_s = hits[-1].report().impact_speed_m_s if hits else math.hypot(*latest.velocity_ned_m_s)
     damage, height_m = flight.motors.damage, -flight.mission_ned_m(latest.position_ned_m)[2]
+    flight.flew_us = None
     flight.crashed = f"crashed: {how}, tilted by {tilt_deg:.0f} degrees"
-    text = f"{flight.crashed}, {height_m:.1f} m up, {'last hit' if hits else 'moving'} at {speed_m_s:.1f} m/s"
+    text = f"{flight.crashed}, {height_m:z.1f} m up, {'last hit' if hits else 'moving'} at {speed_m_s:.1f} m/s"
     text += "" if damage is None else f"; {damage.text}"
     flight.report(
         now_us,

@@ -49,16 +49,16 @@ class Evidence(Enum):
 class Situation(NamedTuple):
     """What the flight knows when samples arrive; None where it does not. A tuple: one is made in every step.
 
-    `off_reason` says why no hit may be reported now, but for a crash. `height_m` is above the place of arming;
-    `has_climbed`: the vehicle has been higher than a take-off reaches since it stood on the ground or touched it. The
-    setpoint is the place last sent, local NED, where one is flown to. `descent_commanded`: the vehicle goes down
-    because it was told to, or by the hand that flies it, so that touching the ground is no surprise. `flown_by_hand`:
-    by a pilot's sticks. `has_position`: one came of late. `is_wreck`: it has crashed and not flown since; that it
-    bounces and is picked up is not told.
+    `off_reason` says why no hit may be reported now, but for a crash. `may_crash`: the vehicle is known to fly, or did
+    a moment ago, be it unwatched. `height_m` is above the place of arming; `has_climbed`: the vehicle has been higher
+    than a take-off reaches since it stood on the ground or touched it. The setpoint is the place last sent, local NED,
+    where one is flown to. `descent_commanded`: the vehicle goes down because it was told to, or by the hand that flies
+    it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks. `has_position`: one came of
+    late. `is_wreck`: it has crashed and not flown since; that it bounces and is picked up is not told.
     """
 
     off_reason: str | None = None
-    armed: bool | None = None
+    may_crash: bool = False
     landed_state: LandedState = LandedState.UNDEFINED
     height_m: float | None = None
     descent_commanded: bool = False
@@ -67,11 +67,6 @@ class Situation(NamedTuple):
     has_climbed: bool = True
     has_position: bool = True
     is_wreck: bool = False
-
-    @property
-    def may_crash(self) -> bool:
-        """Whether the vehicle is known to fly, be it unwatched."""
-        return self.armed is True and self.landed_state is not LandedState.ON_GROUND
 
 
 class Motion(Protocol):

@@ -22,7 +22,7 @@ from companion.reflex.detection.monitor import advance, start_monitor
 from companion.reflex.reflex import start_reflex
 
 STILL = (0.0, 0.0, 0.0)
-IN_FLIGHT = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
+IN_FLIGHT = Situation(may_crash=True, landed_state=LandedState.IN_AIR, height_m=3.0)
 # Noise by a hair's breadth: velocities that stand still to the last digit are no estimate.
 HAIR_M_S = 1e-3
 
@@ -143,7 +143,7 @@ def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_
 
 def test_a_touch_that_tips_the_vehicle_over_is_a_crash_as_soon_as_it_lies_there():
     # Given a vehicle that has touched the ground, upright, and is in its next take-off for the detector
-    down = Situation(armed=True, height_m=0.2, descent_commanded=True)
+    down = Situation(may_crash=True, height_m=0.2, descent_commanded=True)
     monitor = start_monitor(CompanionConfig(), 0)
     fly(monitor, 2_000_000, situation=down._replace(height_m=3.0))
     (touch,), *_ = fly(monitor, 2_020_000, lambda t: -60.0, situation=down, start_us=2_000_000)

@@ -21,7 +21,7 @@ TICK_US = 1_000
 WINDOW_US = 4_000
 GRAVITY = 9.81
 HOVER_FRACTION = 0.7
-IN_FLIGHT = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=5.0)
+IN_FLIGHT = Situation(may_crash=True, landed_state=LandedState.IN_AIR, height_m=5.0)
 HIT_US = 3_001_000
 
 

@@ -161,7 +161,7 @@ def kind(
     has_climbed=True,
     sinking_m_s=None,
 ):
-    situation = Situation(armed=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
+    situation = Situation(may_crash=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
     return kind_of(force, velocity, tilted(tilt_deg), situation._replace(has_climbed=has_climbed), sinking_m_s)
 
 
@@ -235,7 +235,7 @@ def test_a_fall_is_as_fast_as_at_its_end_and_not_as_its_heights_were_in_the_mean
         motion.history.add(LocalPosition(time_us, place, (0.0, 0.0, 9.81 * since_s)))
     motion.history.add(LocalPosition(touch_us, (0.0, 0.0, 0.0), (0.0, 0.0, -1.5)))
     motion.strapdown.fixes.append(VelocityFix(touch_us - 20_000, (0.0, 0.0, 3.7), (0.0, 0.0, 0.0)))
-    situation = Situation(armed=True, height_m=0.1)
+    situation = Situation(may_crash=True, height_m=0.1)
     # When it meets the ground at 3.7 m/s, whose mean over the last tenths of a second was 2.9 m/s
     impact = Impact(touch_us, touch_us - 10_000, (0.0, 0.0, -100.0))
     # Then it has crashed

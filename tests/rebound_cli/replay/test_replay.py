@@ -9,8 +9,18 @@ import pytest
 import yaml
 
 from companion.mavlink.packet import message_id_of
-from companion.messages import Attitude, ExtendedState, ImuSample, LandedState, LocalPosition, MessageId, PositionTarget
+from companion.messages import (
+    Attitude,
+    AttitudeTarget,
+    ExtendedState,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    MessageId,
+    PositionTarget,
+)
 from companion.mission.config import CompanionConfig
+from companion.reflex.config import LEAST_FRACTION, LIES_US
 from companion.reflex.detection.detector import ImpactKind, Situation
 from companion.shell.tlog import read_tlog
 from rebound_cli.inputs.inputs import load_mission_document, mission_from
@@ -261,6 +271,47 @@ def test_of_a_vehicle_that_lies_on_its_back_a_replay_tells_its_crash_and_no_hit(
     assert findings.impacts == [] and "crashed" in [span.reason for span in findings.off]
     (crash,) = [text for _, text in findings.happenings if text.startswith("crashed")]
     assert crash == "crashed: tipped over, tilted by 180 degrees, 0.2 m up, moving at 0.0 m/s"
+
+
+IDLE, UP = 0.9 * LEAST_FRACTION, 1.1 * LEAST_FRACTION
+
+
+@pytest.mark.parametrize(
+    ("landed", "thrust", "may"),
+    [
+        (LandedState.IN_AIR, IDLE, True),
+        (LandedState.ON_GROUND, None, False),
+        (LandedState.ON_GROUND, IDLE, False),
+        (LandedState.ON_GROUND, UP, True),
+        (LandedState.UNDEFINED, None, True),
+        (LandedState.UNDEFINED, IDLE, False),
+        (LandedState.UNDEFINED, UP, True),
+    ],
+)
+def test_what_flies_or_is_about_to_may_crash_and_what_is_carried_while_its_motors_idle_may_not(landed, thrust, may):
+    circumstances = Circumstances(CompanionConfig())
+    told = [beat(False), position(0, 0.0), beat(True), ExtendedState(landed)]
+    told += [] if thrust is None else [AttitudeTarget(1, thrust)]
+    circumstances.hear(told, 0)
+    assert circumstances.situation.may_crash is may
+
+
+@pytest.mark.parametrize(
+    ("fell_us", "told"), [(100_000, (1, 1)), (LIES_US - 100_000, (1, 0)), (LIES_US + 100_000, (0, 0))]
+)
+def test_a_vehicle_whose_motors_stop_in_the_air_crashes_though_disarmed_and_landed_by_its_own_word(fell_us, told):
+    # Given one that is killed, tips over and meets the ground so long after that
+    killed_us, log = HIT_US - fell_us, flight(push_m_s2=60.0)
+    killed = [LoggedSample(killed_us, sample) for sample in (beat(False), ExtendedState(LandedState.ON_GROUND))]
+    turned = [Attitude(us, (0.0, 1.0, 0.0, 0.0)) for us in range(HIT_US - SECOND // 20, 10 * SECOND, SECOND // 20)]
+    heard = [*log.heard, *killed, *(LoggedSample(each.time_boot_us, each) for each in turned)]
+    findings = watch_log(replace(log, heard=tuple(sorted(heard, key=lambda item: item.at_us))), CompanionConfig())
+    # Then its impact is told, and once that it lies
+    crashes = [text for _, text in findings.happenings if text.startswith("crashed")]
+    assert [finding.is_crash for finding in findings.impacts] == [True] * told[0]
+    assert crashes == ["crashed: tipped over, tilted by 180 degrees, 0.0 m up, moving at 1.0 m/s"] * told[1]
+    # And it has not flown since
+    assert findings.flown_us == pytest.approx(killed_us - 2 * SECOND, abs=10_000) and not findings.is_flying
 
 
 def test_a_margin_is_the_largest_sign_of_a_hit_over_the_threshold():
