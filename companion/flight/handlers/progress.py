@@ -21,6 +21,7 @@ from companion.mission.item_trajectory import (
     trajectory_around,
 )
 from companion.mission.trajectory import Motion, Trajectory
+from companion.motion.vector import plus
 
 # Of a time-out, and of a goal out of reach; "continue" is no move.
 _TRIGGERS = {
@@ -54,11 +55,15 @@ class _OnTrajectory:
         # Without the acceleration the vehicle falls behind as it speeds up, and then overshoots the speed.
         return self._flight.on_trajectory(place, yaw_rad, *motion[1:])
 
-    def _arrived(self) -> bool:
+    def _arrived(self, later_s: float = 0.0) -> bool:
+        """Whether it is at its goal; with its speed also so much later."""
         flight = self._flight
         latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
         radius_m = flight.mission.companion.flight.acceptance_radius_m
-        return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
+        if latest is None:
+            return False
+        ahead = plus(latest.position_ned_m, later_s, latest.velocity_ned_m_s)
+        return max(math.dist(latest.position_ned_m, goal), math.dist(ahead, goal)) <= radius_m
 
 
 class FlyItems(_OnTrajectory):
@@ -289,6 +294,10 @@ class Heading:
         return self.fixed_rad
 
 
+# A Copter that was told to land at 0.8 m/s stood by up to 0.9 m beside home: its land mode brakes for so long.
+BRAKES_S = 1.0
+
+
 class FlyHome(_OnTrajectory):
     """Up where that is asked for, then straight; planned again after each recovery on the way."""
 
@@ -318,7 +327,7 @@ class FlyHome(_OnTrajectory):
         overdue_s = self._elapsed_s - self._trajectory.duration_s
         if overdue_s < 0.0:
             return None
-        if self._arrived():
+        if self._arrived(BRAKES_S):
             return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)

@@ -129,6 +129,25 @@ def test_a_mission_can_end_with_the_way_home_below_the_fences_top(max_height_m):
     assert f.run_to_end().outcome == "completed"
 
 
+def test_a_vehicle_that_comes_past_home_does_not_land_before_it_is_slow():
+    # Given one whose way home is over while it moves, 0.2 m off, so that a second later it is out of reach
+    f = flight(items=[TAKEOFF, {"go_to": {"position_ned_m": [2, 0, -1.5]}}, {"return": {}}])
+    f.run_to("returning")
+    vehicle, wanted_m_s = f.vehicle, 0.6
+
+    def move():
+        vehicle.position[:2] = [max(0.2, vehicle.position[0] - 0.004), 0.0]
+        vehicle.velocity[:2] = [vehicle.velocity[0] + 0.004 * (wanted_m_s - vehicle.velocity[0]), 0.0]
+
+    vehicle.move = move
+    f.run_for(8.0)
+    assert f.state == "returning"
+    # When it becomes slower
+    wanted_m_s = 0.2
+    f.run_to("landing", 1.5)
+    assert vehicle.velocity[0] == pytest.approx(0.3, abs=0.03)
+
+
 @pytest.mark.parametrize(
     ("items", "words"),
     [
