@@ -43,19 +43,12 @@ LEAST_FRACTION = 0.1
 # Error of the gain from the battery, ground effect and a mean that has not converged.
 MARGIN = 1.15
 
-# --- a contact that gets worse
-# A contact longer than springs take to bottom out, whose force then exceeds twice its peak, is another hit: a vehicle
-# scrapes along the ground and then strikes it.
-WORSE_AFTER_US = 100_000
-
 # --- velocity jumps
 # Number of earlier velocities that the newest is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3
-# Velocities further apart are slow: samples cover a quarter of the time, and the filter corrects itself in between. At
-# 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
+# Velocities further apart are not compared: samples cover a quarter of the time, and the filter corrects itself in
+# between. At 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
-# 10 Hz with the jitter of a log. Velocities further apart are not compared.
-LONGEST_SLOW_STEP_US = 130_000
 # A rate jump belongs to a velocity jump within this time: PX4's estimator begins to correct what clipping hid of a hit
 # after 0.14 to 0.18 s, and does so for as long.
 TURNED_US = 2 * SHOWN_US
@@ -66,8 +59,6 @@ MEMORY, RISE = 100, 10
 # deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
 # STAMP_S: without unsampled time, the velocity's stamp of a millisecond and a lost sample.
 SHAKEN_S, STAMP_S = 0.15, 0.008
-# An output predictor's lag.
-LAG_S = 0.02
 # Share of a rate jump's test ratio that adds to a velocity jump's: beside one that no motor makes half a step is then
 # enough. Alone it is no evidence, as a failed motor turns a vehicle, too.
 TURNED_SHARE = 0.75
@@ -251,7 +242,7 @@ class FusedConfig(StrictModel):
 
     retired = frozenset(
         {"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push", "spin_rad_s", "spin_rad_s2"}
-        | {"velocity_step_turned_m_s", "velocity_per_rate_m", "velocity_rest_s"}
+        | {"velocity_step_turned_m_s", "velocity_step_slow_m_s", "velocity_per_rate_m", "velocity_rest_s"}
     )
 
     side_threshold_m_s2: Positive = 1.75
@@ -271,8 +262,6 @@ class FusedConfig(StrictModel):
     """Least velocity jump that is a hit. A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
     clipping leaves the estimate 0.16."""
-    velocity_step_slow_m_s: Positive = 0.7
-    """The same of velocities at 8 to 13 Hz: more than twice what healthy vehicles' steps reach at 10 Hz."""
     rate_step_rad_s: Positive = 2.0
     """Least rate jump that counts beside a velocity jump, more than motors make in the same time. A push at 0.15 m from
     the centre that turns the vehicle by 2 rad/s changes its velocity by 0.06 m/s, half of `velocity_step_m_s`."""

@@ -42,13 +42,13 @@ class Circumstances:
         streams = StreamMonitor(config.streams, ())
         mission = settings.as_mission()
         reflex = start_reflex(config, mission.recovery, config.settled, 0)
-        self._guard = GuardContext(mission, Vehicle(), streams, reflex, config=settings, keeps_others_out=False)
+        self.guard = GuardContext(mission, Vehicle(), streams, reflex, config=settings, keeps_others_out=False)
         self._now_us = 0
         self._wreck: Crashed | None = None
 
     def hear(self, told: Sequence[messages.Sample], now_us: int) -> Sequence[str]:
         """Take-offs, landings, arming and modes, as the samples report them."""
-        guard, self._now_us = self._guard, now_us
+        guard, self._now_us = self.guard, now_us
         vehicle = guard.vehicle
         armed, landed = vehicle.armed, vehicle.landed
         observe(guard, told, now_us)
@@ -70,16 +70,12 @@ class Circumstances:
     def note(self, impacts: Sequence[ImpactEstimate]) -> None:
         """What the detector has reported."""
         if any(estimate.impact.is_ground for estimate in impacts):
-            self._guard.note_touchdown()
-
-    @property
-    def is_flying(self) -> bool:
-        return self._guard.vehicle.is_airborne
+            self.guard.note_touchdown()
 
     @property
     def situation(self) -> Situation:
         """Now."""
-        guard = self._guard
+        guard = self.guard
         off = self._why_not(guard) or (State.CRASHED.value if guard.is_wreck else None)
         return situation_of(guard, off, goes_down(guard, self._now_us), is_held=False)
 
@@ -207,7 +203,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
         result = advance(monitor, samples, situation, now_us)
         for notice in result.notices:
             findings.tell(now_us, notice.text)
-        findings.note(monitor, situation, circumstances.is_flying, now_us)
+        findings.note(monitor, situation, circumstances.guard.vehicle.is_airborne, now_us)
         circumstances.note(result.impacts)
 
     for at_us, group in groupby(log.heard, key=lambda item: max(item.at_us, start_us)):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from companion.reflex.config import LONGEST_SLOW_STEP_US
+from companion.reflex.config import LONGEST_STEP_US
 from companion.reflex.detection.detector import Phase
 from rebound_cli.replay.listening import PHASES, Numbers
 from rebound_cli.report.moments import Moment, moments_of
@@ -68,7 +68,7 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "tables": _tables(flight, moments),
         "moments": [_moment(flight, moment) for moment in moments],
         # Velocities further apart than this are not compared.
-        "jump_held_s": 1e-6 * LONGEST_SLOW_STEP_US,
+        "jump_held_s": 1e-6 * LONGEST_STEP_US,
         "modes": modes(flight),
         "recovering": recovering(flight),
         "obstacles": obstacles(flight),

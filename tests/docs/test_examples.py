@@ -19,6 +19,7 @@ import rebound_cli.main
 from companion.guard.config import GuardConfig
 from companion.memory.stored import ObstacleFile
 from companion.mission.model import Mission
+from rebound_cli import __version__
 from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.scene import Scene
 from tests.docs.pages import ROOT, blocks, manual, name_of
@@ -28,6 +29,8 @@ PYTHON_PAGES = {"docs/how-to/testing.md", "docs/tutorials/test-your-program.md",
 LANGUAGES = {"sh", "console", "yaml", "python", "text", "mermaid"}
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?")
 TOLERANCE, LEAST = 0.25, 0.3
+_STAMP = re.compile(r"Measured\s+by\s+`python -m bench ([^`]+)`\s+on\s+version\s+([\w.]*\w)")
+_IMAGES = re.compile(r"!\[[^]]*\]\([^)]*\.(?:png|webp)\)")
 
 
 def consoles(path):
@@ -149,3 +152,15 @@ def test_every_block_says_what_it_is_and_python_is_run_somewhere():
         languages = {language for language, _ in blocks(path)}
         assert languages <= LANGUAGES, path
         assert "python" not in languages or name_of(path) in PYTHON_PAGES, path
+
+
+@pytest.mark.parametrize("path", manual(), ids=name_of)
+def test_a_picture_and_a_measured_figure_name_their_command_and_are_of_this_release(path):
+    # A release with another number is red until its pictures and figures are made anew
+    text = path.read_text(encoding="utf-8")
+    for command, version in _STAMP.findall(text):
+        bench.main.build_parser().parse_args(shlex.split(command))
+        assert version == __version__, f"run `python -m bench {command}` and write its version"
+    assert not re.search(r"Measured\s+by\s+`", _STAMP.sub("", text)), "a stamp that says no version"
+    sections = re.split(r"^#+ ", text, flags=re.MULTILINE)
+    assert [part[:40] for part in sections if _IMAGES.search(part) and not _STAMP.search(part)] == []

@@ -1,4 +1,4 @@
-"""Every link and every path that the manual, the notes and the code name leads somewhere."""
+"""Every link, path and name that the manual, the notes and the code use leads somewhere."""
 
 import re
 
@@ -62,3 +62,31 @@ def test_every_page_that_the_code_names_exists():
         if not (ROOT / named).exists() or (anchor and anchor not in anchors((ROOT / named).read_text(encoding="utf-8")))
     }
     assert found == set()
+
+
+@pytest.mark.parametrize("package", ["companion", "sim_vehicle"])
+def test_the_architecture_has_words_for_every_folder_and_file(package):
+    page = (ROOT / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
+    section = page.split(f"## {package}/\n", 1)[1].split("\n## ", 1)[0]
+    # What stands in the first column of the table; of a path its first part.
+    cells = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
+    named = {name.split("/")[0] for cell in cells for name in re.findall(r"`([^`]+)`", cell)}
+    assert named == {path.name for path in (ROOT / package).iterdir() if not path.name.startswith("__")}
+
+
+def terms():
+    """The rows of the glossary."""
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").partition("## Words")[0]
+    cells = [re.split(r"\s*\|\s*", line)[1:-1] for line in text.splitlines() if line.startswith("| ")]
+    return [[part.strip("`") for part in row] for row in cells[1:]]
+
+
+def test_the_glossarys_terms_are_in_the_order_of_the_alphabet():
+    names = [row[0] for row in terms()]
+    assert len(names) > 40 and names == sorted(names)
+
+
+@pytest.mark.parametrize("row", terms(), ids=lambda row: row[0])
+def test_a_name_of_the_glossary_is_in_its_file(row):
+    *_, name, file = row
+    assert re.search(rf"\b{name}\b", (ROOT / file).read_text(encoding="utf-8"))

@@ -22,7 +22,6 @@ from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.report import Replay, replay_log
-from rebound_cli.replay.watching import Findings
 from rebound_cli.report import page as report_page
 from rebound_cli.report.shown_flight import replayed_flight
 
@@ -52,35 +51,25 @@ class Event:
 
 
 def events(replay: Replay) -> Iterator[Event]:
-    groups: list[list[tuple[int, str]]] = []
-    for at_us, told in sorted(_told(replay.findings)):
-        if groups and at_us - groups[-1][-1][0] < ONE_EVENT_US:
-            groups[-1].append((at_us, told))
+    impacts, groups = replay.findings.impacts, list[list[tuple[int, str]]]()
+    told = [(f.at_us, "crash" if f.is_crash else "collision" if f.is_collision else "touchdown") for f in impacts]
+    told += [(at_us, "crash") for at_us, text in replay.findings.happenings if text.startswith("crashed")]
+    for at_us, what in sorted(told):
+        if not groups or at_us - groups[-1][-1][0] >= ONE_EVENT_US:
+            groups.append([(at_us, what)])
         else:
-            groups.append([(at_us, told)])
+            groups[-1].append((at_us, what))
     for group in groups:
-        told = min((told for _, told in group), key=WORST_FIRST.index)
-        late_s = _late_s(replay, group) if told == WORST_FIRST[0] else None
-        (first_us, _), (last_us, _) = group[0], group[-1]
-        yield Event(replay.log.seconds(first_us), replay.log.seconds(last_us), told, late_s)
-
-
-def _told(findings: Findings) -> Iterator[tuple[int, str]]:
-    """By its impact, or by what follows."""
-    for finding in findings.impacts:
-        is_known = (finding.is_crash, finding.is_collision, True)
-        yield finding.at_us, WORST_FIRST[is_known.index(True)]
-    for at_us, text in findings.happenings:
-        if text.startswith("crashed"):
-            yield at_us, WORST_FIRST[0]
+        worst = min((what for _, what in group), key=WORST_FIRST.index)
+        first_s, last_s = (replay.log.seconds(group[place][0]) for place in (0, -1))
+        yield Event(first_s, last_s, worst, _late_s(replay, group) if worst == "crash" else None)
 
 
 def _late_s(replay: Replay, group: Sequence[tuple[int, str]]) -> float:
-    (first_us, _), (last_us, _) = group[0], group[-1]
-    around = (first_us - 1e6 * LABEL_S, last_us + 1e6 * LABEL_S)
-    samples = [(at_us, sample) for at_us, sample in replay.log.imu() if around[0] <= at_us <= around[1]]
+    first_us, last_us = group[0][0] - 1e6 * LABEL_S, group[-1][0] + 1e6 * LABEL_S
+    samples = [(at_us, sample) for at_us, sample in replay.log.imu() if first_us <= at_us <= last_us]
     hardest_us, _ = max(samples, key=lambda item: math.hypot(*item[1].specific_force_frd_m_s2))
-    return 1e-6 * (next(at_us for at_us, told in group if told == WORST_FIRST[0]) - hardest_us)
+    return 1e-6 * (next(at_us for at_us, what in group if what == "crash") - hardest_us)
 
 
 def mistakes(found: Sequence[Event], labels: Mapping[float, str]) -> Iterator[str]:

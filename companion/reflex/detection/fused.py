@@ -40,7 +40,6 @@ from companion.reflex.config import (
     MEAN_MEMORY_S,
     SETTLED_US,
     SHAKING,
-    WORSE_AFTER_US,
     FusedConfig,
 )
 from companion.reflex.detection.classify import classified, hovers
@@ -114,11 +113,6 @@ class FusedState(DetectorState):
         (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
         x, y = f_x + g_x, f_y + g_y
         return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
-
-    @property
-    def is_hand(self) -> bool:
-        """Whether the present contact, or the latest one, was taken for a hand."""
-        return self.kind is ImpactKind.CONTACT
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves."""
@@ -236,9 +230,6 @@ class FusedDetector:
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
-                is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
-                if is_another and size > 2.0 * s.peak_specific_force_m_s2:
-                    return self._fire(s, situation, motion, impact)
                 # A touch that tips the vehicle over becomes a crash.
                 if (
                     s.kind is not ImpactKind.CRASH
@@ -286,10 +277,9 @@ class FusedDetector:
         if step is None:
             return None
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
-        change_m_s2 = abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2])
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
         caution = 1.0 if type(sample) is Odometry and motion.validity.is_valid else 2.0
-        size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
+        size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2)
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         is_jump = size / s.velocity.limit > 1.0

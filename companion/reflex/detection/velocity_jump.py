@@ -17,8 +17,6 @@ from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex.config import (
     COMPARED,
-    LAG_S,
-    LONGEST_SLOW_STEP_US,
     LONGEST_STEP_US,
     MEMORY,
     NO_MOTORS_RAD_S2,
@@ -40,8 +38,6 @@ class VelocityJump:
     rate_step_frd_rad_s: Vector3 = ZERO
     rate_step_over_us: int = 0
     rate_step_until_us: int = 0
-    is_slow: bool = False
-    """Whether velocities come further apart than `LONGEST_STEP_US`."""
     since_us: int = 0
     """Velocities before this time are not compared."""
     delay: Delay = field(default_factory=Delay)
@@ -73,9 +69,8 @@ class VelocityJump:
             # Equal to the last digit: the estimator is not running, and restarts after this.
             self.since_us = times[-1]
         apart_us = [b - a for a, b in pairwise(times)]
-        if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_SLOW_STEP_US:
+        if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_STEP_US:
             return None
-        self.is_slow = max(apart_us) > LONGEST_STEP_US
         step = _newest_less_mean(fix.less_sum_m_s for fix in recent[1:])
         # Mean accelerations between velocities, without vibration.
         pairs = zip(pairwise(recent), apart_us, strict=True)
@@ -100,25 +95,21 @@ class VelocityJump:
         change = square - self.variance_m2_s2
         self.variance_m2_s2 += change / (min(self.known, RISE) if change > 0.0 else self.known)
 
-    def least_m_s(
-        self, config: FusedConfig, time_us: int, caution: float, shaking_m_s2: float, thrust_change_m_s2: float
-    ) -> float:
+    def least_m_s(self, config: FusedConfig, time_us: int, caution: float, shaking_m_s2: float) -> float:
         """The step, m/s, that is a hit; infinite before the first step.
 
         Noise exceeds it as rarely as `noise_factor` standard deviations, by Student's t (its quantile, expanded in
         1 / degrees of freedom): a standard deviation from few steps is uncertain. Each has three axes, and shares
         velocities with those around it: four are worth as much as one. It is larger by `caution` where the estimate may
-        jump without a hit, by vibration between the samples (standard deviation `shaking_m_s2`), and by the velocity's
-        lag where the thrust changes, as in free fall. Beside a rate jump less is enough: the test ratios of one impulse
-        add up.
+        jump without a hit, and by vibration between the samples (standard deviation `shaking_m_s2`). Beside a rate jump
+        less is enough: the test ratios of one impulse add up.
         """
         if not self.known:
             return math.inf
         spreads = config.noise_factor
-        step_m_s = config.velocity_step_slow_m_s if self.is_slow else config.velocity_step_m_s
         noise_m_s = spreads * math.sqrt(self.variance_m2_s2) * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
-        unseen_m_s = shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S) + LAG_S * thrust_change_m_s2
-        least_m_s = caution * max(step_m_s, noise_m_s) + unseen_m_s
+        unseen_m_s = shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S)
+        least_m_s = caution * max(config.velocity_step_m_s, noise_m_s) + unseen_m_s
         (p, q, r), since_us = self.rate_step_frd_rad_s, time_us - self.rate_step_until_us
         most_rad_s = config.rate_step_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
         turned = math.hypot(p, q, r / YAW_SHARE) / most_rad_s if since_us < TURNED_US else 0.0

@@ -142,9 +142,9 @@ def stepped(change_m_s, at_us=3_002_000, turn_frd_rad_s=(0.0, 0.0, 0.0), **scene
         # Straight into a ceiling, without a turn: a sensor that clips at 16 g shows the estimator 1 ms of that
         ((0.0, 0.0, 0.16), {"velocity": (0.0, 0.0, -1.0)}, 1),
         ((0.0, 0.0, 0.08), {"velocity": (0.0, 0.0, -1.0)}, 0),
-        # Velocities ten times a second show a large step alone
-        ((1.5, 0.0, 0.0), {"slower": 3}, 1),
-        ((0.6, 0.0, 0.0), {"slower": 3}, 0),
+        # Velocities ten times a second are not compared
+        ((1.5, 0.0, 0.0), {"slower": 2}, 1),
+        ((1.5, 0.0, 0.0), {"slower": 3}, 0),
         # A beam met in the climb: within 20 ms the nimblest motors turn the vehicle by 10 rad/s at most, and by a third
         # of that about yaw; beside a turn that no motor makes little of a step is enough
         ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (7.7, 7.7, 0.0)}, 1),

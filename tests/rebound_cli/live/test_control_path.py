@@ -54,10 +54,6 @@ class InTheAir(ConfirmAtOnce):
 BREAKS = Mock(side_effect=ValueError("nobody thought of this"))
 
 
-def falls_deaf(world):
-    world.is_deaf = True
-
-
 class EverySecond:
     """A computer that is the same every second."""
 
@@ -114,7 +110,10 @@ def test_a_reader_that_is_gone_ends_no_flight_and_is_told_and_replayed(tmp_path)
     assert "lost" in [event["kind"] for event in events_of(tmp_path)]
 
 
-@pytest.mark.parametrize(("happens", "words"), [(BREAKS, "nobody thought"), (falls_deaf, "driver is gone")])
+@pytest.mark.parametrize(
+    ("happens", "words"),
+    [(BREAKS, "nobody thought"), (lambda world: setattr(world, "is_deaf", True), "driver is gone")],
+)
 def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, happens, words):
     # When something beside the control path fails in the air, for good
     companion, world, recorder, _, problem = fly(tmp_path, confirm=lambda world: InTheAir(world, happens))

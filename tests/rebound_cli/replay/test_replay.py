@@ -277,23 +277,18 @@ IDLE, UP = 0.9 * LEAST_FRACTION, 1.1 * LEAST_FRACTION
 
 
 @pytest.mark.parametrize(
-    ("landed", "thrust", "may"),
+    ("landed", "idle", "pushes", "unknown"),
     [
-        (LandedState.IN_AIR, IDLE, True),
-        (LandedState.ON_GROUND, None, False),
-        (LandedState.ON_GROUND, IDLE, False),
-        (LandedState.ON_GROUND, UP, True),
-        (LandedState.UNDEFINED, None, True),
-        (LandedState.UNDEFINED, IDLE, False),
-        (LandedState.UNDEFINED, UP, True),
+        (LandedState.IN_AIR, True, True, True),
+        (LandedState.ON_GROUND, False, True, False),
+        (LandedState.UNDEFINED, False, True, True),
     ],
 )
-def test_what_flies_or_is_about_to_may_crash_and_what_is_carried_while_its_motors_idle_may_not(landed, thrust, may):
-    circumstances = Circumstances(CompanionConfig())
-    told = [beat(False), position(0, 0.0), beat(True), ExtendedState(landed)]
-    told += [] if thrust is None else [AttitudeTarget(1, thrust)]
-    circumstances.hear(told, 0)
-    assert circumstances.situation.may_crash is may
+def test_what_flies_or_begins_to_may_crash_and_what_is_carried_may_not(landed, idle, pushes, unknown):
+    for thrust, may in ((IDLE, idle), (UP, pushes), (None, unknown)):
+        circumstances, told = Circumstances(CompanionConfig()), [] if thrust is None else [AttitudeTarget(1, thrust)]
+        circumstances.hear([beat(False), position(0, 0.0), beat(True), ExtendedState(landed), *told], 0)
+        assert circumstances.situation.may_crash is may
 
 
 @pytest.mark.parametrize(
