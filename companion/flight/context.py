@@ -26,7 +26,6 @@ from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
 from companion.motion.vector import ZERO, minus, plus
-from companion.reflex.config import LIES_US
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
 from companion.reflex.recovery.collision import CollisionRecord
@@ -171,7 +170,9 @@ class FlightContext:
     crashed: str = ""  # how, once it has
     is_wreck: bool = False  # since then, until it is disarmed or flies again
     motors: MotorWatch = field(default_factory=MotorWatch)
-    flew_us: int | None = None  # when it last flew, or was about to
+    flies: bool = False  # armed, and off the ground or about to be
+    flew_us: int | None = None  # when it last did
+    may_crash: bool = False  # flies, or did a moment ago: whose motors stop in the air says at once that it has landed
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     no_data_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
@@ -203,11 +204,6 @@ class FlightContext:
         if latest is None or origin is None or heard_us is None or vehicle.last_received_us - heard_us >= OLD_NEWS_US:
             return None
         return origin[2] - latest.position_ned_m[2]
-
-    @property
-    def may_crash(self) -> bool:
-        """Whether it flies, or did a moment ago: one whose motors stop in the air says at once that it has landed."""
-        return self.stepped_us is not None and self.flew_us is not None and self.stepped_us - self.flew_us < LIES_US
 
     @property
     def collisions(self) -> list[CollisionRecord]:

@@ -9,7 +9,7 @@ from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import OLD_NEWS_US, Vehicle, identify, is_autopilot
 from companion.messages import MessageId, Sample
-from companion.reflex.config import HELD_S, LEAST_FRACTION
+from companion.reflex.config import HELD_S, LEAST_FRACTION, LIES_US
 from companion.reflex.detection.detector import NO_POSITION, Situation
 
 
@@ -55,6 +55,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             flight.round_trip.update(sample, now_us)
         was_known = vehicle.is_mode_known
         vehicle.update(sample, now_us, flight.own_modes)
+        if type(sample) in _FLYING:
+            flight.flies = _flies(vehicle)
         is_mode_lost |= was_known and not vehicle.is_mode_known
         streams.count(type(sample), now_us)
     _advance_trajectory_time(flight, now_us)
@@ -123,8 +125,14 @@ def note_height(flight: FlightContext) -> None:
         flight.has_climbed = True
     elif height_m is None or flight.vehicle.stands:
         flight.has_climbed = False
-    if _flies(flight.vehicle) and not flight.is_wreck:
+    if flight.flies and not flight.is_wreck:
         flight.flew_us = flight.stepped_us
+    stepped_us, flew_us = flight.stepped_us, flight.flew_us
+    flight.may_crash = stepped_us is not None and flew_us is not None and stepped_us - flew_us < LIES_US
+
+
+# What tells whether it flies.
+_FLYING = frozenset((messages.Heartbeat, messages.ExtendedState, messages.AttitudeTarget))
 
 
 def _flies(vehicle: Vehicle) -> bool:
