@@ -253,9 +253,11 @@ def test_what_follows_within_two_seconds_is_one_event():
     replay = replay_log(flight(), CompanionConfig())
     (hit,) = replay.findings.impacts
     replay.findings.impacts += [replace(hit, at_us=hit.at_us + 1_500_000), replace(hit, at_us=hit.at_us + 4_000_000)]
+    replay.findings.tell(hit.at_us + 5_000_000, "crashed: tipped over")
     first, second = events(replay)
+    assert (first.told, second.told) == ("collision", "crash")
     assert first.at_s == pytest.approx(HIT_US * 1e-6, abs=0.01)
-    assert first.until_s == pytest.approx(first.at_s + 1.5) and second.until_s == second.at_s
+    assert first.until_s == pytest.approx(first.at_s + 1.5) and second.until_s == pytest.approx(second.at_s + 1.0)
 
 
 def test_a_log_that_cannot_be_read_is_named_and_a_folder_without_logs_is_an_error(tmp_path, capsys):

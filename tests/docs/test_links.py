@@ -75,7 +75,6 @@ def test_the_architecture_has_words_for_every_folder_and_file(package):
 
 
 def terms():
-    """The rows of the glossary."""
     text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").partition("## Words")[0]
     cells = [re.split(r"\s*\|\s*", line)[1:-1] for line in text.splitlines() if line.startswith("| ")]
     return [[part.strip("`") for part in row] for row in cells[1:]]

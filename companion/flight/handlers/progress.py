@@ -294,7 +294,7 @@ class Heading:
         return self.fixed_rad
 
 
-# A Copter that was told to land at 0.8 m/s stood by up to 0.9 m beside home: its land mode brakes for so long.
+# A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside home: about a second of its speed.
 BRAKES_S = 1.0
 
 

@@ -286,26 +286,26 @@ IDLE, UP = 0.9 * LEAST_FRACTION, 1.1 * LEAST_FRACTION
 )
 def test_what_flies_or_begins_to_may_crash_and_what_is_carried_may_not(landed, idle, pushes, unknown):
     for thrust, may in ((IDLE, idle), (UP, pushes), (None, unknown)):
-        circumstances, told = Circumstances(CompanionConfig()), [] if thrust is None else [AttitudeTarget(1, thrust)]
-        circumstances.hear([beat(False), position(0, 0.0), beat(True), ExtendedState(landed), *told], 0)
-        assert circumstances.situation.may_crash is may
+        news = [beat(True), ExtendedState(landed), *([] if thrust is None else [AttitudeTarget(1, thrust)])]
+        for heard in (news, news[::-1]):
+            circumstances = Circumstances(CompanionConfig())
+            circumstances.hear([beat(False), position(0, 0.0), *heard], 0)
+            assert circumstances.situation.may_crash is may
 
 
 @pytest.mark.parametrize(
     ("fell_us", "told"), [(100_000, (1, 1)), (LIES_US - 100_000, (1, 0)), (LIES_US + 100_000, (0, 0))]
 )
 def test_a_vehicle_whose_motors_stop_in_the_air_crashes_though_disarmed_and_landed_by_its_own_word(fell_us, told):
-    # Given one that is killed, tips over and meets the ground so long after that
+    # Given one that is killed, tips over and meets the ground a while after that
     killed_us, log = HIT_US - fell_us, flight(push_m_s2=60.0)
     killed = [LoggedSample(killed_us, sample) for sample in (beat(False), ExtendedState(LandedState.ON_GROUND))]
     turned = [Attitude(us, (0.0, 1.0, 0.0, 0.0)) for us in range(HIT_US - SECOND // 20, 10 * SECOND, SECOND // 20)]
     heard = [*log.heard, *killed, *(LoggedSample(each.time_boot_us, each) for each in turned)]
     findings = watch_log(replace(log, heard=tuple(sorted(heard, key=lambda item: item.at_us))), CompanionConfig())
-    # Then its impact is told, and once that it lies
     crashes = [text for _, text in findings.happenings if text.startswith("crashed")]
     assert [finding.is_crash for finding in findings.impacts] == [True] * told[0]
     assert crashes == ["crashed: tipped over, tilted by 180 degrees, 0.0 m up, moving at 1.0 m/s"] * told[1]
-    # And it has not flown since
     assert findings.flown_us == pytest.approx(killed_us - 2 * SECOND, abs=10_000) and not findings.is_flying
 
 
