@@ -9,7 +9,7 @@ import pytest
 
 from bench.fly.packets import made
 from companion.errors import ConnectionSetupError
-from companion.shell.connections import addresses
+from companion.shell.connections import addresses, streams
 from companion.shell.connections.addresses import open_connection
 from companion.shell.connections.connection import udp_in
 from companion.shell.connections.peer import RELEASED_US, Peer
@@ -225,6 +225,34 @@ def test_the_beginning_of_a_packet_is_kept_until_the_rest_has_come():
         # And where seven bytes were lost, the next packet comes at once with what is left of this one
         os.write(far, HEARTBEAT[9:] + HEARTBEAT)
         assert stream.receive(1.0) == HEARTBEAT[:2] + HEARTBEAT[9:] + HEARTBEAT
+    os.close(far)
+
+
+def test_nobody_is_woken_for_a_piece_of_a_packet(monkeypatch):
+    # Given a line on which a byte takes 10 ms, and the beginning of a packet has come
+    far, near = pty.openpty()
+    tty.setraw(near)
+    rests_s = []
+
+    def rest(rest_s):
+        rests_s.append(rest_s)
+        os.write(far, HEARTBEAT[7:])
+
+    monkeypatch.setattr(streams.time, "sleep", rest)
+    with os.fdopen(near, "rb", buffering=0) as port:
+        stream = Stream(port, "the line", byte_s=0.01)
+        os.write(far, HEARTBEAT[:7])
+        # When there is time, then the bytes that are missing are slept through at once
+        assert stream.receive(60.0) == HEARTBEAT
+        assert rests_s == [pytest.approx(0.01 * len(HEARTBEAT[7:]))]
+        # And when there is none, or nothing has begun, nobody sleeps
+        os.write(far, HEARTBEAT[:7])
+        assert stream.receive(0.0) == b"" and len(rests_s) == 1
+        os.write(far, HEARTBEAT[7:])
+        assert stream.receive(0.0) == HEARTBEAT and stream.receive(0.0) == b"" and len(rests_s) == 1
+        # Nor beyond the time that is left
+        os.write(far, HEARTBEAT[:7])
+        assert stream.receive(0.05) == HEARTBEAT and rests_s[1] <= 0.05
     os.close(far)
 
 

@@ -32,6 +32,8 @@ ATTEMPT_S = 0.5
 UNACKNOWLEDGED_MS = defaults.LOSS_US // 1000
 # A send that blocks longer than this would stall the setpoints, 20 to 50 a second; the packet is dropped instead.
 SEND_TIMEOUT_S = 0.02
+# A byte on the line: 8 data bits between a start bit and a stop bit.
+BITS = 10
 # Where udev names serial devices by maker, model and serial number.
 SERIAL_BY_ID = Path("/dev/serial/by-id")
 
@@ -48,12 +50,13 @@ class Stream:
     """An open byte stream; broken once the other end has gone.
 
     A UART's driver hands on a few bytes at a time. The beginning of a packet is kept back until the rest has come: a
-    step for it takes as long as for a whole packet, and decides nothing.
+    step for it takes as long as for a whole packet, and decides nothing. Nor is anybody woken for a piece of it: the
+    line's rate says when the rest is there.
     """
 
-    def __init__(self, port: Port, at: str) -> None:
-        """`at` is its address or device, for people."""
-        self._port, self.at = port, at
+    def __init__(self, port: Port, at: str, byte_s: float = 0.0) -> None:
+        """`at` is its address or device, for people; `byte_s` is how long a byte takes."""
+        self._port, self.at, self._byte_s = port, at, byte_s
         self._descriptor = port.fileno()
         self.broken = False
         self._begun = b""
@@ -61,7 +64,7 @@ class Stream:
 
     def receive(self, timeout_s: float) -> bytes:
         until_s = time.monotonic() + timeout_s
-        while not self.broken and readable(self._descriptor, until_s - time.monotonic()):
+        while not self.broken and readable(self._descriptor, self._left_s(until_s)):
             try:
                 content = os.read(self._descriptor, READ_SIZE)
             except BlockingIOError:
@@ -75,6 +78,15 @@ class Stream:
             if content:
                 return content
         return b""
+
+    def _left_s(self, until_s: float) -> float:
+        """Until that time, once a packet that has begun is there, or the time is over."""
+        left_s = until_s - time.monotonic()
+        if self._begun and left_s > 0.0:
+            rest_s = self._byte_s * (packet_length(self._begun) - len(self._begun))
+            time.sleep(min(rest_s, left_s))
+            left_s -= rest_s
+        return left_s
 
     def fileno(self) -> int:
         return self._descriptor
@@ -271,7 +283,7 @@ class SerialDevice:
             raise FileNotFoundError(self._links[0])
         path = str(links[0]) if links else self._path
         # 8 data bits, no parity, one stop bit, without flow control, as PX4's TELEM ports.
-        stream = Stream(serial.Serial(path, self._baud), path)
+        stream = Stream(serial.Serial(path, self._baud), path, BITS / self._baud)
         device = Path(path).resolve()
         by_id = SERIAL_BY_ID.iterdir() if SERIAL_BY_ID.is_dir() else ()
         self._links = sorted(link for link in by_id if link.resolve() == device)
