@@ -154,7 +154,7 @@ class GoToItem(StrictModel):
     speed_m_s: Speed | None = None
     """At most; without one that of the last set_speed."""
     acceleration_m_s2: Acceleration | None = None
-    """Of braking and turning; the speed grows by companion.flight.speeding_up_m_s2 at most."""
+    """Of braking; the velocity grows and turns by companion.flight.speeding_up_m_s2 at most."""
     yaw_deg: Yaw | None = None
     """Heading, clockwise from north."""
 

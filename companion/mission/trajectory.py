@@ -61,7 +61,7 @@ class Ramps:
 class LineProfile:
     """A straight line, never faster than `speed`, never changing faster than `acceleration`.
 
-    `speeding_up_m_s2` limits how fast the horizontal speed grows (see FlightConfig).
+    `speeding_up_m_s2` limits how fast the horizontal velocity grows, and on a curve turns (see FlightConfig).
     """
 
     start_m: Vector3
@@ -115,7 +115,7 @@ class CircleProfile:
     @cached_property
     def _ramps(self) -> Ramps:
         # v^2 / R sideways within its share of the acceleration
-        turning_m_s = math.sqrt(TURNING_SHARE * self.acceleration_m_s2 * self.radius_m)
+        turning_m_s = math.sqrt(min(TURNING_SHARE * self.acceleration_m_s2, self.speeding_up_m_s2) * self.radius_m)
         braking = SPEEDING_SHARE * self.acceleration_m_s2
         growth = min(braking, self.speeding_up_m_s2)
         return Ramps(self.distance_m, min(self.speed_m_s, turning_m_s), growth, braking)
@@ -233,7 +233,8 @@ class CurveProfile:
         pieces_m = 0.5 * (rate[1:] + rate[:-1]) * np.diff(u)
         curvature = _curvature(first / rate[:, None], pieces_m)
         along_m = np.concatenate([[0.0], np.cumsum(pieces_m)])
-        top_m_s = np.minimum(speed_m_s, np.sqrt(TURNING_SHARE * acceleration_m_s2 / np.maximum(curvature, 1e-9)))
+        turning_m_s2 = min(TURNING_SHARE * acceleration_m_s2, speeding_up_m_s2)
+        top_m_s = np.minimum(speed_m_s, np.sqrt(turning_m_s2 / np.maximum(curvature, 1e-9)))
         braking_m_s2 = SPEEDING_SHARE * acceleration_m_s2
         speeds = _within_acceleration(top_m_s, pieces_m, min(braking_m_s2, speeding_up_m_s2), braking_m_s2)
         times_s = np.concatenate([[0.0], np.cumsum(2.0 * pieces_m / (speeds[1:] + speeds[:-1]))])

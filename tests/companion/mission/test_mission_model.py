@@ -142,6 +142,17 @@ def test_the_speed_grows_slower_than_it_falls(trajectory):
     assert math.dist(trajectory.at(trajectory.duration_s - 1e-6)[0], trajectory.target_m) < 1e-4
 
 
+@pytest.mark.parametrize(("speeding_up_m_s2", "turns_m_s2"), [(1.0, 1.0), (math.inf, 0.8 * 2.0)])
+def test_a_bend_leans_the_vehicle_no_more_than_speeding_up(speeding_up_m_s2, turns_m_s2):
+    circle = CircleProfile((3.0, 0.0, -2.0), 2.0, math.pi, math.tau, 2.0, 2.0, speeding_up_m_s2)
+    for way in (CurveProfile(ZIGZAG, 3.0, 2.0, speeding_up_m_s2), circle):
+        turning_m_s2 = []
+        for t in np.arange(0.1, way.duration_s - 0.1, 0.02):
+            _, (v_n, v_e, _), (a_n, a_e, _) = way.at(t)
+            turning_m_s2.append(abs(v_n * a_e - v_e * a_n) / math.hypot(v_n, v_e))
+        assert max(turning_m_s2) == pytest.approx(turns_m_s2, abs=0.03)
+
+
 @pytest.mark.parametrize(("speed_m_s", "tried_m_s"), [(2.0, 0.5), (0.8, 0.3), (0.2, 0.2)])
 def test_another_try_is_slower_but_not_so_slow_that_nobody_notices_the_touch(speed_m_s, tried_m_s):
     assert SpeedLimits(speed_m_s, 2.0, factor=0.25).limits(None, None)[0] == pytest.approx(tried_m_s)
