@@ -23,6 +23,8 @@ from companion.mission.item_trajectory import (
 from companion.mission.trajectory import Motion, Trajectory
 from companion.motion.vector import plus
 
+# A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
+BRAKES_S = 1.0
 # Of a time-out, and of a goal out of reach; "continue" is no move.
 _TRIGGERS = {
     "abort": Trigger.INTERRUPTED,
@@ -177,7 +179,8 @@ class FlyItems(_OnTrajectory):
                 over = elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
                 if over and self._over_since_us is None:
                     self._over_since_us = now_us
-                return over and self._arrived()
+                lands = isinstance(flight.steps[flight.step_index + 1].action, items.LandItem)
+                return over and self._arrived(BRAKES_S if lands else 0.0)
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
@@ -292,10 +295,6 @@ class Heading:
             north, east, _ = velocity_m_s
             return math.atan2(east, north) if math.hypot(north, east) > _LEAST_SPEED_M_S else self.yaw_rad
         return self.fixed_rad
-
-
-# A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside home: about a second of its speed.
-BRAKES_S = 1.0
 
 
 class FlyHome(_OnTrajectory):

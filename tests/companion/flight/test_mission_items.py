@@ -129,10 +129,14 @@ def test_a_mission_can_end_with_the_way_home_below_the_fences_top(max_height_m):
     assert f.run_to_end().outcome == "completed"
 
 
-def test_a_vehicle_that_comes_past_home_does_not_land_before_it_is_slow():
-    # Given one whose way home is over while it moves, 0.2 m off, so that a second later it is out of reach
-    f = flight(items=[TAKEOFF, {"go_to": {"position_ned_m": [2, 0, -1.5]}}, {"return": {}}])
-    f.run_to("returning")
+@pytest.mark.parametrize(
+    ("ending", "state"),
+    [([{"return": {}}], "returning"), ([{"go_to": {"position_ned_m": [0, 0, -1.5]}}, {"land": {}}], "mission")],
+)
+def test_a_vehicle_that_comes_past_its_goal_does_not_land_before_it_is_slow(ending, state):
+    # Given one whose way there is over while it moves, 0.2 m off, so that a second later it is out of reach
+    f = flight(items=[TAKEOFF, {"go_to": {"position_ned_m": [2, 0, -1.5]}}, *ending])
+    f.run_until(lambda: f.state == state and f.companion.core.flight.step_index == 2)
     vehicle, wanted_m_s = f.vehicle, 0.6
 
     def move():
@@ -141,7 +145,7 @@ def test_a_vehicle_that_comes_past_home_does_not_land_before_it_is_slow():
 
     vehicle.move = move
     f.run_for(8.0)
-    assert f.state == "returning"
+    assert f.state == state
     # When it becomes slower
     wanted_m_s = 0.2
     f.run_to("landing", 1.5)
