@@ -79,10 +79,10 @@ class FlightConfig(StrictModel):
     cruise_acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 2.0
     """A tilt of 11 degrees, well inside every multicopter's."""
     speeding_up_m_s2: Annotated[Positive, Field(le=9.81)] = 1.0
-    """The most, of any item's acceleration, with which the horizontal velocity grows or turns. A vehicle that leans into
-    its way, or into a bend, is hit below its centre and tips: beyond 10 degrees at 3 m/s, or 16 at 1 m/s, its thrust
-    then pins it to the obstacle (docs/explanation/recovery.md). This leans it by 6, and what a head wind leans it by is
-    taken off it; drag comes on top. Braking leans it the other way."""
+    """The most, of any item's acceleration, with which the horizontal velocity grows or turns. A vehicle that leans
+    into its way, or into a bend, is hit below its centre and tips: beyond 10 degrees at 3 m/s, or 16 at 1 m/s, its
+    thrust then pins it to the obstacle (docs/explanation/recovery.md). This leans it by 6, and what a head wind leans
+    it by is taken off it; drag comes on top. Braking leans it the other way."""
     acceptance_radius_m: Positive = 0.5
     """A waypoint is passed, not settled on. A PX4 that flies by GPS wanders by this much around a setpoint (its own
     simulator's noise moves a hover by 0.5 m); a quarter of it could be missed for a long time."""
