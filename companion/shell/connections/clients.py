@@ -14,6 +14,7 @@ from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
 from companion.shell.connections.addresses import host_and_port, scheme_and_rest, serial_device
 from companion.shell.connections.connection import LinkCounts, Selectable, Way, bound_socket, resolve, send_datagram
+from companion.shell.connections.streams import BITS_A_BYTE
 
 # A sender of heartbeats has missed nine.
 FORGOTTEN_US = 10_000_000
@@ -27,8 +28,8 @@ MOST_DATAGRAMS = 32
 DATAGRAM_BYTES = 1452
 # Three seconds of a full UART of 921,600 baud: longer than a garbage collection, and old by then.
 UNREAD_BYTES = 256_000
-# A serial port's ten bits a byte. A network's is bounded by this computer: twice what a fast link carries.
-BITS_A_BYTE, NETWORK_BYTES_S = 10, 2_000_000
+# A network is bounded by this computer: twice what a fast link carries.
+NETWORK_BYTES_S = 2_000_000
 # A vehicle whose port is gone, and packets that wait their turn, are looked for so often.
 LOOK_S, TURN_S = 0.02, 0.001
 

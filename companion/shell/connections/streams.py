@@ -33,7 +33,7 @@ UNACKNOWLEDGED_MS = defaults.LOSS_US // 1000
 # A send that blocks longer than this would stall the setpoints, 20 to 50 a second; the packet is dropped instead.
 SEND_TIMEOUT_S = 0.02
 # A byte on the line: 8 data bits between a start bit and a stop bit.
-BITS = 10
+BITS_A_BYTE = 10
 # Where udev names serial devices by maker, model and serial number.
 SERIAL_BY_ID = Path("/dev/serial/by-id")
 
@@ -283,7 +283,7 @@ class SerialDevice:
             raise FileNotFoundError(self._links[0])
         path = str(links[0]) if links else self._path
         # 8 data bits, no parity, one stop bit, without flow control, as PX4's TELEM ports.
-        stream = Stream(serial.Serial(path, self._baud), path, BITS / self._baud)
+        stream = Stream(serial.Serial(path, self._baud), path, BITS_A_BYTE / self._baud)
         device = Path(path).resolve()
         by_id = SERIAL_BY_ID.iterdir() if SERIAL_BY_ID.is_dir() else ()
         self._links = sorted(link for link in by_id if link.resolve() == device)
