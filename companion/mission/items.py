@@ -154,7 +154,7 @@ class GoToItem(StrictModel):
     speed_m_s: Speed | None = None
     """At most; without one that of the last set_speed."""
     acceleration_m_s2: Acceleration | None = None
-    """Of braking; the velocity grows and turns by companion.flight.speeding_up_m_s2 at most."""
+    """Of braking; the speed grows by companion.flight.speeding_up_m_s2 at most."""
     yaw_deg: Yaw | None = None
     """Heading, clockwise from north."""
 
@@ -187,7 +187,7 @@ class PathItem(StrictModel):
     speed_m_s: Speed | None = None
     """At most; slower in bends."""
     acceleration_m_s2: Acceleration | None = None
-    """Also across the path, in bends."""
+    """Also across the path, in bends; there, too, companion.flight.speeding_up_m_s2 at most."""
     yaw_deg: Yaw | Literal["along"] | None = None
     """Heading, clockwise from north, or along the path."""
 
@@ -206,7 +206,7 @@ class OrbitItem(StrictModel):
     speed_m_s: Speed | None = None
     """Along the circle, at most."""
     acceleration_m_s2: Acceleration | None = None
-    """Also towards the centre."""
+    """Also towards the centre; there, too, companion.flight.speeding_up_m_s2 at most."""
     yaw_deg: Yaw | Literal["centre", "along"] | None = "centre"
     """Heading, clockwise from north, or towards the centre, or along the path."""
 

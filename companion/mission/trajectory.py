@@ -61,7 +61,7 @@ class Ramps:
 class LineProfile:
     """A straight line, never faster than `speed`, never changing faster than `acceleration`.
 
-    `speeding_up_m_s2` limits how fast the horizontal velocity grows, and on a curve turns (see FlightConfig).
+    `speeding_up_m_s2` limits how fast the horizontal speed grows (see FlightConfig).
     """
 
     start_m: Vector3
@@ -114,7 +114,7 @@ class CircleProfile:
 
     @cached_property
     def _ramps(self) -> Ramps:
-        # v^2 / R sideways within its share of the acceleration
+        # v^2 / R sideways within its share of the acceleration, and no more than what speeds up.
         turning_m_s = math.sqrt(min(TURNING_SHARE * self.acceleration_m_s2, self.speeding_up_m_s2) * self.radius_m)
         braking = SPEEDING_SHARE * self.acceleration_m_s2
         growth = min(braking, self.speeding_up_m_s2)
@@ -190,8 +190,9 @@ LEAST_GAP_M = 0.01
 class CurveProfile:
     """Natural cubic spline over centripetal knots (Catmull-Rom's remedy against loops), timed by its curvature.
 
-    Where the curve bends, v^2 / R stays within its share of the acceleration; a pass forwards and one backwards
-    along the curve hold the change of speed within its own (the method of Bobrow, Dubowsky and Gibson, 1985).
+    Where the curve bends, v^2 / R stays within its share of the acceleration, and no more than what speeds up; a pass
+    forwards and one backwards along the curve hold the change of speed within its own (the method of Bobrow, Dubowsky
+    and Gibson, 1985).
     """
 
     def __init__(

@@ -64,7 +64,10 @@ class Stream:
 
     def receive(self, timeout_s: float) -> bytes:
         until_s = time.monotonic() + timeout_s
-        while not self.broken and readable(self._descriptor, self._left_s(until_s)):
+        while not self.broken:
+            self._await_rest(until_s)
+            if not readable(self._descriptor, until_s - time.monotonic()):
+                break
             try:
                 content = os.read(self._descriptor, READ_SIZE)
             except BlockingIOError:
@@ -79,14 +82,11 @@ class Stream:
                 return content
         return b""
 
-    def _left_s(self, until_s: float) -> float:
-        """Until that time, once a packet that has begun is there, or the time is over."""
+    def _await_rest(self, until_s: float) -> None:
+        """Sleep until a packet that has begun is there, or the time is over."""
         left_s = until_s - time.monotonic()
         if self._begun and left_s > 0.0:
-            rest_s = self._byte_s * (packet_length(self._begun) - len(self._begun))
-            time.sleep(min(rest_s, left_s))
-            left_s -= rest_s
-        return left_s
+            time.sleep(min(self._byte_s * (packet_length(self._begun) - len(self._begun)), left_s))
 
     def fileno(self) -> int:
         return self._descriptor
