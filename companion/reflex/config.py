@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from companion.motion.config import GRAVITY_M_S2, MOTORS_RAD_S2, SHOWN_US
+from companion.motion.config import GRAVITY_M_S2, SHOWN_US
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 # --- the specific force's noise
@@ -49,9 +49,6 @@ COMPARED = 3
 # Velocities further apart are not compared: samples cover a quarter of the time, and the filter corrects itself in
 # between. At 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
-# A rate jump belongs to a velocity jump within this time: PX4's estimator begins to correct what clipping hid of a hit
-# after 0.14 to 0.18 s, and does so for as long.
-TURNED_US = 2 * SHOWN_US
 # Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz.
 MEMORY, RISE = 100, 10
 # Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
@@ -59,12 +56,9 @@ MEMORY, RISE = 100, 10
 # deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
 # STAMP_S: without unsampled time, the velocity's stamp of a millisecond and a lost sample.
 SHAKEN_S, STAMP_S = 0.15, 0.008
-# Share of a rate jump's test ratio that adds to a velocity jump's: beside one that no motor makes half a step is then
-# enough. Alone it is no evidence, as a failed motor turns a vehicle, too.
-TURNED_SHARE = 0.75
-# Four times what motors do, with room for a nimbler vehicle's flips. A rigid vehicle that hits an inclined wall at 2
-# m/s has a rate jump of 15 rad/s and more.
-NO_MOTORS_RAD_S2 = 4.0 * MOTORS_RAD_S2
+# --- rate jumps
+# Two steps of the rates are compared where neither lasts longer than the other by this: no sample is lost.
+EVEN = 1.5
 
 # --- the kind of an impact
 # Sine of 45 degrees: a force nearer to the vertical is that of a ceiling or a floor.
@@ -263,8 +257,8 @@ class FusedConfig(StrictModel):
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
     clipping leaves the estimate 0.16."""
     rate_step_rad_s: Positive = 2.0
-    """Least rate jump that counts beside a velocity jump, more than motors make in the same time. A push at 0.15 m from
-    the centre that turns the vehicle by 2 rad/s changes its velocity by 0.06 m/s, half of `velocity_step_m_s`."""
+    """Least rate jump that is a hit: more than motors make in 20 ms. A push at 0.15 m from the centre that turns the
+    vehicle by 2 rad/s changes its velocity by 0.06 m/s, half of `velocity_step_m_s`."""
     rearm_quiet_s: Positive = 0.04
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5

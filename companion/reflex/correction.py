@@ -64,12 +64,19 @@ class VelocityValidity:
     """Whether the velocity was invalid already when the latest hit came: an earlier hit's part stays hidden."""
     is_disproved: bool = False
     """Whether a receiver's velocity shows that the vehicle's own is not right yet."""
+    left_m_s: float = math.inf
+    """What is left to correct, once that is known."""
     _speed_m_s: float = 0.0
     """Of the latest hit, or of the hardest of those."""
 
     @property
     def is_valid(self) -> bool:
         return self.invalid_since_boot_us is None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the velocity is valid, or by how much it is not."""
+        return self.is_valid or math.isfinite(self.left_m_s)
 
     def tilt_error_rad(self, time_us: int) -> float:
         """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
@@ -80,14 +87,15 @@ class VelocityValidity:
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:
         """By how much the newest of these velocities may differ from the mean of the others, because a hit is being
-        corrected: an elastic one that was hidden whole, by the worst model of an estimator. What struck a vehicle that
-        stood still may have done so at any speed."""
+        corrected: by what is left of it, or an elastic one that was hidden whole, by the worst model of an estimator.
+        What struck a vehicle that stood still may have done so at any speed."""
         if self.invalid_since_boot_us is None:
             return 0.0
         if self._speed_m_s < APPROACH_M_S or self.is_disproved:
-            return math.inf
+            return self.left_m_s
         *before, newest = (error_response(1e-6 * (each - self.invalid_since_boot_us))[0] for each in times_us)
-        return 2.0 * self._speed_m_s * float(np.abs(newest - sum(before) / len(before)).max())
+        swing_m_s = 2.0 * self._speed_m_s * float(np.abs(newest - sum(before) / len(before)).max())
+        return min(swing_m_s, self.left_m_s)
 
     def invalidate(self, time_us: int, speed_m_s: float) -> None:
         """A new hit, at this speed: the velocity is not valid until the hit is known to be measured whole."""

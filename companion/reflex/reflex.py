@@ -181,7 +181,10 @@ class Reflex:
         if self.hits:
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             self.hits[-1].follow(self.monitor.state, self.monitor.estimator, positions)
-            self.monitor.estimator.validity.is_disproved = self.hits[-1].estimator.is_measured_apart
+            validity, estimator = self.monitor.estimator.validity, self.hits[-1].estimator
+            is_newest = validity.invalid_since_boot_us == estimator.hit_boot_us
+            validity.left_m_s = estimator.left_m_s if is_newest else math.inf
+            validity.is_disproved = estimator.is_measured_apart
         self.crash.update(samples, height_m, landed)
 
     def left_wrong(self, time_boot_us: int) -> LeftWrong | None:

@@ -18,7 +18,7 @@ from mcap.writer import Writer
 from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPosition, Quaternion, Vector3
 from rebound_cli import __version__
 from rebound_cli.logs.log import Log
-from rebound_cli.replay.listening import Numbers
+from rebound_cli.replay.listening import FORCES, Numbers
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.content import finite, heard_at_us
 from rebound_cli.report.shown_flight import ShownFlight
@@ -113,7 +113,7 @@ def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
 def _test_ratios(flight: ShownFlight) -> tuple[Iterator[Message], Iterator[Message]]:
     """As EKF2 publishes its own: the square of an innovation over its limit."""
     forces, jumps = flight.findings.listener.forces.all(), flight.findings.listener.velocities.all()
-    of_forces = {"side": forces.ratio_of("side"), "vertical": np.fmax(0.0, forces.ratio_of("beyond"))}
+    of_forces = dict(zip(("side", "vertical", "turn"), map(forces.ratio_of, FORCES), strict=True))
     return (
         _squares(flight, "/test_ratio/force", forces.time_boot_us, of_forces),
         _squares(flight, "/test_ratio/velocity", jumps.time_boot_us, {"jump": jumps.ratio}),
@@ -121,7 +121,7 @@ def _test_ratios(flight: ShownFlight) -> tuple[Iterator[Message], Iterator[Messa
 
 
 def _squares(flight: ShownFlight, topic: str, boot_us: Numbers, ratios: Mapping[str, Numbers]) -> Iterator[Message]:
-    squares = np.square(np.asarray(list(ratios.values()))).T.tolist()
+    squares = np.square(np.fmax(0.0, np.asarray(list(ratios.values())))).T.tolist()
     for at_us, row in zip(heard_at_us(flight, boot_us).tolist(), squares, strict=True):
         yield at_us, topic, dict(zip(ratios, row, strict=True))
 

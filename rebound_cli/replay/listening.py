@@ -24,10 +24,9 @@ Numbers: TypeAlias = float | npt.NDArray[np.float64]
 PHASES = tuple(Phase)
 _NUMBERS = {phase: float(number) for number, phase in enumerate(PHASES)}
 
-
-# What is tested of an IMU sample: f_x and f_y, and f_z outside what propellers can do, negative inside, m/s^2. And of a
-# velocity: its jump, m/s.
-FORCES, JUMPS = ("side", "beyond"), ("jump",)
+# What is tested of an IMU sample: f_x and f_y, and f_z outside what propellers can do, negative inside, m/s^2; and the
+# rate jump before it, rad/s. And of a velocity: its jump, m/s.
+FORCES, JUMPS = ("side", "beyond", "turn"), ("jump",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,8 +129,8 @@ class _ListenedTo:
         return Shown(self._listener.forces.one(-1), is_soft)
 
 
-def _forces(state: DetectorState) -> tuple[float, ...]:
+def _forces(s: DetectorState) -> tuple[float, ...]:
     """Innovations and limits of the newest sample."""
-    if not isinstance(state, FusedState):
-        return math.nan, state.threshold_m_s2, math.nan, state.threshold_m_s2
-    return state.side.value, state.side.limit, state.vertical.value, state.vertical.limit
+    if not isinstance(s, FusedState):
+        return math.nan, s.threshold_m_s2, math.nan, s.threshold_m_s2, math.nan, math.nan
+    return s.side.value, s.side.limit, s.vertical.value, s.vertical.limit, s.turn.value, s.turn.limit

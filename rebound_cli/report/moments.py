@@ -128,6 +128,7 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
 _SIGNS = {
     "side": ("Push sideways", "m/s²", 1),
     "beyond": ("Push along the thrust", "m/s² beyond the propellers", 1),
+    "turn": ("Turn at once", "rad/s", 1),
     "jump": ("Velocity jump", "m/s that no sample shows", 2),
 }
 

@@ -1,13 +1,13 @@
-"""Detector `fused`, the default: an unexplained external force, or a velocity jump after an unseen contact.
+"""Detector `fused`, the default: an unexplained external force, or the jump that an unseen contact leaves.
 
-By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs show a
+By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Four signs show a
 contact, each compared with this vehicle's own flight:
 
 * horizontal: f_x, f_y differ from their running mean and from zero, with an allowance for drag on a turning vehicle;
 * vertical: f_z is outside the range of the propellers, from zero to their maximum (see `free_flight`). A failed motor,
   free fall, a dropped payload and every manoeuvre stay inside;
-* the velocity jumps and the accelerometer does not show it (see `velocity_jump`). The threshold is lower beside a rate
-  jump.
+* the body rates jump, and stay (see `rate_jump`);
+* the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
 
 A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
 push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
@@ -32,8 +32,9 @@ from companion.messages import (
 )
 from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
-from companion.motion.vector import ZERO, limited, minus
+from companion.motion.vector import ZERO, limited, minus, plus
 from companion.reflex.config import (
+    APPROACH_M_S,
     CLEAR,
     JUMP,
     LEARNT_S,
@@ -55,6 +56,7 @@ from companion.reflex.detection.detector import (
     Situation,
 )
 from companion.reflex.detection.free_flight import ForceNoise
+from companion.reflex.detection.rate_jump import RateJump
 from companion.reflex.detection.velocity_jump import VelocityJump
 
 
@@ -66,6 +68,7 @@ class FusedState(DetectorState):
 
     side: Innovation = field(default_factory=Innovation)
     vertical: Innovation = field(default_factory=Innovation)
+    turn: RateJump = field(default_factory=RateJump)
     velocity: Innovation = field(default_factory=Innovation)
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
     vertical_threshold_m_s2: float = 0.0
@@ -89,7 +92,8 @@ class FusedState(DetectorState):
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
         speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
-        turning_rad_s = sum(map(abs, rates_frd_rad_s))
+        p, q, r = rates_frd_rad_s
+        turning_rad_s = abs(p) + abs(q) + abs(r)
         return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, MEAN_MEMORY_S * turning_rad_s)
 
     def side_force(self, config: FusedConfig, force_frd_m_s2: Vector3) -> tuple[float, float, bool]:
@@ -139,8 +143,8 @@ class FusedDetector:
 
     def initial(self) -> FusedState:
         side, vertical = self._config.side_threshold_m_s2, self._config.vertical_threshold_m_s2
-        jump = VelocityJump(self._averaging_us)
-        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, jump=jump)
+        jump, turn = VelocityJump(self._averaging_us), RateJump(limit=self._config.rate_step_rad_s)
+        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, turn=turn, jump=jump)
 
     def step(
         self, state: FusedState, sample: Sample, situation: Situation, motion: Motion
@@ -166,7 +170,7 @@ class FusedDetector:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         s.last_sample_boot_us = now_us
-        s.jump.imu(before_us, now_us, w)
+        s.turn.imu(before_us, now_us, w, config)
         side, thresholds, is_of_two = s.side_force(config, f)
         if is_of_two:
             free_until_us = s.before_boot_us
@@ -184,7 +188,7 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            return None
+            return self._turned(s, now_us, situation, motion) if s.turn.value > s.turn.limit else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         x, y, z = s.floor.mean_frd_m_s2
         force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
@@ -199,6 +203,20 @@ class FusedDetector:
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
             return None if is_learnt else self._unwatched(s, situation, motion, impact)
         return self._loud(s, situation, motion, impact, s.jumps(f))
+
+    def _turned(self, s: FusedState, now_us: int, situation: Situation, motion: Motion) -> Impact | None:
+        """What turned a vehicle that flew somewhere pushed it back: where to, only its velocity before says."""
+        free_until_us = s.before_boot_us
+        before = motion.history.before(free_until_us + 1) if motion.validity.is_known else None
+        is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
+        if s.phase is not Phase.ARMED or is_again or before is None:
+            return None
+        if math.hypot(*before.velocity_ned_m_s) < APPROACH_M_S:
+            return None
+        push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
+        force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.value / s.turn.limit)
+        impact = Impact(now_us, free_until_us, force, evidence=Evidence.RATE_JUMP, confidence=confidence)
+        return self._fire(s, situation, motion, impact)
 
     def _unwatched(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact | None:
         """A crash is reported where no hit is looked for, too: in a take-off, in a landing, under strong vibration."""
@@ -278,8 +296,8 @@ class FusedDetector:
             return None
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
-        caution = 1.0 if type(sample) is Odometry and motion.validity.is_valid else 2.0
-        size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2)
+        caution = 1.0 if type(sample) is Odometry and motion.validity.is_known else 2.0
+        size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         is_jump = size / s.velocity.limit > 1.0

@@ -150,7 +150,7 @@ class ImpactEstimator:
             position_ned_m=place,
             velocity_ned_m_s=velocity,
             velocity_error_m_s=error_m_s,
-            normal=self._normal(force_ned),
+            normal=self._normal(force_ned, impact.evidence is Evidence.RATE_JUMP),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_fully_measured=False,
@@ -189,8 +189,8 @@ class ImpactEstimator:
             is_lower_bound=contact.has_gap or not contact.is_fully_measured,
         )
 
-    def _normal(self, impulse_ned: Vector3) -> Normal:
-        return normal_of(impulse_ned, self.came_ned_m_s, self.hides_clipping)
+    def _normal(self, impulse_ned: Vector3, is_guessed: bool = False) -> Normal:
+        return normal_of(impulse_ned, self.came_ned_m_s, self.hides_clipping or is_guessed)
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
         """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.

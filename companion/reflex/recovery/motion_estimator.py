@@ -183,6 +183,11 @@ class MotionEstimator:
         return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
 
     @property
+    def left_m_s(self) -> float:
+        """By how much the reported velocity may be wrong; infinite until that is known."""
+        return SAME_M_S + math.hypot(*self.velocity_error_m_s) if self.has_converged else math.inf
+
+    @property
     def is_reported(self) -> bool:
         """Whether what the vehicle reports is its motion: the hit was measured whole, or is corrected."""
         return self.is_fully_measured or (self.has_converged and not self.is_measured_apart)

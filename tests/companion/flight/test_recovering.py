@@ -11,8 +11,9 @@ from companion.flight.handlers.recovering import Recover
 from companion.flight.obstacle_map import FlightRoom
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import Attitude, AttitudeSetpoint, LocalPosition, PositionSetpoint
+from companion.messages import Attitude, AttitudeSetpoint, LandedState, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
+from companion.motion.config import SAME_M_S
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
 from companion.reflex.config import NOTICED_S, EstimateConfig
@@ -43,6 +44,15 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         estimator.note_contact(True, HIT_US, estimator.normal)
     flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator))
     return flight
+
+
+def test_what_is_left_of_one_hit_says_nothing_of_what_came_after_it():
+    flight = flight_with()
+    validity, flight.collisions[-1].estimator.has_converged = flight.reflex.monitor.estimator.validity, True
+    for later_us, left_m_s in ((0, SAME_M_S), (500_000, math.inf)):
+        validity.invalidate(HIT_US + later_us, 2.0)
+        flight.reflex.follow([], 2.0, LandedState.IN_AIR)
+        assert validity.left_m_s == left_m_s
 
 
 def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:

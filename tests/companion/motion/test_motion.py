@@ -221,6 +221,7 @@ def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
     air.reported_off_m_s = -0.8
     go_on(air, found, 3.5)
     assert found.has_converged
+    assert found.left_m_s == pytest.approx(0.8 + SAME_M_S, abs=0.1), "a jump beyond it is another hit's"
     # Then a next hit's velocity is the measured one's
     assert found.is_measured_apart
     assert not found.is_reported
@@ -242,6 +243,7 @@ def test_an_error_that_changes_is_not_known():
         go_on(air, found, 0.1)
     assert found.is_measured_apart
     assert not found.has_converged
+    assert found.left_m_s == math.inf
 
 
 def test_after_twelve_seconds_the_vehicle_has_put_itself_right():

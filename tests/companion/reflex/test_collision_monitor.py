@@ -16,7 +16,8 @@ from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
-from companion.reflex.config import RecoveryConfig
+from companion.reflex.config import APPROACH_RAD, RecoveryConfig
+from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.detector import ImpactKind, Phase, Situation
 from companion.reflex.detection.monitor import advance, start_monitor
 from companion.reflex.reflex import start_reflex
@@ -183,7 +184,7 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():
     assert final.is_fully_measured
 
 
-def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, speed=0.0, **more_m_s2):
+def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, speed=0.0, left_m_s=math.inf, rates=lambda t: STILL, **more_m_s2):
     """Flying north, or still; a push at 2.0 s; then velocities that are off by what `error_m_s` of the time says.
 
     `more_m_s2`: what else pushes: the push's `first` sample, its last where arms meet their `stop`, one sample of the
@@ -203,9 +204,11 @@ def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, speed=0.0, **more_m_s2):
     def velocity(t):
         return north_m_s[t] + (error_m_s(t * 1e-6 - 2.0) if t > 2_000_000 else 0.0), 0.0, 0.0
 
-    watch.fly(
-        round(seconds * 1e6), push, velocity, look=lambda t: trusted.append(watch.monitor.estimator.validity.is_valid)
-    )
+    def look(t):
+        watch.monitor.estimator.validity.left_m_s = left_m_s
+        trusted.append(watch.monitor.estimator.validity.is_valid)
+
+    watch.fly(round(seconds * 1e6), push, velocity, rates=rates, look=look)
     return watch.impacts, [(t, text) for t, kind, text in watch.told if kind == "estimate"], trusted
 
 
@@ -244,6 +247,33 @@ def test_a_hit_that_only_the_velocity_shows_is_found_while_another_is_corrected(
     """Given a clipped hit at 2 m/s, a contact between the samples is one where no correction makes such a jump."""
     impacts, _, _ = after_a_hit(7.0, 120.0, 3, lambda s: swing(s) + jump_m_s * (s >= later_s), speed=2.0)
     assert len(impacts) == hits
+
+
+@pytest.mark.parametrize(
+    ("speed", "later_s", "left_m_s", "hits"),
+    [(0.0, 1.5, math.inf, 1), (0.0, 1.5, 0.9, 1), (0.0, 1.5, 0.6, 2), (2.0, 0.3, math.inf, 1), (2.0, 0.3, 0.2, 2)],
+)
+def test_a_jump_beyond_what_is_left_of_a_hit_is_another(speed, later_s, left_m_s, hits):
+    """What struck a hovering vehicle may have done so at any speed; once its error is known, it no longer may."""
+    impacts, _, _ = after_a_hit(4.0, 120.0, 3, lambda since_s: 0.8 * (since_s >= later_s), speed, left_m_s)
+    assert len(impacts) == hits
+
+
+@pytest.mark.parametrize(("left_m_s", "hits"), [(math.inf, 1), (0.3, 2)])
+def test_a_turn_is_a_hit_where_it_is_known_whereto_the_vehicle_flies(left_m_s, hits):
+    rates = {"rates": lambda t: (3.0 if t >= 2_500_000 else 0.0, 0.0, 0.0)}
+    impacts, _, _ = after_a_hit(2.6, 120.0, 3, lambda since_s: 0.0, speed=2.0, left_m_s=left_m_s, **rates)
+    assert len(impacts) == hits
+
+
+def test_a_turn_shows_no_direction_and_needs_no_other_evidence():
+    watch = Watch().fly(
+        2_600_000, velocity=lambda t: (2.0, 0.0, 0.0), rates=lambda t: (3.0 if t >= 2_500_000 else 0.0, 0.0, 0.0)
+    )
+    (hit,) = watch.impacts
+    assert hit.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.1)
+    assert hit.normal.error_rad == APPROACH_RAD
+    assert hypothesis_of(hit, hit.impact.specific_force_frd_m_s2, 0.005) is None
 
 
 def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():

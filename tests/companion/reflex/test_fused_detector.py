@@ -46,6 +46,7 @@ class Flight:
     jump: tuple | None = None  # (time, velocity step, counted): the estimator's own
     heard: tuple = (LocalPosition, Odometry, Attitude, AttitudeTarget)
     situation: Callable = lambda t: IN_FLIGHT
+    lost_us: tuple = ()  # IMU samples
     slower: int = 1  # velocities come so much more seldom
     velocity_noise: float = 0.01
     is_filtered: bool = False  # samples come through a low-pass filter
@@ -65,7 +66,7 @@ class Flight:
             seen: Any = tuple(
                 v + o + self.rng.gauss(0.0, self.velocity_noise) for v, o in zip(self.velocity, offset, strict=True)
             )
-            if t % self.imu_every_us == 0:
+            if t % self.imu_every_us == 0 and t not in self.lost_us:
                 mean = [
                     sum(f[axis] for f in window) / len(window) + self.rng.gauss(0.0, self.noise) for axis in (0, 1, 2)
                 ]
@@ -129,35 +130,73 @@ def test_a_hit_between_the_samples_is_found_from_the_velocity_it_leaves(push, im
     assert along > 0.97 * math.hypot(*impacts[0].specific_force_frd_m_s2) * math.hypot(*push)
 
 
-def stepped(change_m_s, at_us=3_002_000, turn_frd_rad_s=(0.0, 0.0, 0.0), **scene):
-    """Hits told at 50 Hz of a velocity that changes at once, between the samples, while the vehicle begins to turn."""
-    flight = Flight(imu_every_us=20_000, jump=(at_us, change_m_s, 0), **scene)
-    flight.rates = lambda t: turn_frd_rad_s if t > at_us else (0.0, 0.0, 0.0)
-    return [impact.evidence for impact in flight.fly(until_us=at_us + 35_000 * scene.get("slower", 1) ** 2)]
+@pytest.mark.parametrize(
+    ("change_m_s", "slower", "hits"),
+    [
+        # Straight into a ceiling, without a turn: a sensor that clips at 16 g shows the estimator 1 ms of that
+        ((0.0, 0.0, 0.16), 1, 1),
+        ((0.0, 0.0, 0.08), 1, 0),
+        # Velocities ten times a second are not compared
+        ((1.5, 0.0, 0.0), 2, 1),
+        ((1.5, 0.0, 0.0), 3, 0),
+    ],
+)
+def test_of_what_no_sample_showed_the_velocity_that_it_leaves_tells(change_m_s, slower, hits):
+    flight = Flight(imu_every_us=20_000, jump=(3_002_000, change_m_s, 0), slower=slower, velocity=(0.0, 0.0, -1.0))
+    impacts = flight.fly(until_us=3_002_000 + 35_000 * slower**2)
+    assert [impact.evidence for impact in impacts] == [Evidence.VELOCITY_JUMP] * hits
+
+
+# --- rate jump ----------------------------------------------------------------------------------------------
+
+
+def at_once(p, q, r, until_us=4_000_000):
+    """Rates that a contact between the samples makes, and that stay, or go with one broken sample."""
+    return lambda t: (p, q, r) if HIT_US < t <= until_us else (0.0, 0.0, 0.0)
+
+
+def ever_faster(rad_s2):
+    return lambda t: (1e-6 * rad_s2 * max(0, t - HIT_US), 0.0, 0.0)
+
+
+def shaken(t):
+    return (random.Random(t).gauss(0.0, 2.0), 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("change_m_s", "scene", "hits"),
+    ("rates", "scene", "hits"),
     [
-        # Straight into a ceiling, without a turn: a sensor that clips at 16 g shows the estimator 1 ms of that
-        ((0.0, 0.0, 0.16), {"velocity": (0.0, 0.0, -1.0)}, 1),
-        ((0.0, 0.0, 0.08), {"velocity": (0.0, 0.0, -1.0)}, 0),
-        # Velocities ten times a second are not compared
-        ((1.5, 0.0, 0.0), {"slower": 2}, 1),
-        ((1.5, 0.0, 0.0), {"slower": 3}, 0),
-        # A beam met in the climb: within 20 ms the nimblest motors turn the vehicle by 10 rad/s at most, and by a third
-        # of that about yaw; beside a turn that no motor makes little of a step is enough
-        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (7.7, 7.7, 0.0)}, 1),
-        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (2.1, 2.1, 0.0)}, 0),
-        # Step and turn are together what neither is alone
-        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (5.4, 5.4, 0.0)}, 1),
-        ((0.0, 0.0, 0.08), {"at_us": 3_010_000, "turn_frd_rad_s": (5.4, 5.4, 0.0)}, 0),
-        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (3.4, 0.0, 0.0)}, 0),
-        ((0.0, 0.0, 0.1), {"at_us": 3_010_000, "turn_frd_rad_s": (0.0, 0.0, 3.4)}, 1),
+        (at_once(2.4, -2.0, 0.0), {}, 1),
+        (at_once(0.0, 0.0, 2.1), {}, 1),
+        (at_once(1.2, -1.2, 0.0), {}, 0),
+        # It has stopped the vehicle by then
+        (at_once(2.4, -2.0, 0.0), {"is_filtered": True, "jump": (3_002_000, (0.0, 0.0, 0.7), 0)}, 1),
+        # A broken sample, a failed motor, vibration
+        (at_once(9.0, 0.0, 0.0, until_us=3_020_000), {}, 0),
+        (ever_faster(150.0), {}, 0),
+        (shaken, {}, 0),
+        # Beside a lost sample nothing shows whether a turn stays
+        (at_once(2.4, -2.0, 0.0), {"lost_us": (3_040_000,)}, 0),
+        # Motors turn the vehicle by as much in the longer time
+        (at_once(2.4, -2.0, 0.0), {"imu_every_us": 40_000}, 0),
+        # What turns a vehicle that flies nowhere may be a hand
+        (at_once(2.4, -2.0, 0.0), {"velocity": (0.0, 0.0, -0.4)}, 0),
+        # A person who flips it on the ground
+        (at_once(2.4, -2.0, 0.0), {"situation": lambda t: IN_FLIGHT._replace(off_reason="below 0.5 m")}, 0),
     ],
 )
-def test_of_what_no_sample_showed_the_velocity_that_it_leaves_and_the_turn_tell(change_m_s, scene, hits):
-    assert stepped(change_m_s, **scene) == [Evidence.VELOCITY_JUMP] * hits
+def test_a_beam_that_only_turns_a_climbing_vehicle_is_a_hit_once_the_turn_has_stayed(rates, scene, hits):
+    scene = {"imu_every_us": 20_000, "velocity": (0.0, 0.0, -1.0), "rates": rates} | scene
+    impacts = Flight(**scene).fly(until_us=3_100_000)
+    found = [(impact.evidence, impact.kind, impact.sample_time_boot_us) for impact in impacts]
+    assert found == [(Evidence.RATE_JUMP, ImpactKind.CEILING, 3_040_000)] * hits
+    assert all(impact.contact_free_until_boot_us == 3_000_000 for impact in impacts)
+
+
+def test_what_a_felt_contact_still_turns_is_no_other_hit():
+    flight = Flight(pulse((-30.0, 0.0, 0.0), 3_009_000, 12_000), imu_every_us=20_000)
+    flight.rates = lambda t: (3.0 if t > 3_020_000 else 0.0, 0.0, 0.0)
+    assert [impact.evidence for impact in flight.fly(until_us=3_150_000)] == [Evidence.FORCE]
 
 
 @pytest.mark.parametrize(
