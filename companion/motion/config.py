@@ -30,8 +30,8 @@ LONGEST_DELAY_US = 40_000
 # real PX4 takes 0.037 rad for each m/s with motion capture and 0.056 with GPS (bench/notes/px4.md). The same again for
 # a speed of 1 m/s: the obstacle may move. Where attitude and gyroscopes differ by more, the gyroscopes are wrong.
 TILT_RAD_PER_M_S = 0.11
-# Largest angular acceleration by motors, rad/s^2, and its share about yaw, where only their drag turns the vehicle.
-MOTORS_RAD_S2, YAW_SHARE = 100.0, 0.3
+# Largest angular acceleration by motors, rad/s^2.
+MOTORS_RAD_S2 = 100.0
 
 # --- the velocity's delay
 # Prior, and its own standard deviation: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.

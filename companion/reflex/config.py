@@ -56,8 +56,10 @@ MEMORY, RISE = 100, 10
 # deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
 # STAMP_S: without unsampled time, the velocity's stamp of a millisecond and a lost sample.
 SHAKEN_S, STAMP_S = 0.15, 0.008
+
 # --- rate jumps
-# Two steps of the rates are compared where neither lasts longer than the other by this: no sample is lost.
+# Two steps of the rates are compared where neither lasts longer than the other by this factor: beside a lost sample it
+# is two, and a step back may be what is lost.
 EVEN = 1.5
 
 # --- the kind of an impact

@@ -32,8 +32,7 @@ class ForceNoise:
         if self.known_s <= 0.0:
             self.mean_frd_m_s2 = force_frd_m_s2
         known_s = self.known_s = min(self.known_s + step_s, SPREAD_MEMORY_S)
-        mean_share = step_s / (known_s if known_s < MEAN_MEMORY_S else MEAN_MEMORY_S)
-        share = step_s / known_s
+        mean_share, share = step_s / min(known_s, MEAN_MEMORY_S), step_s / known_s
         (f_x, f_y, f_z), (m_x, m_y, m_z), (v_x, v_y, v_z) = force_frd_m_s2, self.mean_frd_m_s2, self.variance_m2_s4
         x, y, z = f_x - m_x, f_y - m_y, f_z - m_z
         v_x, v_y, v_z = v_x + share * (x * x - v_x), v_y + share * (y * y - v_y), v_z + share * (z * z - v_z)

@@ -26,8 +26,8 @@ class RateJump(Innovation):
     rates_frd_rad_s: Vector3 = ZERO
     step_frd_rad_s: Vector3 = ZERO
     over_us: int = 0
-    shared: float = 0.0
-    """Of that step and the one before it, their product's size."""
+    shared_rad2_s2: float = 0.0
+    """Size of the product of that step and the one before it."""
     variance_rad2_s2: float = 0.0
 
     def imu(self, before_us: int, time_us: int, rates_frd_rad_s: Vector3, config: FusedConfig) -> None:
@@ -38,12 +38,12 @@ class RateJump(Innovation):
         """
         p, q, r = self.rates_frd_rad_s
         a, b, c = self.step_frd_rad_s
-        was_us, was_shared, elapsed_us, size = self.over_us, self.shared, time_us - before_us, math.hypot(a, b, c)
+        was_us, was_shared, elapsed_us = self.over_us, self.shared_rad2_s2, time_us - before_us
         self.rates_frd_rad_s, self.over_us = rates_frd_rad_s, elapsed_us
         x, y, z = rates_frd_rad_s
         self.step_frd_rad_s = x, y, z = x - p, y - q, z - r
-        self.shared = shared = abs(x * a + y * b + z * c)
-        self.value = 0.0
+        self.shared_rad2_s2 = shared = abs(x * a + y * b + z * c)
+        size, self.value = math.hypot(a, b, c), 0.0
         if size == 0.0 or elapsed_us >= EVEN * was_us or was_us >= EVEN * elapsed_us:
             return
         value = size - (shared if shared > was_shared else was_shared) / size
