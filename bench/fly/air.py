@@ -143,21 +143,15 @@ class Air:
             self._waiting += self.passed()
 
     def receive(self, timeout_s: float) -> bytes:
-        """A wait lets one interval pass, or a stall's many; what has arrived then waits packet by packet."""
-        if self._waiting:
-            return self._hand_over([self._waiting.pop(0)])
-        if timeout_s <= 0.0:
-            return b""
-        frames = self.passed()
-        until_s, self.stall_s = self.now_s + self.stall_s, 0.0
-        if self.now_s >= until_s:
-            return self._hand_over(frames)
-        self._waiting = list(frames)
-        while self.now_s < until_s:
-            self._waiting += self.passed()
+        """A wait lets one interval pass, or a stall's many."""
+        if not self._waiting and timeout_s > 0.0:
+            self._waiting = self.passed()
+            until_s, self.stall_s = self.now_s + self.stall_s, 0.0
+            while self.now_s < until_s:
+                self._waiting += self.passed()
+        frames, self._waiting = self._waiting, []
         # A socket that is full drops what is new.
-        del self._waiting[MOST_DATAGRAMS:]
-        return self.receive(timeout_s)
+        return self._hand_over(frames[:MOST_DATAGRAMS])
 
     def way(self, frame: bytes) -> None:
         """Not on virtual time: whoever dies here leaves no word."""

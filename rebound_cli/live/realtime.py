@@ -14,7 +14,7 @@ from companion.errors import ReboundError
 from companion.messages import ComputerStatus
 from companion.shell.clock import Clock
 from companion.shell.computer import ComputerReader
-from companion.shell.connections.connection import MOST_DATAGRAMS, Connection
+from companion.shell.connections.connection import Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.live.console import Console, state_fields
@@ -87,14 +87,6 @@ class AskPerson:
         if piece and b"\n" not in self._typed:
             return None
         return self._typed.split(b"\n")[0].decode(errors="replace").strip().lower()
-
-
-def waiting(connection: Connection, timeout_s: float) -> bytes:
-    """All that has arrived, once something has. A loop that wakes late judges no silence before it has heard it."""
-    pieces = [connection.receive(timeout_s)]
-    while pieces[-1] and len(pieces) < MOST_DATAGRAMS:
-        pieces.append(connection.receive(0.0))
-    return b"".join(pieces)
 
 
 def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -> None:
@@ -184,7 +176,7 @@ class Loop:
     def exchange(self) -> tuple[int, StepResult]:
         """Wait for bytes or the next deadline, take one step, send and record; when it was and what came of it."""
         deadline_us = self.stepped.next_deadline_us()
-        received = waiting(self.connection, min((deadline_us - self.clock.now_us()) / 1e6, LONGEST_WAIT_S))
+        received = self.connection.receive(min((deadline_us - self.clock.now_us()) / 1e6, LONGEST_WAIT_S))
         now_us = self.clock.now_us()
         self.heard.take(len(received), now_us)
         result = self._step(received, now_us)
@@ -257,7 +249,7 @@ class Loop:
             wait_s = min((self.stepped.next_deadline_us() - self.clock.now_us()) / 1e6, LONGEST_WAIT_S)
             received = b""
             try:
-                received = waiting(self.connection, wait_s)
+                received = self.connection.receive(wait_s)
             except Exception:
                 # A link that cannot be read may still be written to.
                 self.clock.sleep(wait_s)

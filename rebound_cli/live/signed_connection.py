@@ -6,7 +6,7 @@ from collections.abc import Callable
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.clock import Clock
 from companion.shell.connections.addresses import open_connection
-from companion.shell.connections.connection import MOST_DATAGRAMS, Connection, LinkCounts, Selectable, Way
+from companion.shell.connections.connection import Connection, LinkCounts, Selectable, Way
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 
@@ -24,11 +24,7 @@ class SignedConnection:
         self._writer = Background("the signatures' time stamp")
 
     def receive(self, timeout_s: float) -> bytes:
-        for number in range(MOST_DATAGRAMS):
-            received = self._connection.receive(0.0 if number else timeout_s)
-            opened = self.signing.opened(received, self._clock.now_us())
-            if opened or not received:
-                break
+        opened = self.signing.opened(self._connection.receive(timeout_s), self._clock.now_us())
         if self.signing.stamp - self._kept >= KEEP_EVERY:
             self._keep()
         return opened

@@ -11,7 +11,7 @@ from bench.fly.packets import made
 from companion.errors import ConnectionSetupError
 from companion.shell.connections import addresses, streams
 from companion.shell.connections.addresses import open_connection
-from companion.shell.connections.connection import udp_in
+from companion.shell.connections.connection import MOST_DATAGRAMS, UdpConnection, bound_socket, udp_in
 from companion.shell.connections.peer import RELEASED_US, Peer
 from companion.shell.connections.streams import Stream
 
@@ -155,6 +155,17 @@ def test_udpin_answers_the_vehicle_one_packet_a_datagram_whoever_else_sends(peer
             assert peer.recv(100) == b"three"
         assert f"{LOCAL}:{other.getsockname()[1]} sends to this port, too" in connection.news()
     connection.close()
+
+
+def test_all_that_has_arrived_is_received_at_once_but_who_sends_without_end_keeps_nobody(peer):
+    # Given a socket in which more datagrams wait than are taken in one step
+    with bound_socket(socket.SOCK_DGRAM, LOCAL, 0) as opened:
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 212_992)
+        for _ in range(MOST_DATAGRAMS + 20):
+            peer.sendto(HEARTBEAT, opened.getsockname())
+        connection = UdpConnection(opened, Peer())
+        assert connection.receive(2.0) == HEARTBEAT * MOST_DATAGRAMS
+        assert connection.receive(2.0) == HEARTBEAT * 20
 
 
 def test_udpin_with_a_peer_named_hears_that_one_alone(peer):

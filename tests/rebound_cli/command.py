@@ -113,9 +113,14 @@ def processes_naming(text):
 
 
 def wait_until_gone(text):
+    wait_until_there(text, False)
+
+
+def wait_until_there(text, is_there=True):
+    """A process that has just been started has no command line for a moment."""
     end_s = time.monotonic() + 5.0
-    while processes_naming(text):
-        assert time.monotonic() < end_s, f"still running: {processes_naming(text)}"
+    while bool(processes_naming(text)) is not is_there:
+        assert time.monotonic() < end_s, f"running: {processes_naming(text)}"
         time.sleep(0.05)
 
 

@@ -4,6 +4,7 @@ import errno
 import select
 import socket
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -40,7 +41,10 @@ class Connection(Protocol):
     """
 
     def receive(self, timeout_s: float) -> bytes:
-        """The bytes that came, or b"" when nothing came in time."""
+        """All that has come, once something has, or b"" when nothing came in time.
+
+        A loop that wakes late judges no silence before it has heard it.
+        """
 
     def send(self, frame: bytes) -> None:
         """Send one packet; one datagram a packet on UDP. Dropped when nobody is there to take it."""
@@ -78,16 +82,15 @@ class UdpConnection:
         return int(self._socket.getsockname()[1])
 
     def receive(self, timeout_s: float) -> bytes:
-        if not readable(self._socket, timeout_s):
-            return b""
-        for _ in range(MOST_DATAGRAMS):
-            try:
+        pieces: list[bytes] = []
+        with suppress(OSError):
+            for number in range(MOST_DATAGRAMS):
+                if not readable(self._socket, 0.0 if number else timeout_s):
+                    break
                 datagram, sender = self._socket.recvfrom(READ_SIZE)
-            except OSError:
-                return b""
-            if self._peer.accepts(datagram, sender[:2], time.monotonic_ns() // 1000):
-                return datagram
-        return b""
+                if self._peer.accepts(datagram, sender[:2], time.monotonic_ns() // 1000):
+                    pieces.append(datagram)
+        return b"".join(pieces)
 
     def fileno(self) -> int:
         return self._socket.fileno()

@@ -122,7 +122,7 @@ def test_ctrl_c_while_waiting_for_px4_ends_everything(tmp_path):
     folder = tmp_path / "run"
     process = start("fly", WALL, "--sim", "px4", "--instance", INSTANCE, "--out", folder)
     assert str(SIMULATOR_PORT) in next_line_with(process, "Waiting for PX4")
-    assert command.processes_naming(folder / "resolved.yaml")
+    command.wait_until_there(folder / "resolved.yaml")
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
     assert process.returncode == 1
