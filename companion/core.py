@@ -369,8 +369,13 @@ class FlightCore(Core[FlightContext, Machine]):
         return situation_of(self.flight, off_state, state is State.LANDING, is_held=True)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
-        """The samples in a local frame that does not jump when the estimator resets its position."""
+        """The samples in a local frame that does not jump when the estimator resets its position.
+
+        One that is still wrong from a hit only puts that right.
+        """
         before, most_m = self.resets.shift_ned_m, self.flight.mission.limits.max_step_m
+        if not self.reflex.monitor.estimator.validity.is_valid:
+            most_m = 0.0
         if not PLACES.isdisjoint(map(type, samples)):
             samples = [self.resets.follow(sample, most_m) for sample in samples]
         if self.resets.shift_ned_m != before:
@@ -411,7 +416,7 @@ class Limiter:
         """
         latest = flight.vehicle.history.latest
         around = Surroundings(
-            vehicle_ned_m=None if latest is None else latest.position_ned_m,
+            vehicle_ned_m=None if latest is None else flight.reflex.place_ned_m(latest),
             origin_ned_m=flight.origin_ned_m,
             has_floor=has_floor,
             last_ned_m=None if moved else self.last_ned_m,

@@ -114,10 +114,12 @@ class LocalPosition(Sample):
 
 
 @dataclass(frozen=True, slots=True)
-class GpsVelocity(Sample):
-    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift. Its time stamp is no boot time."""
+class GpsFix(Sample):
+    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift, and its place. Its stamp is no boot."""
 
     velocity_ne_m_s: tuple[float, float]
+    latitude_deg: float
+    longitude_deg: float
 
 
 @dataclass(frozen=True, slots=True)

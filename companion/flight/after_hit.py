@@ -1,5 +1,7 @@
 """The mission's policy for hits: decided at each hit, acted on when the vehicle has settled."""
 
+import math
+
 from companion.flight.context import AfterRecovery, BeforeHit, FlightContext, Target, Transition
 from companion.flight.states import State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem
@@ -36,7 +38,7 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
 def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str, str]:
     """What follows, and the reason where that is not the policy's `then`."""
     limit_m_s = flight.mission.abort_when.hit_above_m_s
-    speed_m_s = flight.collisions[-1].report().impact_speed_m_s
+    speed_m_s = math.hypot(*flight.collisions[-1].contact.velocity_ned_m_s)
     if limit_m_s is not None and speed_m_s > limit_m_s:
         return "abort", f"hit at {speed_m_s:.2f} m/s, above abort_when.hit_above_m_s = {limit_m_s:g}"
     if hits >= policy.max_hits:

@@ -125,7 +125,7 @@ def is_finite(target: Target) -> bool:
     ]
     if target.lean is not None:
         belief = target.lean.belief
-        parts += [belief.attitude_wxyz, belief.level_m_s2, (belief.yaw_rate_rad_s,)]
+        parts += [belief.attitude_wxyz, belief.level_m_s2, (belief.yaw_rate_rad_s, belief.heading_error_rad)]
     values = [value for part in parts for value in part]
     return all(map(math.isfinite, values)) and (target.yaw_rad is None or math.isfinite(target.yaw_rad))
 

@@ -35,7 +35,7 @@ def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -
         RequestedStream(MessageId.ATTITUDE_QUATERNION, messages.Attitude, config.attitude_hz, config.min_attitude_hz),
         RequestedStream(MessageId.EXTENDED_SYS_STATE, messages.ExtendedState, config.extended_sys_state_hz, 0.0),
         RequestedStream(MessageId.CURRENT_MODE, messages.CurrentMode, config.current_mode_hz, 0.0),
-        RequestedStream(MessageId.GPS_RAW_INT, messages.GpsVelocity, config.gps_raw_int_hz, 0.0),
+        RequestedStream(MessageId.GPS_RAW_INT, messages.GpsFix, config.gps_raw_int_hz, 0.0),
     )
     wished = (
         RequestedStream(MessageId.ATTITUDE_TARGET, messages.AttitudeTarget, config.attitude_target_hz, 0.0),

@@ -47,7 +47,9 @@ LEVEL_SPREAD_M_S2 = 0.5
 # gyroscopes' bias, and takes it off HIGHRES_IMU.
 LEVEL_DRIFT_M2_S5 = (0.01 * GRAVITY_M_S2) ** 2
 
-# --- a receiver's velocity
+# --- a receiver's place and velocity
+# The earth's mean radius.
+EARTH_M = 6_371_000.0
 # Delay of a satellite receiver's velocity: PX4's default EKF2_GPS_DELAY; the receivers that ArduPilot knows have 0.1 to
 # 0.22 s (AP_GPS's get_lag), a simulated one none.
 RECEIVER_DELAY_S, RECEIVER_SPREAD_S, RECEIVER_LATEST_S = 0.11, 0.06, 0.3

@@ -1,22 +1,25 @@
-"""The velocity that a satellite receiver measures by Doppler shift, carried on to now by the accelerometer.
+"""The velocity that a satellite receiver measures by Doppler shift, and its place, carried on to now.
 
 No accelerometer has a part in it: after a clipped hit it shows what the vehicle's own estimate lacks. What is received
 now was measured earlier. Delay and noise are learnt in free flight. With the vehicle's own velocity v, its acceleration
 a by the accelerometer and the delay d
 
     u(t) = v(t - d) + noise,    u(t) - v(t) = -d a + noise
+
+How far its place is from the vehicle's own is learnt in free flight, too.
 """
 
 import math
 from dataclasses import dataclass, field
 
-from companion.messages import GpsVelocity, Vector3
+from companion.messages import GpsFix, LocalPosition, Vector3
 from companion.motion.config import (
     CERTAIN,
     DOPPLER_GATE,
     DOPPLER_M_S,
     DOPPLER_MEMORY,
     DRIFT_M2_S3,
+    EARTH_M,
     FINEST_DOPPLER_M_S,
     LEVEL_DRIFT_M2_S5,
     LEVEL_SPREAD_M_S2,
@@ -36,9 +39,13 @@ class Doppler:
     variance_m2_s2: float = DOPPLER_M_S**2
     known: int = 1
     delay: Delay = field(default_factory=lambda: Delay(RECEIVER))
+    place_ned_m: Vector3 | None = None  # horizontal, as of then; None until it is known beside the vehicle's own
+    _first: GpsFix | None = None  # where its places are counted from
+    _off_m: Vector3 | None = None  # the vehicle's own place less the receiver's
 
-    def take(self, sample: GpsVelocity, strapdown: Strapdown, is_free: bool) -> None:
-        """Take one velocity; `is_free`: the vehicle's own is right. What cannot be carried on to now is left out."""
+    def take(self, sample: GpsFix, strapdown: Strapdown, own: LocalPosition | None, is_free: bool) -> None:
+        """Take one fix; `is_free`: the vehicle's own newest report is right. What cannot be carried on to now is left
+        out."""
         if is_free:
             self._learn(sample, strapdown)
         late_s = self.late_s = self.delay.delay_s(self.variance_m2_s2)
@@ -49,8 +56,21 @@ class Doppler:
         surely_s = late_s + CERTAIN * self.delay.error_s(self.variance_m2_s2)
         self.taken_boot_us = strapdown.time_boot_us - round(1e6 * surely_s)
         self.velocity_ned_m_s = (n + faster[0], e + faster[1], 0.0)
+        place = plus(self._counted_m(sample), 0.5 * late_s, plus((n, e, 0.0), 1.0, self.velocity_ned_m_s))
+        if is_free and own is not None:
+            since_s = 1e-6 * (strapdown.time_boot_us - own.time_boot_us)
+            off = minus(plus(own.position_ned_m, since_s, own.velocity_ned_m_s), place)
+            self._off_m = off if self._off_m is None else towards(self._off_m, off, 1.0 / self.known)
+        self.place_ned_m = None if self._off_m is None else plus(place, 1.0, self._off_m)
 
-    def _learn(self, sample: GpsVelocity, strapdown: Strapdown) -> None:
+    def _counted_m(self, sample: GpsFix) -> Vector3:
+        """North and east of the first fix."""
+        first = self._first = self._first or sample
+        north_rad = math.radians(sample.latitude_deg - first.latitude_deg)
+        east_rad = math.remainder(math.radians(sample.longitude_deg - first.longitude_deg), math.tau)
+        return (EARTH_M * north_rad, EARTH_M * east_rad * math.cos(math.radians(first.latitude_deg)), 0.0)
+
+    def _learn(self, sample: GpsFix, strapdown: Strapdown) -> None:
         faster = _faster_by(strapdown, RECEIVER.expected_s)
         if faster is None:
             return

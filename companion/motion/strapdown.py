@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from companion.messages import LocalPosition, Odometry, Quaternion, Vector3
 from companion.motion.config import CURRENT_US, GRAVITY_M_S2, KEPT_US, LONGEST_GAP_US
-from companion.motion.rotation import body_to_ned, ned_to_body, turned
+from companion.motion.rotation import body_to_ned, ned_to_body, turned, yaw_rad
 from companion.motion.vector import ZERO, minus, plus
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -47,6 +47,8 @@ class Strapdown:
     """
     level_acceleration_m_s2: Vector3 = ZERO
     """Horizontal acceleration, NED, of a vehicle that is level by its reported attitude; zero while that is valid."""
+    heading_error_rad: float = 0.0
+    """Of the reported attitude; zero while that is valid."""
     sinks_m_s2: float = 0.0
     """By how much less than by its reported attitude a thrust of 1 g lifts; zero while that is valid."""
     fixes: deque[VelocityFix] = field(default_factory=deque)
@@ -63,9 +65,11 @@ class Strapdown:
             attitude_wxyz = turned(attitude_wxyz, self.rates_frd_rad_s, 1e-6 * behind_us)
         n, e, d = body_to_ned(self.valid_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
         if not most_wrong_rad or -d < math.cos(most_wrong_rad):
-            self.valid_wxyz, self.level_acceleration_m_s2, self.sinks_m_s2 = attitude_wxyz, ZERO, 0.0
+            self.valid_wxyz, self.level_acceleration_m_s2 = attitude_wxyz, ZERO
+            self.heading_error_rad = self.sinks_m_s2 = 0.0
         else:
             self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
+            self.heading_error_rad = math.remainder(yaw_rad(attitude_wxyz) - yaw_rad(self.valid_wxyz), math.tau)
             told, valid = (body_to_ned(each, (0.0, 0.0, 1.0))[2] for each in (attitude_wxyz, self.valid_wxyz))
             self.sinks_m_s2 = GRAVITY_M_S2 * (told - valid)
 

@@ -194,12 +194,21 @@ class Reflex:
         record = self.hits[-1] if self.hits else None
         if record is None or not (self.law.leans and record.estimator.has_converged):
             return None
-        left_us = record.sample_time_boot_us + numbers.FADED_US - time_boot_us
-        if left_us <= 0:
+        estimator, left_us = record.estimator, record.sample_time_boot_us + numbers.FADED_US - time_boot_us
+        share = min(1.0, left_us / (numbers.FADED_US - numbers.FADES_FROM_US))
+        if estimator.is_measured_apart:
+            share = 1.0
+        if share <= 0.0:
             return None
-        estimator, share = record.estimator, min(1.0, left_us / (numbers.FADED_US - numbers.FADES_FROM_US))
         pushed = ZERO if self.keeps_trim else plus(estimator.wind_m_s2, 1.0, estimator.tilted_m_s2)
         return LeftWrong(share, estimator.position_error_m, estimator.velocity_error_m_s, pushed)
+
+    def place_ned_m(self, reported: LocalPosition) -> Vector3:
+        """Where the vehicle is: by the belief in a recovery, then as reported without what is left wrong."""
+        if self.hits and not self.hits[-1].is_over:
+            return self.hits[-1].estimator.motion.position_ned_m
+        place, wrong = reported.position_ned_m, self.left_wrong(reported.time_boot_us)
+        return place if wrong is None else plus(place, -wrong.share, wrong.position_m)
 
     # --- by which law
 

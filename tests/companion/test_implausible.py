@@ -63,7 +63,8 @@ def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_res
     )
 
 
-def test_a_reset_moves_no_vehicle_and_is_told():
+@pytest.mark.parametrize("is_wrong", [False, True])
+def test_a_reset_moves_no_vehicle_and_is_told_but_where_it_puts_right_what_a_hit_left(is_wrong):
     # Given a vehicle that hovers, and counts its resets
     f = hovering()
 
@@ -76,8 +77,15 @@ def test_a_reset_moves_no_vehicle_and_is_told():
     before_m = list(f.vehicle.position)
     # When its estimate jumps by 3 m north
     f.vehicle.position[0] += 3.0
+    if is_wrong:
+        f.companion.core.reflex.monitor.estimator.validity.invalidate(f.vehicle.time_us, 2.0)
     attacked(f, [counted(1, 1000), counted(1, 2000)])
     f.run_for(1.0)
+    if is_wrong:
+        assert f.vehicle.setpoints[-1][1].x == pytest.approx(before_m[0], abs=0.02), (
+            "it was somewhere else all the time"
+        )
+        return
     # Then it stays where it is, which it now calls 3 m further north, and the mission goes on
     assert f.vehicle.position == pytest.approx([before_m[0] + 3.0, *before_m[1:]], abs=0.02)
     assert f.vehicle.setpoints[-1][1].x == pytest.approx(before_m[0] + 3.0, abs=0.02)

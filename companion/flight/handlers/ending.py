@@ -129,7 +129,8 @@ def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now
     # Two positions in a row have to say so: one forged or broken packet ends no flight.
     if when.outside_fence_by_m is not None and latest is not None and earlier is not None:
         fence = flight.mission.fence
-        outside_m = min(fence.outside_by_m(flight.mission_ned_m(one.position_ned_m)) for one in (latest, earlier))
+        places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (latest, earlier)]
+        outside_m = min(map(fence.outside_by_m, places))
         if outside_m > when.outside_fence_by_m:
             return f"the vehicle is {outside_m:.2f} m outside the fence"
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6

@@ -94,7 +94,7 @@ class Recover:
     def _tell(self, flight: FlightContext, shown: Progress, now_us: int) -> None:
         record, place = self._recovery.record, self._recovery.record.setpoint_ned_m
         if shown.rested_s is not None:
-            text = f"at rest {shown.rested_s:.2f} s after the hit; from here on by position"
+            text = f"at rest; by position from here on, {shown.rested_s:.2f} s after the hit"
             flight.report(now_us, "hand_over", text, after_s=shown.rested_s, recovery_setpoint_ned_m=place)
         if shown.rebound_m_s is not None:
             goal, off_m_s = as_text(flight.mission_ned_m(place)), shown.rebound_m_s

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from companion.messages import Attitude, GpsVelocity, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
+from companion.messages import Attitude, GpsFix, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
 from companion.motion.config import STAMP_RESOLUTION_US
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
@@ -120,9 +120,9 @@ class ImpactEstimator:
                 self.history.add(sample)
             self.strapdown.velocity(sample)
             self.validity.update(sample.time_boot_us)
-        elif isinstance(sample, GpsVelocity):
+        elif isinstance(sample, GpsFix):
             is_free = self.validity.is_valid and (self.estimate is None or self.estimate.is_final)
-            self.doppler.take(sample, self.strapdown, is_free)
+            self.doppler.take(sample, self.strapdown, self.history.latest, is_free)
         elif isinstance(sample, Attitude):
             time_us = sample.time_boot_us
             self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.tilt_error_rad(time_us))

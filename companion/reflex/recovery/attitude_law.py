@@ -36,6 +36,7 @@ class Belief:
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude
+    heading_error_rad: float = 0.0  # of the vehicle's own attitude
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,9 +132,11 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     by_axis = along((n, e, (max(d, 0.0) if lies else d) - GRAVITY_M_S2), up)
     thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
     thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
-    asked = minus((n, e, -lifts_m_s2), belief.level_m_s2)
-    # No heading is asked for but the present one: motors that turn the vehicle have no thrust left to lift it.
-    return tilted(asked, turn_rad(belief.attitude_wxyz)), thrust
+    n, e, d = minus((n, e, -lifts_m_s2), belief.level_m_s2)
+    turned_rad = belief.heading_error_rad
+    c, s = math.cos(turned_rad), math.sin(turned_rad)
+    # No heading is asked for but the vehicle's own: motors that turn it have no thrust left to lift it.
+    return tilted((n * c - e * s, n * s + e * c, d), turn_rad(belief.attitude_wxyz) + turned_rad), thrust
 
 
 def turn_kept(yaw_rate_rad_s: float) -> float:

@@ -88,7 +88,8 @@ class CollisionRecord:
             self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal)
         self.estimator.imu(strapdown)
         self.estimator.measure(source.doppler)
-        if self.is_over and strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US:
+        is_left = strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US or self.estimator.is_measured_apart
+        if self.is_over and is_left:
             for sample in positions:
                 self.estimator.update(sample)
 

@@ -59,6 +59,7 @@ class MotionEstimator:
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
+    heading_error_rad: float = 0.0  # of the vehicle's own attitude
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, by gyroscopes, NED
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
@@ -72,6 +73,7 @@ class MotionEstimator:
     _moved_m_s: Vector3 = ZERO  # the integral up to that time
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
     _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
+    _lasting_error_m_s: Vector3 = ZERO  # its mean of late, by a receiver
     _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
@@ -90,7 +92,7 @@ class MotionEstimator:
         self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
         self.has_converged = self._has_agreed = self._was_odd = False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
-        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
+        self.position_error_m = self._hidden_error_m_s = self._lasting_error_m_s = self._rate_error_m_s = ZERO
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
@@ -116,6 +118,7 @@ class MotionEstimator:
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
         self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
+        self.heading_error_rad = strapdown.heading_error_rad
         if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
             # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
             self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
@@ -149,6 +152,7 @@ class MotionEstimator:
             self.attitude_wxyz,
             self.yaw_rate_rad_s,
             self.tilted_m_s2,
+            self.heading_error_rad,
         )
 
     @property
@@ -157,7 +161,7 @@ class MotionEstimator:
         return self.level_m_s2 if self._measured is None else plus(self.level_m_s2, 1.0, self._measured.unseen_m_s2)
 
     def measure(self, doppler: Doppler) -> None:
-        """Take a receiver's velocity: the horizontal one from then on, until the vehicle's own agrees with it."""
+        """Take a receiver's velocity and place: the horizontal ones from then on, until the vehicle's own agrees."""
         was = self._measured
         newest_us = self.pushed_boot_us if was is None else was.taken_boot_us
         is_right = self.is_fully_measured or self._has_agreed or (self.has_converged and was is None)
@@ -170,15 +174,21 @@ class MotionEstimator:
         was_odd, self._was_odd = self._was_odd, is_odd
         if is_odd and not was_odd:
             return
+        since_s = 1e-6 * (now_us - max(known.taken_boot_us, self.hit_boot_us))
         known.update(doppler)
         self._measured = known
-        self._believe(self.motion, self.spread_m_s)
+        place = self.motion.position_ned_m
+        if doppler.place_ned_m is not None:
+            n, e, _ = minus(doppler.place_ned_m, place)
+            off = limited((n, e, 0.0), DOPPLER_GATE * reflex.PLACE_SPREAD_M)
+            place = plus(place, since_s / (reflex.FOLLOWED_S + since_s), off)
+        self._believe(replace(self.motion, position_ned_m=place), self.spread_m_s)
 
     @property
     def is_measured_apart(self) -> bool:
         """Whether a receiver shows the velocity, and the vehicle's own is another, which it puts right by itself."""
         is_right = self.is_fully_measured or self._has_agreed
-        if self._measured is None or is_right or self._time_boot_us - self.hit_boot_us > reflex.FADED_US:
+        if self._measured is None or is_right:
             return False
         return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
 
@@ -257,7 +267,8 @@ class MotionEstimator:
         bank.leave(normal, along(self._summed_m_s, normal), self.normal.error_rad)
         motion, spread_m_s, left_m_s = bank.estimate(left)
         # Of the height the report is right sooner than any model: a barometer shows no hit.
-        n, e, _ = self.motion.position_ned_m if self.has_converged else motion.position_ned_m
+        is_led = self.has_converged or self._measured is not None
+        n, e, _ = self.motion.position_ned_m if is_led else motion.position_ned_m
         estimate = MotionState((n, e, place[2]), motion.velocity_ned_m_s)
         is_known, error_m_s = left_m_s <= SAME_M_S, bank.mean_error(1, g)
         if not self.fits_models:
@@ -270,11 +281,9 @@ class MotionEstimator:
             self.has_converged = True
         else:
             self._believe(estimate, spread_m_s)
-        if self.has_converged and not self._has_agreed:
+        if self.has_converged and not (self._has_agreed or self.is_measured_apart):
             n, e, _ = bank.mean_error(0, way_s)
-            self.position_error_m = (n, e, 0.0)
-            if self._measured is None:
-                self._hidden_error_m_s = error_m_s
+            self.position_error_m, self._hidden_error_m_s = (n, e, 0.0), error_m_s
 
     def _compare(
         self, reported_m_s: Vector3, climb_error_m_s: float, elapsed_s: float, is_known: bool, time_boot_us: int
@@ -286,7 +295,8 @@ class MotionEstimator:
         """
         off = minus(reported_m_s, self.motion.velocity_ned_m_s)
         share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
-        n, e, _ = error = towards(self._hidden_error_m_s, off, share)
+        n, e, _ = off
+        error = self._lasting_error_m_s = towards(self._lasting_error_m_s, off, share)
         steady_us, same_us = self._agrees_since_boot_us
         steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)
         same_us = _since(_differs_m_s(off, ZERO) <= SAME_M_S, same_us, time_boot_us)
@@ -299,8 +309,11 @@ class MotionEstimator:
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter.
 
-        A velocity that is measured apart stays.
+        A velocity that is measured apart stays, and so does the place that it leads to: the report's is compared.
         """
+        if self.is_measured_apart:
+            n, e, _ = minus(sample.position_ned_m, self.motion.position_ned_m)
+            self.position_error_m = (n, e, 0.0)
         measured = self.corrected(sample)
         was, share, before, self._newest = self.motion, 1.0, self._newest, measured
         if before is not None:

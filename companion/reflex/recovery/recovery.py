@@ -15,7 +15,7 @@ from companion.motion.settling import SettlingMonitor
 from companion.motion.vector import along, minus, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.config import RecoveryConfig
-from companion.reflex.recovery.attitude_law import Lean, wanted
+from companion.reflex.recovery.attitude_law import Lean, brakable_m_s, wanted
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import Contact, Law, MotionState
 from companion.reflex.surface import Surface, projected
@@ -67,8 +67,7 @@ class Recovery:
         self.rests_s = settled.duration_s if keeps_trim else reflex.RESTS_S
         self._contact = record.contact  # as known now, at the vehicle's place while the obstacle goes along
         self._surfaces = self._around(self._contact)
-        expected = record.contact.rebound(config.restitution)
-        record.setpoint_ned_m = self._told_ned_m = self._goal(expected)
+        record.setpoint_ned_m = self._told_ned_m = self._goal(record.estimator.start)
         self._has_left = self._has_passed = False
         self._slow_since_us: int | None = None
         self._held_since_us = record.sample_time_boot_us  # by a position
@@ -145,7 +144,10 @@ class Recovery:
         """
         estimator, motion = self.record.estimator, self.record.estimator.motion
         is_there = math.dist(motion.position_ned_m, self.record.setpoint_ned_m) <= reflex.PLACE_SPREAD_M
-        if not estimator.has_converged or not is_there or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
+        # An error that PX4 corrects of a sudden makes it as fast: no more than it brakes within the clearance.
+        most_m_s = brakable_m_s(self._config.clearance_m, reflex.LEAD_S)
+        is_off = not estimator.has_converged or math.hypot(*estimator.velocity_error_m_s) > most_m_s
+        if is_off or not is_there or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
             self._slow_since_us = None
             return False
         self._slow_since_us = self._slow_since_us or sample.time_boot_us

@@ -7,14 +7,17 @@ import pytest
 from companion.core import Limiter
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.envelope import SetpointError
+from companion.flight.handlers.ending import early_end
 from companion.flight.handlers.recovering import Recover
 from companion.flight.obstacle_map import FlightRoom
+from companion.flight.states import State
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, AttitudeSetpoint, LandedState, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.config import SAME_M_S
-from companion.motion.strapdown import LEVEL
+from companion.motion.doppler import Doppler
+from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO
 from companion.reflex.config import NOTICED_S, EstimateConfig
 from companion.reflex.recovery.collision import CollisionRecord
@@ -218,6 +221,38 @@ def test_the_wind_is_sent_to_a_position_control_that_begins_without_it(keeps_tri
     flight.reflex.keeps_trim, estimator = keeps_trim, flight.collisions[0].estimator
     estimator.has_converged, estimator.external_m_s2 = True, (0.0, 1.0, 0.0)
     assert flight.reflex.left_wrong(HIT_US + 1_000_000).pushed_m_s2 == (0.0, wind_m_s2, 0.0)
+
+
+def measured_apart() -> MotionEstimator:
+    """Of a hit whose error a receiver shows, 13 s later."""
+    contact, now_us = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH), HIT_US + 13_000_000
+    estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
+    estimator.imu(Strapdown(time_boot_us=now_us))
+    estimator.measure(Doppler(taken_boot_us=now_us))
+    estimator.has_converged, estimator.position_error_m = True, (30.0, 0.0, 0.0)
+    return estimator
+
+
+@pytest.mark.parametrize("is_apart", [False, True])
+def test_what_is_left_wrong_of_a_hit_fades_but_while_a_receiver_shows_it(is_apart):
+    flight = flight_with(estimator=measured_apart() if is_apart else None)
+    flight.collisions[0].estimator.has_converged = True
+    wrong = flight.reflex.left_wrong(HIT_US + 13_000_000)
+    assert wrong.share == 1.0 if is_apart else wrong is None
+
+
+@pytest.mark.parametrize("is_over", [False, True])
+def test_a_vehicle_that_takes_itself_for_outside_the_fence_is_where_the_belief_has_it(is_over):
+    # Given an estimate that a hit has left wrong by 30 m
+    flight = flight_with(estimator=measured_apart())
+    flight.armed_at_us, flight.collisions[0].is_over = 0, is_over
+    positions = [LocalPosition(HIT_US + since_us, (33.0, 0.0, -2.0), ZERO) for since_us in (12_980_000, 13_000_000)]
+    for sample in positions:
+        flight.vehicle.history.add(sample)
+    # Then neither the flight ends nor is the setpoint held back
+    assert early_end(flight, State.RECOVERING, Inputs(positions=positions), 0) is None
+    asked = Target(AT, 0.0)
+    assert Limiter().passed(flight, asked, has_floor=True, moved=True, now_us=0) == asked
 
 
 @pytest.mark.parametrize("wrong_m_s", [40.0, math.nan])

@@ -6,14 +6,14 @@ import random
 import pytest
 
 from companion.mavlink.readers import sample_from
-from companion.messages import GpsVelocity, LocalPosition, Refused
-from companion.motion.config import FINEST_DOPPLER_M_S, LATEST_S, SAME_M_S, SettledConfig
+from companion.messages import GpsFix, LocalPosition, Refused
+from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, SAME_M_S, SettledConfig
 from companion.motion.delay import RECEIVER, Delay
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
-from companion.motion.rotation import body_to_ned, yaw_rad
+from companion.motion.rotation import body_to_ned, turned, yaw_rad
 from companion.motion.settling import SettlingMonitor
-from companion.motion.strapdown import Strapdown
+from companion.motion.strapdown import LEVEL, Strapdown
 from companion.reflex.config import EstimateConfig
 from companion.reflex.recovery.laws import Contact
 from companion.reflex.recovery.motion_estimator import MotionEstimator
@@ -97,6 +97,7 @@ class Air:
         self.strapdown, self.doppler, self.draw = Strapdown(), Doppler(), random.Random(1)
         self.late, self.noise_m_s = round(late_s / 0.004), noise_m_s
         self.now_us, self.velocities, self.reported_off_m_s = began_us, [0.0], 0.0
+        self.newest, self.reported_off_m, self.place_noise_m = None, 0.0, 0.0
 
     def step(self, acceleration_m_s2=0.0, is_free=True, receives=True, turns_rad_s=0.0):
         self.now_us += 4_000
@@ -105,13 +106,15 @@ class Air:
         tick, sample = len(self.velocities), None
         if tick % 5 == 0:
             velocity = (self.velocities[-1] + self.reported_off_m_s, 0.0, 0.0)
-            sample = LocalPosition(self.now_us, (4.0 + 0.004 * sum(self.velocities), 0.0, -2.0), velocity)
+            place = (4.0 + 0.004 * sum(self.velocities) + self.reported_off_m, 0.0, -2.0)
+            self.newest = sample = LocalPosition(self.now_us, place, velocity)
             self.strapdown.velocity(sample)
         if receives and tick % 25 == 0 and tick > self.late:
             noise = [self.draw.gauss(0.0, self.noise_m_s) for _ in range(2)]
-            self.doppler.take(
-                GpsVelocity((self.velocities[-1 - self.late] + noise[0], noise[1])), self.strapdown, is_free
-            )
+            measured = self.velocities[: tick - self.late]
+            north_m = 0.004 * sum(measured) + self.draw.gauss(0.0, self.place_noise_m)
+            fix = GpsFix((measured[-1] + noise[0], noise[1]), 47.0 + math.degrees(north_m / EARTH_M), 8.0)
+            self.doppler.take(fix, self.strapdown, self.newest, is_free)
         return sample
 
 
@@ -122,6 +125,15 @@ def test_between_two_reports_the_gyroscope_turns_the_attitude():
         for number in range(1, 26):
             strapdown.imu(4_000 * number, (0.0, 0.0, -G), (p * number, q * number, r * number))
         assert 2.0 * math.asin(sum(strapdown.valid_wxyz[1:])) == pytest.approx(0.1, abs=1e-4)
+
+
+@pytest.mark.parametrize("most_wrong_rad", [0.0, 0.2])
+def test_a_heading_that_is_reported_while_a_hit_is_corrected_is_compared_with_the_gyroscopes(most_wrong_rad):
+    strapdown = Strapdown(time_boot_us=4_000)
+    strapdown.attitude(4_000, turned(LEVEL, (0.0, 0.0, 0.3), 1.0), most_wrong_rad)
+    is_wrong = most_wrong_rad > 0.0
+    assert strapdown.heading_error_rad == pytest.approx(0.3 if is_wrong else 0.0)
+    assert yaw_rad(strapdown.valid_wxyz) == pytest.approx(0.0 if is_wrong else 0.3)
 
 
 @pytest.mark.parametrize("late_s", [0.012, 0.06, 0.2])
@@ -246,12 +258,24 @@ def test_an_error_that_changes_is_not_known():
     assert found.left_m_s == math.inf
 
 
-def test_after_twelve_seconds_the_vehicle_has_put_itself_right():
-    air, found = clipped(off_m_s=6.0, rebound_m_s=0.0)
-    go_on(air, found, 11.9)
+@pytest.mark.parametrize(("noise_m", "within_m"), [(0.0, 0.1), (2.0, 0.35)])
+def test_the_place_is_the_receivers_as_far_as_that_is_good_until_the_vehicles_estimate_agrees(noise_m, within_m):
+    # Given a receiver whose places are known beside the vehicle's own, and an estimate that a hit leads off by 2 m
+    air = Air(0.112, noise_m_s=0.02)
+    air.place_noise_m = noise_m
+    for _ in range(500):
+        air.step()
+    contact = Contact(air.now_us, (4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
+    found = MotionEstimator(contact, air.now_us, contact.rebound(0.45), EstimateConfig())
+    air.reported_off_m, air.reported_off_m_s = 2.0, 0.4
+    # When it is off for longer than any model says
+    for _ in range(20):
+        newest = go_on(air, found, 1.0)
+        air.reported_off_m = 2.0 + 0.1 * math.sin(air.now_us)
+    # Then the vehicle is where the receiver has it, and what is wrong of the report is known
     assert found.is_measured_apart
-    go_on(air, found, 0.2)
-    assert not found.is_measured_apart
+    assert found.motion.position_ned_m[0] == pytest.approx(4.0, abs=within_m)
+    assert found.position_error_m[0] == pytest.approx(newest.position_ned_m[0] - 4.0, abs=within_m)
 
 
 def test_a_swing_that_passes_the_measured_velocity_before_any_model_knows_it_is_no_agreement():
@@ -302,7 +326,7 @@ def test_one_velocity_beyond_belief_does_not_count_and_two_do():
         air.now_us += 4_000
         air.strapdown.imu(air.now_us, (0.0, 0.0, -G), (0.0, 0.0, 0.0))
         found.imu(air.strapdown)
-        air.doppler.take(GpsVelocity((30.0, 0.0)), air.strapdown, is_free=False)
+        air.doppler.take(GpsFix((30.0, 0.0), 47.0, 8.0), air.strapdown, None, is_free=False)
         found.measure(air.doppler)
         shown_m_s = found.motion.velocity_ned_m_s[0]
         assert shown_m_s == pytest.approx(expected_m_s, abs=0.1) if expected_m_s < 0.0 else shown_m_s > expected_m_s / 4
@@ -317,11 +341,14 @@ def test_a_receiver_that_falls_silent_leaves_the_belief_to_the_reports():
 
 
 def gps(**fields):
-    return sample_from("GPS_RAW_INT", (1, 1), {"fix_type": 3, "vel": 250, "cog": 9000, **fields})
+    place = {"lat": 471234567, "lon": -81234567}
+    return sample_from("GPS_RAW_INT", (1, 1), {"fix_type": 3, "vel": 250, "cog": 9000, **place, **fields})
 
 
-def test_gps_raw_int_is_read_as_a_velocity():
-    assert gps().velocity_ne_m_s == pytest.approx((0.0, 2.5))
+def test_gps_raw_int_is_read_as_a_velocity_and_a_place():
+    fix = gps()
+    assert fix.velocity_ne_m_s == pytest.approx((0.0, 2.5))
+    assert (fix.latitude_deg, fix.longitude_deg) == pytest.approx((47.1234567, -8.1234567))
     for unknown in ({"fix_type": 2}, {"vel": 0xFFFF}, {"cog": 0xFFFF}):
         assert gps(**unknown) is None
     assert isinstance(gps(vel=10_100), Refused)

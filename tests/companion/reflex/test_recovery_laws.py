@@ -217,6 +217,15 @@ def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_
     assert up_of(attitude) == pytest.approx((0.0, 0.0, -1.0)), "level by its own attitude"
 
 
+def test_a_vehicle_that_is_wrong_about_its_heading_leans_as_meant_and_does_not_turn():
+    # Given one that heads east and takes itself for half a radian further to the south
+    belief = Belief(HERE, ZERO, attitude_wxyz=tilted((0.0, 0.0, -GRAVITY_M_S2), 1.57), heading_error_rad=0.5)
+    attitude, _ = attitude_and_thrust((3.0, 0.0, 0.0), lean(belief))
+    # Then a lean to the north is one as far to the east for itself, and its heading is what it takes it for
+    leans = (3.0 * math.cos(0.5), 3.0 * math.sin(0.5), -GRAVITY_M_S2)
+    assert attitude == pytest.approx(tilted(leans, 2.07), abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("full_m_s2", "upright"), [(13.0, GRAVITY_M_S2 / 13.0 / 0.85), (30.0, math.cos(MOST_TILT_RAD))]
 )
