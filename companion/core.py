@@ -373,10 +373,10 @@ class FlightCore(Core[FlightContext, Machine]):
 
         One that is still wrong from a hit only puts that right.
         """
-        before, most_m = self.resets.shift_ned_m, self.flight.mission.limits.max_step_m
-        if not self.reflex.monitor.estimator.validity.is_valid:
-            most_m = 0.0
+        before = self.resets.shift_ned_m
         if not PLACES.isdisjoint(map(type, samples)):
+            is_valid = self.reflex.monitor.estimator.validity.is_valid
+            most_m = self.flight.mission.limits.max_step_m if is_valid else 0.0
             samples = [self.resets.follow(sample, most_m) for sample in samples]
         if self.resets.shift_ned_m != before:
             jump_m = math.dist(self.resets.shift_ned_m, before)

@@ -182,33 +182,39 @@ class Reflex:
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             self.hits[-1].follow(self.monitor.state, self.monitor.estimator, positions)
             validity, estimator = self.monitor.estimator.validity, self.hits[-1].estimator
-            is_newest = validity.invalid_since_boot_us == estimator.hit_boot_us
-            validity.left_m_s = estimator.left_m_s if is_newest else math.inf
-            validity.is_disproved = estimator.is_measured_apart
+            if validity.invalid_since_boot_us is not None:
+                is_newest = validity.invalid_since_boot_us == estimator.hit_boot_us
+                validity.left_m_s = estimator.left_m_s if is_newest else math.inf
+                validity.is_disproved = estimator.is_measured_apart
         self.crash.update(samples, height_m, landed)
 
     def left_wrong(self, time_boot_us: int) -> LeftWrong | None:
         """The errors that the newest hit has left in the vehicle's estimate and tilt, and what its integrators have
-        forgotten while it was flown by attitude. They fade out, as PX4 puts all of it right by itself.
+        forgotten while it was flown by attitude.
         """
-        record = self.hits[-1] if self.hits else None
-        if record is None or not (self.law.leans and record.estimator.has_converged):
+        share = self._left_share(time_boot_us)
+        if share <= 0.0 or not self.law.leans:
             return None
-        estimator, left_us = record.estimator, record.sample_time_boot_us + numbers.FADED_US - time_boot_us
-        share = min(1.0, left_us / (numbers.FADED_US - numbers.FADES_FROM_US))
-        if estimator.is_measured_apart:
-            share = 1.0
-        if share <= 0.0:
-            return None
+        estimator = self.hits[-1].estimator
         pushed = ZERO if self.keeps_trim else plus(estimator.wind_m_s2, 1.0, estimator.tilted_m_s2)
         return LeftWrong(share, estimator.position_error_m, estimator.velocity_error_m_s, pushed)
+
+    def _left_share(self, time_boot_us: int) -> float:
+        """They fade out, as PX4 puts all of it right by itself, but for what a receiver shows."""
+        if not self.hits or not self.hits[-1].estimator.has_converged:
+            return 0.0
+        left_us = self.hits[-1].sample_time_boot_us + numbers.FADED_US - time_boot_us
+        share = left_us / (numbers.FADED_US - numbers.FADES_FROM_US)
+        return 1.0 if share >= 1.0 or self.hits[-1].estimator.is_measured_apart else share
 
     def place_ned_m(self, reported: LocalPosition) -> Vector3:
         """Where the vehicle is: by the belief in a recovery, then as reported without what is left wrong."""
         if self.hits and not self.hits[-1].is_over:
             return self.hits[-1].estimator.motion.position_ned_m
-        place, wrong = reported.position_ned_m, self.left_wrong(reported.time_boot_us)
-        return place if wrong is None else plus(place, -wrong.share, wrong.position_m)
+        share = self._left_share(reported.time_boot_us)
+        if share <= 0.0:
+            return reported.position_ned_m
+        return plus(reported.position_ned_m, -share, self.hits[-1].estimator.position_error_m)
 
     # --- by which law
 

@@ -73,7 +73,6 @@ class MotionEstimator:
     _moved_m_s: Vector3 = ZERO  # the integral up to that time
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
     _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
-    _lasting_error_m_s: Vector3 = ZERO  # its mean of late, by a receiver
     _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
@@ -92,7 +91,7 @@ class MotionEstimator:
         self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
         self.has_converged = self._has_agreed = self._was_odd = False
         self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
-        self.position_error_m = self._hidden_error_m_s = self._lasting_error_m_s = self._rate_error_m_s = ZERO
+        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
@@ -295,11 +294,12 @@ class MotionEstimator:
         """
         off = minus(reported_m_s, self.motion.velocity_ned_m_s)
         share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
-        n, e, _ = off
-        error = self._lasting_error_m_s = towards(self._lasting_error_m_s, off, share)
+        n, e, _ = error = towards(self._hidden_error_m_s, off, share)
         steady_us, same_us = self._agrees_since_boot_us
         steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)
-        same_us = _since(_differs_m_s(off, ZERO) <= SAME_M_S, same_us, time_boot_us)
+        # `spread_m_s` is the measured one's.
+        is_same = _differs_m_s(off, ZERO) <= math.hypot(SAME_M_S, self.spread_m_s)
+        same_us = _since(is_same, same_us, time_boot_us)
         self._agrees_since_boot_us = (steady_us, same_us)
         is_steady = self.fits_models and steady_us is not None and time_boot_us - steady_us > SHOWN_US
         self._has_agreed = same_us is not None and time_boot_us - same_us > 1e6 * reflex.COMPARED_S
