@@ -233,6 +233,27 @@ def measured_apart() -> MotionEstimator:
     return estimator
 
 
+def test_it_is_not_handed_over_to_a_velocity_that_is_far_off():
+    flight = flight_with()
+    recover, estimator = recover_in(flight), flight.collisions[0].estimator
+    # Given a vehicle at rest that takes itself for 2 m/s fast, and then for 0.5
+    for from_us, wrong_m_s, kind in ((100_000, 2.0, AttitudeSetpoint), (600_000, 0.5, PositionSetpoint)):
+        estimator._hidden_error_m_s = (wrong_m_s, 0.0, 0.0)
+        for since_us in range(from_us, from_us + 500_000, 20_000):
+            _, sent = hears(flight, recover, since_us, 2.4, wrong_m_s)
+        assert isinstance(sent, kind)
+
+
+def test_what_a_receiver_shows_to_be_wrong_is_followed_after_the_recovery():
+    flight = flight_with(estimator=measured_apart())
+    record = flight.collisions[0]
+    record.is_over = True
+    wrong = LocalPosition(HIT_US + 13_000_000, (record.estimator.motion.position_ned_m[0] + 20.0, 0.0, -2.0), ZERO)
+    flight.reflex.monitor.estimator.strapdown.time_boot_us = wrong.time_boot_us
+    flight.reflex.follow([wrong], 2.0, LandedState.IN_AIR)
+    assert record.estimator.position_error_m[0] == pytest.approx(20.0)
+
+
 @pytest.mark.parametrize("is_apart", [False, True])
 def test_what_is_left_wrong_of_a_hit_fades_but_while_a_receiver_shows_it(is_apart):
     flight = flight_with(estimator=measured_apart() if is_apart else None)

@@ -14,6 +14,7 @@ from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, turned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.motion.strapdown import LEVEL, Strapdown
+from companion.motion.vector import ZERO
 from companion.reflex.config import EstimateConfig
 from companion.reflex.recovery.laws import Contact
 from companion.reflex.recovery.motion_estimator import MotionEstimator
@@ -134,6 +135,11 @@ def test_a_heading_that_is_reported_while_a_hit_is_corrected_is_compared_with_th
     is_wrong = most_wrong_rad > 0.0
     assert strapdown.heading_error_rad == pytest.approx(0.3 if is_wrong else 0.0)
     assert yaw_rad(strapdown.valid_wxyz) == pytest.approx(0.0 if is_wrong else 0.3)
+    _, found = clipped()
+    for time_us in (8_000, 12_000):
+        strapdown.imu(time_us, (0.0, 0.0, -G), ZERO)
+        found.imu(strapdown)
+    assert found.belief.heading_error_rad == strapdown.heading_error_rad
 
 
 @pytest.mark.parametrize("late_s", [0.012, 0.06, 0.2])
@@ -217,8 +223,8 @@ def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_
     air.reported_off_m_s = -1.0
     go_on(air, found, 0.5)
     assert found.is_measured_apart
-    # When it stays there
-    air.reported_off_m_s = 0.0
+    # When it stays there, as far as this receiver can tell
+    air.reported_off_m_s = 0.18
     go_on(air, found, 0.7)
     # Then it counts again
     assert found.has_converged
@@ -276,6 +282,12 @@ def test_the_place_is_the_receivers_as_far_as_that_is_good_until_the_vehicles_es
     assert found.is_measured_apart
     assert found.motion.position_ned_m[0] == pytest.approx(4.0, abs=within_m)
     assert found.position_error_m[0] == pytest.approx(newest.position_ned_m[0] - 4.0, abs=within_m)
+    # And one fix that jumps by 50 m leads it by no more than a tenth of a metre
+    before_m = found.motion.position_ned_m[0]
+    jumps = GpsFix((0.0, 0.0), 47.0 + math.degrees(50.0 / EARTH_M), 8.0)
+    air.doppler.take(jumps, air.strapdown, air.newest, is_free=False)
+    found.measure(air.doppler)
+    assert abs(found.motion.position_ned_m[0] - before_m) < 0.1
 
 
 def test_a_swing_that_passes_the_measured_velocity_before_any_model_knows_it_is_no_agreement():
