@@ -192,6 +192,12 @@ class MotionEstimator:
         return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
 
     @property
+    def is_known(self) -> bool:
+        """Whether what is wrong of the report is known as it is now."""
+        is_steady = self._agrees_since_boot_us[0] is not None
+        return self.has_converged and (is_steady or not self.is_measured_apart)
+
+    @property
     def left_m_s(self) -> float:
         """By how much the reported velocity may be wrong; infinite until that is known."""
         return SAME_M_S + math.hypot(*self.velocity_error_m_s) if self.has_converged else math.inf

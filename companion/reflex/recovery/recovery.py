@@ -146,7 +146,7 @@ class Recovery:
         is_there = math.dist(motion.position_ned_m, self.record.setpoint_ned_m) <= reflex.PLACE_SPREAD_M
         # An error that PX4 corrects of a sudden makes it as fast: no more than it brakes within the clearance.
         most_m_s = brakable_m_s(self._config.clearance_m, reflex.LEAD_S)
-        is_off = not estimator.has_converged or math.hypot(*estimator.velocity_error_m_s) > most_m_s
+        is_off = not estimator.is_known or math.hypot(*estimator.velocity_error_m_s) > most_m_s
         if is_off or not is_there or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
             self._slow_since_us = None
             return False

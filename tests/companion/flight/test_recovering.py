@@ -21,7 +21,7 @@ from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO
 from companion.reflex.config import NOTICED_S, EstimateConfig
 from companion.reflex.recovery.collision import CollisionRecord
-from companion.reflex.recovery.laws import Contact
+from companion.reflex.recovery.laws import Contact, MotionState
 from companion.reflex.recovery.motion_estimator import MotionEstimator
 from companion.reflex.recovery.recovery import Recovery
 from companion.reflex.reflex import start_reflex
@@ -225,10 +225,11 @@ def test_the_wind_is_sent_to_a_position_control_that_begins_without_it(keeps_tri
 
 def measured_apart() -> MotionEstimator:
     """Of a hit whose error a receiver shows, 13 s later."""
-    contact, now_us = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH), HIT_US + 13_000_000
+    contact, now_us = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH, 0.2), HIT_US + 13_000_000
     estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
     estimator.imu(Strapdown(time_boot_us=now_us))
-    estimator.measure(Doppler(taken_boot_us=now_us))
+    for taken_us in range(now_us, now_us + 100):
+        estimator.measure(Doppler(taken_boot_us=taken_us))
     estimator.has_converged, estimator.position_error_m = True, (30.0, 0.0, 0.0)
     return estimator
 
@@ -242,6 +243,18 @@ def test_it_is_not_handed_over_to_a_velocity_that_is_far_off():
         for since_us in range(from_us, from_us + 500_000, 20_000):
             _, sent = hears(flight, recover, since_us, 2.4, wrong_m_s)
         assert isinstance(sent, kind)
+
+
+def test_it_is_not_handed_over_while_what_is_wrong_of_its_velocity_changes():
+    # Given a vehicle at rest that soon takes itself for 1 m/s fast
+    estimator = measured_apart()
+    estimator.motion = MotionState((2.4, *AT[1:]), ZERO)
+    flight = flight_with(estimator=estimator)
+    recover = recover_in(flight)
+    for since_us in range(13_020_000, 13_300_000, 20_000):
+        estimator.imu(Strapdown(time_boot_us=HIT_US + since_us))
+        _, sent = hears(flight, recover, since_us, 2.4, 1.0 if since_us > 13_080_000 else 0.0)
+    assert isinstance(sent, AttitudeSetpoint)
 
 
 def test_what_a_receiver_shows_to_be_wrong_is_followed_after_the_recovery():

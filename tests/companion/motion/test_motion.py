@@ -252,6 +252,12 @@ def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
         assert math.dist(found.motion.position_ned_m, found.corrected(newest).position_ned_m) < 0.05
         assert 0.0 < found.spread_m_s < 0.2, "the velocity is the receiver's, and as good"
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.0, abs=0.1)
+    # When it changes fast then it is not known until that is over
+    air.reported_off_m_s = 3.0
+    go_on(air, found, 0.5)
+    assert found.has_converged and not found.is_known
+    go_on(air, found, 3.0)
+    assert found.is_measured_apart and found.is_known
 
 
 def test_an_error_that_changes_is_not_known():
@@ -260,7 +266,7 @@ def test_an_error_that_changes_is_not_known():
         air.reported_off_m_s -= 0.1
         go_on(air, found, 0.1)
     assert found.is_measured_apart
-    assert not found.has_converged
+    assert not found.has_converged and not found.is_known
     assert found.left_m_s == math.inf
 
 
