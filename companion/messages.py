@@ -115,7 +115,7 @@ class LocalPosition(Sample):
 
 @dataclass(frozen=True, slots=True)
 class GpsFix(Sample):
-    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift, and its place. Its stamp is no boot."""
+    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift, and place. Its stamp is no boot time."""
 
     velocity_ne_m_s: tuple[float, float]
     latitude_deg: float

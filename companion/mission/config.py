@@ -33,7 +33,7 @@ class StreamsConfig(StrictModel):
     current_mode_hz: Rate = 10.0
     """Mode changes are acted on within a tenth of a second."""
     gps_raw_int_hz: Rate = 10.0
-    """The receiver's own velocity, which no hit can falsify; receivers have 5 to 10 Hz."""
+    """The receiver's own velocity and place, which no hit can falsify; receivers have 5 to 10 Hz."""
     window_s: Positive = 2.0
     """Long enough to see 80 samples of the slowest acceptable IMU stream."""
     min_highres_imu_hz: NotNegative = 40.0
