@@ -82,9 +82,7 @@ def test_a_reset_moves_no_vehicle_and_is_told_but_where_it_puts_right_what_a_hit
     attacked(f, [counted(1, 1000), counted(1, 2000)])
     f.run_for(1.0)
     if is_wrong:
-        assert f.vehicle.setpoints[-1][1].x == pytest.approx(before_m[0], abs=0.02), (
-            "it was somewhere else all the time"
-        )
+        assert f.vehicle.setpoints[-1][1].x == pytest.approx(before_m[0], abs=0.02), "it had been elsewhere"
         return
     # Then it stays where it is, which it now calls 3 m further north, and the mission goes on
     assert f.vehicle.position == pytest.approx([before_m[0] + 3.0, *before_m[1:]], abs=0.02)
