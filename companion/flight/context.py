@@ -1,9 +1,11 @@
 """What the parts of a flight share: the mission, the vehicle's state, messages to send and events."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from companion.autopilot.known import defaults
 from companion.flight.states import State, Trigger
 from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
@@ -25,12 +27,16 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
+from companion.motion.rotation import yaw_rad
 from companion.motion.vector import ZERO, minus, plus
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.reflex import Reflex
 from companion.report import Event, JsonValue, Outcome
+
+# As the autopilot's own modes turn: the vehicle can follow.
+TURNING_RAD_S = math.radians(defaults.TURNING_DEG_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +232,19 @@ class FlightContext:
         if not self.has_position:
             return Target(place_ned_m, yaw_rad)
         return Target(place_ned_m, yaw_rad, velocity_ned_m_s, acceleration_ned_m_s2)
+
+    def heading_towards(self, wanted_rad: float | None, rate_rad_s: float = TURNING_RAD_S) -> float | None:
+        """The heading to ask for on the way to a wanted one: it leads the vehicle's own by what turns it at a rate.
+
+        Motors that turn a vehicle as fast as they can have no thrust left to climb with. One that something holds they
+        turn over it.
+        """
+        attitude = self.vehicle.attitude
+        if wanted_rad is None or attitude is None:
+            return wanted_rad
+        heading_rad, lead_rad = yaw_rad(attitude.attitude_wxyz), rate_rad_s / defaults.YAW_GAIN_PER_S
+        short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
+        return wanted_rad if abs(short_rad) <= lead_rad else heading_rad + math.copysign(lead_rad, short_rad)
 
     def report(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""

@@ -153,9 +153,6 @@ LEAST_THRUST = 0.12
 THRUST_LEARNT_S = 0.5
 # Rest, by the belief: as slow as a hovering vehicle wanders by a poor estimate, for so long.
 RESTS_M_S, RESTS_S = 0.2, 0.1
-# Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
-# A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
-YAW_LEAD_RAD = 0.28
 # PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
 BRAKES_M_S2 = 3.0
 # An attitude is flown on for COM_OF_LOSS_T: no vehicle that leans by 35 degrees is safe for longer than this.

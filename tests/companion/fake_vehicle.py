@@ -63,6 +63,7 @@ class FakeVehicle:
 
     time_us: int = 5_000_000
     yaw_rad: float = 0.0
+    yaw_rate_rad_s: float = 0.0
     roll_rad: float = 0.0
     mode: int = LOITER
     intended: int = LOITER
@@ -167,7 +168,21 @@ class FakeVehicle:
             push, self.push_m_s2 = self.push_m_s2, (0.0, 0.0)
             self.send(
                 mav.MAVLink_highres_imu_message(
-                    self.time_us, f[0] + push[0], f[1] + push[1], f[2], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F
+                    self.time_us,
+                    f[0] + push[0],
+                    f[1] + push[1],
+                    f[2],
+                    0,
+                    0,
+                    self.yaw_rate_rad_s,
+                    0,
+                    0,
+                    0,
+                    0,
+                    0,
+                    0,
+                    0,
+                    0x3F,
                 )
             )
         if n % 5 == 0 and not self.no_positions:
@@ -194,9 +209,12 @@ class FakeVehicle:
 
     def move(self) -> None:
         dt = INTERVAL_US * 1e-6
-        command = [0.0, 0.0, 0.0]
+        command, self.yaw_rate_rad_s = [0.0, 0.0, 0.0], 0.0
         if self.armed and self.mode == OFFBOARD and self.target is not None:
             t = self.target
+            if not t.type_mask & 0x400:
+                self.yaw_rate_rad_s = 2.8 * math.remainder(t.yaw - self.yaw_rad, math.tau)
+                self.yaw_rad += self.yaw_rate_rad_s * dt
             acceleration_only = t.type_mask & 0x007
             ahead = self.position if acceleration_only else [t.x, t.y, t.z]
             forward = [0.0, 0.0, 0.0] if t.type_mask & 0x038 else [t.vx, t.vy, t.vz]

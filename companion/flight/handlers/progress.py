@@ -3,9 +3,8 @@
 import math
 from dataclasses import dataclass, replace
 
-from companion.autopilot.known import defaults
 from companion.flight import expectations
-from companion.flight.context import FlightContext, Inputs, StepTally, Target, Transition
+from companion.flight.context import TURNING_RAD_S, FlightContext, Inputs, StepTally, Target, Transition
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
@@ -46,7 +45,7 @@ class _OnTrajectory:
 
     def _turned(self, motion: Motion, now_us: int) -> float | None:
         """The heading at this motion."""
-        return self._flight.yaw_rad
+        return self._flight.heading_towards(self._flight.yaw_rad)
 
     def target(self, now_us: int) -> Target | None:
         elapsed_s = self._elapsed_s
@@ -129,13 +128,15 @@ class FlyItems(_OnTrajectory):
             flight.report(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
 
     def interrupt(self, now_us: int) -> None:
-        """A hit ends the present trajectory: note which points of a path were passed."""
+        """A hit ends the present trajectory: note its heading, and which points of a path were passed."""
+        self._flight.yaw_rad = self._heading.yaw_rad
         if isinstance(self._action, items.PathItem):
             tally = self._flight.tally
             tally.points_passed = max(tally.points_passed, passed(self._action, self._trajectory, self._elapsed_s))
 
     def _turned(self, motion: Motion, now_us: int) -> float | None:
-        return self._heading.turn(motion[0], motion[1], now_us)
+        wanted_rad = self._heading.turn(motion[0], motion[1], now_us)
+        return self._flight.heading_towards(wanted_rad, self._heading.rate_rad_s)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         damage, wanted = flight.motors.damage, flight.mission.on_damage
@@ -227,18 +228,17 @@ class HoldAfterRecovery:
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         hold_s = flight.after_recovery.hold_s
         self._until_us = now_us + round(hold_s * 1e6)
-        self._target = flight.target
+        self._flight, self._target = flight, flight.target
         flight.report(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)
 
     def target(self, now_us: int) -> Target | None:
-        return self._target
+        target, flight = self._target, self._flight
+        return target and replace(target, yaw_rad=flight.heading_towards(flight.yaw_rad))
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return Transition(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
 
 
-# As the autopilot's own modes turn: the vehicle can follow.
-YAW_RATE_RAD_S = math.radians(defaults.TURNING_DEG_S)
 # Slower, or nearer, than this there is no direction that noise in the last digits could not have made.
 _LEAST_SPEED_M_S = 0.05
 _LEAST_DISTANCE_M = 0.05
@@ -259,7 +259,7 @@ class Heading:
     def of_step(cls, step: items.Step, yaw_rad: float | None, now_us: int) -> "Heading":
         """The heading that the step asks for, beginning with the present one."""
         action = step.action
-        rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else YAW_RATE_RAD_S
+        rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else TURNING_RAD_S
         asked = getattr(action, "yaw_deg", None)
         fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad
         centre = action.centre_ned_m if isinstance(action, items.OrbitItem) and asked == "centre" else None
@@ -305,7 +305,6 @@ class FlyHome(_OnTrajectory):
         self._flight = flight
         self._trajectory_began_us = flight.trajectory_us
         flight.going_home = True
-        flight.yaw_rad = flight.target.yaw_rad
         start = flight.mission_ned_m(flight.target.position_ned_m)
         wind_m_s2, homewards = flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0)
         speeds = replace(flight.speeds, factor=1.0).against(wind_m_s2, homewards)

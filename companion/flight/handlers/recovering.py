@@ -1,12 +1,8 @@
 """State recovering: asks the reflex for the way to rest, and tells how it goes."""
 
-import math
-
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
-from companion.motion.rotation import yaw_rad
-from companion.reflex.config import YAW_LEAD_RAD
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.collision import CollisionReport
 from companion.reflex.recovery.recovery import Progress, Recovery
@@ -49,31 +45,15 @@ class Recover:
         self._flight, self._recovery = flight, recovery
         *_, first = flight.reflex.in_one_recovery()
         self._first_hit_us = first.detected_at_us
-        if flight.target is not None and first is recovery.record:
-            flight.yaw_rad = flight.target.yaw_rad
 
     def target(self, now_us: int) -> Target | None:
         """Attitude and thrust until it rests; then its place."""
-        place = self._recovery.record.setpoint_ned_m
+        flight, place = self._flight, self._recovery.record.setpoint_ned_m
+        yaw_rad = flight.heading_towards(flight.yaw_rad)
         if not self._recovery.leans:
-            return Target(place, self._yaw_rad)
-        acceleration, lean = self._flight.reflex.lean()
-        return Target(place, self._yaw_rad, None, acceleration, lean)
-
-    @property
-    def _yaw_rad(self) -> float | None:
-        """The heading to ask for on the way back to the wanted one: it leads the vehicle's own by YAW_LEAD_RAD at most.
-
-        Motors that turn a vehicle as fast as they can have no thrust left to climb with.
-        """
-        attitude, wanted_rad = self._flight.vehicle.attitude, self._flight.yaw_rad
-        if attitude is None:
-            return wanted_rad
-        heading_rad = yaw_rad(attitude.attitude_wxyz)
-        if wanted_rad is None:
-            return heading_rad if self._recovery.leans else None
-        short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
-        return wanted_rad if abs(short_rad) <= YAW_LEAD_RAD else heading_rad + math.copysign(YAW_LEAD_RAD, short_rad)
+            return Target(place, yaw_rad)
+        acceleration, lean = flight.reflex.lean()
+        return Target(place, yaw_rad, None, acceleration, lean)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         for sample in inputs.positions:
