@@ -26,18 +26,20 @@ STILL = (0.0, 0.0, 0.0)
 IN_FLIGHT = Situation(may_crash=True, landed_state=LandedState.IN_AIR, height_m=3.0)
 # Noise by a hair's breadth: velocities that stand still to the last digit are no estimate.
 HAIR_M_S = 1e-3
+INTERVAL_US = 4_000
 
 
 @dataclass
 class Watch:
     """`impacts`, `finished` and `notices`: of all that has been heard, the last with its time."""
 
+    config: CompanionConfig = field(default_factory=CompanionConfig)
     impacts: list = field(default_factory=list)
     finished: list = field(default_factory=list)
     told: list[tuple[int, str, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.monitor = start_monitor(CompanionConfig(detector="fused"), 0)
+        self.monitor = start_monitor(self.config, 0)
 
     def texts(self, kind: str) -> list[str]:
         return [text for _, of, text in self.told if of == kind]
@@ -51,9 +53,12 @@ class Watch:
         rates: Callable[[int], Vector3] = lambda t: STILL,
         attitude: Callable[[int], Quaternion | None] = lambda t: LEVEL,
         look: Callable[[int], None] = lambda t: None,
+        situation: Situation = IN_FLIGHT,
+        from_us: int = INTERVAL_US,
+        every_us: int = INTERVAL_US,
     ) -> "Watch":
         """`push` is what moves it beside its thrust, body m/s^2; no attitude comes where there is none."""
-        for t in range(4_000, until_us, 4_000):
+        for t in range(from_us, until_us, every_us):
             x, y, z = push(t)
             samples: list[Sample] = [ImuSample(t, (x, y, z - 9.80665), rates(t))]
             if t % 32_000 == 0:
@@ -62,7 +67,7 @@ class Watch:
                 samples += [Odometry(t, place(t), told, 0), LocalPosition(t, place(t), told)]
                 wxyz = attitude(t)
                 samples += [] if wxyz is None else [Attitude(t, wxyz, rates(t))]
-            seen = advance(self.monitor, samples, IN_FLIGHT, t)
+            seen = advance(self.monitor, samples, situation, t)
             self.impacts += seen.impacts
             self.finished += seen.finished
             self.told += [(t, notice.kind, notice.text) for notice in seen.notices]
@@ -70,61 +75,36 @@ class Watch:
         return self
 
 
-INTERVAL_US = 4_000
-WANTED = Situation()
-
-
-def lateral(**changes):
-    return BaselineConfig(detector="lateral", **changes)
-
-
-def fly(monitor, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WANTED, start_us=INTERVAL_US):
-    """North at 2 m/s, level; `push` is the contact's force per unit mass on body x, m/s^2."""
-    impacts, finished, notices = [], [], []
-    for t in range(start_us, until_us, every_us):
-        north_m = 2.0 * t * 1e-6
-        samples: list[Sample] = [ImuSample(t, (push(t), 0.0, -9.81), (0.0, 0.0, 0.0))]
-        samples.append(LocalPosition(t, (north_m, 0.0, -1.5), (2.0, 0.0, 0.0)))
-        samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
-        seen = advance(monitor, samples, situation, t)
-        impacts += seen.impacts
-        finished += seen.finished
-        notices += seen.notices
-    return impacts, finished, notices
-
-
 def test_late_and_doubled_samples_are_dropped_and_a_reboot_is_not():
-    monitor = start_monitor(lateral(), 0)
-    fly(monitor, 2_900_000)
-    at = monitor.estimator.strapdown.time_boot_us
-    late = ImuSample(at - INTERVAL_US, (-50.0, 0.0, -9.81), (0.0, 0.0, 0.0))
-    assert not advance(monitor, [late], WANTED, 2_900_000).impacts
-    fly(monitor, 500_000)
-    assert monitor.estimator.strapdown.time_boot_us < 500_000
+    watch = Watch().fly(2_900_000)
+    strapdown = watch.monitor.estimator.strapdown
+    late = ImuSample(strapdown.time_boot_us - INTERVAL_US, (-50.0, 0.0, -9.81), STILL)
+    assert not advance(watch.monitor, [late], IN_FLIGHT, 2_900_000).impacts
+    watch.fly(500_000)
+    assert strapdown.time_boot_us < 500_000
 
 
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
-        (lambda monitor: advance(monitor, [], WANTED, 1_500_000), "no HIGHRES_IMU for 250 ms"),
+        (lambda watch: advance(watch.monitor, [], IN_FLIGHT, 1_500_000), "no HIGHRES_IMU for 250 ms"),
+        (lambda watch: watch.fly(4_000_000, from_us=1_000_000, every_us=100_000), "HIGHRES_IMU at 10 Hz, below 20"),
         (
-            lambda monitor: fly(monitor, 4_000_000, every_us=100_000, start_us=1_000_000),
-            "HIGHRES_IMU at 10 Hz, below 20",
+            lambda watch: watch.fly(4_000_000, lambda t: (12.0 * math.sin(t), 0.0, 0.0), from_us=1_000_000),
+            "vibration hides",
         ),
-        (lambda monitor: fly(monitor, 4_000_000, lambda t: 12.0 * math.sin(t), start_us=1_000_000), "vibration hides"),
     ],
 )
 def test_a_blind_watch_says_why_and_a_seeing_one_says_it_sees_again(spoil, reason):
-    monitor = start_monitor(lateral(), 0)
-    fly(monitor, 1_000_000)
-    assert monitor.no_data_reason is None
-    spoil(monitor)
-    assert reason in monitor.no_data_reason
-    assert monitor.describe().startswith("blind (")
-    _, _, notices = fly(monitor, 12_000_000, start_us=4_000_000)
-    assert monitor.no_data_reason is None
-    assert monitor.state.phase is Phase.ARMED
-    assert "the detector sees again" in [notice.text for notice in notices]
+    watch = Watch(BaselineConfig(detector="lateral")).fly(1_000_000)
+    assert watch.monitor.no_data_reason is None
+    spoil(watch)
+    assert reason in watch.monitor.no_data_reason
+    assert watch.monitor.describe().startswith("blind (")
+    watch.fly(12_000_000, from_us=4_000_000)
+    assert watch.monitor.no_data_reason is None
+    assert watch.monitor.state.phase is Phase.ARMED
+    assert watch.texts("link")[-1] == "the detector sees again"
 
 
 def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_is_blind():
@@ -145,16 +125,16 @@ def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_
 def test_a_touch_that_tips_the_vehicle_over_is_a_crash_as_soon_as_it_lies_there():
     # Given a vehicle that has touched the ground, upright, and is in its next take-off for the detector
     down = Situation(may_crash=True, height_m=0.2, descent_commanded=True)
-    monitor = start_monitor(CompanionConfig(), 0)
-    fly(monitor, 2_000_000, situation=down._replace(height_m=3.0))
-    (touch,), *_ = fly(monitor, 2_020_000, lambda t: -60.0, situation=down, start_us=2_000_000)
-    assert touch.impact.kind.value == "landing"
+    watch = Watch().fly(2_000_000, situation=down._replace(height_m=3.0))
+    watch.fly(2_020_000, lambda t: (-60.0, 0.0, 0.0), situation=down, from_us=2_000_000)
+    (touch,), monitor = watch.impacts, watch.monitor
+    assert touch.impact.kind is ImpactKind.LANDING
     # When it tumbles 0.2 s later
     monitor.estimator.strapdown.valid_wxyz = (0.5, math.sqrt(0.75), 0.0, 0.0)
     tilted = down._replace(off_reason="below 0.5 m")
     sample = ImuSample(2_220_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
     _, impact = monitor.detector.step(monitor.state, sample, tilted, monitor.estimator)
-    assert impact is not None and impact.kind.value == "crash"
+    assert impact is not None and impact.kind is ImpactKind.CRASH
     # Then it is one crash
     again = ImuSample(2_240_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
     assert monitor.detector.step(monitor.state, again, tilted, monitor.estimator)[1] is None
@@ -308,9 +288,6 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
     assert strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
 
 
-TICK_US = 4_000
-
-
 class FreeRoom:
     """Nothing else is known, and there is no fence."""
 
@@ -326,11 +303,11 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
     # Given a vehicle that flies north, whose estimator takes a jump back, as of a hit that clipping hides whole
     config, rejected = CompanionConfig(), []
     reflex = start_reflex(config, RecoveryConfig(), config.settled, 0)
-    for us in range(TICK_US, 3_600_000, TICK_US):
+    for us in range(INTERVAL_US, 3_600_000, INTERVAL_US):
         samples: list[Sample] = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
-        if us % (5 * TICK_US) == 0:
+        if us % (5 * INTERVAL_US) == 0:
             place = (2e-6 * us, 0.0, -2.0)
-            velocity = (1.0 if us == 3_000_000 else 2.0, 0.0, 1e-3 * (us // (5 * TICK_US) % 2))
+            velocity = (1.0 if us == 3_000_000 else 2.0, 0.0, 1e-3 * (us // (5 * INTERVAL_US) % 2))
             told = [Odometry(us, place, velocity, 0), Attitude(us, LEVEL, ZERO), LocalPosition(us, place, velocity)]
             samples = [*told, messages.AttitudeTarget(us, 0.6), *samples]
         for estimate in reflex.step(samples, IN_FLIGHT, us).collisions:
