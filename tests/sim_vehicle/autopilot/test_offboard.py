@@ -17,6 +17,7 @@ from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.autopilot import kinematic_plant
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Flight, hovering, in_offboard, set_mode, sticks, target
+from tests.sim_vehicle.physics.throwing import flown
 
 NORTH = kinematic_plant.attitude_of_yaw(0.0)
 EAST = kinematic_plant.attitude_of_yaw(math.pi / 2)
@@ -168,16 +169,14 @@ def thrown_up() -> tuple[Plant, float]:
     airframe = load_built_in("foldable")
     plant = Plant(airframe, Scene(), seed=1)
     plant.place((0.0, 0.0, -20.0), (0.0, 0.0, 0.0))
-    for _ in range(100):
-        plant.step(TrajectorySetpoint((0.0, 0.0, -20.0)), armed=True)
+    flown(plant, TrajectorySetpoint((0.0, 0.0, -20.0)), 0.4)
     return plant, airframe.hover_fraction
 
 
 def test_the_loops_lean_as_asked_and_accelerate_as_leaning_does():
     plant, hover = thrown_up()
     asked = AttitudeSetpoint(leaning(15.0), hover / math.cos(math.radians(15.0)))
-    for _ in range(250):
-        output = plant.step(asked, armed=True)
+    output = flown(plant, asked, 1.0)[-1]
     assert math.degrees(2 * math.asin(output.attitude_wxyz[1])) == pytest.approx(15.0, abs=1.0)
     # Right wing down flies to the right, g tan 15 deg less what the first quarter of a second misses
     assert output.velocity_ned_m_s[1] == pytest.approx(9.81 * math.tan(math.radians(15.0)) * 0.8, abs=0.35)
@@ -186,8 +185,7 @@ def test_the_loops_lean_as_asked_and_accelerate_as_leaning_does():
 
 def test_the_loops_turn_at_the_rates_asked_for():
     plant, hover = thrown_up()
-    for _ in range(60):
-        output = plant.step(RatesSetpoint((0.8, -0.4, 0.5), hover), armed=True)
+    output = flown(plant, RatesSetpoint((0.8, -0.4, 0.5), hover), 0.24)[-1]
     assert output.angular_velocity_frd_rad_s == pytest.approx((0.8, -0.4, 0.5), abs=0.12)
 
 

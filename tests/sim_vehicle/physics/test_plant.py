@@ -10,23 +10,18 @@ from bench.cases.vehicles import vehicle_of
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.attitude import attitude_control
 from sim_vehicle.control.setpoint import TrajectorySetpoint
-from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.physics.layout import constants_from, initial_state
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
-from tests.sim_vehicle.physics.throwing import quiet
+from tests.sim_vehicle.physics.throwing import flown, quiet
 
 NONE = (None, None, None)
 
 
 def at(north: float, east: float, down: float) -> TrajectorySetpoint:
     return TrajectorySetpoint((north, east, down), NONE, NONE, 0.0, None)
-
-
-def flown(plant: Plant, setpoint: TrajectorySetpoint | None, seconds: float) -> list[Estimate]:
-    return [plant.step(setpoint, armed=setpoint is not None) for _ in range(round(seconds / 0.004))]
 
 
 def hovering(airframe: Airframe, seed: int = 1, **scene: object) -> Plant:

@@ -4,6 +4,8 @@ import math
 from typing import Any
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.control.setpoint import Setpoint
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.plant.interval import FINE_STEPS
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
@@ -32,10 +34,15 @@ def quiet(airframe: Airframe, **changes: object) -> Airframe:
     return Airframe.model_validate(data)
 
 
+def flown(plant: Plant, setpoint: Setpoint | None, seconds: float) -> list[Estimate]:
+    """What it takes itself for in each interval of so long behind a setpoint, or without thrust."""
+    intervals = range(round(seconds / (1e-6 * plant.interval_us)))
+    return [plant.step(setpoint, armed=setpoint is not None) for _ in intervals]
+
+
 def motors_off(plant: Plant, seconds: float) -> Plant:
     """The plant after so long without thrust."""
-    for _ in range(round(seconds / (1e-6 * plant.interval_us))):
-        plant.step(None, armed=False)
+    flown(plant, None, seconds)
     return plant
 
 
