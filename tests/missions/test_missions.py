@@ -14,12 +14,6 @@ NAMES = tuple(sorted(path.stem for path in MISSIONS.glob("*.yaml")))
 WITHOUT_OBSTACLES = ("orbit", "path", "square")
 
 
-def load(name):
-    document = load_document(MISSIONS / f"{name}.yaml")
-    world = world_from(document)
-    return mission_from(document, world), world
-
-
 def test_the_document_lists_all():
     listed = DOCUMENT.read_text().split("## Missions that ship")[1]
     assert sorted(re.findall(r"^\| `(\w+)` \|", listed, flags=re.MULTILINE)) == list(NAMES)
@@ -27,6 +21,8 @@ def test_the_document_lists_all():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_each_is_valid_and_called_like_its_file(name):
-    mission, world = load(name)
+    document = load_document(MISSIONS / f"{name}.yaml")
+    world = world_from(document)
+    mission = mission_from(document, world)
     assert mission.name == name and mission.description
     assert (world.scene.obstacles() == ()) is (name in WITHOUT_OBSTACLES)

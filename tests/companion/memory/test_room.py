@@ -67,10 +67,6 @@ def turned(deg: float):
     return (-math.cos(math.radians(deg)), -math.sin(math.radians(deg)), 0.0)
 
 
-def deg(rad: float) -> float:
-    return math.degrees(rad)
-
-
 # --- from a hit to a touch
 
 
@@ -103,7 +99,7 @@ def test_the_places_give_a_better_normal_than_the_pushes():
     touches = [wall(east_m, normal=turned(30.0), north_m=4.0 - slope * east_m) for east_m in (0.0, 1.0, 2.0)]
     (patch,) = remembered((), touches, CLEARANCE_M)
     assert patch.normal_ned == pytest.approx(turned(10.0), abs=0.02)
-    assert deg(patch.normal_error_rad) < 6.0
+    assert math.degrees(patch.normal_error_rad) < 6.0
 
 
 @pytest.mark.parametrize(

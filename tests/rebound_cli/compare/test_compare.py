@@ -37,11 +37,8 @@ def test_a_dask_scheduler_s_workers_fly_as_this_machine_s_cores_do(tmp_path):
     assert done.returncode == 0, done.stderr
     # Then each flight is as this process flies it
     assert run_here("fly", "wall", "--lockstep", "--seed", "2", "--out", tmp_path / "here").returncode == 0
-    assert flown(tmp_path / "there" / "as-written-seed-2") == flown(tmp_path / "here")
-
-
-def flown(run):
-    return (run / "flight.tlog").read_bytes()
+    there, here = (tmp_path / run / "flight.tlog" for run in ("there/as-written-seed-2", "here"))
+    assert there.read_bytes() == here.read_bytes()
 
 
 def test_what_cannot_be_compared_is_one_sentence_before_anything_is_flown(tmp_path):

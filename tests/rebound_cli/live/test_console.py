@@ -97,16 +97,8 @@ def planned():
     return Mock(plan_is_ready=Mock(return_value=True), plan_text=lambda: "the plan")
 
 
-@pytest.fixture
-def typed():
+def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile():
     reads, writes = os.pipe()
-    yield reads, lambda text: os.write(writes, text)
-    for descriptor in (reads, writes):
-        os.close(descriptor)
-
-
-def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile(typed):
-    reads, types = typed
     companion = planned()
     shown = io.StringIO()
     console = Console(shown)
@@ -116,7 +108,7 @@ def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile
     assert shown.getvalue().count("Fly this plan?") == 1 and console.live_is_held
     # When the vehicle is away, and yes is typed
     companion.plan_is_ready.return_value = False
-    types(b"y\n")
+    os.write(writes, b"y\n")
     person.poll(companion)
     assert not console.live_is_held
     # Then the next plan is asked for, and that yes says nothing of it
@@ -125,9 +117,11 @@ def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile
         person.poll(companion)
     assert shown.getvalue().count("the plan") == 2 and not companion.confirm_plan.called
     # And a yes to that one does
-    types(b"yes\n")
+    os.write(writes, b"yes\n")
     person.poll(companion)
     assert companion.confirm_plan.called and not companion.stop.called
+    for descriptor in (reads, writes):
+        os.close(descriptor)
 
 
 # The last one is the end of input.

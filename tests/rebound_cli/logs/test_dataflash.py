@@ -17,6 +17,7 @@ from companion.messages import Attitude, ExtendedState, Heartbeat, ImuSample, La
 from companion.motion.rotation import body_to_ned
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
+from tests.rebound_cli.logs.test_ulog import of
 
 HEAD = b"\xa3\x95"
 # A letter of FMT to that of struct, and the factor by which a number is kept.
@@ -81,10 +82,6 @@ def read(tmp_path, rows, formats=FORMATS, name="flight.BIN"):
     path = tmp_path / name
     path.write_bytes(dataflash(rows, formats))
     return read_log(path)
-
-
-def of(log, kind):
-    return [heard.sample for heard in log.heard if isinstance(heard.sample, kind)]
 
 
 @pytest.mark.parametrize("name", ["flight.BIN", "flight"])

@@ -96,11 +96,6 @@ def collision(sample_ms, settled_after_s=2.0):
     return replace(made, detected_at_us=made.detected_at_us + 500)
 
 
-def counts(collisions, hits):
-    matches = match_contacts(collisions, hits, SETTLED_S)
-    return matches.false_detections, matches.missed_contacts, matches.recontacts
-
-
 @pytest.mark.parametrize(
     ("collisions", "hits", "expected"),
     [
@@ -123,7 +118,8 @@ def counts(collisions, hits):
     ],
 )
 def test_what_counts(collisions, hits, expected):
-    assert counts(collisions, hits) == expected
+    matches = match_contacts(collisions, hits, SETTLED_S)
+    assert (matches.false_detections, matches.missed_contacts, matches.recontacts) == expected
 
 
 def path_of(rows):

@@ -109,20 +109,16 @@ def answer(time_us: int, armed: bool = True, is_lockstep: bool = True) -> Actuat
     return ActuatorControls(time_us, armed, is_lockstep, HALF_THRUST)
 
 
-def starting() -> Exchange:
-    return Exchange(0)
-
-
 def in_lockstep() -> Exchange:
     """PX4 has answered the sample of 4 ms, sent at the machine's time 1000."""
-    exchange = starting()
+    exchange = Exchange(0)
     exchange.sent(4_000, 1_000)
     exchange.received(answer(4_000))
     return exchange
 
 
 def test_an_answer_to_an_older_sample_gives_its_commands_but_not_the_turn():
-    exchange = starting()
+    exchange = Exchange(0)
     exchange.sent(4_000, 0)
     exchange.sent(8_000, 4_000)
     exchange.received(answer(4_000))
@@ -155,7 +151,7 @@ def test_an_answer_that_does_not_come_is_given_up_after_the_timeout_and_told_onc
 
 
 def test_a_px4_that_never_answers_is_told_of_once():
-    exchange = starting()
+    exchange = Exchange(0)
     for now_us in range(0, STARTING_TIMEOUT_US + 3_000_000, 1_000_000):
         exchange.look_at_clock(now_us)
     assert len(exchange.notices) == 1
@@ -164,7 +160,7 @@ def test_a_px4_that_never_answers_is_told_of_once():
 
 @pytest.mark.parametrize("wrong", [answer(4_000, is_lockstep=False), answer(8_000)])
 def test_a_px4_with_a_clock_of_its_own_is_refused(wrong):
-    exchange = starting()
+    exchange = Exchange(0)
     exchange.sent(4_000, 0)
     with pytest.raises(NotInLockstep, match="lockstep"):
         exchange.received(wrong)
@@ -177,10 +173,6 @@ NOSE_UP = (HALF, 0.0, HALF, 0.0)
 RIGHT_WING_DOWN = (HALF, HALF, 0.0, 0.0)
 
 FOLDABLE = load_built_in("foldable")
-
-
-def new_vehicle() -> HilVehicle:
-    return HilVehicle(FOLDABLE, Scene(), seed=1, sample_interval_us=4_000)
 
 
 def flown(vehicle: HilVehicle, seconds: float, motor_fraction: float) -> list:
@@ -214,7 +206,7 @@ def test_pressure_is_the_standard_atmospheres_and_falls_with_height():
 
 
 def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():
-    vehicle = new_vehicle()
+    vehicle = HilVehicle(FOLDABLE, Scene(), seed=1, sample_interval_us=4_000)
     steps = [vehicle.step(MOTORS_STOPPED) for _ in range(250)]
     assert all(isinstance(messages[-1], HilSensor) for messages in steps)
     assert all(messages[-1].time_us == 4000 * (i + 1) for i, messages in enumerate(steps))

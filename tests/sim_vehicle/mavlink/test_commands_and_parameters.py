@@ -118,29 +118,27 @@ def whole_of(message) -> int:
     return struct.unpack_from("<i", message.get_msgbuf(), 10)[0]
 
 
-def values(client: Client) -> list:
+def told(client: Client, message: dialect.MAVLink_message) -> list:
+    """The values that are told because of it."""
+    client.forget()
+    client.send(message)
+    client.run(0.05)
     return client.all("PARAM_VALUE")
 
 
 def request(client: Client, name: str = "", index: int = -1, target: tuple[int, int] = (1, 1)) -> list:
-    client.forget()
-    client.send(dialect.MAVLink_param_request_read_message(*target, name.encode(), index))
-    client.run(0.02)
-    return values(client)
+    return told(client, dialect.MAVLink_param_request_read_message(*target, name.encode(), index))
 
 
 def set_to(client: Client, name: str, value: float, kind: int, target: tuple[int, int] = (1, 1)) -> list:
-    client.forget()
-    client.send(dialect.MAVLink_param_set_message(*target, name.encode(), value, kind))
-    client.run(0.05)
-    return values(client)
+    return told(client, dialect.MAVLink_param_set_message(*target, name.encode(), value, kind))
 
 
 def test_the_list_is_whole_and_in_order():
     client = Client()
     client.send(dialect.MAVLink_param_request_list_message(1, 1))
     client.run(0.5)
-    listed = values(client)
+    listed = client.all("PARAM_VALUE")
     assert [message.param_index for message in listed] == list(range(listed[0].param_count))
     assert [message.param_id for message in listed] == sorted(Parameters())
     kinds = {message.param_id: message.param_type for message in listed}
@@ -183,7 +181,7 @@ def test_whole_numbers_travel_byte_by_byte(whole):
     payload = struct.pack("<iBB16sB", whole, 1, 1, b"SYS_AUTOSTART", INT32)
     client.push(bytes(message._pack(link, message.crc_extra, payload)))
     client.run(0.05)
-    assert whole_of(values(client)[0]) == whole
+    assert whole_of(client.all("PARAM_VALUE")[0]) == whole
     assert client.vehicle.parameters.stored("SYS_AUTOSTART") == whole
 
 
