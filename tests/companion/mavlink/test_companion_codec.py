@@ -135,18 +135,13 @@ def test_after_a_reboot_of_a_vehicle_that_was_up_for_a_month_stamps_are_as_they_
     assert frames[1][1].time_boot_us == 2_500_000
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 100_000])
-def test_every_sample_is_decoded_in_any_chunking(chunk):
-    stream = b"".join(packed(message) for message, _ in CASES)
+@pytest.mark.parametrize(("chunk", "v1"), [(1, False), (7, False), (100_000, False), (7, True)])
+def test_every_sample_is_decoded_in_any_chunking_and_in_mavlink_1_too(chunk, v1):
+    stream = b"".join(packed(message, v1=v1 and message.get_msgId() < 256) for message, _ in CASES)
     decoder = listening_decoder()
     frames = [f for i in range(0, len(stream), chunk) for f in decoder.feed(stream[i : i + chunk])]
     assert [sample for _, sample in frames] == [sample for _, sample in CASES]
     assert b"".join(frame for frame, _ in frames) == stream
-
-
-def test_mavlink_1_packets_are_understood():
-    message, expected = CASES[2]
-    assert listening_decoder().feed(packed(message, v1=True)) == [(packed(message, v1=True), expected)]
 
 
 @pytest.mark.parametrize(

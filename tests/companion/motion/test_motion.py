@@ -306,14 +306,6 @@ def test_a_swing_that_passes_the_measured_velocity_before_any_model_knows_it_is_
     assert found.is_measured_apart
 
 
-def test_what_was_measured_before_the_contacts_next_push_does_not_count():
-    air, found = clipped()
-    go_on(air, found, 0.5)
-    assert found.is_measured_apart
-    found.note_contact(False, air.now_us, found.normal)
-    assert not found.is_measured_apart
-
-
 def test_an_acceleration_that_the_accelerometer_does_not_show_is_found():
     # Given gyroscopes whose tilt is wrong by 3 degrees
     air, found = clipped()
@@ -350,11 +342,15 @@ def test_one_velocity_beyond_belief_does_not_count_and_two_do():
         assert shown_m_s == pytest.approx(expected_m_s, abs=0.1) if expected_m_s < 0.0 else shown_m_s > expected_m_s / 4
 
 
-def test_a_receiver_that_falls_silent_leaves_the_belief_to_the_reports():
+@pytest.mark.parametrize("is_pushed", [False, True])
+def test_a_receiver_that_is_silent_or_spoke_before_the_contacts_next_push_leaves_the_belief_to_the_reports(is_pushed):
     air, found = clipped()
     go_on(air, found, 1.0)
     assert found.is_measured_apart
-    go_on(air, found, 0.7, receives=False)
+    if is_pushed:
+        found.note_contact(False, air.now_us, found.normal)
+    else:
+        go_on(air, found, 0.7, receives=False)
     assert not found.is_measured_apart
 
 

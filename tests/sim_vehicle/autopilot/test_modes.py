@@ -180,29 +180,19 @@ def test_a_landing_takes_a_second_in_three_stages():
 
 
 @pytest.mark.parametrize(
-    "hinders",
+    ("hinders", "touches"),
     [
-        {"asked_down": None},
-        {"asked_down": 0.25},
-        {"asked_down": -1.0},
-        {"velocity": (0.0, 0.0, 0.3)},
-        {"velocity": (1.6, 0.0, 0.0)},
-        {"thrust": LOW + 0.02},
+        *(({"asked_down": speed_m_s}, False) for speed_m_s in (None, 0.25, -1.0)),
+        *(({"velocity": velocity}, False) for velocity in ((0.0, 0.0, 0.3), (1.6, 0.0, 0.0))),
+        ({"thrust": LOW + 0.02}, False),
+        *((hinders, True) for hinders in ({"rate": (0.4, 0.0, 0.0)}, {"thrust": LOW}, {"force": (0, 0, -1)})),
     ],
     ids=str,
 )
-def test_what_keeps_it_flying(hinders):
+def test_what_keeps_it_flying_and_ground_contact_alone_is_no_landing(hinders, touches):
     detection = Detection()
     detection.feed(5.0, **{"thrust": NONE, **hinders})
-    assert not detection.detector.ground_contact
-
-
-@pytest.mark.parametrize("hinders", [{"rate": (0.4, 0.0, 0.0)}, {"thrust": LOW}, {"force": (0, 0, -1)}], ids=str)
-def test_ground_contact_alone_is_no_landing(hinders):
-    detection = Detection()
-    detection.feed(5.0, **{"thrust": NONE, **hinders})
-    assert detection.detector.ground_contact
-    assert not detection.detector.maybe_landed
+    assert detection.detector.ground_contact is touches and not detection.detector.maybe_landed
 
 
 NAN = math.nan
