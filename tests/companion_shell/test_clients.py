@@ -167,12 +167,11 @@ def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
         ("serial:///dev/ttyUSB0:57600", "clients come by udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"),
         ("udpout://0.0.0.0", "names no host and port"),
         ("udpout://:14540", "names no remote host and port"),
-        ("14540", "did you mean udpin://0.0.0.0:14540?"),
     ],
 )
 def test_an_address_that_is_none_for_clients_is_one_sentence(url, says):
     vehicle = udp_out(LOOPBACK, 1)
-    with pytest.raises(AddressError, match=says.replace("?", "[?]")):
+    with pytest.raises(AddressError, match=says):
         SharedConnection(vehicle, [url], Between(1.0))
 
 

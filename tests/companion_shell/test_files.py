@@ -1,7 +1,6 @@
 """Files of a flight: the key and the time stamp beside it, and the telemetry log against pymavlink's own reader."""
 
 import os
-import stat
 
 import pytest
 from pymavlink import mavutil
@@ -21,13 +20,6 @@ NOW = stamp_at(NOW_US)
 def file(tmp_path):
     write_new(tmp_path / "key", KEY.hex().encode() + b"\n")
     return tmp_path / "key"
-
-
-def test_a_new_file_is_its_owners_alone_and_replaces_none(file):
-    assert stat.S_IMODE(file.stat().st_mode) == 0o600 and read_key(file) == KEY
-    with pytest.raises(SigningFileError, match="exists already"):
-        write_new(file, b"other")
-    assert read_key(file) == KEY
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o610, 0o644])

@@ -79,11 +79,6 @@ def bounced(*after, policy=LAND, **settings):
     return flight(events_with_hit(*(after or LANDS_THERE)), on_collision=policy, **settings)
 
 
-def test_a_flight_as_its_mission_says_has_no_failure():
-    assert failures(flight()) == []
-    assert failures(bounced()) == []
-
-
 def test_a_vehicle_that_leans_by_more_than_a_right_angle_has_tumbled():
     series = made_up.plain_path()
     half = math.radians(100.0) / 2

@@ -61,12 +61,6 @@ def test_eq_3_lies_back_along_the_approach_in_every_quadrant(north, east):
     assert goal[2] == -1.5, "height kept, climb or not"
 
 
-def test_the_papers_own_numbers():
-    """v_c = 2.1 m/s and gamma = 0.5 from x(t_c) = [0.6, 0, -0.5] give x_d = [-0.45, 0, -0.5]."""
-    assert goal_of("paper", Contact(0, (0.6, 0.0, -0.5), (2.1, 0.0, 0.0), SOUTH)) == pytest.approx((-0.45, 0.0, -0.5))
-    assert goal_of("paper", Contact(0, AT, ZERO, SOUTH)) == AT, "hit while hovering: stay"
-
-
 def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
     # 2 m/s at 60 degrees from the normal: 1 m/s into the wall, 1.73 along it
     touched = hit(2.0, math.radians(60))

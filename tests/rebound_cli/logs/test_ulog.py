@@ -152,7 +152,6 @@ def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
     ("status", "parameters", "words"),
     [
         ({"system_type": 1}, (), "fixed-wing aircraft"),
-        ({"system_type": 22}, (), "VTOL aircraft"),
         ({"vehicle_type": 2}, (), "fixed-wing aircraft"),
         ({"vehicle_type": 3}, (), "ground rover"),
         ({"system_type": 2, "vehicle_type": 1, "is_vtol": 1}, (), "VTOL aircraft"),

@@ -12,8 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
-from hypothesis import strategies as st
 
 import rebound_cli.report
 from companion.shell.tlog import read_tlog
@@ -68,17 +66,11 @@ class Opened(HTMLParser):
         return [attributes[name] for _, attributes in self.tags if name in attributes]
 
 
-@given(st.lists(st.floats(-300.0, 300.0), min_size=1, max_size=50))
-def test_numbers_come_back_to_half_the_resolution(values):
-    again = unpacked(packed(np.array(values), 0.01))
-    assert np.abs(again - values).max() <= 0.005 + 1e-9
-
-
 @pytest.mark.parametrize(("most", "kind"), [(60.0, "i2"), (6000.0, "i4")])
 def test_a_column_takes_two_bytes_a_number_where_it_fits_and_four_elsewhere(most, kind):
-    column = packed(np.linspace(-most, most, 7), 0.01)
+    column = packed(values := np.linspace(-most, most, 77), 0.01)
     assert column["kind"] == kind
-    assert np.allclose(unpacked(column), np.linspace(-most, most, 7), atol=0.005)
+    assert np.abs(unpacked(column) - values).max() <= 0.005 + 1e-9
 
 
 def test_what_is_not_finite_is_none_and_harms_no_neighbour():

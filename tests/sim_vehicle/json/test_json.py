@@ -130,8 +130,7 @@ class Sitl:
     def sends(self, count: int, said: bytes = b"") -> None:
         """MAVLink first, as it leaves before the next pulses do."""
         self.mavlink.sendall(said)
-        pulses = struct.pack("<HHI16H", 18_458, 1000, count, *(1000,) * 16)
-        self.states.sendto(pulses, ("127.0.0.1", self.json_port))
+        self.states.sendto(packet(count, *(STOPPED,) * 16), ("127.0.0.1", self.json_port))
 
     def state(self) -> dict | None:
         """What has come; None where nothing has."""
@@ -201,12 +200,3 @@ def test_a_sitl_that_has_gone_ends_the_flight_in_a_sentence(sitl: Sitl) -> None:
     sitl.vehicle._states.settimeout(0.01)
     with pytest.raises(VehicleEnded, match="ArduPilot's SITL has ended"):
         sitl.vehicle.step(b"")
-
-
-def test_who_waits_for_a_sitl_can_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(json_udp, "JSON_PORT", free_port(socket.SOCK_DGRAM))
-    monkeypatch.setattr(json_udp, "MAVLINK_PORT", free_port(socket.SOCK_STREAM))
-    body = JsonVehicle(load_built_in("foldable"), Scene(), 1)
-    stops = iter((False, True))
-    with pytest.raises(VehicleEnded, match="stopped before"):
-        ArduPilotVehicle(body, 0, lambda: next(stops))
