@@ -80,12 +80,6 @@ def test_what_the_companion_sends_once_it_has_heard_of_the_pilot_counts(air: Air
     assert air.after_told == 3
 
 
-def sending() -> Injector:
-    """One setpoint far outside, as if the companion had sent it."""
-    frame = made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0})
-    return Injector(When("mission"), lambda air: air.send(frame))
-
-
 def overruling() -> Injector:
     """Soon after the pilot has taken over, somebody asks for OFFBOARD in the companion's name."""
 
@@ -103,8 +97,10 @@ def overruling() -> Injector:
 @pytest.mark.slow
 def test_a_judge_names_each_kind_of_loss() -> None:
     no_wall = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
+    # One setpoint far outside, as if the companion had sent it
+    far = made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0})
     bad = {
-        "setpoint outside: outside the fence": lambda _: sending(),
+        "setpoint outside: outside the fence": lambda _: Injector(When("mission"), lambda air: air.send(far)),
         "the pilot was overruled": lambda _: overruling(),
         "tumbled: ": lambda _: simulated(motor_failure(0), When("mission", 0.3)),
         "1 false hits counted": lambda _: simulated(

@@ -17,10 +17,6 @@ def items_flown(f: Flight) -> list[int]:
     return [event.data["number"] for event in f.events if event.kind == "item"]
 
 
-def speeds_m_s(f: Flight) -> list[float]:
-    return [hit.impact_speed_m_s for hit in f.report.collisions]
-
-
 @pytest.mark.parametrize(
     ("then", "state", "flown"),
     [("hold", "holding", [2, 3, 4]), ("continue", "mission", [2, 3, 4]), ("land", "landing", [2])],
@@ -43,7 +39,7 @@ def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     f = at_wall(INTO_WALL, ASIDE, on_collision=on_collision, companion=flying)
     f.run_to_end(200)
     assert items_flown(f) == [2, 2, 2], "the rest of the mission is not flown"
-    assert speeds_m_s(f) == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
+    assert [hit.impact_speed_m_s for hit in f.report.collisions] == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
     assert "at 49% of the speed" in f.event("item", 2).text
     assert "recovery 3 of at most 3; after the recovery: return" in f.event("policy").text
     assert f.report.outcome == "completed" and "not flown from item 2 on" in f.report.reason

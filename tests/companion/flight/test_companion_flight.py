@@ -187,12 +187,8 @@ def test_headings_turn_the_shorter_way_at_a_limited_rate():
     assert max(steps) <= math.radians(45) * 0.021
 
 
-class SumError(Exception):
-    pass
-
-
 def breaks(*arguments):
-    raise SumError("the sum is not the sum")
+    raise ArithmeticError("the sum is not the sum")
 
 
 ON_THE_WAY_OUT = ["companion.core.bounded", "companion.core.status_text"]
@@ -218,7 +214,7 @@ def test_whatever_breaks_in_the_air_hands_the_vehicle_over_by_setpoints_that_are
     assert f.report.outcome == "failed"
     assert f.vehicle.mode == fake_vehicle.LOITER and f.vehicle.armed
     if does is breaks:
-        assert "SumError in breaks: the sum is not the sum" in f.report.reason
+        assert "ArithmeticError in breaks: the sum is not the sum" in f.report.reason
         assert "test_companion_flight.py" in f.event("fault").data["traceback"]
     times_us = [at_us for at_us, _ in f.setpoints_since(broken_at_us - 100_000)]
     assert max(b - a for a, b in itertools.pairwise(times_us)) <= 50_000, "no gap before the mode is seen to hold"
@@ -296,15 +292,6 @@ def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_t
     assert phases[-1][0] <= f.report.ended_at_us
 
 
-def spoken(steps):
-    """What is sent when, in tenths of a second, of texts about a subject that are told then."""
-    texts, heard = Texts(), []
-    for tenth in range(40):
-        told = [(subject, StatusText(Severity.WARNING, text)) for at, subject, text in steps if at == tenth]
-        heard += [(tenth, text.text) for text in texts.due(told, False, EPOCH_US + tenth * 100_000)]
-    return heard
-
-
 @pytest.mark.parametrize(
     ("told", "sent"),
     [
@@ -321,7 +308,12 @@ def spoken(steps):
     ],
 )
 def test_of_each_subject_one_text_a_second_is_sent_and_none_twice(told, sent):
-    assert spoken(told) == sent
+    # Given texts about subjects that are told then, and what is sent when, in tenths of a second
+    texts, heard = Texts(), []
+    for tenth in range(40):
+        now = [(subject, StatusText(Severity.WARNING, text)) for at, subject, text in told if at == tenth]
+        heard += [(tenth, text.text) for text in texts.due(now, False, EPOCH_US + tenth * 100_000)]
+    assert heard == sent
 
 
 @pytest.mark.parametrize(

@@ -236,10 +236,6 @@ def surroundings(known=(), vehicle=HERE) -> Surroundings:
     return Surroundings(vehicle, HOME, True, known=known)
 
 
-def lean(acceleration, velocity=REST, place=HERE) -> Target:
-    return Target(place, 0.0, None, acceleration, Lean(Belief(place, velocity), (), 15.0, HELD_BY_ATTITUDE_S))
-
-
 def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, tuple]:
     """PX4's loops in steps of a millisecond, by their gains' defaults."""
     place, velocity = list(motion.position_ned_m), list(motion.velocity_ned_m_s)
@@ -271,7 +267,8 @@ def test_no_setpoint_beside_the_wall_leads_a_vehicle_that_follows_it_there_while
 def test_a_lean_that_is_held_leads_no_nearer_to_the_wall_than_can_be_braked(off_m_s):
     # Given a vehicle half a metre off the wall, and an acceleration to the wall and along it
     velocity = (-off_m_s, 0.3, 0.0)
-    asked = lean((6.0, 1.0, 0.0), velocity)
+    lean = Lean(Belief(HERE, velocity), (), 15.0, HELD_BY_ATTITUDE_S)
+    asked = Target(HERE, 0.0, None, (6.0, 1.0, 0.0), lean)
     # When PX4 holds what is sent until it notices the silence, and then brakes with 3 m/s^2
     sent, _ = bounded(asked, surroundings([KnownSurface(WALL)]), ROOM, DEFAULTS)
     north_m_s = velocity[0] + HELD_BY_ATTITUDE_S * sent.acceleration_ned_m_s2[0]

@@ -243,14 +243,6 @@ def asked_over(trip: RoundTrip, seconds: float, start_us: int = EPOCH_US) -> lis
     return [trip.ask(now_us) for now_us in times if now_us >= trip.due_us]
 
 
-def answered(trip: RoundTrip, *trips_us: int, start_us: int = EPOCH_US) -> None:
-    """Questions two seconds apart, each answered after so long."""
-    for number, trip_us in enumerate(trips_us):
-        now_us = start_us + 2_000_000 * number
-        question = trip.ask(now_us)
-        trip.update(TimeSyncAnswer(question.companion_time_ns, 7), now_us + trip_us)
-
-
 def test_it_asks_ten_times_a_second_until_a_first_answer_and_then_once():
     trip = RoundTrip()
     first = asked_over(trip, 2.0)
@@ -275,8 +267,10 @@ def test_an_answer_to_nobodys_question_and_a_second_answer_are_counted_and_no_mo
 def test_the_alarm_is_given_once_while_it_lasts_and_again_after_five_short_ones():
     trip, told = RoundTrip(), []
     trips_us = [2_000] * 5 + [400_000] * 6 + [2_000, 400_000] * 4 + [2_000] * 5 + [400_000] * 5
+    # Given questions two seconds apart, each answered after so long
     for number, trip_us in enumerate(trips_us):
-        answered(trip, trip_us, start_us=EPOCH_US + 2_000_000 * number)
+        now_us = EPOCH_US + 2_000_000 * number
+        trip.update(TimeSyncAnswer(trip.ask(now_us).companion_time_ns, 7), now_us + trip_us)
         if trip.alarm() is not None:
             told.append(number)
     assert told == [7, 26]

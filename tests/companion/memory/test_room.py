@@ -137,10 +137,6 @@ PACE = SpeedLimits(1.5, 2.0)
 START, GOAL = (0.0, 0.0, -1.5), (7.0, 0.0, -1.5)
 
 
-def ceiling(height_m: float, north_m: float = 0.0) -> Patch:
-    return Patch(((north_m, 0.0, -height_m),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
-
-
 def around(*patches: Patch, fence: Fence | None = None) -> ObstacleMap:
     return ObstacleMap(patches, fence or Fence(radius_m=9, max_height_m=2.4), REACH_M, MARGIN_M)
 
@@ -183,7 +179,8 @@ def test_where_the_fence_is_high_enough_the_way_leads_over_it():
     assert over_m == pytest.approx(known.patches[0].assumed_heights_m()[1] + CLEARANCE_M)
     assert places[0][:2] == START[:2] and places[-2][:2] == GOAL[:2] and places[-1] == GOAL
     # and not through a ceiling above the start
-    assert route(around(wall(-1.0, 0.0, 1.0), ceiling(2.2), fence=room), START, GOAL) is None
+    ceiling = Patch(((0.0, 0.0, -2.2),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
+    assert route(around(wall(-1.0, 0.0, 1.0), ceiling, fence=room), START, GOAL) is None
 
 
 def test_ways_stay_inside_a_fence_with_a_bend():

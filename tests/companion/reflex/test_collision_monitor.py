@@ -6,6 +6,8 @@ A `Watch` in flight hears what a test says the vehicle measures: every 4 ms its 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -288,20 +290,12 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
     assert strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
 
 
-class FreeRoom:
-    """Nothing else is known, and there is no fence."""
-
-    def surfaces(self, contact):
-        return ()
-
-    def inside(self, contact_ned_m, goal_ned_m):
-        return goal_ned_m
-
-
 @pytest.mark.parametrize("force_m_s2", [0.0, 40.0])
 def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_order_they_come(force_m_s2):
     # Given a vehicle that flies north, whose estimator takes a jump back, as of a hit that clipping hides whole
     config, rejected = CompanionConfig(), []
+    # Nothing else is known, and there is no fence
+    room: Any = SimpleNamespace(surfaces=lambda contact: (), inside=lambda contact_ned_m, goal_ned_m: goal_ned_m)
     reflex = start_reflex(config, RecoveryConfig(), config.settled, 0)
     for us in range(INTERVAL_US, 3_600_000, INTERVAL_US):
         samples: list[Sample] = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
@@ -312,7 +306,7 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
             samples = [*told, messages.AttitudeTarget(us, 0.6), *samples]
         for estimate in reflex.step(samples, IN_FLIGHT, us).collisions:
             assert us == 3_000_000, "told with the first sample that shows it"
-            reflex.begin(estimate, FreeRoom(), us)
+            reflex.begin(estimate, room, us)
         if reflex.recovery is not None:
             shown = [reflex.recovery.take(sample) for sample in samples if isinstance(sample, LocalPosition)]
             rejected += [progress for progress in shown if progress.is_rejected]

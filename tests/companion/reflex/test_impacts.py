@@ -6,7 +6,7 @@ import random
 import pytest
 
 from companion.messages import ImuSample, LocalPosition, Odometry
-from companion.motion.strapdown import VelocityFix
+from companion.motion.strapdown import LEVEL, VelocityFix
 from companion.reflex.config import CHANGE_RAD, GROUND_M, IMPULSE_RAD, EstimateConfig
 from companion.reflex.detection.classify import FASTEST_LANDING_M_S, classified, kind_of
 from companion.reflex.detection.detector import Impact, ImpactKind, Situation
@@ -15,7 +15,6 @@ from companion.reflex.surface import Normal, normal_of, with_change
 
 CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000
-LEVEL = (1.0, 0.0, 0.0, 0.0)
 STILL = (0.0, 0.0, 0.0)
 
 
@@ -63,13 +62,6 @@ def test_what_is_told_after_the_contact_or_in_its_millisecond_changes_nothing(la
     assert begun(estimator).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0))
 
 
-def pushed(pushes, every_us=4_000):
-    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
-    for number, force in enumerate(pushes, start=1):
-        contact.add(ImuSample(1_000_000 + number * every_us, (force, 0.0, -9.81), STILL), every_us, LEVEL)
-    return contact
-
-
 @pytest.mark.parametrize(
     ("pushes", "every_us"),
     [
@@ -82,7 +74,9 @@ def pushed(pushes, every_us=4_000):
     ids=["may have clipped", "too short to tell", "gaps", "over in one window", "guards that clatter"],
 )
 def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
-    contact = pushed(pushes, every_us)
+    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
+    for number, force in enumerate(pushes, start=1):
+        contact.add(ImuSample(1_000_000 + number * every_us, (force, 0.0, -9.81), STILL), every_us, LEVEL)
     assert contact.has_gap or not contact.is_fully_measured
 
 
@@ -146,11 +140,6 @@ UP, BACK = (0.0, 0.0, -30.0), (-30.0, 0.0, 0.0)
 FORWARD, HOVER = (2.0, 0.0, 0.0), (0.0, 0.05, 0.0)
 
 
-def tilted(degrees):
-    half = math.radians(degrees) / 2.0
-    return (math.cos(half), math.sin(half), 0.0, 0.0)
-
-
 def kind(
     force,
     velocity=FORWARD,
@@ -162,7 +151,8 @@ def kind(
     sinking_m_s=None,
 ):
     situation = Situation(may_crash=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
-    return kind_of(force, velocity, tilted(tilt_deg), situation._replace(has_climbed=has_climbed), sinking_m_s)
+    tilted = (math.cos(math.radians(tilt_deg / 2.0)), math.sin(math.radians(tilt_deg / 2.0)), 0.0, 0.0)
+    return kind_of(force, velocity, tilted, situation._replace(has_climbed=has_climbed), sinking_m_s)
 
 
 def sinking(speed_m_s):

@@ -27,19 +27,10 @@ from tests.docs.pages import ROOT
 from tests.rebound_cli.command import WALL
 
 
-@pytest.fixture
-def nothing_compiles(monkeypatch):
-    def compiled(*_):
-        raise AssertionError("minutes of compiling for a flight that cannot be kept")
-
-    monkeypatch.setattr(fly, "prepare_vehicle", compiled)
-
-
-COMMANDS = [("fly", str(WALL), "--lockstep"), ("guard", "--connect", "udpin://127.0.0.1:0")]
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_a_folder_below_a_file_or_with_a_flight_is_refused_at_once(command, tmp_path, capsys, nothing_compiles):
+@pytest.mark.parametrize("command", [("fly", str(WALL), "--lockstep"), ("guard", "--connect", "udpin://127.0.0.1:0")])
+def test_a_folder_below_a_file_or_with_a_flight_is_refused_at_once(command, tmp_path, capsys, monkeypatch):
+    # Minutes of compiling are too many for a flight that cannot be kept
+    monkeypatch.setattr(fly, "prepare_vehicle", lambda *_: pytest.fail("compiles"))
     (tmp_path / TLOG_NAME).write_bytes(b"")
     assert main([*command, "--out", str(tmp_path / TLOG_NAME / "run")]) == 1
     assert f"run cannot be made: nothing can be written to {tmp_path / TLOG_NAME}." in capsys.readouterr().err

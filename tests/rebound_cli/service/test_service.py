@@ -237,23 +237,17 @@ def test_words_that_mean_something_to_systemd_are_taken_literally():
     assert command_line.endswith('--signing-key "/var/lib/rebound/my $$key 100%%\\".key"')
 
 
-def analysed(tmp_path, text):
-    """What systemd-analyze says of a unit, offline: its complaints, and how exposed the service is, of 10."""
-    file = tmp_path / UNIT_NAME
-    file.write_text(text)
-    complaints, _ = answer("systemd-analyze", "verify", str(file))
-    said, _ = answer("systemd-analyze", "security", "--offline=true", "--no-pager", str(file))
-    return complaints, float(said.rpartition("→ ")[2].rpartition(": ")[2].split()[0])
-
-
 @NEEDS_SYSTEMD
 @pytest.mark.parametrize("connect", [f"serial://{UART}:921600", f"serial://{FTDI}:57600", UDP])
 @pytest.mark.parametrize("run", ["guard", "mission"])
 def test_systemd_finds_nothing_to_complain_of_and_little_exposed(connect, run, tmp_path):
     # With an interpreter that is there, for systemd looks.
     systemd = System().release()
-    text = unit_text(ServiceSettings(run=run, connect=connect), shutil.which("python3"), systemd, "dialout")
-    complaints, exposed = analysed(tmp_path, text)
+    file = tmp_path / UNIT_NAME
+    file.write_text(unit_text(ServiceSettings(run=run, connect=connect), shutil.which("python3"), systemd, "dialout"))
+    complaints, _ = answer("systemd-analyze", "verify", str(file))
+    said, _ = answer("systemd-analyze", "security", "--offline=true", "--no-pager", str(file))
+    exposed = float(said.rpartition("→ ")[2].rpartition(": ")[2].split()[0])
     # It calls up to 2 of its 10 safe or nearly so.
     assert complaints == "" and exposed <= 2.0
 

@@ -111,11 +111,6 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 NO_RATES = (None, None, None)
 
 
-def leaning(roll_deg: float) -> tuple[float, float, float, float]:
-    half = math.radians(roll_deg) / 2
-    return math.cos(half), math.sin(half), 0.0, 0.0
-
-
 @pytest.mark.parametrize(
     ("message", "flown"),
     [
@@ -175,11 +170,12 @@ def thrown_up() -> tuple[Plant, float]:
 
 def test_the_loops_lean_as_asked_and_accelerate_as_leaning_does():
     plant, hover = thrown_up()
-    asked = AttitudeSetpoint(leaning(15.0), hover / math.cos(math.radians(15.0)))
+    roll_rad = math.radians(15.0)
+    asked = AttitudeSetpoint((math.cos(roll_rad / 2), math.sin(roll_rad / 2), 0.0, 0.0), hover / math.cos(roll_rad))
     output = flown(plant, asked, 1.0)[-1]
     assert math.degrees(2 * math.asin(output.attitude_wxyz[1])) == pytest.approx(15.0, abs=1.0)
     # Right wing down flies to the right, g tan 15 deg less what the first quarter of a second misses
-    assert output.velocity_ned_m_s[1] == pytest.approx(9.81 * math.tan(math.radians(15.0)) * 0.8, abs=0.35)
+    assert output.velocity_ned_m_s[1] == pytest.approx(9.81 * math.tan(roll_rad) * 0.8, abs=0.35)
     assert output.velocity_ned_m_s[2] == pytest.approx(0.0, abs=0.35)
 
 

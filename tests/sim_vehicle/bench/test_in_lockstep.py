@@ -8,7 +8,9 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import FaultError, ParameterError, SceneError
+from sim_vehicle.scene import Scene
 from sim_vehicle.testing import FaultRequest, LockstepVehicle, Motion, Pole, Wall, faults
+from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, End
 
 
@@ -75,16 +77,12 @@ def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
     assert pilot.received and pilot.vehicle.truth.is_armed
 
 
-def stamps(pilot: Pilot) -> np.ndarray:
-    return np.array([message.time_usec for message in pilot.all("HIGHRES_IMU")])
-
-
 def test_a_clock_jumps_and_jumps_back() -> None:
     pilot = standing()
     pilot.fly(0.5)
     pilot.vehicle.inject(faults.clock_jump(100.0), for_s=0.5)
     pilot.fly(1.0)
-    jumps = np.diff(stamps(pilot)) / 1e6
+    jumps = np.diff([message.time_usec for message in pilot.all("HIGHRES_IMU")]) / 1e6
     assert jumps.max() == pytest.approx(100.0, abs=0.03) and jumps.min() == pytest.approx(-100.0, abs=0.03)
 
 
@@ -142,9 +140,6 @@ def test_what_cannot_be_injected_is_one_sentence(request_: FaultRequest, for_s: 
 
 
 def test_a_vehicle_that_is_not_changed_is_the_one_of_a_mission_file() -> None:
-    from sim_vehicle.scene import Scene
-    from sim_vehicle.vehicle import SimulatedVehicle
-
     plain = SimulatedVehicle(load_built_in("foldable"), Scene(), 5)
     sent = b"".join(packet for _ in range(250) for packet in plain.step(b""))
     vehicle = LockstepVehicle(seed=5)

@@ -14,6 +14,7 @@ import pytest
 
 from sim_vehicle.errors import ConditionNotMet, SceneError, SimulationError, VehicleEnded
 from sim_vehicle.physics import jit
+from sim_vehicle.shell.truth_file import load_truth
 from sim_vehicle.testing import RunningVehicle, Truth, Wall, faults, start_vehicle
 from sim_vehicle.truth import Hit
 from tests.sim_vehicle.vehicle_client import End, heard_until
@@ -265,8 +266,6 @@ def test_a_failed_test_says_what_happened_and_where_the_truth_is(suite: pytest.P
     )
     output = result.stdout.str()
     assert output.count("rebound vehicle ---") == 2
-    from sim_vehicle.shell.truth_file import load_truth
-
     paths = re.findall(r"truth: (\S+)", output)
     hits: list[Hit] = load_truth(Path(paths[0]))[0]
     assert [hit.obstacle for hit in hits] == ["strike 1"] and len(set(paths)) == 2

@@ -5,13 +5,13 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import NotInLockstep
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.hil.exchange import ANSWER_TIMEOUT_US, STARTING_TIMEOUT_US, Exchange, ExchangePhase
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Air, HilGps, HilSensor, MotionCapture
-from sim_vehicle.hil.parameters import Position, px4_parameters
+from sim_vehicle.hil.parameters import px4_parameters
 from sim_vehicle.hil.sensors import air_at, to_body
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.decode import Decoder
@@ -102,11 +102,8 @@ def test_the_range_finder_looks_down(distance_m: float | None, shown_cm: int, si
     assert sent.signal_quality == signal
 
 
-HALF_THRUST = (0.5, 0.5, 0.5, 0.5)
-
-
 def answer(time_us: int, armed: bool = True, is_lockstep: bool = True) -> ActuatorControls:
-    return ActuatorControls(time_us, armed, is_lockstep, HALF_THRUST)
+    return ActuatorControls(time_us, armed, is_lockstep, (0.5,) * 4)
 
 
 def in_lockstep() -> Exchange:
@@ -166,12 +163,7 @@ def test_a_px4_with_a_clock_of_its_own_is_refused(wrong):
         exchange.received(wrong)
 
 
-LEVEL_NORTH = (1.0, 0.0, 0.0, 0.0)
 HALF = math.sqrt(0.5)
-NOSE_EAST = (HALF, 0.0, 0.0, HALF)
-NOSE_UP = (HALF, 0.0, HALF, 0.0)
-RIGHT_WING_DOWN = (HALF, HALF, 0.0, 0.0)
-
 FOLDABLE = load_built_in("foldable")
 
 
@@ -187,10 +179,10 @@ def of_kind(messages: list, kind: type) -> list:
 @pytest.mark.parametrize(
     ("attitude", "seen"),
     [
-        (LEVEL_NORTH, (1, 2, 3)),
-        (NOSE_EAST, (2, -1, 3)),  # the nose sees east, the right side looks south
-        (NOSE_UP, (-3, 2, 1)),  # the nose looks up, the belly north
-        (RIGHT_WING_DOWN, (1, 3, -2)),  # the right side sees down, the belly looks west
+        ((1.0, 0.0, 0.0, 0.0), (1, 2, 3)),
+        ((HALF, 0.0, 0.0, HALF), (2, -1, 3)),  # the nose sees east, the right side looks south
+        ((HALF, 0.0, HALF, 0.0), (-3, 2, 1)),  # the nose looks up, the belly north
+        ((HALF, HALF, 0.0, 0.0), (1, 3, -2)),  # the right side sees down, the belly looks west
     ],
 )
 def test_a_vector_of_the_world_in_the_body(attitude, seen):
@@ -235,14 +227,11 @@ def test_a_lost_gps_is_silent():
     assert not of_kind(flown(vehicle, 1.0, 0.0)[50:], HilGps)
 
 
-def values(airframe: Airframe = FOLDABLE, position: Position = "mocap") -> dict[str, float]:
-    return {parameter.name: parameter.value for parameter in px4_parameters(airframe, position)}
-
-
 def test_a_unit_of_roll_torque_turns_as_fast_as_the_gains_assume():
     """A roll torque setpoint s moves each motor by s / sqrt(2); P times the acceleration of s = 1 is the loop."""
     vehicle = HilVehicle(quiet(FOLDABLE), Scene(), 1, sample_interval_us=4_000)
-    hover, part = values()["MPC_THR_HOVER"], 0.01
+    values = {parameter.name: parameter.value for parameter in px4_parameters(FOLDABLE, "mocap")}
+    hover, part = values["MPC_THR_HOVER"], 0.01
     for _ in range(150):
         vehicle.step((0.95,) * 4)
     offset = part / math.sqrt(2)
@@ -253,4 +242,4 @@ def test_a_unit_of_roll_torque_turns_as_fast_as_the_gains_assume():
     (t0, p0), (t1, p1) = rates[-6], rates[-1]
     per_unit = (p1 - p0) / (1e-6 * (t1 - t0)) / part
     loop_per_s = 2 * FOLDABLE.control.attitude_damping * FOLDABLE.control.attitude_frequency_rad_s
-    assert values()["MC_ROLLRATE_P"] * per_unit == pytest.approx(loop_per_s, rel=0.05)
+    assert values["MC_ROLLRATE_P"] * per_unit == pytest.approx(loop_per_s, rel=0.05)
