@@ -209,12 +209,6 @@ def asked(message_id: int, interval_us: float) -> tuple[Client, list[int]]:
     return client, client.results(SET_INTERVAL)
 
 
-@pytest.fixture
-def on_time(monkeypatch):
-    """No loop of the link comes too late."""
-    monkeypatch.setattr(module, "MISSED_LOOPS_SHARE", 0.0)
-
-
 @pytest.mark.parametrize(
     ("kind", "asked_hz", "received_hz", "gaps"),
     [
@@ -229,7 +223,9 @@ def on_time(monkeypatch):
         ("LOCAL_POSITION_NED", 50, 50, {20}),
     ],
 )
-def test_asked_and_received(on_time, kind, asked_hz, received_hz, gaps):
+def test_asked_and_received(monkeypatch, kind, asked_hz, received_hz, gaps):
+    # Given a link of which no loop comes too late
+    monkeypatch.setattr(module, "MISSED_LOOPS_SHARE", 0.0)
     client, _ = asked(NUMBERS[kind], 1e6 / asked_hz)
     assert client.rate_hz(kind, 8.0) == pytest.approx(received_hz, rel=0.005)
     times_s = [time_s for time_s, message in client.received if message.get_type() == kind]

@@ -113,10 +113,6 @@ MESSAGES = [
 ]
 
 
-def decoder() -> Decoder:
-    return Decoder(Identity(), READ)
-
-
 def ids(messages) -> list[int]:
     return [message.get_msgId() for message in messages]
 
@@ -126,8 +122,8 @@ def ids(messages) -> list[int]:
 def test_each_message_whole_and_byte_by_byte(message, v1):
     raw = packed(message, v1)
     wanted = [number for number in ids([message]) if number in READ]
-    assert ids(decoder().push(raw)) == wanted
-    parts = decoder()
+    assert ids(Decoder(Identity(), READ).push(raw)) == wanted
+    parts = Decoder(Identity(), READ)
     assert ids(got for byte in raw for got in parts.push(bytes([byte]))) == wanted
 
 
