@@ -187,6 +187,18 @@ def test_headings_turn_the_shorter_way_at_a_limited_rate():
     assert max(steps) <= math.radians(45) * 0.021
 
 
+@pytest.mark.parametrize("state", ["mission", "holding", "returning"])
+def test_a_vehicle_that_something_has_turned_is_turned_back_at_leisure(state):
+    # Given a flight northwards
+    f = flying_in(state)
+    # When something turns the vehicle by 115 degrees
+    f.vehicle.yaw_rad = 2.0
+    f.run_for(0.1)
+    # Then the heading that is asked for leads its own by what turns it at 45 degrees a second
+    led_rad = math.remainder(f.vehicle.setpoints[-1][1].yaw - f.vehicle.yaw_rad, math.tau)
+    assert led_rad == pytest.approx(-math.radians(45.0) / 2.8, abs=0.03)
+
+
 def breaks(*arguments):
     raise ArithmeticError("the sum is not the sum")
 
