@@ -20,8 +20,6 @@ from companion.flight.operator import Texts, status_text, values
 from companion.flight.states import FINAL_STATES, State
 from companion.flight.vehicle_update import note_height, situation_of, update_vehicle
 from companion.link.commands import CommandClient
-from companion.link.streams import StreamMonitor
-from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
     LocalPosition,
@@ -40,7 +38,6 @@ from companion.reflex.detection.detector import Situation
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import braked
 from companion.reflex.recovery.collision import CollisionReport
-from companion.reflex.reflex import start_reflex
 from companion.report import Event, Status
 
 # MAVLink's heartbeat microservice: once a second.
@@ -349,10 +346,7 @@ class FlightCore(Core[FlightContext, Machine]):
     """The core of one flight of a mission."""
 
     def __init__(self, mission: Mission) -> None:
-        config = mission.companion
-        reflex = start_reflex(config, mission.recovery, config.settled, 0)
-        streams = StreamMonitor(config.streams, tuple(reflex.monitor.detector.losses))
-        flight = FlightContext(mission, Vehicle(), streams, reflex)
+        flight = FlightContext(mission)
         super().__init__(flight, Machine(flight, Connect()))
 
     @property

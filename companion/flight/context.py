@@ -32,7 +32,7 @@ from companion.motion.vector import ZERO, minus, plus
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
 from companion.reflex.recovery.collision import CollisionRecord
-from companion.reflex.reflex import Reflex
+from companion.reflex.reflex import Reflex, start_reflex
 from companion.report import Event, JsonValue, Outcome
 
 # As the autopilot's own modes turn: the vehicle can follow.
@@ -135,9 +135,9 @@ class FlightContext:
     """The flight's shared state. Only the flight's parts change it, within a step."""
 
     mission: Mission
-    vehicle: Vehicle
-    streams: StreamMonitor
-    reflex: Reflex
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    streams: StreamMonitor = field(init=False)
+    reflex: Reflex = field(init=False)
     command_client: CommandClient = field(default_factory=CommandClient)
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
@@ -154,7 +154,7 @@ class FlightContext:
     foreign_mode_since_us: int | None = None  # when the mode was first not ours, though perhaps nobody decided it
     arming_requested: bool = False
     armed_at_us: int | None = None
-    steps: tuple[Step, ...] = ()
+    steps: tuple[Step, ...] = field(init=False)
     step_index: int = 0  # the one that is flown, or is to be flown next
     tally: StepTally = field(default_factory=StepTally)
     speeds: SpeedLimits = field(init=False)
@@ -189,9 +189,11 @@ class FlightContext:
     fault: str = ""  # of this program
 
     def __post_init__(self) -> None:
-        config = self.mission.companion.flight
-        self.speeds = SpeedLimits.of(config)
-        self.steps = self.steps or steps_to_fly(self.mission)
+        config = self.mission.companion
+        self.reflex = start_reflex(config, self.mission.recovery, config.settled, 0)
+        self.streams = StreamMonitor(config.streams, tuple(self.reflex.monitor.detector.losses))
+        self.speeds = SpeedLimits.of(config.flight)
+        self.steps = steps_to_fly(self.mission)
         self.patches = self.mission.obstacles.patches()
         if self.steps and isinstance(last := self.steps[-1].action, ReturnItem):
             self.returning_as = last

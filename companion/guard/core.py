@@ -10,21 +10,15 @@ from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
 from companion.guard.watching import GuardConnect, goes_down, observe, why_not
-from companion.link.streams import StreamMonitor
-from companion.link.vehicle import Vehicle
 from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
 from companion.reflex.detection.detector import Situation
-from companion.reflex.reflex import start_reflex
 
 
 class GuardCore(Core[GuardContext, GuardMachine]):
     """`keeps_others_out`: see GuardContext."""
 
     def __init__(self, config: GuardConfig, keeps_others_out: bool) -> None:
-        mission = config.as_mission()
-        reflex = start_reflex(config.companion, mission.recovery, config.companion.settled, 0)
-        streams = StreamMonitor(config.companion.streams, tuple(reflex.monitor.detector.losses))
-        guard = GuardContext(mission, Vehicle(), streams, reflex, config=config, keeps_others_out=keeps_others_out)
+        guard = GuardContext(config.as_mission(), config=config, keeps_others_out=keeps_others_out)
         super().__init__(guard, GuardMachine(guard, GuardConnect()))
         self.is_enabled = False  # asked for, and not yet taken up
 

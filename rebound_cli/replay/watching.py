@@ -13,14 +13,11 @@ from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
 from companion.guard.states import State
 from companion.guard.watching import goes_down, not_flying, observe, why_not
-from companion.link.streams import StreamMonitor
-from companion.link.vehicle import Vehicle
 from companion.mission.config import CompanionConfig
 from companion.reflex.detection.detector import Impact, ImpactKind, Situation
 from companion.reflex.detection.health import Promise
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.detection.monitor import CollisionMonitor, advance, start_monitor
-from companion.reflex.reflex import start_reflex
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.listening import Listener
 
@@ -39,10 +36,7 @@ class Circumstances:
     def __init__(self, config: CompanionConfig, modes: Sequence[str] | None = None) -> None:
         self._why_not = not_flying if modes is None else why_not
         settings = GuardConfig.model_construct(companion=config, modes=tuple(modes or ()))
-        streams = StreamMonitor(config.streams, ())
-        mission = settings.as_mission()
-        reflex = start_reflex(config, mission.recovery, config.settled, 0)
-        self.guard = GuardContext(mission, Vehicle(), streams, reflex, config=settings, keeps_others_out=False)
+        self.guard = GuardContext(settings.as_mission(), config=settings, keeps_others_out=False)
         self._now_us = 0
         self._wreck: Crashed | None = None
 

@@ -11,8 +11,6 @@ from companion.flight.handlers.ending import early_end
 from companion.flight.handlers.recovering import Recover
 from companion.flight.obstacle_map import FlightRoom
 from companion.flight.states import State
-from companion.link.streams import StreamMonitor
-from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, AttitudeSetpoint, LandedState, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.config import SAME_M_S
@@ -24,7 +22,6 @@ from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import Contact, MotionState
 from companion.reflex.recovery.motion_estimator import MotionEstimator
 from companion.reflex.recovery.recovery import Recovery
-from companion.reflex.reflex import start_reflex
 from companion.reflex.surface import Normal, Surface
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
@@ -35,9 +32,8 @@ MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_m_s=2.0, **keys) -> FlightContext:
     """A flight that has just hit a wall in the north, measured whole unless an estimator says otherwise."""
     mission = Mission.model_validate(MISSION | {"recovery": {"law": law}} | keys)
-    config = mission.companion
-    reflex = start_reflex(config, mission.recovery, config.settled, 0)
-    flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams), reflex)
+    flight = FlightContext(mission)
+    reflex = flight.reflex
     flight.origin_ned_m, reflex.loss_s = (0.0, 0.0, 0.0), loss_s
     flight.vehicle.attitude = reflex.monitor.gate.latest = Attitude(HIT_US, LEVEL)
     reflex.thrust.full_m_s2, reflex.thrust.known_s = 16.0, learnt_s
