@@ -28,7 +28,6 @@ from companion.messages import (
     Outgoing,
     PositionSetpoint,
     Sample,
-    Vector3,
 )
 from companion.mission.model import Mission
 from companion.motion.resets import PLACES, Resets
@@ -398,7 +397,6 @@ class Limiter:
     """Limits setpoints by the envelope; remembers the last one sent and the last reason reported."""
 
     last: Target | None = None
-    last_ned_m: Vector3 | None = None
     last_us: int = 0
     limited_by: str = ""
     told_us: int = 0
@@ -409,11 +407,13 @@ class Limiter:
         Raises SetpointError for one that is not finite.
         """
         latest = flight.vehicle.history.latest
+        # Without a position setpoint there is no step to the next one.
+        last = None if moved or self.last is None or self.last.lean is not None else self.last
         around = Surroundings(
             vehicle_ned_m=None if latest is None else flight.reflex.place_ned_m(latest),
             origin_ned_m=flight.origin_ned_m,
             has_floor=has_floor,
-            last_ned_m=None if moved else self.last_ned_m,
+            last_ned_m=None if last is None else last.position_ned_m,
             since_last_s=(now_us - self.last_us) * 1e-6,
             held_s=min(flight.reflex.loss_s or HELD_S, HELD_S) + NOTICED_S,
             known=known_surfaces(flight),
@@ -423,9 +423,7 @@ class Limiter:
             self.limited_by, self.told_us = reason, now_us
             text = f"setpoint held back: {reason}" if reason else "setpoint free again"
             flight.report(now_us, "envelope", text, reason=reason)
-        self.last = target
-        # Without a position setpoint there is no step to the next one.
-        self.last_ned_m, self.last_us = None if target.lean is not None else target.position_ned_m, now_us
+        self.last, self.last_us = target, now_us
         return target
 
     def in_vehicles_view(self, flight: FlightContext, target: Target, has_floor: bool, time_boot_us: int) -> Target:
