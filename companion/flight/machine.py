@@ -24,6 +24,8 @@ class StateMachine(ABC):
     """What a flight's and a guard's have in common. The same inputs always give the same moves."""
 
     program: ClassVar[str]
+    giving_away: ClassVar[tuple[Enum, ...]]
+    """States in which the vehicle is given away already."""
     flight: FlightContext
     state: Enum
     handler: Any
@@ -46,11 +48,6 @@ class StateMachine(ABC):
     def _give_away(self, text: str, now_us: int) -> None:
         """Begin to give the vehicle away."""
 
-    @property
-    @abstractmethod
-    def _gives_away(self) -> bool:
-        """Whether that has begun."""
-
     @abstractmethod
     def _release(self, text: str) -> None:
         """Even giving away fails: silence lets the vehicle's own failsafe act."""
@@ -64,7 +61,7 @@ class StateMachine(ABC):
         place = traceback.extract_tb(error.__traceback__)[-1]
         text = f"fault of the {self.program}, please report it: {type(error).__name__} in {place.name}: {error}"
         flight.report(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
-        if flight.fault or self._gives_away:
+        if flight.fault or self.state in self.giving_away:
             self._release(text)
         flight.fault = text
         try:
@@ -88,6 +85,7 @@ class Machine(StateMachine):
     """The present state and what is being done in it."""
 
     program = "companion"
+    giving_away = FINAL_STATES
     flight: FlightContext
     handler: Handler
     state: State = State.CONNECT
@@ -100,9 +98,7 @@ class Machine(StateMachine):
     def step(self, inputs: Inputs, now_us: int) -> bool:
         before = self.handler
         if self.state not in FINAL_STATES:
-            ended = early_end(self.flight, self.state, inputs, now_us)
-            if ended is not None:
-                self._take(ended, now_us)
+            self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
         if self.state in MAY_CRASH:
             how = crashed(self.flight, self.state is State.LANDING, now_us)
             if how is not None:
@@ -124,10 +120,6 @@ class Machine(StateMachine):
             expectations.review(self.flight, now_us)
         return self.handler is not before
 
-    @property
-    def _gives_away(self) -> bool:
-        return self.state in FINAL_STATES
-
     def _give_away(self, text: str, now_us: int) -> None:
         self._take(Transition(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
 
@@ -136,8 +128,8 @@ class Machine(StateMachine):
         if self.state not in FINAL_STATES or self.flight.outcome is None:
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
-    def _take(self, transition: Transition, now_us: int) -> None:
-        if not TABLE.moves(self.state, transition.trigger):
+    def _take(self, transition: Transition | None, now_us: int) -> None:
+        if transition is None or not TABLE.moves(self.state, transition.trigger):
             return
         previous, self.state = self.state, TABLE.next_state(self.state, transition.trigger)
         self.handler = self._begin(previous, transition, now_us)

@@ -58,6 +58,7 @@ class GuardMachine(StateMachine):
     """The present state and what is being done in it."""
 
     program = "guard"
+    giving_away = (State.GIVING_BACK,)
     flight: GuardContext
     handler: Handler
     state: State = State.CONNECTING
@@ -99,10 +100,6 @@ class GuardMachine(StateMachine):
             # The answers and positions of this step belong to the state that asked for them.
             transition = self.handler.step(self.flight, Inputs(), now_us)
         return self.handler is not before
-
-    @property
-    def _gives_away(self) -> bool:
-        return self.state is State.GIVING_BACK
 
     def _give_away(self, text: str, now_us: int) -> None:
         self._take(GuardTransition(Trigger.STOPPED, text), now_us)
