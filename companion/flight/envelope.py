@@ -118,16 +118,11 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Setpoint
 
 def is_finite(target: Target) -> bool:
     """Whether every number of the setpoint is."""
-    parts: list[tuple[float, ...]] = [
-        target.position_ned_m,
-        target.velocity_ned_m_s or (),
-        target.acceleration_ned_m_s2 or (),
-    ]
+    values = [*target.position_ned_m, *(target.velocity_ned_m_s or ()), *(target.acceleration_ned_m_s2 or ())]
     if target.lean is not None:
         belief = target.lean.belief
-        parts += [belief.attitude_wxyz, belief.level_m_s2, (belief.yaw_rate_rad_s, belief.heading_error_rad)]
-    values = [value for part in parts for value in part]
-    return all(map(math.isfinite, values)) and (target.yaw_rad is None or math.isfinite(target.yaw_rad))
+        values += (*belief.attitude_wxyz, *belief.level_m_s2, belief.yaw_rate_rad_s, belief.heading_error_rad)
+    return all(map(math.isfinite, (*values, target.yaw_rad or 0.0)))
 
 
 def _with_place(
@@ -145,11 +140,10 @@ def _with_place(
         reasons += [f"more than {limits.max_step_m:g} m from the vehicle"] if is_far else []
     if around.origin_ned_m is not None:
         inside = _within_fence(place, around.origin_ned_m, fence, around.has_floor)
-        reasons += ["outside the fence"] if math.dist(inside, place) > _ROUNDING_M else []
-        place = inside if math.dist(inside, place) > _ROUNDING_M else place
-    if place == asked:
-        return target
-    return Target(place, target.yaw_rad)
+        if math.dist(inside, place) > _ROUNDING_M:
+            place = inside
+            reasons.append("outside the fence")
+    return target if place == asked else Target(place, target.yaw_rad)
 
 
 def _with_velocity(target: Target, limits: SetpointLimits, reasons: list[str]) -> Target:
@@ -237,8 +231,7 @@ def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3
     distance_m = math.dist(place, start)
     if distance_m <= most_m:
         return place, False
-    scale = most_m / distance_m
-    return towards(start, place, scale), True
+    return towards(start, place, most_m / distance_m), True
 
 
 def _within_fence(place: Vector3, origin: Vector3, fence: Fence, has_floor: bool) -> Vector3:
