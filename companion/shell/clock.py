@@ -7,10 +7,6 @@ import time
 STAMP_STEP_US = 4
 
 
-def round_down_to_stamp_us(time_us: int) -> int:
-    return time_us - time_us % STAMP_STEP_US
-
-
 class Clock:
     """Microseconds since the epoch that never jump: the wall clock is read once, then time is monotonic."""
 
@@ -18,7 +14,8 @@ class Clock:
         self._epoch_at_monotonic_zero_us = time.time_ns() // 1000 - time.monotonic_ns() // 1000
 
     def now_us(self) -> int:
-        return round_down_to_stamp_us(self._epoch_at_monotonic_zero_us + time.monotonic_ns() // 1000)
+        time_us = self._epoch_at_monotonic_zero_us + time.monotonic_ns() // 1000
+        return time_us - time_us % STAMP_STEP_US
 
     def sleep(self, duration_s: float) -> None:
         """Let so much of it pass; no time where that is negative."""
