@@ -48,7 +48,7 @@ class TakeOver:
             text = f"{name} already, the program's setpoints kept out" if outcome is None else f"{name} confirmed"
             guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return GuardTransition(Trigger.CONFIRMED)
-        recovered(guard, self.recover, inputs, now_us)
+        self.recover.step(guard, inputs, now_us)
         if outcome is not None:
             return GuardTransition(Trigger.NOT_CONFIRMED, outcome.text)
         # A late step is no refusal: the answer may not have been read yet.
@@ -86,7 +86,9 @@ class Recovering:
         if self._foreign >= CROSSED_TIMES and asked_us is None:
             self._asked_us = now_us
             guard.outbox.append(SendCommand(RequestMessage(MessageId.HEARTBEAT), 0))
-        return GuardTransition(Trigger.SETTLED) if recovered(guard, self._recover, inputs, now_us) else None
+        # Over it is also where the hit was none.
+        is_over = self._recover.step(guard, inputs, now_us) is not None
+        return GuardTransition(Trigger.SETTLED) if is_over else None
 
     def _forget_what_was_late(self, guard: GuardContext, now_us: int) -> None:
         """The echoes that waited for a late step are older than what is known to have been sent. Without the guard's
@@ -96,11 +98,6 @@ class Recovering:
         if late_us != self._late_us or not guard.vehicle.flies_setpoints:
             self._late_us, self._since_us = late_us, now_us
             self._foreign, self._asked_us = 0, None
-
-
-def recovered(guard: GuardContext, recover: Recover, inputs: Inputs, now_us: int) -> bool:
-    """One step of the recovery; whether it is over, be it that the hit was none."""
-    return recover.step(guard, inputs, now_us) is not None
 
 
 def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
