@@ -312,11 +312,13 @@ class FlightContext:
         return minus(local_ned_m, self.origin_ned_m or ZERO)
 
 
-class NoSetpoint:
-    """Base of states in which no setpoint is sent."""
+class FixedSetpoint:
+    """Base of states whose setpoint does not move; without one none is sent."""
 
-    def target(self, now_us: int) -> None:
-        return None
+    _target: Target | None = None
+
+    def target(self, now_us: int) -> Target | None:
+        return self._target
 
 
 def as_text(vector: Vector3) -> str:

@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.interface import Pilot
-from companion.flight.context import Inputs, NoSetpoint, Target
+from companion.flight.context import FixedSetpoint, Inputs, Target
 from companion.flight.handlers.crash import Crashed
 from companion.flight.handlers.ending import silent_position
 from companion.flight.handlers.recovering import Recover
@@ -110,7 +110,7 @@ def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
     return place is None or all(math.dist(sent, place) > CROSSED_M for sent in recent)
 
 
-class GiveBack:
+class GiveBack(FixedSetpoint):
     """Ask for one mode after the other until one is seen; setpoints go on meanwhile.
 
     The first is asked for straight after a report of the present one: a person's own request that shows there is not
@@ -134,9 +134,6 @@ class GiveBack:
         self._began_us = now_us
         self._is_asked = self._is_told = False
         self._is_doubted = self.wish == previous  # whether it would hit again
-
-    def target(self, now_us: int) -> Target | None:
-        return self._target
 
     def _waits(self, guard: GuardContext, inputs: Inputs, now_us: int) -> bool:
         """Whether a program's next setpoints are waited for, or a pilot. A mode that would hit again is given up."""
@@ -191,7 +188,7 @@ class GiveBack:
         return self.step(guard, Inputs(positions=inputs.positions), now_us)
 
 
-class StandDown:
+class StandDown(FixedSetpoint):
     """A pilot who moved the sticks is given the position mode, as PX4's own stick override does.
 
     OFFBOARD would go on without a word of the pilot's otherwise. Setpoints go on until the mode is seen.
@@ -199,7 +196,6 @@ class StandDown:
 
     def __init__(self, guard: GuardContext, for_sticks: bool, now_us: int) -> None:
         self._until_us = now_us + HAND_OVER_US
-        self._target: Target | None = None
         if for_sticks and guard.vehicle.flies_setpoints and guard.target is not None:
             self._target = guard.target.at_rest()
             guard.ask_for_mode(guard.vehicle.autopilot.sticks)
@@ -208,9 +204,6 @@ class StandDown:
     def hands_over(self) -> bool:
         """Whether the pilot does not have the vehicle yet."""
         return self._target is not None
-
-    def target(self, now_us: int) -> Target | None:
-        return self._target
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         if self._target is not None:
@@ -222,7 +215,7 @@ class StandDown:
         return GuardTransition(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None
 
 
-class GuardCrashed(NoSetpoint):
+class GuardCrashed(FixedSetpoint):
     """The same as of a flight; after it the guard stands by, and for the next flight watches again."""
 
     def __init__(self, guard: GuardContext) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from companion.autopilot.interface import Autopilot, Pilot
-from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target
+from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target
 from companion.flight.envelope import unattended_text
 from companion.flight.handlers.connecting import Meet
 from companion.flight.vehicle_update import update_vehicle
@@ -138,7 +138,7 @@ class GuardConnect(Meet[GuardTransition]):
         return GuardTransition(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
 
 
-class StandBy(NoSetpoint):
+class StandBy(FixedSetpoint):
     """Nothing to guard; the reason is reported when it changes."""
 
     def __init__(self) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Generic, TypeVar
 
-from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
+from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Transition
 from companion.flight.handlers.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
@@ -14,7 +14,7 @@ from companion.messages import LandedState, MessageId, RequestMessage, SetMessag
 MoveT = TypeVar("MoveT")
 
 
-class Meet(NoSetpoint, ABC, Generic[MoveT]):
+class Meet(FixedSetpoint, ABC, Generic[MoveT]):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
 
     def __init__(self) -> None:
@@ -116,7 +116,7 @@ class Connect(Meet[Transition]):
         return Transition(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
 
 
-class Ready(NoSetpoint):
+class Ready(FixedSetpoint):
     """Show the plan; nothing happens until it is confirmed."""
 
     def __init__(self) -> None:

@@ -2,7 +2,7 @@
 
 import math
 
-from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
+from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Transition
 from companion.flight.handlers.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import SetArmed
@@ -56,7 +56,7 @@ def _is_pressed(flight: FlightContext, now_us: int) -> bool:
     return off_m < settled.distance_m
 
 
-class Crashed(NoSetpoint):
+class Crashed(FixedSetpoint):
     """Until it is disarmed, or flies again in other hands. No setpoint is sent to a vehicle that lies or tumbles.
 
     One that lies is asked to disarm where `on_crash` says so, never one that may fly. PX4 refuses where it does not

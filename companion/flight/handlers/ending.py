@@ -3,7 +3,7 @@
 import math
 from enum import Enum
 
-from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target, Transition
+from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition
 from companion.flight.states import State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
 from companion.link.vehicle import ModeReport
@@ -180,7 +180,7 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 
-class Released(NoSetpoint):
+class Released(FixedSetpoint):
     """Nothing more to do: somebody else has the vehicle, or it was never taken."""
 
     finished = True

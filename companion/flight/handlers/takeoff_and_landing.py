@@ -2,7 +2,7 @@
 
 import math
 
-from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
+from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
@@ -157,7 +157,7 @@ def mean_position(flight: FlightContext) -> Vector3:
 LANDING_TIMEOUT_US = 120_000_000
 
 
-class Land:
+class Land(FixedSetpoint):
     """Ask for the mode, keep the setpoints going until the vehicle has taken it, then wait."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
@@ -166,9 +166,6 @@ class Land:
         self._landing = False
         flight.is_landing = True
         flight.ask_for_mode(flight.vehicle.autopilot.land)
-
-    def target(self, now_us: int) -> Target | None:
-        return None if self._landing else self._target
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if flight.vehicle.armed is False:
@@ -180,7 +177,7 @@ class Land:
                 return None
             if not outcome.succeeded:
                 return Transition(Trigger.INTERRUPTED, f"no landing: {outcome.text}", hand_over=True)
-            self._landing = True
+            self._landing, self._target = True, None
             flight.expected_mode = flight.vehicle.autopilot.land
             flight.report(now_us, "landing", "landing here")
         if now_us - self._started_us > LANDING_TIMEOUT_US:
