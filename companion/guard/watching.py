@@ -124,9 +124,6 @@ class GuardConnect(Meet[GuardTransition]):
         return GuardTransition(Trigger.REFUSED, text)
 
     def _judge(self, flight: FlightContext, now_us: int) -> GuardTransition | None:
-        too_old = flight.vehicle.version_complaint()
-        if too_old is not None:
-            return self._refused(too_old)
         complaint = flight.streams.too_slow(flight.vehicle.autopilot) or flight.round_trip.complaint()
         if complaint is not None and (flight.mission.companion.link.wait or not self._is_first):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)

@@ -59,8 +59,10 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
         if self._measuring_since_us is None:
             self._ask(flight, self._requests, inputs, now_us)
             return None
-        is_measured = now_us - self._measuring_since_us >= companion.streams.window_s * 1e6
-        return self._judge(flight, now_us) if is_measured and not flight.is_silent(now_us) else None
+        if now_us - self._measuring_since_us < companion.streams.window_s * 1e6 or flight.is_silent(now_us):
+            return None
+        too_old = flight.vehicle.version_complaint()
+        return self._judge(flight, now_us) if too_old is None else self._refused(too_old)
 
     def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
@@ -105,9 +107,7 @@ class Connect(Meet[Transition]):
         return Transition(Trigger.REFUSED, text)
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
-        too_old, too_slow = flight.vehicle.version_complaint(), flight.streams.too_slow(flight.vehicle.autopilot)
-        if too_old is not None:
-            return self._refused(too_old)
+        too_slow = flight.streams.too_slow(flight.vehicle.autopilot)
         if too_slow is not None and flight.mission.companion.link.wait:
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None
