@@ -81,7 +81,7 @@ class Signing:
 
     def opened(self, received: bytes, now_us: int) -> bytes:
         """The genuine packets that are complete by now, without their signatures, and no other byte."""
-        self._keep_up(now_us)
+        self.stamp = max(self.stamp, stamp_at(now_us))
         genuine: list[bytes] = []
         for packet, _ in self._framer.feed(received):
             if packet_length(packet) != len(packet):
@@ -97,17 +97,13 @@ class Signing:
 
     def signed(self, packet: bytes, now_us: int) -> bytes:
         """An unsigned packet of MAVLink 2 with a signature that is later than all before."""
-        self._keep_up(now_us)
-        self.stamp = min(self.stamp + 1, LAST_STAMP)
+        self.stamp = min(max(self.stamp, stamp_at(now_us)) + 1, LAST_STAMP)
         content = _with_flags(packet, FLAG_SIGNED) + bytes((_LINK_ID,)) + self.stamp.to_bytes(6, "little")
         return content + self._hash(content)
 
     def is_genuine(self, packet: bytes) -> bool:
         """Whether `opened` would let it through; nothing changes."""
         return self._refusal(packet) is None
-
-    def _keep_up(self, now_us: int) -> None:
-        self.stamp = max(self.stamp, stamp_at(now_us))
 
     def _is_packet(self, data: bytes, start: int, length: int) -> bool:
         """Of a message that the dialect does not have the signature alone tells; without it, it may be stray bytes
