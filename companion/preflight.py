@@ -203,9 +203,7 @@ def _delivery(survey: Survey) -> Iterator[PreflightItem]:
         yield PreflightItem("signing", BAD, found, "--signing-key FILE, with the key that the vehicle has")
     jitter_us, timer_ms = delivery.jitter_us, None if line is None else line.latency_timer_ms
     if jitter_us is not None:
-        held = "an FTDI converter's latency timer" + (
-            " is 16 ms by default" if timer_ms is None else f" is {timer_ms} ms"
-        )
+        held = "an FTDI converter's latency timer is " + ("16 ms by default" if timer_ms is None else f"{timer_ms} ms")
         remedy = f"{held}; 1 ms is best (`rebound service install` sets it); a busy computer does the same"
         is_held = timer_ms is not None and timer_ms > 1
         found = f"delays of samples differ by {jitter_us / 1e3:.1f} ms"
