@@ -54,9 +54,7 @@ class AttachedGuard:
 
     def hear(self, name: str, source: tuple[int, int], fields: Mapping[str, Any], now_us: int) -> AttachedStep:
         """A message that has arrived."""
-        if source != self._source:
-            return self.step((), now_us)
-        sample = sample_from(name, source, fields)
+        sample = sample_from(name, source, fields) if source == self._source else None
         return self.step(() if sample is None else (sample,), now_us)
 
     def step(self, samples: Sequence[Sample], now_us: int) -> AttachedStep:
