@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Protocol
@@ -210,10 +211,7 @@ class StreamConnection:
 
 def tcp_out(host: str, port: int, waits: bool = False) -> StreamConnection:
     """A client of a TCP server."""
-
-    def open_anew() -> Stream:
-        return _connected(host, port, ATTEMPT_S)
-
+    open_anew = partial(_connected, host, port, ATTEMPT_S)
     try:
         stream = _connected(host, port, TCP_CONNECT_TIMEOUT_S)
     except (OSError, UnicodeError) as error:
