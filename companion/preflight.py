@@ -21,7 +21,7 @@ from companion.mavlink.delivery import Delivery
 from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
-from companion.reflex.config import EXCESS, MOST_HELD_S
+from companion.reflex.config import EXCESS
 
 # The streams need a second to settle at their new rates; what comes then counts.
 SETTLING_US = 1_000_000
@@ -76,17 +76,14 @@ class Survey:
 
     @property
     def setup(self) -> Setup:
-        identity, estimate, fused = self.vehicle.identity, self.config.estimate, self.config.fused
+        identity, fused = self.vehicle.identity, self.config.fused
         imu_hz = self.streams.rates_hz().get("HIGHRES_IMU", 0.0)
         per_h = 3600.0 * imu_hz * math.exp(-0.5 * (EXCESS * fused.noise_factor) ** 2)
         return Setup(
             parameters=self.parameters,
             line=self.line,
             vehicle_type="" if identity is None else identity.vehicle_type,
-            guard_centre_m=estimate.guards.centre_m,
-            guard_radius_m=estimate.guards.radius_m,
-            imu_averaging_interval_s=estimate.imu_averaging_interval_s,
-            most_held_s=MOST_HELD_S,
+            estimate=self.config.estimate,
             imu_hz=imu_hz,
             threshold_m_s2=fused.side_threshold_m_s2,
             false_alarms=f"at most {per_h:.2g} false alarms an hour by Gaussian vibration",

@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from companion.reflex.config import MOST_HELD_S, EstimateConfig
+
 
 @dataclass(frozen=True, slots=True)
 class SerialLine:
@@ -21,11 +23,7 @@ class Setup:
     parameters: Mapping[str, int | float]
     line: SerialLine | None
     vehicle_type: str
-    guard_centre_m: float
-    guard_radius_m: float
-    imu_averaging_interval_s: float
-    most_held_s: float
-    """For so long an attitude is safe to hold, if the companion dies."""
+    estimate: EstimateConfig
     imu_hz: float
     threshold_m_s2: float
     false_alarms: str
@@ -75,12 +73,9 @@ def judged_settings(
         yield unread if value is None else judge(name, value, setup)
 
 
-def judged_loss(name: str, loss_s: float, setup: Setup, found: str, cost: str = "") -> PreflightItem:
+def judged_loss(name: str, loss_s: float, found: str, cost: str = "") -> PreflightItem:
     """For how long the last attitude is flown on. `cost`: of less, for people."""
-    held_s = setup.most_held_s
-    case = (
-        round(loss_s, 3) > held_s,
-        DOUBTFUL,
-        f"{name} = {held_s:g}, or recoveries are flown by position alone{cost}",
-    )
-    return judged(name, found, case, mended=held_s, beyond=f"; an attitude is safe to hold {held_s:g} s")
+    is_long = round(loss_s, 3) > MOST_HELD_S
+    remedy = f"{name} = {MOST_HELD_S:g}, or recoveries are flown by position alone{cost}"
+    beyond = f"; an attitude is safe to hold {MOST_HELD_S:g} s"
+    return judged(name, found, (is_long, DOUBTFUL, remedy), mended=MOST_HELD_S, beyond=beyond)

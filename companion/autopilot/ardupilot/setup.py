@@ -79,7 +79,7 @@ def _port(setup: Setup) -> Iterator[PreflightItem]:
 
 def _timeout(name: str, timeout_s: float, setup: Setup) -> PreflightItem:
     found = f"{timeout_s:g} s until Copter levels out, or stops, when the companion has died"
-    return judged_loss(name, timeout_s, setup, found)
+    return judged_loss(name, timeout_s, found)
 
 
 def _options(name: str, bits: float, setup: Setup) -> PreflightItem:

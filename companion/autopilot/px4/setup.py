@@ -62,15 +62,16 @@ def _rotors(setup: Setup) -> Iterator[PreflightItem]:
         others = f"MAV_TYPE says {kind}, CA_ROTOR_COUNT {count:g}"
         yield judged("rotors", others, (kind == "quadrotor", DOUBTFUL, "choose the airframe in QGroundControl"))
         return
-    along_m = setup.guard_centre_m / math.sqrt(2)
+    guards = setup.estimate.guards
+    along_m = guards.centre_m / math.sqrt(2)
     off_m = max(math.dist((abs(x), abs(y)), (along_m, along_m)) for x, y in rotors)
     middle_m = sum(math.hypot(*rotor) for rotor in rotors) / count
     remedy = "measure; then correct CA_ROTORn_PX, _PY or companion.estimate.guards.centre_m"
     # Further off than a guard is wide, surfaces are remembered where they are not.
     yield judged(
         "rotors",
-        f"{middle_m:.2f} m from the middle by PX4, {setup.guard_centre_m:g} m by companion.estimate.guards",
-        (off_m > setup.guard_radius_m, DOUBTFUL, remedy),
+        f"{middle_m:.2f} m from the middle by PX4, {guards.centre_m:g} m by companion.estimate.guards",
+        (off_m > guards.radius_m, DOUBTFUL, remedy),
         beyond=f"; one is {off_m:.2f} m from where that has it",
     )
 
@@ -115,7 +116,7 @@ def _integration(name: str, rate_hz: float, setup: Setup) -> PreflightItem:
     if rate_hz < LEAST_INTEG_HZ:
         remedy = f"{name} = {LEAST_INTEG_HZ}, then reboot"
         return judged(name, found, (True, DOUBTFUL, remedy), mended=LEAST_INTEG_HZ)
-    is_long = 1.0 / rate_hz > setup.imu_averaging_interval_s
+    is_long = 1.0 / rate_hz > setup.estimate.imu_averaging_interval_s
     remedy = f"companion.estimate.imu_averaging_interval_s: {1.0 / rate_hz:.4f} in the mission"
     return judged(name, found, (is_long, DOUBTFUL, remedy))
 
@@ -123,7 +124,7 @@ def _integration(name: str, rate_hz: float, setup: Setup) -> PreflightItem:
 def _offboard_loss_time(name: str, loss_s: float, setup: Setup) -> PreflightItem:
     found = f"{loss_s:g} s until PX4 acts when the companion has died"
     cost = "; a program that streams at less than 4 Hz then loses OFFBOARD"
-    return judged_loss(name, loss_s, setup, found, cost)
+    return judged_loss(name, loss_s, found, cost)
 
 
 def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
@@ -198,7 +199,7 @@ def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
 
 def sight(setup: Setup) -> PreflightItem:
     """By force alone and in the quiet of standing: a flight's vibration is `rebound tune`'s to judge."""
-    integ_hz = setup.parameters.get(INTEGRATION) or 1.0 / setup.imu_averaging_interval_s
+    integ_hz = setup.parameters.get(INTEGRATION) or 1.0 / setup.estimate.imu_averaging_interval_s
     share = min(1.0, setup.imu_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
     folding = f"arms that fold: from {setup.threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
     stiff = f"stiff frames: {100 * share:.0f} % of 1 ms contacts fall into a sample"

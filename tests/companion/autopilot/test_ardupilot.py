@@ -22,7 +22,15 @@ from companion.guard.guard import Guard
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.moves import would_move
-from companion.messages import AttitudeSetpoint, AttitudeTarget, Parameter, PositionSetpoint, Refused, SetParameter
+from companion.messages import (
+    AttitudeSetpoint,
+    AttitudeTarget,
+    Parameter,
+    PositionSetpoint,
+    Refused,
+    SetParameter,
+)
+from companion.reflex.config import EstimateConfig
 from tests.companion.autopilot.fake_copter import ARM, AUX_FUNCTION, COPTER_LAND, GUIDED, SET_MODE, TAKE_OFF, FakeCopter
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, FakeVehicle, flight
 
@@ -353,7 +361,7 @@ ON_SERIAL2 = {"SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 921}
 
 
 def setup_of(parameters, line=None):
-    return VehicleSetup(parameters, line, "quadrotor", 0.145, 0.1, 0.005, 0.3, 250.0, 5.7, "")
+    return VehicleSetup(parameters, line, "quadrotor", EstimateConfig(), 250.0, 5.7, "")
 
 
 def judged(parameters, line=None):

@@ -13,7 +13,7 @@ import pytest
 
 from companion.autopilot.ardupilot.setup import judge_parameters
 from companion.autopilot.setup import Setup, Verdict
-from companion.reflex.config import MOST_HELD_S
+from companion.reflex.config import EstimateConfig
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import AirframeError, VehicleEnded
 from sim_vehicle.json.messages import Pulses, pulses_from
@@ -107,7 +107,7 @@ def test_the_file_has_a_name_and_a_number_a_line_and_reasons_between() -> None:
 @pytest.mark.parametrize("airframe", ["foldable", "rigid", "racer"])
 def test_the_file_has_what_preflight_asks_for(airframe: str) -> None:
     told = {parameter.name: parameter.value for parameter in ardupilot_parameters(load_built_in(airframe))}
-    setup = Setup(told, None, "quadrotor", 0.145, 0.08, 0.005, MOST_HELD_S, 250.0, 5.0, "")
+    setup = Setup(told, None, "quadrotor", EstimateConfig(), 250.0, 5.0, "")
     found = {item.item: item.verdict for item in judge_parameters(setup) if item.item in told}
     wanted = {"GUID_TIMEOUT", "GUID_OPTIONS", "ATC_RATE_FF_ENAB", "ATC_RAT_YAW_PDMX", "FENCE_ENABLE", "ATC_ANGLE_MAX"}
     assert wanted <= set(found)
