@@ -106,7 +106,7 @@ class Machine(StateMachine):
         for estimate in inputs.impacts:
             if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
-                    self.handler.interrupt(now_us)
+                    self.handler.interrupt()
                 note_before(self.flight, self.state)
                 record_collision(self.flight, estimate, now_us)
                 decide(self.flight, self.state, now_us)

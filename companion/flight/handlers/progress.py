@@ -127,7 +127,7 @@ class FlyItems(_OnTrajectory):
             text = f"round what is known: {planned.trajectory.distance_m:.1f} m{left_out}"
             flight.report(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
 
-    def interrupt(self, now_us: int) -> None:
+    def interrupt(self) -> None:
         """A hit ends the present trajectory: note its heading, and which points of a path were passed."""
         self._flight.yaw_rad = self._heading.yaw_rad
         if isinstance(self._action, items.PathItem):
