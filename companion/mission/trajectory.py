@@ -10,9 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.messages import Vector3
-from companion.motion.vector import minus, plus, towards
-
-REST: Vector3 = (0.0, 0.0, 0.0)
+from companion.motion.vector import ZERO, minus, plus, towards
 
 # Position, velocity and acceleration; any frame, SI units.
 Motion: TypeAlias = tuple[Vector3, Vector3, Vector3]
@@ -89,7 +87,7 @@ class LineProfile:
         ramps = self._ramps
         remaining_s = ramps.duration_s - elapsed_s
         if remaining_s <= 0.0:
-            return self.target_m, REST, REST
+            return self.target_m, ZERO, ZERO
         way, rate, change = ramps.at(max(0.0, elapsed_s), remaining_s)
         distance = ramps.distance_m
         n, e, d = (part / distance for part in minus(self.target_m, self.start_m))
@@ -132,7 +130,7 @@ class CircleProfile:
         ramps = self._ramps
         remaining_s = ramps.duration_s - elapsed_s
         if remaining_s <= 0.0:
-            return self.target_m, REST, REST
+            return self.target_m, ZERO, ZERO
         way, rate, change = ramps.at(max(0.0, elapsed_s), remaining_s)
         sense = math.copysign(1.0, self.angle_rad)
         angle = self.start_rad + sense * way / self.radius_m
@@ -212,16 +210,12 @@ class CurveProfile:
     def at(self, elapsed_s: float) -> Motion:
         """Position, velocity and acceleration; before the start at rest there, after the end at the target."""
         if elapsed_s >= self.duration_s:
-            return self.target_m, REST, REST
-        place = max(0.0, elapsed_s) / _TABLE_STEP_S
-        index = min(int(place), len(self._table) - 2)
-        part = place - index
-        before, after = self._table[index], self._table[index + 1]
-        return (
-            towards(before[0], after[0], part),
-            towards(before[1], after[1], part),
-            towards(before[2], after[2], part),
-        )
+            return self.target_m, ZERO, ZERO
+        steps = max(0.0, elapsed_s) / _TABLE_STEP_S
+        index = min(int(steps), len(self._table) - 2)
+        before, after = self._table[index : index + 2]
+        place, velocity, acceleration = (towards(a, b, steps - index) for a, b in zip(before, after, strict=True))
+        return place, velocity, acceleration
 
     def _plan(self, points: Floats, speed_m_s: float, acceleration_m_s2: float, speeding_up_m_s2: float) -> None:
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
