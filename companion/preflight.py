@@ -100,10 +100,6 @@ class Survey:
         return self.refusal is not None or (since_us is not None and self.now_us >= since_us + LISTENING_US)
 
 
-def start_survey(config: CompanionConfig, now_us: int, line: SerialLine | None = None) -> Survey:
-    return Survey(config, now_us, StreamMonitor(config.streams, (MessageId.VIBRATION,)), line)
-
-
 def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[messages.Outgoing]:
     """Take what was heard, return what is to be sent; call it every 50 ms at least."""
     survey.now_us = now_us
@@ -302,7 +298,7 @@ class Preflight:
 
     def __init__(self, config: CompanionConfig, now_us: int, line: SerialLine | None = None) -> None:
         self._decoder, self._encoder = Decoder(), Encoder()
-        self.survey: Survey = start_survey(config, now_us, line)
+        self.survey = Survey(config, now_us, StreamMonitor(config.streams, (MessageId.VIBRATION,)), line)
 
     def step(self, received: bytes, now_us: int) -> tuple[bytes, ...]:
         """Call with what was received since the last call; what is to be sent."""

@@ -8,7 +8,7 @@ from companion import messages
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.messages import Attitude, LocalPosition, Parameter, ReadParameter, Sample, TimeSyncAnswer, TimeSyncAsk
 from companion.mission.config import CompanionConfig
-from companion.preflight import Survey, advance, findings, start_survey
+from companion.preflight import Preflight, Survey, advance, findings
 
 PX4 = messages.Heartbeat(1, 1, 2, 12, False, 0, 3)
 HEALTHY = {
@@ -55,7 +55,7 @@ def surveyed(
     shakes_m_s2=0.0,
 ) -> Survey:
     """A vehicle that was listened to for the whole time; its samples arrive in batches, every `held_us`."""
-    survey = start_survey(CompanionConfig(), 0, line)
+    survey = Preflight(CompanionConfig(), 0, line).survey
     advance(survey, [PX4], 0)
     step_us, asked = 4_000, []
     held: list[Sample] = []
@@ -215,7 +215,7 @@ def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
 
 
 def test_silence_is_told_after_the_stated_wait():
-    survey = start_survey(CompanionConfig(), 0)
+    survey = Preflight(CompanionConfig(), 0).survey
     advance(survey, [], 9_900_000)
     assert not survey.finished
     advance(survey, [], 10_100_000)
