@@ -265,9 +265,6 @@ class FlightContext:
         """Whether an identified vehicle has been silent for longer than `link.silence_s`."""
         return self.vehicle.identity is not None and self.silent_s(now_us) > self.mission.companion.link.silence_s
 
-    def note_silence(self, now_us: int) -> None:
-        self.was_silent |= self.is_silent(now_us)
-
     def may_command(self, now_us: int) -> bool:
         """Whether a command to a held vehicle may be sent: not on an old mode report, as the pilot may have changed the
         mode.

@@ -136,7 +136,7 @@ class GuardMachine(StateMachine):
     def _from_outside(self, inputs: Inputs, now_us: int) -> GuardTransition | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
         guard = self.flight
-        guard.note_silence(now_us)
+        guard.was_silent |= guard.is_silent(now_us)
         if guard.vehicle.armed is False and TABLE.moves(self.state, Trigger.DISARMED):
             return GuardTransition(Trigger.DISARMED, "disarmed")
         if self.state in HOLDING:

@@ -87,14 +87,13 @@ def _may_be_down(flight: FlightContext, now_us: int) -> bool:
 
 
 def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition | None:
-    link = flight.mission.companion.link
     if flight.vehicle.identity is None:
         return None
     if state in ON_THE_GROUND:
         silent_s = flight.silent_s(now_us)
-        if silent_s > link.patience_s:
+        if silent_s > flight.mission.companion.link.patience_s:
             return Transition(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
-        flight.note_silence(now_us)
+        flight.was_silent |= flight.is_silent(now_us)
         if flight.is_silent(now_us) or not flight.was_silent:
             return None
         flight.report(now_us, "link", LINK_RESTORED)
@@ -165,12 +164,10 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
     yet seen. In a failsafe PX4 keeps the user's intended mode (CURRENT_MODE) and reports MAV_STATE_CRITICAL
     (HEARTBEAT); a pilot's change moves the intended mode too.
     """
-    if report.custom_mode in (expected_mode, requested_mode):
+    own_modes, intended_mode = (expected_mode, requested_mode), report.intended_custom_mode
+    if report.custom_mode in own_modes:
         return Holder.COMPANION
-    still_intended = report.intended_custom_mode is not None and report.intended_custom_mode in (
-        expected_mode,
-        requested_mode,
-    )
+    still_intended = intended_mode is not None and intended_mode in own_modes
     return Holder.FAILSAFE if report.failsafe or still_intended else Holder.PILOT
 
 
