@@ -3,6 +3,7 @@
 import math
 import struct
 from collections.abc import Callable, Iterable
+from dataclasses import astuple
 from operator import itemgetter
 from typing import Any
 
@@ -239,14 +240,11 @@ def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
             used: tuple[float, ...] = (dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *command.parameters)
         case messages.SetArmed(armed, is_forced):
             used = (1.0 if armed else 0.0, _FORCE if is_forced else 0.0)
-        case messages.SetMessageInterval(message_id, interval_us):
-            used = (message_id, interval_us)
-        case messages.RequestMessage(message_id):
-            used = (message_id,)
         case messages.TakeOff(height_m):
             used = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m)
-        case messages.SetAuxFunction(function, level):
-            used = (function, level)
-        case messages.RunChecks():
-            used = ()
+        case (
+            messages.SetMessageInterval() | messages.RequestMessage() | messages.SetAuxFunction() | messages.RunChecks()
+        ):
+            # Their fields are the first parameters, in their order.
+            used = astuple(command)
     return used + (0.0,) * (7 - len(used))
