@@ -57,18 +57,14 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
     if flight.expected_mode is None or vehicle.mode is None:
         return None
-    holder = Holder.COMPANION
-    if vehicle.mode.custom_mode != flight.expected_mode:
-        holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
+    holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
     if holder is Holder.COMPANION:
         flight.foreign_mode_since_us = None
         return None
     if state is State.LANDING and _may_be_down(flight, now_us):
         return None
-    mode = vehicle.mode_name
-    if holder is Holder.FAILSAFE:
-        return Transition(Trigger.CONTROL_LOST, f"a failsafe of the vehicle took over in {mode}; setpoints stopped")
-    return Transition(Trigger.CONTROL_LOST, f"the pilot took over in {mode}; setpoints stopped")
+    who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot"
+    return Transition(Trigger.CONTROL_LOST, f"{who} took over in {vehicle.mode_name}; setpoints stopped")
 
 
 def _may_be_down(flight: FlightContext, now_us: int) -> bool:
