@@ -66,10 +66,9 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
 
     def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
-        if flight.command_client.pending is not None:
-            outcome = flight.command_outcome(inputs, False, now_us)
-            if outcome is not None and outcome.refused:
-                requests = self._requests = chain(self._in_its_place(flight), requests)
+        outcome = flight.command_outcome(inputs, False, now_us)
+        if outcome is not None and outcome.refused:
+            requests = self._requests = chain(self._in_its_place(flight), requests)
         if flight.command_client.pending is not None:
             return
         self._asked = request = next(requests, None)
