@@ -92,8 +92,7 @@ class Machine(StateMachine):
 
     @property
     def finished(self) -> bool:
-        handing_over = isinstance(self.handler, HandOver) and not self.handler.finished
-        return self.state in FINAL_STATES and not handing_over
+        return isinstance(self.handler, Released | HandOver) and self.handler.finished
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
         before = self.handler
