@@ -139,13 +139,6 @@ def _checks(name: str, bits: float, setup: Setup) -> PreflightItem:
     )
 
 
-def _renamed(setup: Setup) -> Iterator[PreflightItem]:
-    """Parameters with two names, of which a vehicle tells one."""
-    for names, judge in ((JERKS, _jerk), (LEANS, _lean), (CHECKS, _checks)):
-        told = next((name for name in names if name in setup.parameters), names[0])
-        yield from judged_settings({told: judge}, setup)
-
-
 # What decides whether a collision is survived.
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     LOSS: _timeout,
@@ -169,10 +162,13 @@ def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
-    yield from judged_settings(_SETTINGS, setup)
-    yield from _renamed(setup)
-    if YAW in setup.parameters:
-        yield from judged_settings({YAW: _yaw}, setup)
+    settings, told = dict(_SETTINGS), setup.parameters
+    for names, judge in ((JERKS, _jerk), (LEANS, _lean), (CHECKS, _checks)):
+        # Of two names a vehicle tells one.
+        settings[next((name for name in names if name in told), names[0])] = judge
+    if YAW in told:
+        settings[YAW] = _yaw
+    return judged_settings(settings, setup)
 
 
 def sight(setup: Setup) -> PreflightItem:
