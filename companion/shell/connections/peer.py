@@ -57,11 +57,14 @@ class Peer:
 
     def accepts(self, datagram: bytes, sender: Address, now_us: int) -> bool:
         """Whether the datagram is to be heard."""
-        if not self._is_heard(datagram, sender, now_us):
-            self.dropped += 1
-            self._note(sender)
-            return False
-        return True
+        if self._is_heard(datagram, sender, now_us):
+            return True
+        self.dropped += 1
+        # An attacker has sixty thousand ports; the first few tell all there is to tell.
+        if sender not in self._told and len(self._told) < 3:
+            self._told.add(sender)
+            self._news = f"{sender[0]}:{sender[1]} sends to this port, too; it is not listened to"
+        return False
 
     def news(self) -> str | None:
         """A stranger that has just been turned away for the first time."""
@@ -95,12 +98,6 @@ class Peer:
         self._before = None if sender == self._before else self._pinned
         self._pinned = self.answered = sender
         self._last_us, self._moved = now_us, None
-
-    def _note(self, sender: Address) -> None:
-        # An attacker has sixty thousand ports; the first few tell all there is to tell.
-        if sender not in self._told and len(self._told) < 3:
-            self._told.add(sender)
-            self._news = f"{sender[0]}:{sender[1]} sends to this port, too; it is not listened to"
 
 
 def _packets(datagram: bytes) -> Iterator[bytes]:
