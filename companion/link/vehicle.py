@@ -140,8 +140,6 @@ class Vehicle:
                 self.battery_percent = sample.remaining_percent
             case messages.AutopilotVersion():
                 self.version = sample.flight_version
-            case _:
-                pass
 
     def _update_mode(self, report: ModeReport, own_modes: tuple[int | None, ...], now_us: int) -> None:
         self.mode_received_us = now_us
