@@ -7,6 +7,7 @@ only the edges that the search comes to are looked at. Mission coordinates, metr
 import heapq
 import math
 from collections.abc import Sequence
+from itertools import accumulate, pairwise
 
 import shapely
 from shapely import Point, Polygon
@@ -115,11 +116,8 @@ def _fence_shape(fence: Fence) -> BaseGeometry:
 
 def _sloped(start: Vector3, goal: Vector3, places: Sequence[Place]) -> tuple[Vector3, ...]:
     """The places with heights that change evenly along the way."""
-    lengths, here = [0.0], start[:2]
-    for place in places:
-        lengths.append(lengths[-1] + math.dist(here, place))
-        here = place
+    lengths = list(accumulate(math.dist(*leg) for leg in pairwise((start[:2], *places))))
     total = lengths[-1] or 1.0
-    downs = [start[2] + (goal[2] - start[2]) * length / total for length in lengths[1:]]
+    downs = [start[2] + (goal[2] - start[2]) * length / total for length in lengths]
     sloped = [(n, e, down) for (n, e), down in zip(places, downs, strict=True)]
     return (*sloped[:-1], goal)
