@@ -76,7 +76,7 @@ class StateMachine(ABC):
 
 # What is done in a state; one object is made each time the state is entered. `step` does what is due and returns a
 # transition when the state is over; `target` is the setpoint for now, None while none must be sent.
-OnTheWay: TypeAlias = TakeOff | FlyItems | Recover | TakeBack | HoldAfterRecovery | FlyHome | Land
+OnTheWay: TypeAlias = TakeOff | FlyItems | Recover | HoldAfterRecovery | FlyHome | Land
 Handler: TypeAlias = Connect | Ready | OnTheWay | Crashed | Released | HandOver
 
 
@@ -154,10 +154,10 @@ class Machine(StateMachine):
                     flight.step_index = 1
                 return FlyItems(flight, now_us)
             case State.RECOVERING:
-                assert flight.reflex.recovery is not None, "a collision begins one"
-                recovery = Recover(flight, flight.reflex.recovery)
+                recovery = flight.reflex.recovery
+                assert recovery is not None, "a collision begins one"
                 flies = flight.expected_mode == flight.vehicle.autopilot.setpoints
-                return recovery if flies else TakeBack(flight, recovery, now_us)
+                return Recover(flight, recovery) if flies else TakeBack(flight, recovery, now_us)
             case State.HOLDING:
                 return HoldAfterRecovery(flight, now_us)
             case State.RETURNING:

@@ -11,6 +11,7 @@ from companion.messages import TakeOff as TakeOffCommand
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
 from companion.motion.rotation import yaw_rad
+from companion.reflex.recovery.recovery import Recovery
 
 # The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.
 ORIGIN_MEAN_US = 1_000_000
@@ -190,23 +191,20 @@ class Land(FixedSetpoint):
 LEAD_US = 40_000
 
 
-class TakeBack:
+class TakeBack(Recover):
     """A recovery out of the land mode: its setpoints first, then OFFBOARD, in which alone they are flown.
 
     A vehicle that does not take the mode goes on landing by itself, and is left to it.
     """
 
-    def __init__(self, flight: FlightContext, recovery: Recover, now_us: int) -> None:
-        self._recovery = recovery
+    def __init__(self, flight: FlightContext, recovery: Recovery, now_us: int) -> None:
+        super().__init__(flight, recovery)
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.
         self._is_asked = flight.command_client.requested_mode == flight.vehicle.autopilot.setpoints
         self._ask_us = now_us + (0 if self._is_asked else LEAD_US)
         if not self._is_asked:
             flight.command_client.cancel()
-
-    def target(self, now_us: int) -> Target | None:
-        return self._recovery.target(now_us)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if not self._is_taken and now_us >= self._ask_us:
@@ -218,4 +216,4 @@ class TakeBack:
                 return Transition(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
             if outcome is not None:
                 self._is_taken, flight.expected_mode = True, flight.vehicle.autopilot.setpoints
-        return self._recovery.step(flight, inputs, now_us)
+        return super().step(flight, inputs, now_us)
