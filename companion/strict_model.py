@@ -1,7 +1,6 @@
 """Number types for files a person writes: finite, never a string or a truth value in disguise."""
 
 import warnings
-from collections.abc import Container
 from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -21,19 +20,15 @@ class StrictModel(BaseModel):
 
     retired: ClassVar[frozenset[str]] = frozenset()
     """Keys of earlier versions: files that have them are taken, with a warning."""
+    bare: ClassVar[frozenset[str]] = frozenset()
+    """Keys that need no value: without one, which YAML reads as null, they are as with an empty map."""
 
     @model_validator(mode="before")
     @classmethod
-    def _without_retired(cls, data: Any) -> Any:
-        if not isinstance(data, dict) or cls.retired.isdisjoint(data):
+    def _as_written(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
             return data
         for key in sorted(cls.retired.intersection(data)):
             warnings.warn(f"the key {key} has no effect any more: it can be left out", stacklevel=2)
-        return {key: value for key, value in data.items() if key not in cls.retired}
-
-
-def with_bare_keys(data: object, keys: Container[str]) -> object:
-    """A key without a value, which YAML reads as null, as one with an empty map; for keys that need no value."""
-    if not isinstance(data, dict):
-        return data
-    return {key: {} if value is None and key in keys else value for key, value in data.items()}
+        kept = {key: value for key, value in data.items() if key not in cls.retired}
+        return kept | {key: {} for key in cls.bare if kept.get(key, {}) is None}

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from companion.autopilot.known import defaults
 from companion.mission.policy import OnCollision, OnTimeout
-from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel, with_bare_keys
+from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel
 
 Count = Annotated[int, Field(strict=True, ge=0)]
 
@@ -100,6 +100,7 @@ class ExpectItem(StrictModel):
     """A map with exactly one key. One that is not met makes the flight's outcome `failed`; the flight goes on."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+    bare = frozenset({"no_collision", "recovered"})
 
     collision: ExpectHit | None = None
     no_collision: ExpectNoHit | None = None
@@ -108,11 +109,6 @@ class ExpectItem(StrictModel):
     position: ExpectPosition | None = None
     height: ExpectHeight | None = None
     flight_time: ExpectFlightTime | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, data: object) -> object:
-        return with_bare_keys(data, ("no_collision", "recovered"))
 
     @model_validator(mode="after")
     def _exactly_one_key(self) -> Self:
@@ -314,6 +310,7 @@ class MissionItem(StrictModel):
             "dependentRequired": {"on_timeout": ["timeout_s"]},
         }
     )
+    bare = frozenset({"land", "return"})
 
     takeoff: TakeoffItem | None = None
     go_to: GoToItem | None = None
@@ -335,12 +332,6 @@ class MissionItem(StrictModel):
     """How long the item may take, recoveries included."""
     on_timeout: OnTimeout = "abort"
     """What follows then; abort hands the vehicle over as on_interrupt says."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, data: object) -> object:
-        """`- land:` without braces reads as null in YAML and means the same."""
-        return with_bare_keys(data, ("land", "return"))
 
     @model_validator(mode="after")
     def _exactly_one_action(self) -> Self:
