@@ -61,8 +61,7 @@ class _OnTrajectory:
         flight = self._flight
         latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
         radius_m = flight.mission.companion.flight.acceptance_radius_m
-        if latest is None:
-            return False
+        assert latest is not None, "the flight is in the air"
         ahead = plus(latest.position_ned_m, later_s, latest.velocity_ned_m_s)
         return max(math.dist(latest.position_ned_m, goal), math.dist(ahead, goal)) <= radius_m
 
