@@ -8,6 +8,7 @@ from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
 from companion.messages import SetArmed, Vector3
 from companion.messages import TakeOff as TakeOffCommand
+from companion.mission.item_trajectory import climb
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
 from companion.motion.rotation import yaw_rad
@@ -42,17 +43,16 @@ class TakeOff:
         self._climbed_until_us = flight.trajectory_us  # on the clock of ways
         attitude = flight.vehicle.attitude
         flight.yaw_rad = yaw_rad(attitude.attitude_wxyz) if attitude is not None else None
-        self._yaw_rad = flight.yaw_rad
         self._ground_ned_m = mean_position(flight)
         flight.report(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
 
     def target(self, now_us: int) -> Target | None:
         if self._profile is None:
-            return Target(self._ground_ned_m, self._yaw_rad)
+            return Target(self._ground_ned_m, self._flight.yaw_rad)
         if self._is_told:
             return None  # a setpoint ends its take-off
         position, velocity, acceleration = self._profile.at(self._climbing_s)
-        return self._flight.on_trajectory(position, self._yaw_rad, velocity, acceleration)
+        return self._flight.on_trajectory(position, self._flight.yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return self._now(flight, inputs, now_us)
@@ -93,10 +93,8 @@ class TakeOff:
         latest = flight.vehicle.history.latest
         assert latest is not None, "a flight begins only with positions arriving"
         flight.origin_ned_m = origin_of(flight, self._ground_ned_m, latest.time_boot_us, now_us)
-        limits = flight.mission.companion.flight
-        n, e, d = self._ground_ned_m
-        top = (n, e, d - self._item.height_m)
-        self._profile = LineProfile(self._ground_ned_m, top, limits.takeoff_speed_m_s, limits.takeoff_acceleration_m_s2)
+        top_m = self._item.height_m - self._ground_ned_m[2]
+        self._profile = climb(self._ground_ned_m, top_m, flight.mission.companion.flight)
         text = f"armed at {as_text(self._ground_ned_m)}, climbing to {self._item.height_m:g} m"
         flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
@@ -120,7 +118,7 @@ class TakeOff:
         is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
         if self._is_told and is_up and latest is not None and math.hypot(*latest.velocity_ned_m_s) < ARRIVES_M_S:
             # The mission's first way begins here.
-            flight.target = Target(profile.target_m, self._yaw_rad)
+            flight.target = Target(profile.target_m, flight.yaw_rad)
             return Transition(Trigger.TAKEN_OFF)
         if not self._is_told and is_up and self._climbing_s >= profile.duration_s:
             return Transition(Trigger.TAKEN_OFF)
