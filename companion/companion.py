@@ -166,7 +166,7 @@ class Companion(Stepped[FlightCore]):
             unreachable=tuple(flight.unreachable),
             refused_messages=dict(flight.refusals.counts),
             unconfirmed=flight.unconfirmed,
-            round_trip=flight.round_trip.report(),
+            round_trip_ms=flight.round_trip.summary_ms(),
             promise=core.reflex.monitor.promise,
             crashed=flight.crashed,
         )

@@ -38,20 +38,6 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
-class RoundTripReport:
-    """To the vehicle and back by TIMESYNC; None without an answer. `ignored` counts answers to no question of ours."""
-
-    median_us: int | None = None
-    worst_us: int | None = None
-    ignored: int = 0
-
-    def summary(self) -> dict[str, float | int | None]:
-        """As summary.json has it, in milliseconds."""
-        median_ms, worst_ms = (None if us is None else us / 1e3 for us in (self.median_us, self.worst_us))
-        return {"median": median_ms, "worst": worst_ms, "ignored": self.ignored}
-
-
-@dataclass(frozen=True, slots=True)
 class ExpectationReport:
     """An assertion of the mission's: `label` is its item's number, `detail` what was found."""
 
@@ -71,8 +57,8 @@ class FlightReport:
     coordinates. `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits,
     in mission coordinates. `unreachable` are the labels of items, or "home", to which that left no way.
     `refused_messages` counts the vehicle's messages that were not accepted, by name. `unconfirmed` counts the hits that
-    were none: one sample showed them, and nothing else. `promise` is the detector's, when it was last armed.
-    `crashed` says how; empty of a vehicle that has not.
+    were none: one sample showed them, and nothing else. `round_trip_ms` is as summary.json has it. `promise` is the
+    detector's, when it was last armed. `crashed` says how; empty of a vehicle that has not.
     """
 
     outcome: Outcome
@@ -89,6 +75,6 @@ class FlightReport:
     unreachable: tuple[str, ...] = ()
     refused_messages: Mapping[str, int] = field(default_factory=dict)
     unconfirmed: int = 0
-    round_trip: RoundTripReport = RoundTripReport()
+    round_trip_ms: Mapping[str, float | None] = field(default_factory=dict)
     promise: Promise | None = None
     crashed: str = ""

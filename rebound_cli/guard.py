@@ -93,7 +93,7 @@ def _recorded(
             "left_alone": flight.left_alone,
             "crashed": flight.crashed or None,
             "kept_out": 0 if between is None else between.kept_out,
-            "round_trip_ms": flight.round_trip.report().summary(),
+            "round_trip_ms": flight.round_trip.summary_ms(),
             **asdict(connection.counts),
             "refused_packets": refused_packets(connection),
         }

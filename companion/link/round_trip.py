@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from statistics import median_low
 
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
-from companion.report import RoundTripReport
 
 # Until a first answer as often as PX4 asks by itself (its TIMESYNC stream has 10 Hz): a lost packet delays nothing, and
 # a slow link is judged by several answers at once. Then as often as a HEARTBEAT.
@@ -63,8 +62,10 @@ class RoundTrip:
         """Of all answers."""
         return median_low(self._all_us.elements()) if self._all_us else None
 
-    def report(self) -> RoundTripReport:
-        return RoundTripReport(self.median_us, self.worst_us, self.ignored)
+    def summary_ms(self) -> dict[str, float | None]:
+        """None without an answer. `ignored` counts answers to no question of ours."""
+        median_ms, worst_ms = (None if us is None else us / 1e3 for us in (self.median_us, self.worst_us))
+        return {"median": median_ms, "worst": worst_ms, "ignored": self.ignored}
 
     def complaint(self) -> str | None:
         """One sentence when the round trip is too long to begin; None before the first answer."""

@@ -67,7 +67,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         "realtime_factor": round(duration_s / flown.wall_clock_s, 3) if flown.wall_clock_s > 0 else None,
         **(flown.timing or Timing()).summary(),
         "stream_rates_hz": {name: round(rate, 2) for name, rate in report.stream_rates_hz.items()},
-        "round_trip_ms": report.round_trip.summary(),
+        "round_trip_ms": dict(report.round_trip_ms),
         **asdict(flown.link),
         "refused_messages": dict(report.refused_messages),
         "refused_packets": dict(flown.refused_packets),
