@@ -14,7 +14,7 @@ from companion.mavlink.readers import READERS, Reader
 from companion.memory.patch import Patch
 from companion.messages import ComputerStatus, Sample
 from companion.mission.model import Mission
-from companion.report import Event, ExpectationReport, FlightReport, Status
+from companion.report import Event, FlightReport, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,9 +159,7 @@ class Companion(Stepped[FlightCore]):
             started_at_us=core.started_at_us,
             ended_at_us=core.now_us if flight.ended_at_us is None else flight.ended_at_us,
             armed_at_us=flight.armed_at_us,
-            expectations=tuple(
-                [ExpectationReport(wish.label, wish.text, wish.met, wish.detail) for wish in flight.expectations]
-            ),
+            expectations=tuple([wish.report for wish in flight.expectations]),
             obstacles=all_known(flight),
             unreachable=tuple(flight.unreachable),
             refused_messages=dict(flight.refusals.counts),

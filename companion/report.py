@@ -43,8 +43,8 @@ class ExpectationReport:
 
     label: str
     text: str
-    met: bool | None  # None: the flight is not over
-    detail: str
+    met: bool | None = None  # None: the flight is not over
+    detail: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.reflex import Reflex, start_reflex
-from companion.report import Event, JsonValue, Outcome
+from companion.report import Event, ExpectationReport, JsonValue, Outcome
 
 # As the autopilot's own modes turn: the vehicle can follow.
 TURNING_RAD_S = math.radians(defaults.TURNING_DEG_S)
@@ -119,15 +119,12 @@ class BeforeHit:
 
 @dataclass(slots=True)
 class Expectation:
-    """An assertion of the mission's: pending until `met` is known."""
+    """An assertion of the mission's: pending until it is known whether it is met."""
 
-    label: str  # of its step
-    text: str
     item: ExpectItem
     began_us: int
     hits_before: int
-    met: bool | None = None
-    detail: str = ""
+    report: ExpectationReport
 
 
 @dataclass(slots=True)

@@ -1,10 +1,12 @@
 """The item `expect`: assertions of a mission about its own flight, from their step on until they are decided."""
 
 import math
+from dataclasses import replace
 
 from companion.flight.context import Expectation, FlightContext, as_text
 from companion.mission import items
 from companion.reflex.recovery.collision import CollisionReport
+from companion.report import ExpectationReport
 
 
 def describe(item: items.ExpectItem) -> str:
@@ -32,7 +34,7 @@ def describe(item: items.ExpectItem) -> str:
 
 def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int) -> None:
     """Take up an expectation; what can be said at once is said."""
-    expectation = Expectation(label, describe(item), item, now_us, len(flight.collisions))
+    expectation = Expectation(item, now_us, len(flight.collisions), ExpectationReport(label, describe(item)))
     flight.expectations.append(expectation)
     latest = flight.vehicle.history.latest
     assert latest is not None, "the flight is in the air"
@@ -61,7 +63,7 @@ def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int
 def review(flight: FlightContext, now_us: int) -> None:
     """Look at those that are still open: has the hit come, is the time over?"""
     for expectation in flight.expectations:
-        if expectation.met is not None:
+        if expectation.report.met is not None:
             continue
         hits = [record.report() for record in flight.collisions[expectation.hits_before :]]
         waited_s = (now_us - expectation.began_us) * 1e-6
@@ -86,14 +88,14 @@ def close(flight: FlightContext, now_us: int) -> None:
     """The flight is over: a hit that has not come will not, and none is none."""
     review(flight, now_us)
     for expectation in flight.expectations:
-        if expectation.met is None:
+        if expectation.report.met is None:
             met = isinstance(expectation.item.check, items.ExpectNoHit)
             _decide(flight, expectation, met, "none until the end of the flight", now_us)
 
 
 def failure(flight: FlightContext) -> str | None:
     """The sentence for the outcome, or None when everything was as expected."""
-    failed = [expectation for expectation in flight.expectations if expectation.met is False]
+    failed = [wish.report for wish in flight.expectations if wish.report.met is False]
     if not failed:
         return None
     first = failed[0]
@@ -102,9 +104,9 @@ def failure(flight: FlightContext) -> str | None:
 
 
 def _decide(flight: FlightContext, expectation: Expectation, met: bool, detail: str, now_us: int) -> None:
-    expectation.met, expectation.detail = met, detail
+    expectation.report = replace(expectation.report, met=met, detail=detail)
     word = "met" if met else "NOT met"
-    flight.report(now_us, "expect", f"{word}: {expectation.text} ({detail})", met=met)
+    flight.report(now_us, "expect", f"{word}: {expectation.report.text} ({detail})", met=met)
 
 
 def _heard_of(hits: list[CollisionReport]) -> str:
