@@ -1,6 +1,7 @@
 """The mission's policy for hits: decided at each hit, acted on when the vehicle has settled."""
 
 import math
+from dataclasses import replace
 
 from companion.flight.context import AfterRecovery, BeforeHit, FlightContext, Target, Transition
 from companion.flight.states import State, Trigger
@@ -73,8 +74,7 @@ _GOES_ON = {
 
 def note_before(flight: FlightContext, state: State) -> None:
     """Save the state before a hit is recorded. Within a recovery there is nothing to restore."""
-    tally = flight.tally
-    before = BeforeHit(state, flight.step_index, tally.hits, tally.pace_factor, flight.after_recovery)
+    before = BeforeHit(state, flight.step_index, replace(flight.tally), flight.after_recovery)
     flight.before_hit = None if state is State.RECOVERING else before
 
 
@@ -87,7 +87,7 @@ def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     flight.unconfirmed += 1
     text = "not a hit: one message showed it, and nothing else did; going on"
     flight.report(now_us, "unconfirmed", text, count=flight.unconfirmed)
-    flight.tally.hits, flight.tally.pace_factor = before.step_hits, before.pace_factor
+    flight.tally = before.tally
     flight.step_index = max(before.step_index, 1) if before.state is State.TAKEOFF else before.step_index
     flight.after_recovery = before.after_recovery
     flight.target = Target(latest.position_ned_m, flight.yaw_rad)

@@ -112,8 +112,7 @@ class BeforeHit:
 
     state: State
     step_index: int
-    step_hits: int
-    pace_factor: float
+    tally: StepTally
     after_recovery: AfterRecovery
 
 
