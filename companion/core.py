@@ -196,7 +196,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not flight.vehicle.is_mode_known:
             return
         try:
-            target = self.machine.handler.target(now_us)
+            target = self.machine.handler.target(flight, now_us)
             if target is None:
                 if self._leans:
                     self._change_law(None, now_us)

@@ -310,7 +310,7 @@ class FixedSetpoint:
 
     _target: Target | None = None
 
-    def target(self, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target | None:
         return self._target
 
 

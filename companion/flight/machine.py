@@ -105,7 +105,7 @@ class Machine(StateMachine):
         for estimate in inputs.impacts:
             if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
-                    self.handler.interrupt()
+                    self.handler.interrupt(self.flight)
                 note_before(self.flight, self.state)
                 record_collision(self.flight, estimate, now_us)
                 decide(self.flight, self.state, now_us)

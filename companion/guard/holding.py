@@ -35,8 +35,8 @@ class TakeOver:
         if not guard.vehicle.flies_setpoints:
             guard.ask_for_mode(guard.vehicle.autopilot.setpoints)
 
-    def target(self, now_us: int) -> Target | None:
-        return self.recover.target(now_us)
+    def target(self, guard: GuardContext, now_us: int) -> Target | None:
+        return self.recover.target(guard, now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         is_seen = guard.vehicle.flies_setpoints
@@ -68,8 +68,8 @@ class Recovering:
         self._foreign = 0
         self._asked_us: int | None = None  # whether the mode is still ours
 
-    def target(self, now_us: int) -> Target | None:
-        return self._recover.target(now_us)
+    def target(self, guard: GuardContext, now_us: int) -> Target | None:
+        return self._recover.target(guard, now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode: only

@@ -212,7 +212,7 @@ class GuardMachine(StateMachine):
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:
-                return Watching(guard)
+                return Watching()
             case State.TAKING_OVER:
                 mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode_name(guard.previous_mode)
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)

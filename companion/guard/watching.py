@@ -161,13 +161,10 @@ class StandBy(FixedSetpoint):
 class Watching:
     """Until a hit. Setpoints are sent in advance, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
 
-    def __init__(self, guard: GuardContext) -> None:
-        self._guard = guard
-
-    def target(self, now_us: int) -> Target | None:
+    def target(self, guard: GuardContext, now_us: int) -> Target | None:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
-        guard, vehicle = self._guard, self._guard.vehicle
-        latest, seen_us = vehicle.history.latest, guard.others_setpoint_us
+        vehicle, seen_us = guard.vehicle, guard.others_setpoint_us
+        latest = vehicle.history.latest
         streams_elsewhere = guard.program_elsewhere or (seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US)
         is_wanted = vehicle.autopilot.wants_setpoints_first and not vehicle.flies_setpoints
         if latest is None or not is_wanted or streams_elsewhere:

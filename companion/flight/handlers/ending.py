@@ -203,7 +203,7 @@ class HandOver:
         if self._disarming:
             flight.command_client.begin(SetArmed(False))
 
-    def target(self, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target | None:
         return None if self.finished or now_us - self._began_us >= LONGEST_US else self._target
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:

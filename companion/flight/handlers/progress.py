@@ -35,30 +35,27 @@ _TRIGGERS = {
 class _OnTrajectory:
     """A trajectory in mission coordinates, begun at a time of the trajectories' clock."""
 
-    _flight: FlightContext
     _trajectory: Trajectory
     _trajectory_began_us: int
 
-    @property
-    def _elapsed_s(self) -> float:
-        return (self._flight.trajectory_us - self._trajectory_began_us) * 1e-6
+    def _elapsed_s(self, flight: FlightContext) -> float:
+        return (flight.trajectory_us - self._trajectory_began_us) * 1e-6
 
-    def _turned(self, motion: Motion, now_us: int) -> float | None:
+    def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
         """The heading at this motion."""
-        return self._flight.heading_towards(self._flight.yaw_rad)
+        return flight.heading_towards(flight.yaw_rad)
 
-    def target(self, now_us: int) -> Target | None:
-        elapsed_s = self._elapsed_s
+    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+        elapsed_s = self._elapsed_s(flight)
         motion = self._trajectory.at(elapsed_s)
-        yaw_rad, place = self._turned(motion, now_us), self._flight.local_ned_m(motion[0])
+        yaw_rad, place = self._turned(flight, motion, now_us), flight.local_ned_m(motion[0])
         if elapsed_s >= self._trajectory.duration_s:
             return Target(place, yaw_rad)
         # Without the acceleration the vehicle falls behind as it speeds up, and then overshoots the speed.
-        return self._flight.on_trajectory(place, yaw_rad, *motion[1:])
+        return flight.on_trajectory(place, yaw_rad, *motion[1:])
 
-    def _arrived(self, later_s: float = 0.0) -> bool:
+    def _arrived(self, flight: FlightContext, later_s: float) -> bool:
         """Whether it is at its goal; with its speed also so much later."""
-        flight = self._flight
         latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
         radius_m = flight.mission.companion.flight.acceptance_radius_m
         assert latest is not None, "the flight is in the air"
@@ -78,7 +75,7 @@ class FlyItems(_OnTrajectory):
         if flight.tally.index != flight.step_index or flight.tally.began_us is None:
             flight.tally = StepTally(flight.step_index, now_us)
         step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
-        self._flight, self._step, self._action = flight, step, step.action
+        self._step, self._action = step, step.action
         self._started_us, self._trajectory_began_us = now_us, flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
@@ -101,11 +98,10 @@ class FlyItems(_OnTrajectory):
         if isinstance(self._action, items.ExpectItem):
             expectations.begin(flight, step.label, self._action, now_us)
         elif isinstance(self._action, items.Motion):
-            self._plan(self._action, start, now_us)
+            self._plan(flight, self._action, start, now_us)
 
-    def _plan(self, action: items.Motion, start_m: Vector3, now_us: int) -> None:
+    def _plan(self, flight: FlightContext, action: items.Motion, start_m: Vector3, now_us: int) -> None:
         """The item's own trajectory, or one round known obstacles; of an interrupted path what is left."""
-        flight = self._flight
         behind = flight.tally.points_passed if flight.after_recovery.trigger is Trigger.RECOVERED_TO_DETOUR else 0
         if isinstance(action, items.PathItem) and 0 < behind < len(action.points_ned_m):
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
@@ -126,16 +122,16 @@ class FlyItems(_OnTrajectory):
             text = f"round what is known: {planned.trajectory.distance_m:.1f} m{left_out}"
             flight.report(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
 
-    def interrupt(self) -> None:
+    def interrupt(self, flight: FlightContext) -> None:
         """A hit ends the present trajectory: note its heading, and which points of a path were passed."""
-        self._flight.yaw_rad = self._heading.yaw_rad
+        flight.yaw_rad = self._heading.yaw_rad
         if isinstance(self._action, items.PathItem):
-            tally = self._flight.tally
-            tally.points_passed = max(tally.points_passed, passed(self._action, self._trajectory, self._elapsed_s))
+            points = passed(self._action, self._trajectory, self._elapsed_s(flight))
+            flight.tally.points_passed = max(flight.tally.points_passed, points)
 
-    def _turned(self, motion: Motion, now_us: int) -> float | None:
+    def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
         wanted_rad = self._heading.turn(motion[0], motion[1], now_us)
-        return self._flight.heading_towards(wanted_rad, self._heading.rate_rad_s)
+        return flight.heading_towards(wanted_rad, self._heading.rate_rad_s)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         damage, wanted = flight.motors.damage, flight.mission.on_damage
@@ -157,13 +153,13 @@ class FlyItems(_OnTrajectory):
 
     def _leave(self, flight: FlightContext, now_us: int) -> None:
         """On to the next step, from the setpoint of this moment."""
-        flight.target = self.target(now_us)
+        flight.target = self.target(flight, now_us)
         flight.yaw_rad = self._heading.yaw_rad
         flight.step_index += 1
         self._begin(flight, now_us)
 
     def _is_done(self, flight: FlightContext, now_us: int) -> bool:
-        elapsed_s = self._elapsed_s
+        elapsed_s = self._elapsed_s(flight)
         match self._action:
             case items.SetSpeedItem() | items.ExpectItem():
                 return True
@@ -180,7 +176,7 @@ class FlyItems(_OnTrajectory):
                 if over and self._over_since_us is None:
                     self._over_since_us = now_us
                 lands = isinstance(flight.steps[flight.step_index + 1].action, items.LandItem)
-                return over and self._arrived(BRAKES_S if lands else 0.0)
+                return over and self._arrived(flight, BRAKES_S if lands else 0.0)
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
@@ -227,12 +223,11 @@ class HoldAfterRecovery:
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         hold_s = flight.after_recovery.hold_s
         self._until_us = now_us + round(hold_s * 1e6)
-        self._flight, self._target = flight, flight.target
+        self._target = flight.target
         flight.report(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)
 
-    def target(self, now_us: int) -> Target | None:
-        target, flight = self._target, self._flight
-        return target and replace(target, yaw_rad=flight.heading_towards(flight.yaw_rad))
+    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+        return self._target and replace(self._target, yaw_rad=flight.heading_towards(flight.yaw_rad))
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return Transition(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
@@ -301,7 +296,6 @@ class FlyHome(_OnTrajectory):
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         assert flight.target is not None, "the flight is in the air"
-        self._flight = flight
         self._trajectory_began_us = flight.trajectory_us
         flight.going_home = True
         start = flight.mission_ned_m(flight.target.position_ned_m)
@@ -321,10 +315,10 @@ class FlyHome(_OnTrajectory):
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self._is_cut_off or (flight.motors.damage is not None and flight.mission.on_damage == "land"):
             return Transition(Trigger.LAND_DUE)
-        overdue_s = self._elapsed_s - self._trajectory.duration_s
+        overdue_s = self._elapsed_s(flight) - self._trajectory.duration_s
         if overdue_s < 0.0:
             return None
-        if self._arrived(BRAKES_S):
+        if self._arrived(flight, BRAKES_S):
             return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)

@@ -42,13 +42,13 @@ class Recover:
     """Fly to rest after the newest collision, and wait until the vehicle has settled."""
 
     def __init__(self, flight: FlightContext, recovery: Recovery) -> None:
-        self._flight, self._recovery = flight, recovery
+        self._recovery = recovery
         *_, first = flight.reflex.in_one_recovery()
         self._first_hit_us = first.detected_at_us
 
-    def target(self, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target | None:
         """Attitude and thrust until it rests; then its place."""
-        flight, place = self._flight, self._recovery.record.setpoint_ned_m
+        place = self._recovery.record.setpoint_ned_m
         yaw_rad = flight.heading_towards(flight.yaw_rad)
         if not self._recovery.leans:
             return Target(place, yaw_rad)

@@ -33,7 +33,7 @@ class TakeOff:
     """In OFFBOARD from the start, so that the same setpoint stream carries the whole flight."""
 
     def __init__(self, flight: FlightContext, item: TakeoffItem, now_us: int) -> None:
-        self._flight, self._item = flight, item
+        self._item = item
         # Streaming setpoints, switching to OFFBOARD, arming, climbing: one after the other.
         self._now = self._lead
         self._is_told = flight.vehicle.autopilot.is_told_to_take_off
@@ -46,13 +46,13 @@ class TakeOff:
         self._ground_ned_m = mean_position(flight)
         flight.report(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
 
-    def target(self, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target | None:
         if self._profile is None:
-            return Target(self._ground_ned_m, self._flight.yaw_rad)
+            return Target(self._ground_ned_m, flight.yaw_rad)
         if self._is_told:
             return None  # a setpoint ends its take-off
         position, velocity, acceleration = self._profile.at(self._climbing_s)
-        return self._flight.on_trajectory(position, self._flight.yaw_rad, velocity, acceleration)
+        return flight.on_trajectory(position, flight.yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return self._now(flight, inputs, now_us)

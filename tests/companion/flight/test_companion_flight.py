@@ -212,7 +212,7 @@ ON_THE_WAY_OUT += ["companion.mavlink.encode.Encoder._position_fields"]
     [
         ("companion.flight.handlers.progress.FlyItems.step", breaks),
         ("companion.flight.handlers.progress.FlyItems.target", breaks),
-        ("companion.flight.handlers.progress.FlyItems.target", lambda self, now_us: Target((float("nan"), 0, 0), None)),
+        ("companion.flight.handlers.progress.FlyItems.target", lambda *_: Target((float("nan"), 0, 0), None)),
         ("companion.reflex.reflex.advance", breaks),
         *((place, breaks) for place in ON_THE_WAY_OUT),
     ],

@@ -66,7 +66,7 @@ def hears(
 ):
     sample = LocalPosition(HIT_US + since_us, (north_m, 0.0, down_m), (north_m_s, 0.0, 0.0))
     recover.step(flight, Inputs(positions=[sample]), since_us)
-    target = recover.target(since_us)
+    target = recover.target(flight, since_us)
     assert target is not None
     return target, target.setpoint(0)
 

@@ -261,7 +261,7 @@ def test_a_vehicle_that_a_hit_has_turned_is_turned_back_at_leisure(heading_deg, 
     flight.vehicle.attitude = Attitude(HIT_US, (math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)))
     # When it recovers, then it is asked for no heading far from its own
     recover.step(flight, Inputs(), 100_000)
-    assert math.degrees(recover.target(100_000).yaw_rad) == pytest.approx(asked_deg, abs=0.1)
+    assert math.degrees(recover.target(flight, 100_000).yaw_rad) == pytest.approx(asked_deg, abs=0.1)
     # And for its heading of before when that is over
     assert recover.step(flight, Inputs(), 11_000_000) is not None
     assert flight.target.yaw_rad == 0.0
