@@ -72,7 +72,8 @@ def goes_down(guard: GuardContext, now_us: int) -> bool:
     the sticks ask for velocities, and nothing has ever told which.
     """
     vehicle, sticks, asked_us = guard.vehicle, guard.sticks_now, guard.sinks_us
-    if vehicle.landed is LandedState.LANDING or vehicle.descends or vehicle.pilot is Pilot.HAND:
+    descends = vehicle.custom_mode in vehicle.autopilot.descents
+    if vehicle.landed is LandedState.LANDING or descends or vehicle.pilot is Pilot.HAND:
         return True
     deadzone = vehicle.autopilot.stick_deadzone
     sinks = asked_us is None if sticks is None else sticks.deflections[THROTTLE] < -deadzone

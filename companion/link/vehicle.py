@@ -181,11 +181,6 @@ class Vehicle:
         return "" if self.mode is None else self.autopilot.mode_name(self.mode.custom_mode)
 
     @property
-    def descends(self) -> bool:
-        """Whether its mode ends on the ground."""
-        return self.custom_mode in self.autopilot.descents
-
-    @property
     def flies_setpoints(self) -> bool:
         return self.custom_mode == self.autopilot.setpoints
 
