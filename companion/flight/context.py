@@ -248,11 +248,6 @@ class FlightContext:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
 
-    @property
-    def own_modes(self) -> tuple[int | None, ...]:
-        """The modes that mean that the companion has the vehicle; none while it does not hold it."""
-        return () if self.expected_mode is None else (self.expected_mode, self.command_client.requested_mode)
-
     def silent_s(self, now_us: int) -> float:
         """Seconds since the last message of the vehicle."""
         return (now_us - self.vehicle.last_received_us) * 1e-6
@@ -271,7 +266,9 @@ class FlightContext:
         if self.expected_mode is None or self.vehicle.is_mode_known:
             return True
         is_silent = now_us - self.vehicle.last_received_us >= OLD_NEWS_US
-        return is_silent and self.vehicle.unconfirmed_mode is None and self.command_client.is_unsaid
+        pending = self.command_client.pending
+        is_unsaid = pending is not None and pending.attempts == 0
+        return is_silent and self.vehicle.unconfirmed_mode is None and is_unsaid
 
     def is_time_to_give_away(self, since_us: int, now_us: int) -> bool:
         """Whether a mode that ends the holding may be requested: straight after a report of the mode.

@@ -85,11 +85,6 @@ class CommandClient:
         command = None if self.pending is None else self.pending.command
         return command.custom_mode if isinstance(command, messages.SetMode) else None
 
-    @property
-    def is_unsaid(self) -> bool:
-        """Whether there is a command that has not been sent yet."""
-        return self.pending is not None and self.pending.attempts == 0
-
     def begin(self, command: messages.VehicleCommand) -> None:
         """Take up a command, dropping any other; it goes out in the next `step`."""
         self.pending = Pending(command)
