@@ -218,11 +218,7 @@ def _computer(status: ComputerStatus) -> Any:
         storage_type=none * 4,
         storage_usage=[status.disk_used_mib, *none * 3],
         storage_total=[status.disk_total_mib, *none * 3],
-        link_type=none * 6,
-        link_tx_rate=none * 6,
-        link_rx_rate=none * 6,
-        link_tx_max=none * 6,
-        link_rx_max=none * 6,
+        **dict.fromkeys(("link_type", "link_tx_rate", "link_rx_rate", "link_tx_max", "link_rx_max"), none * 6),
     )
 
 
