@@ -26,6 +26,7 @@ from companion.messages import (
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
+from companion.mission.trajectory import Motion
 from companion.motion.motors import MotorWatch
 from companion.motion.rotation import yaw_rad
 from companion.motion.vector import ZERO, minus, plus
@@ -223,13 +224,10 @@ class FlightContext:
         """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""
         self.has_climbed = False
 
-    def on_trajectory(
-        self, place_ned_m: Vector3, yaw_rad: float | None, velocity_ned_m_s: Vector3, acceleration_ned_m_s2: Vector3
-    ) -> Target:
-        """A position on a trajectory, local NED. While the trajectory stands still, its velocity is left out."""
-        if not self.has_position:
-            return Target(place_ned_m, yaw_rad)
-        return Target(place_ned_m, yaw_rad, velocity_ned_m_s, acceleration_ned_m_s2)
+    def on_trajectory(self, motion: Motion, yaw_rad: float | None) -> Target:
+        """A motion on a trajectory, local NED. While the trajectory stands still, its velocity is left out."""
+        place, velocity, acceleration = motion
+        return Target(place, yaw_rad, velocity, acceleration) if self.has_position else Target(place, yaw_rad)
 
     def heading_towards(self, wanted_rad: float | None, rate_rad_s: float = TURNING_RAD_S) -> float | None:
         """The heading to ask for on the way to a wanted one: it leads the vehicle's own by what turns it at a rate.

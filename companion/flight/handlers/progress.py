@@ -52,7 +52,7 @@ class _OnTrajectory:
         if elapsed_s >= self._trajectory.duration_s:
             return Target(place, yaw_rad)
         # Without the acceleration the vehicle falls behind as it speeds up, and then overshoots the speed.
-        return flight.on_trajectory(place, yaw_rad, *motion[1:])
+        return flight.on_trajectory((place, *motion[1:]), yaw_rad)
 
     def _arrived(self, flight: FlightContext, later_s: float) -> bool:
         """Whether it is at its goal; with its speed also so much later."""

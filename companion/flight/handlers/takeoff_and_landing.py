@@ -51,8 +51,7 @@ class TakeOff:
             return Target(self._ground_ned_m, flight.yaw_rad)
         if self._is_told:
             return None  # a setpoint ends its take-off
-        position, velocity, acceleration = self._profile.at(self._climbing_s)
-        return flight.on_trajectory(position, flight.yaw_rad, velocity, acceleration)
+        return flight.on_trajectory(self._profile.at(self._climbing_s), flight.yaw_rad)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return self._now(flight, inputs, now_us)
