@@ -67,9 +67,8 @@ class StateMachine(ABC):
         try:
             self._give_away(text, now_us)
         except Exception as second:
-            flight.report(
-                now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second))
-            )
+            trace = "".join(traceback.format_exception(second))
+            flight.report(now_us, "fault", f"and again: {second}", traceback=trace)
             self._release(text)
         return self.handler is not before
 

@@ -78,9 +78,8 @@ class Recovering:
         vehicle, asked_us = guard.vehicle, self._asked_us
         if asked_us is not None and vehicle.mode_received_us > asked_us and vehicle.is_mode_known:
             guard.program_elsewhere = True
-            return GuardTransition(
-                Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own"
-            )
+            text = "another program's setpoints reach the vehicle, on a link of its own"
+            return GuardTransition(Trigger.CROSSED, text)
         if vehicle.is_mode_known and now_us - self._since_us > ECHO_STALE_US:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES and asked_us is None:
@@ -207,8 +206,7 @@ class StandDown(FixedSetpoint):
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         if self._target is not None:
-            is_seen = not guard.vehicle.flies_setpoints
-            outcome = guard.command_outcome(inputs, is_seen, now_us)
+            outcome = guard.command_outcome(inputs, not guard.vehicle.flies_setpoints, now_us)
             if outcome is not None or now_us > self._until_us:
                 self._target = None
                 guard.command_client.cancel()

@@ -130,9 +130,8 @@ class GuardConnect(Meet[GuardTransition]):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
             return None
         self._report_streams(flight, now_us)
-        flight.report(
-            now_us, "unattended", unattended_text(flight.vehicle.autopilot, flight.mission.limits.max_speed_m_s)
-        )
+        unattended = unattended_text(flight.vehicle.autopilot, flight.mission.limits.max_speed_m_s)
+        flight.report(now_us, "unattended", unattended)
         return GuardTransition(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
 
 

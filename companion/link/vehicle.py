@@ -189,9 +189,8 @@ class Vehicle:
         least = self.autopilot.least_version
         if self.version is None or self.version >= least:
             return None
-        return (
-            f"{self.autopilot_text()} is too old: {self.autopilot.name} {least[0]}.{least[1]} is the oldest that flies"
-        )
+        oldest = f"{self.autopilot.name} {least[0]}.{least[1]}"
+        return f"{self.autopilot_text()} is too old: {oldest} is the oldest that flies"
 
     def autopilot_text(self) -> str:
         """For people and the report, for example "PX4 1.15.0"; empty before there is a vehicle."""

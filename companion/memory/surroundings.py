@@ -49,9 +49,8 @@ class Walls:
 
         An end that is None does not reduce the clearance.
         """
-        return _keeps(line, start, goal, self.areas, self.clearance_m - SLACK_M) and _keeps(
-            line, start, goal, self.cores, self.least_m
-        )
+        is_clear = _keeps(line, start, goal, self.areas, self.clearance_m - SLACK_M)
+        return is_clear and _keeps(line, start, goal, self.cores, self.least_m)
 
     def grown(self, by_m: float) -> list[BaseGeometry]:
         """The assumed areas, grown by `by_m` on every side."""

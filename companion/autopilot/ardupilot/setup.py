@@ -49,12 +49,9 @@ def _frame(setup: Setup) -> Iterator[PreflightItem]:
     number = setup.parameters.get("FRAME_CLASS")
     if number is not None:
         named, kind = CLASSES.get(int(number), "another frame"), setup.vehicle_type
-        case = (
-            named != kind,
-            DOUBTFUL,
-            "FRAME_CLASS and FRAME_TYPE in Mission Planner: Setup, Frame Type; then reboot",
-        )
-        yield judged("FRAME_CLASS", f"{number:g} ({named}), MAV_TYPE says {kind}", case)
+        remedy = "FRAME_CLASS and FRAME_TYPE in Mission Planner: Setup, Frame Type; then reboot"
+        found = f"{number:g} ({named}), MAV_TYPE says {kind}"
+        yield judged("FRAME_CLASS", found, (named != kind, DOUBTFUL, remedy))
 
 
 def _port(setup: Setup) -> Iterator[PreflightItem]:
@@ -133,10 +130,8 @@ def _lean(name: str, lean: float, setup: Setup) -> PreflightItem:
 
 def _checks(name: str, bits: float, setup: Setup) -> PreflightItem:
     all_checks = 0 if name == CHECKS[0] else 1
-    remedy = f"{name} = {all_checks}, and mend what the check finds"
-    return judged(
-        name, f"{bits:g}: checks before arming", (bits != all_checks, DOUBTFUL, remedy), beyond=" are left out"
-    )
+    found, remedy = f"{bits:g}: checks before arming", f"{name} = {all_checks}, and mend what the check finds"
+    return judged(name, found, (bits != all_checks, DOUBTFUL, remedy), beyond=" are left out")
 
 
 # What decides whether a collision is survived.

@@ -148,9 +148,8 @@ def _radio(name: str, bits: float, setup: Setup) -> PreflightItem:
         return PreflightItem(name, Verdict.GOOD, "a lost radio does not end OFFBOARD")
     value = int(bits) | RCL_EXCEPT_OFFBOARD
     found = f"{int(bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
-    return PreflightItem(
-        name, DOUBTFUL, found, f"{name} = {value}, if the flight may go on without a radio", (name, value)
-    )
+    remedy = f"{name} = {value}, if the flight may go on without a radio"
+    return PreflightItem(name, DOUBTFUL, found, remedy, (name, value))
 
 
 def _termination(name: str, breaker: float, setup: Setup) -> PreflightItem:

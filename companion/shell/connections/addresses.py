@@ -45,8 +45,6 @@ def open_connection(
     if scheme == "serial":
         return serial_port(*_device_and_baud(url, rest), waits)
     host, port = host_and_port(url, rest)
-    if scheme in ("udpout", "tcpout") and (not host or port == 0):
-        raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     if scheme in ("udpout", "tcpout"):
         _check_one_host(url, scheme, host, port)
     if scheme == "udpin":
@@ -100,6 +98,8 @@ def _meant(text: str) -> str | None:
 
 def _check_one_host(url: str, scheme: str, host: str, port: int) -> None:
     """Only who answers from the address that was sent to is ever heard."""
+    if not host or port == 0:
+        raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     _, address = resolve(socket.SOCK_DGRAM, host, port)
     number = ipaddress.ip_address(address[0])
     if number.is_unspecified:
