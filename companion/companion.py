@@ -61,10 +61,14 @@ class Stepped(Generic[CoreT]):
             self._is_addressed = True
             self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot.wire)
             self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot.wire)
-        if outputs is NOTHING:
-            return StepResult(tuple(frames), (), ())
-        sent = self._encoder.all_packets(outputs.messages, lambda error: core.fault(error, now_us))
-        return StepResult(tuple(frames), sent, outputs.events)
+        sent: list[bytes] = []
+        for message in outputs.messages:
+            # What cannot be packed is left out.
+            try:
+                sent += self._encoder.packets(message)
+            except Exception as error:
+                core.fault(error, now_us)
+        return StepResult(tuple(frames), tuple(sent), outputs.events)
 
     def last_words(self) -> list[tuple[float, bytes]]:
         """What the vehicle has to be told if this program dies now, each so many seconds later."""

@@ -2,7 +2,6 @@
 
 import math
 import struct
-from collections.abc import Callable, Iterable
 from dataclasses import astuple
 from operator import itemgetter
 from typing import Any
@@ -76,16 +75,6 @@ class Encoder:
             time_ms, *target, type_mask, attitude, roll, pitch, yaw, thrust = self._attitude_fields(outgoing)
             return [self._pack_fields(_ATTITUDE, (time_ms, *attitude, roll, pitch, yaw, thrust, *target, type_mask))]
         return [self._pack(message) for message in self._messages(outgoing)]
-
-    def all_packets(self, outgoing: Iterable[Outgoing], on_fault: Callable[[Exception], None]) -> tuple[bytes, ...]:
-        """Of all messages that can be packed; what cannot be is left out and told to `on_fault`."""
-        packets: list[bytes] = []
-        for message in outgoing:
-            try:
-                packets += self.packets(message)
-            except Exception as error:
-                on_fault(error)
-        return tuple(packets)
 
     def unsent(self, outgoing: Outgoing) -> bytes:
         """The packets, which do not count as long as they are not sent."""
