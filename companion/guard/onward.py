@@ -27,7 +27,10 @@ def leads_into(guard: GuardContext, mode: int) -> str | None:
     """Why the mode would hit again; None where it would not."""
     autopilot = guard.vehicle.autopilot
     if mode == autopilot.setpoints:
-        return _setpoints_lead_into(guard)
+        does_lead = lead_into(guard, guard.asked or Asked(), CERTAIN)
+        if does_lead is None:
+            return "nobody knows where the program's setpoints lead: choose a mode"
+        return "the program's setpoints lead into what was hit: send others, or choose a mode" if does_lead else None
     if mode == autopilot.hold or not guard.collisions:
         return None
     contact = guard.collisions[-1].contact
@@ -49,13 +52,6 @@ def _sticks_ned(guard: GuardContext) -> Vector3:
     heading_rad = yaw_rad(attitude.attitude_wxyz)
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
     return (forward * cosine - right * sine, forward * sine + right * cosine, 0.0)
-
-
-def _setpoints_lead_into(guard: GuardContext) -> str | None:
-    does_lead = lead_into(guard, guard.asked or Asked(), CERTAIN)
-    if does_lead is None:
-        return "nobody knows where the program's setpoints lead: choose a mode"
-    return "the program's setpoints lead into what was hit: send others, or choose a mode" if does_lead else None
 
 
 def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> bool | None:
