@@ -206,26 +206,26 @@ class HandOver:
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
         return None if self.finished or now_us - self._began_us >= LONGEST_US else self._target
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        if self.finished:
-            return None
-        if self._taken_by_another(flight, now_us):
-            self._finish(flight)
-            return None
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> None:
+        if not self.finished and (self._taken_by_another(flight, now_us) or self._is_over(flight, inputs, now_us)):
+            self.finished = True
+            flight.command_client.cancel()
+
+    def _is_over(self, flight: FlightContext, inputs: Inputs, now_us: int) -> bool:
+        """Whether there is nothing left to ask for."""
         if self._disarming:
-            outcome = flight.command_outcome(inputs, False, now_us)
-            if outcome is None:
-                return None
+            if flight.command_outcome(inputs, False, now_us) is None:
+                return False
             self._disarming = False
             inputs = Inputs()
         if not self._is_asked:
             if not flight.is_time_to_give_away(self._began_us, now_us):
-                return None
+                return False
             self._is_asked = True
             flight.ask_for_mode(self._mode)
         outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == self._mode, now_us)
         if outcome is None:
-            return None
+            return False
         if outcome.succeeded:
             flight.report(now_us, "mode", f"handed over to {self._autopilot.mode_name(self._mode)}")
         elif outcome.refused and self._mode == self._autopilot.hold:
@@ -233,9 +233,8 @@ class HandOver:
             self._mode = self._autopilot.land
             flight.report(now_us, "mode", "the vehicle does not hold: asking it to land")
             flight.ask_for_mode(self._mode)
-            return None
-        self._finish(flight)
-        return None
+            return False
+        return True
 
     def _taken_by_another(self, flight: FlightContext, now_us: int) -> bool:
         report = flight.vehicle.mode
@@ -246,7 +245,3 @@ class HandOver:
             return False
         flight.report(now_us, "mode", f"{holder.value} took over in {self._autopilot.mode_name(report.custom_mode)}")
         return True
-
-    def _finish(self, flight: FlightContext) -> None:
-        self.finished = True
-        flight.command_client.cancel()
