@@ -72,10 +72,7 @@ class Fence(StrictModel):
         """How far beyond the fence a position is, upwards or sideways; 0 inside. The floor does not count."""
         north_m, east_m, down_m = position_ned_m
         above_m = -down_m - self.max_height_m
-        beside_m = 0.0
-        if not self.contains(north_m, east_m):
-            inside = self.nearest_inside(north_m, east_m)
-            beside_m = math.dist((north_m, east_m), inside)
+        beside_m = math.dist((north_m, east_m), self.nearest_inside(north_m, east_m))
         return max(0.0, above_m, beside_m)
 
     def complaint(self, position_ned_m: PositionNed) -> str | None:
@@ -95,9 +92,7 @@ class Fence(StrictModel):
         return None
 
     def nearest_inside(self, north_m: float, east_m: float) -> tuple[float, float]:
-        """The place inside nearest to one outside; of a polygon within a circle, nearly the nearest."""
-        if self.contains(north_m, east_m):
-            return north_m, east_m
+        """The place inside that is nearest to a place; of a polygon within a circle, nearly the nearest."""
         place = (north_m, east_m)
         if self._polygon is not None and not self._polygon.covers(Point(place)):
             edge = self._polygon.exterior
