@@ -104,13 +104,11 @@ class ObstacleMap:
 
     def block(self, points_ned_m: Sequence[Vector3]) -> bool:
         """Whether a line through these points comes too near to a patch."""
-        if not self.patches:
-            return False
         heights, places = [-point[2] for point in points_ned_m], [point[:2] for point in points_ned_m]
         start, goal = places[0], places[-1]
         walls = self.walls(min(heights), max(heights), points_ned_m[0])
         line = LineString(places) if any(place != start for place in places) else Point(start)
-        return bool(walls.cores) and (walls.holds(goal) or not walls.keeps_off(line, start, goal))
+        return walls.holds(goal) or not walls.keeps_off(line, start, goal)
 
 
 def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
