@@ -177,7 +177,9 @@ class Machine(StateMachine):
         left = "" if flight.step.name in ("land", "return") else f"; not flown from item {flight.step.label} on"
         flight.outcome = "completed" if failure is None else "failed"
         flight.reason = failure or f"landed and disarmed{left}"
-        text = f"done: landed and disarmed, {_hits(len(flight.collisions))}{left}"
+        count = len(flight.collisions)
+        hits = {0: "no hit", 1: "1 hit"}.get(count, f"{count} hits")
+        text = f"done: landed and disarmed, {hits}{left}"
         flight.report(now_us, "done", text, outcome=flight.outcome, reason=flight.reason)
         return Released()
 
@@ -192,7 +194,3 @@ class Machine(StateMachine):
         )
         is_held = transition.hand_over and previous is not State.CRASHED
         return HandOver(flight, now_us) if is_held else Released()
-
-
-def _hits(count: int) -> str:
-    return "no hit" if count == 0 else "1 hit" if count == 1 else f"{count} hits"
