@@ -32,7 +32,6 @@ class MavsdkLink:
             raise GuardError(
                 "CollisionGuard wants MAVSDK's Mavsdk object and a System of it: CollisionGuard(mavsdk, system)."
             )
-        self._library = self._mavsdk._lib
         self._message_class = direct.MavlinkMessage
         self._callback_class = ctypes.CFUNCTYPE(ctypes.c_int, direct.MavlinkMessageCStruct, ctypes.c_void_p)
         self._direct = direct.MavlinkDirect(self._system)
@@ -57,7 +56,7 @@ class MavsdkLink:
 
     def _function(self, name: str, result: Any) -> Any:
         try:
-            function = getattr(self._library, name)
+            function = getattr(self._mavsdk._lib, name)
         except AttributeError:
             raise GuardError(f"This MAVSDK's library has no {name}: install mavsdk 4.1 or later.") from None
         function.restype = result

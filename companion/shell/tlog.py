@@ -35,10 +35,7 @@ class TlogWriter:
     def write(self, now_us: int, frames: Iterable[bytes]) -> None:
         """Log packets received or sent at `now_us` (microseconds since the epoch)."""
         stamp = _STAMP.pack(now_us)
-        pending = self._pending
-        for frame in frames:
-            pending.append(stamp)
-            pending.append(frame)
+        self._pending += [part for frame in frames for part in (stamp, frame)]
         if self._flushed_at_us is None:
             self._flushed_at_us = now_us
         elif now_us - self._flushed_at_us >= FLUSH_INTERVAL_US:
