@@ -191,14 +191,9 @@ class MotorOutputs(Sample):
 
 @dataclass(frozen=True, slots=True)
 class Vibration(Sample):
-    """VIBRATION as PX4 fills it: the mean change from sample to sample, and clipped samples since boot.
-
-    `clipping_counts` has one count for each accelerometer, its three axes together.
-    """
+    """VIBRATION: clipped samples since boot, one count for each accelerometer, its three axes together."""
 
     time_boot_us: int
-    gyroscope_rad_s: float
-    accelerometer_m_s2: float
     clipping_counts: tuple[int, int, int]
 
 
@@ -235,10 +230,9 @@ class TimeSyncRequest(Sample):
 
 @dataclass(frozen=True, slots=True)
 class TimeSyncAnswer(Sample):
-    """TIMESYNC that answers ours: the time we sent, and the vehicle's when it answered."""
+    """TIMESYNC that answers ours, by the time we sent."""
 
     companion_time_ns: int
-    vehicle_time_ns: int
 
 
 @dataclass(frozen=True, slots=True)

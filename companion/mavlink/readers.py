@@ -177,12 +177,12 @@ def _attitude_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], th
 def _vibration(
     time_usec: int, vibration_y: float, vibration_z: float, clipping_0: int, clipping_1: int, clipping_2: int
 ) -> Sample:
-    # How much a sample may differ from the one before: no more than the ranges.
+    # As PX4 fills it, the mean change from sample to sample: no more than the ranges.
     turns = abs(vibration_y) <= 2.0 * messages.ANGULAR_VELOCITY_RAD_S
     shakes = abs(vibration_z) <= 2.0 * messages.SPECIFIC_FORCE_M_S2
     if not (turns and shakes) or time_usec >= messages.TIME_US:
         return Refused("VIBRATION", f"{vibration_y:g} rad/s, {vibration_z:g} m/s^2")
-    return messages.Vibration(time_usec, vibration_y, vibration_z, (clipping_0, clipping_1, clipping_2))
+    return messages.Vibration(time_usec, (clipping_0, clipping_1, clipping_2))
 
 
 # What PX4 shows of an output that drives nothing: no value, or that of a disarmed PWM output.
@@ -229,7 +229,7 @@ def _command_ack(command: int, result: int, target_component: int) -> Sample | N
 
 
 def _timesync(tc1: int, ts1: int) -> Sample:
-    return messages.TimeSyncRequest(ts1) if tc1 == 0 else messages.TimeSyncAnswer(ts1, tc1)
+    return messages.TimeSyncRequest(ts1) if tc1 == 0 else messages.TimeSyncAnswer(ts1)
 
 
 def _parameter(param_id: bytes | str, param_value: float, param_type: int) -> Sample | None:

@@ -245,9 +245,9 @@ def _attitude_targets(throttle: Topic, attitude: Topic) -> Iterator[LoggedSample
 
 def _vibration(topic: Topic) -> Iterator[LoggedSample]:
     """Of the first accelerometer: each has its own messages."""
-    for _, time_us, (number, x, y, z, clipped) in topic.rows(topic.vector("IMU", "VibeX", "VibeY", "VibeZ", "Clip")):
+    for _, time_us, (number, clipped) in topic.rows(topic.vector("IMU", "Clip")):
         if number == 0:
-            yield LoggedSample(time_us, messages.Vibration(time_us, 0.0, math.hypot(x, y, z), (int(clipped), 0, 0)))
+            yield LoggedSample(time_us, messages.Vibration(time_us, (int(clipped), 0, 0)))
 
 
 def _heartbeats(events: Topic, modes: Topic) -> Iterator[LoggedSample]:

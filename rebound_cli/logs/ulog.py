@@ -243,13 +243,11 @@ def _attitude_target(topic: Topic) -> Iterator[LoggedSample]:
 
 
 def _vibration(topic: Topic) -> Iterator[LoggedSample]:
-    clipping, levels = topic.array("accel_clipping"), topic.vector("gyro_vibration_metric", "accel_vibration_metric")
-    if clipping is None or levels is None:
+    clipping = topic.array("accel_clipping")
+    if clipping is None:
         return
-    for time_us, count, (gyro, accel) in zip(
-        topic.time_us.tolist(), clipping.sum(axis=1), levels.tolist(), strict=True
-    ):
-        yield LoggedSample(time_us, messages.Vibration(time_us, gyro, accel, (int(count), 0, 0)))
+    for time_us, count in zip(topic.time_us.tolist(), clipping.sum(axis=1), strict=True):
+        yield LoggedSample(time_us, messages.Vibration(time_us, (int(count), 0, 0)))
 
 
 def _heartbeat(topic: Topic) -> Iterator[LoggedSample]:

@@ -246,7 +246,7 @@ def test_it_asks_ten_times_a_second_until_a_first_answer_and_then_once():
     trip = RoundTrip()
     first = asked_over(trip, 2.0)
     assert [b.companion_time_ns - a.companion_time_ns for a, b in itertools.pairwise(first)] == [100_000_000] * 19
-    trip.update(TimeSyncAnswer(first[-1].companion_time_ns, 7), EPOCH_US + 2_000_000)
+    trip.update(TimeSyncAnswer(first[-1].companion_time_ns), EPOCH_US + 2_000_000)
     assert len(asked_over(trip, 5.0, EPOCH_US + 2_000_000)) == 5
 
 
@@ -259,10 +259,10 @@ def test_an_answer_to_nobodys_question_and_a_second_answer_are_counted_and_no_mo
     trip = RoundTrip()
     question = trip.ask(EPOCH_US)
     # When another's answer comes, then its own twice
-    trip.update(TimeSyncAnswer(question.companion_time_ns - 5_000_000_000, 7), EPOCH_US + 1_000)
+    trip.update(TimeSyncAnswer(question.companion_time_ns - 5_000_000_000), EPOCH_US + 1_000)
     assert trip.present_us is None
-    trip.update(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 3_000)
-    trip.update(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 900_000)
+    trip.update(TimeSyncAnswer(question.companion_time_ns), EPOCH_US + 3_000)
+    trip.update(TimeSyncAnswer(question.companion_time_ns), EPOCH_US + 900_000)
     # Then one counts
     assert (trip.present_us, trip.summary_ms()) == (3_000, trip_ms(3.0, 3.0, 2))
 

@@ -137,7 +137,7 @@ def test_attitude_thrust_and_vibration(tmp_path):
     whole, without_attitude = of(log, messages.AttitudeTarget)
     assert (whole.thrust_fraction, without_attitude.thrust_fraction) == pytest.approx((0.6, 0.5))
     assert whole.attitude_wxyz is not None and without_attitude.attitude_wxyz is None
-    assert of(log, Vibration) == [Vibration(START + 40, 0.25, 4.5, (6, 0, 0))]
+    assert of(log, Vibration) == [Vibration(START + 40, (6, 0, 0))]
 
 
 def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
