@@ -127,8 +127,6 @@ class ExpectItem(StrictModel):
 MAX_SPEED_M_S = defaults.MAX_SPEED_M_S
 # One g sideways is a tilt of 45 degrees, PX4's default limit.
 MAX_ACCELERATION_M_S2 = 9.81
-# Nor does it turn faster.
-MAX_YAW_RATE_DEG_S = defaults.MAX_YAW_RATE_DEG_S
 
 Speed = Annotated[Positive, Field(le=MAX_SPEED_M_S)]
 Acceleration = Annotated[Positive, Field(le=MAX_ACCELERATION_M_S2)]
@@ -260,7 +258,7 @@ class SetYawItem(StrictModel):
 
     yaw_deg: Yaw
     """Heading, clockwise from north."""
-    rate_deg_s: Annotated[Positive, Field(le=MAX_YAW_RATE_DEG_S)] = 45.0
+    rate_deg_s: Annotated[Positive, Field(le=defaults.MAX_YAW_RATE_DEG_S)] = 45.0
     """No faster than PX4 turns."""
 
 
