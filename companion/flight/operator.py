@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from companion.memory.patch import LEAST_SPEED_M_S
 from companion.messages import DebugVector, NamedValue, Severity, StatusText, Vector3
 from companion.reflex.detection.detector import Phase
 from companion.reflex.detection.monitor import CollisionMonitor
@@ -21,8 +22,6 @@ _PHASE_NUMBER = {Phase.OFF: 0.0, Phase.QUIET: 1.0, Phase.ARMED: 2.0, Phase.CONTA
 _NO_DATA = -1.0
 
 _COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
-# Slower than this a hit came to the vehicle, and from where is told by the push.
-_LEAST_SPEED_M_S = 0.3
 # A ground station shows a text for some seconds and keeps a list: more of one subject pushes all others out of sight.
 # Once a second, as a HEARTBEAT.
 TEXT_INTERVAL_US = 1_000_000
@@ -69,7 +68,8 @@ def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
             return StatusText(Severity.INFO, f"Mission {mission} begins")
         case "detection":
             speed_m_s, force_m_s2 = data["impact_speed_m_s"], data["specific_force_m_s2"]
-            moving = speed_m_s >= _LEAST_SPEED_M_S
+            # What came to the vehicle is told by its push.
+            moving = speed_m_s >= LEAST_SPEED_M_S
             towards = _direction(data["impact_velocity_ned_m_s" if moving else "normal_ned"])
             how = f"at {speed_m_s:.2f} m/s going {towards}" if moving else f"pushed {towards}"
             return StatusText(Severity.WARNING, f"Hit {hits}: {how}, {force_m_s2:.0f} m/s2")
