@@ -273,7 +273,7 @@ def test_the_alarm_is_given_once_while_it_lasts_and_again_after_five_short_ones(
     # Given questions two seconds apart, each answered after so long
     for number, trip_us in enumerate(trips_us):
         now_us = EPOCH_US + 2_000_000 * number
-        trip.update(TimeSyncAnswer(trip.ask(now_us).companion_time_ns, 7), now_us + trip_us)
+        trip.update(TimeSyncAnswer(trip.ask(now_us).companion_time_ns), now_us + trip_us)
         if trip.alarm() is not None:
             told.append(number)
     assert told == [7, 26]
