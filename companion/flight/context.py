@@ -246,6 +246,11 @@ class FlightContext:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
 
+    @property
+    def own_modes(self) -> tuple[int | None, ...]:
+        """The modes that mean that the companion has the vehicle; none while it does not hold it."""
+        return () if self.expected_mode is None else (self.expected_mode, self.command_client.requested_mode)
+
     def silent_s(self, now_us: int) -> float:
         """Seconds since the last message of the vehicle."""
         return (now_us - self.vehicle.last_received_us) * 1e-6

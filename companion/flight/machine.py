@@ -96,7 +96,9 @@ class Machine(StateMachine):
     def step(self, inputs: Inputs, now_us: int) -> bool:
         before = self.handler
         if self.state not in FINAL_STATES:
-            self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
+            ended = early_end(self.flight, self.state, inputs, now_us)
+            if ended is not None:
+                self._take(ended, now_us)
         if self.state in MAY_CRASH:
             how = crashed(self.flight, self.state is State.LANDING, now_us)
             if how is not None:
@@ -126,8 +128,8 @@ class Machine(StateMachine):
         if self.state not in FINAL_STATES or self.flight.outcome is None:
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
-    def _take(self, transition: Transition | None, now_us: int) -> None:
-        if transition is None or not TABLE.moves(self.state, transition.trigger):
+    def _take(self, transition: Transition, now_us: int) -> None:
+        if not TABLE.moves(self.state, transition.trigger):
             return
         previous, self.state = self.state, TABLE.next_state(self.state, transition.trigger)
         self.handler = self._begin(previous, transition, now_us)

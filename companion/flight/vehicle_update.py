@@ -17,8 +17,6 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
     mode, armed, conflicts, is_mode_lost = vehicle.mode, vehicle.armed, vehicle.conflicts, False
-    # That mean that the companion has the vehicle; none while it does not hold it.
-    own_modes = () if flight.expected_mode is None else (flight.expected_mode, flight.command_client.requested_mode)
     if vehicle.identity is not None and now_us - vehicle.last_received_us >= OLD_NEWS_US:
         is_mode_lost = vehicle.is_mode_known
         vehicle.unsure_since_us = now_us  # after a silence samples may be as old as the silence
@@ -56,7 +54,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         elif isinstance(sample, messages.TimeSyncAnswer):
             flight.round_trip.update(sample, now_us)
         was_known = vehicle.is_mode_known
-        vehicle.update(sample, now_us, own_modes)
+        vehicle.update(sample, now_us, flight.own_modes)
         if type(sample) in _FLYING:
             flight.flies = _flies(vehicle)
         is_mode_lost |= was_known and not vehicle.is_mode_known
