@@ -19,6 +19,9 @@ HEALTHY = {
     "CBRK_FLIGHTTERM": 121212,
     "IMU_INTEG_RATE": 250,
     "MPC_ACC_HOR": 2.0,
+    "EKF2_EV_CTRL": 11,
+    "EKF2_EVP_GATE": 50.0,
+    "EKF2_ACC_NOISE": 1.0,
     "CA_ROTOR_COUNT": 4,
     # The paper's vehicle, its arms 0.145 m long, in PX4's order.
     **{f"CA_ROTOR{n}_PX": ahead * 0.1025 for n, ahead in enumerate((1, -1, 1, -1))},
@@ -172,6 +175,8 @@ def test_what_hovers_is_judged_by_how_it_shakes_and_not_by_how_it_wanders():
         ({"CBRK_FLIGHTTERM": 0}, Verdict.DOUBTFUL, 121212),
         ({"IMU_INTEG_RATE": 100}, Verdict.DOUBTFUL, 200),
         ({"MPC_ACC_HOR": 3.0}, Verdict.DOUBTFUL, 2.0),
+        ({"EKF2_EVP_GATE": 5.0}, Verdict.DOUBTFUL, 50.0),
+        ({"EKF2_ACC_NOISE": 0.35}, Verdict.DOUBTFUL, 1.0),
         # A radio that may be lost is excepted, and the other exceptions stay
         ({"COM_RCL_EXCEPT": 1, "COM_RC_IN_MODE": 0}, Verdict.DOUBTFUL, 5),
     ],
@@ -182,6 +187,11 @@ def test_a_parameter_that_endangers_a_recovery_is_named_with_its_remedy(changed,
     assert found.verdict is verdict
     assert found.fix == (name, mended)
     assert f"{name} = {mended:g}" in found.remedy
+
+
+def test_a_vehicle_that_does_not_fly_by_motion_capture_needs_no_room_for_it():
+    outdoors = {**HEALTHY, "EKF2_EV_CTRL": 12, "EKF2_EVP_GATE": 5.0}
+    assert "EKF2_EVP_GATE" not in found_in(surveyed(outdoors))
 
 
 @pytest.mark.parametrize(
