@@ -115,11 +115,15 @@ class LocalPosition(Sample):
 
 @dataclass(frozen=True, slots=True)
 class GpsFix(Sample):
-    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift, and place. Its stamp is no boot time."""
+    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift, and place. Its stamp is no boot time.
+
+    The altitude is above mean sea level.
+    """
 
     velocity_ne_m_s: tuple[float, float]
     latitude_deg: float
     longitude_deg: float
+    altitude_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,15 +168,6 @@ class Asked:
 
     place_ned_m: Vector3 | None = None
     velocity_ned_m_s: Vector3 | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class GlobalPosition(Sample):
-    """GLOBAL_POSITION_INT; altitude above mean sea level."""
-
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
 
 
 @dataclass(frozen=True, slots=True)

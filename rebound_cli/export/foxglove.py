@@ -15,7 +15,7 @@ from typing import IO, Any, TypeAlias
 import numpy as np
 from mcap.writer import Writer
 
-from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPosition, Quaternion, Vector3
+from companion.messages import Attitude, GpsFix, ImuSample, LocalPosition, Quaternion, Vector3
 from rebound_cli import __version__
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.listening import FORCES, Numbers
@@ -93,7 +93,7 @@ def _heard(log: Log) -> Iterator[Message]:
                 yield at_us, "/tf", {"timestamp": _time(at_us), **frames, **moved}
             case ImuSample():
                 yield at_us, "/imu", _fields(sample)
-            case GlobalPosition():
+            case GpsFix():
                 yield at_us, "/location", _location(at_us, sample)
 
 
@@ -176,7 +176,7 @@ def _log(at_us: float, level: int, name: str, text: str) -> Message:
     return at_us, "/log", {"timestamp": _time(at_us), "level": level, "message": text, "name": name, **nowhere}
 
 
-def _location(at_us: float, sample: GlobalPosition) -> Json:
+def _location(at_us: float, sample: GpsFix) -> Json:
     place = {"latitude": sample.latitude_deg, "longitude": sample.longitude_deg, "altitude": sample.altitude_m}
     error = {"position_covariance": [0.0] * 9, "position_covariance_type": _UNKNOWN}
     return {"timestamp": _time(at_us), "frame_id": "vehicle", **place, **error}

@@ -110,7 +110,7 @@ class Air:
             noise = [self.draw.gauss(0.0, self.noise_m_s) for _ in range(2)]
             measured = self.velocities[: tick - self.late]
             north_m = 0.004 * sum(measured) + self.draw.gauss(0.0, self.place_noise_m)
-            fix = GpsFix((measured[-1] + noise[0], noise[1]), 47.0 + math.degrees(north_m / EARTH_M), 8.0)
+            fix = GpsFix((measured[-1] + noise[0], noise[1]), 47.0 + math.degrees(north_m / EARTH_M), 8.0, 0.0)
             self.doppler.take(fix, self.strapdown, self.newest, is_free)
         return sample
 
@@ -286,7 +286,7 @@ def test_the_place_is_the_receivers_as_far_as_that_is_good_until_the_vehicles_es
     assert found.position_error_m[0] == pytest.approx(newest.position_ned_m[0] - 4.0, abs=within_m)
     # And one fix that jumps by 50 m leads it by no more than a tenth of a metre
     before_m = found.motion.position_ned_m[0]
-    jumps = GpsFix((0.0, 0.0), 47.0 + math.degrees(50.0 / EARTH_M), 8.0)
+    jumps = GpsFix((0.0, 0.0), 47.0 + math.degrees(50.0 / EARTH_M), 8.0, 0.0)
     air.doppler.take(jumps, air.strapdown, air.newest, is_free=False)
     found.measure(air.doppler)
     assert abs(found.motion.position_ned_m[0] - before_m) < 0.1
@@ -332,7 +332,7 @@ def test_one_velocity_beyond_belief_does_not_count_and_two_do():
         air.now_us += 4_000
         air.strapdown.imu(air.now_us, (0.0, 0.0, -G), (0.0, 0.0, 0.0))
         found.imu(air.strapdown)
-        air.doppler.take(GpsFix((30.0, 0.0), 47.0, 8.0), air.strapdown, None, is_free=False)
+        air.doppler.take(GpsFix((30.0, 0.0), 47.0, 8.0, 0.0), air.strapdown, None, is_free=False)
         found.measure(air.doppler)
         shown_m_s = found.motion.velocity_ned_m_s[0]
         assert shown_m_s == pytest.approx(expected_m_s, abs=0.1) if expected_m_s < 0.0 else shown_m_s > expected_m_s / 4
@@ -351,14 +351,14 @@ def test_a_receiver_that_is_silent_or_spoke_before_the_contacts_next_push_leaves
 
 
 def gps(**fields):
-    place = {"lat": 471234567, "lon": -81234567}
+    place = {"lat": 471234567, "lon": -81234567, "alt": 488_000}
     return sample_from("GPS_RAW_INT", (1, 1), {"fix_type": 3, "vel": 250, "cog": 9000, **place, **fields})
 
 
 def test_gps_raw_int_is_read_as_a_velocity_and_a_place():
     fix = gps()
     assert fix.velocity_ne_m_s == pytest.approx((0.0, 2.5))
-    assert (fix.latitude_deg, fix.longitude_deg) == pytest.approx((47.1234567, -8.1234567))
+    assert (fix.latitude_deg, fix.longitude_deg, fix.altitude_m) == pytest.approx((47.1234567, -8.1234567, 488.0))
     for unknown in ({"fix_type": 2}, {"vel": 0xFFFF}, {"cog": 0xFFFF}):
         assert gps(**unknown) is None
     assert isinstance(gps(vel=10_100), Refused)

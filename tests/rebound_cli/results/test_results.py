@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from companion.messages import GlobalPosition, LocalPosition
+from companion.messages import GpsFix, LocalPosition
 from rebound_cli import fly
 from rebound_cli.export.foxglove import write_mcap
 from rebound_cli.logs.log import LoggedSample
@@ -247,7 +247,7 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     attitude = next(h for h in log.heard if type(h.sample).__name__ == "Attitude")
     heard = (replace(attitude, sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
     imu, end_us = LoggedSample(*log.imu()[0]), log.heard[-1].at_us
-    here = LoggedSample(end_us, GlobalPosition(47.397742, 8.545594, 488.0))
+    here = LoggedSample(end_us, GpsFix((0.0, 0.0), 47.397742, 8.545594, 488.0))
     content, log = BytesIO(), replace(log, heard=(imu, *heard, LoggedSample(end_us, moved), here))
     write_mcap(replace(shown, truth=None), log, content)
     topics = read_mcap(content.getvalue())
