@@ -81,18 +81,6 @@ def _rotors(setup: Setup) -> Iterator[PreflightItem]:
     )
 
 
-def _capture(setup: Setup) -> Iterator[PreflightItem]:
-    """Whether PX4 goes on with motion capture after a hit, where it flies by that."""
-    told = setup.parameters
-    if not int(told.get(CAPTURE, 0)) & CAPTURED_PLACE:
-        return
-    beyond = ": after a hit PX4 takes its true place for an error, and may fly off"
-    for name, least in LEAST_CAPTURED.items():
-        value = told.get(name, least)
-        cases = (value < least, DOUBTFUL, f"{name} = {least:g}; see docs/how-to/px4.md")
-        yield judged(name, f"{value:g}", cases, mended=least, beyond=beyond)
-
-
 def _port(setup: Setup) -> Iterator[PreflightItem]:
     """The port of PX4's that this line is plugged into, by its baud rate."""
     told, line = setup.parameters, setup.line
@@ -185,6 +173,13 @@ def _speeding_up(name: str, most_m_s2: float, setup: Setup) -> PreflightItem:
     return judged(name, found, (most_m_s2 > LEAST_ACC_HOR_M_S2, DOUBTFUL, remedy), mended=LEAST_ACC_HOR_M_S2)
 
 
+def _captured(name: str, value: float, setup: Setup) -> PreflightItem:
+    least = LEAST_CAPTURED[name]
+    remedy = f"{name} = {least:g}; see docs/how-to/px4.md"
+    beyond = ": after a hit PX4 takes its true place for an error, and may fly off"
+    return judged(name, f"{value:g}", (value < least, DOUBTFUL, remedy), mended=least, beyond=beyond)
+
+
 # What decides whether a collision is survived.
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     INTEGRATION: _integration,
@@ -206,12 +201,13 @@ def asked(line: SerialLine | None) -> tuple[str, ...]:
 
 def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
     yield from _rotors(setup)
-    yield from _capture(setup)
     yield from _port(setup)
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:
-    return judged_settings(_SETTINGS, setup)
+    yield from judged_settings(_SETTINGS, setup)
+    if int(setup.parameters.get(CAPTURE, 0)) & CAPTURED_PLACE:
+        yield from judged_settings(dict.fromkeys(LEAST_CAPTURED, _captured), setup)
 
 
 def sight(setup: Setup) -> PreflightItem:
