@@ -88,6 +88,8 @@ class FusedState(DetectorState):
     before_frd_m_s2: Vector3 = ZERO
     """Of the sample before the last."""
     before_boot_us: int = 0
+    before_threshold_m_s2: float = 0.0
+    """Before the last sample was learnt: it may be a hit's first."""
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
@@ -105,8 +107,8 @@ class FusedState(DetectorState):
         alone = math.dist(force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2])
         if self.phase is not Phase.ARMED or self.threshold_m_s2 <= SHAKING * config.side_threshold_m_s2:
             return alone, 1.0, False
-        together = self._together_m_s2(force_frd_m_s2)
-        return (together, 1.0, True) if together > alone / CLEAR else (alone, CLEAR, False)
+        together, of_two = self._together_m_s2(force_frd_m_s2), self.before_threshold_m_s2 / self.threshold_m_s2
+        return (together, of_two, True) if together / of_two > alone / CLEAR else (alone, CLEAR, False)
 
     def _together_m_s2(self, force_frd_m_s2: Vector3) -> float:
         """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
@@ -235,7 +237,7 @@ class FusedDetector:
         # A sample after a gap or a reboot has the weight of the longest interval.
         elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
         s.floor.learn(f, elapsed_s)
-        config = self._config
+        config, s.before_threshold_m_s2 = self._config, s.threshold_m_s2
         s.threshold_m_s2 = max(config.side_threshold_m_s2, config.noise_factor * s.floor.side_m_s2)
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from companion.messages import Vector3
 from companion.motion.config import MOTORS_RAD_S2
 from companion.motion.vector import ZERO
-from companion.reflex.config import EVEN, MEAN_MEMORY_S, FusedConfig
+from companion.reflex.config import EVEN, SPREAD_MEMORY_S, FusedConfig
 from companion.reflex.detection.detector import Innovation
 
-_MEMORY_US, _BY_MOTORS_RAD_S_US = 1e6 * MEAN_MEMORY_S, 1e-6 * MOTORS_RAD_S2
+_MEMORY_US, _BY_MOTORS_RAD_S_US = 1e6 * SPREAD_MEMORY_S, 1e-6 * MOTORS_RAD_S2
 
 
 @dataclass(slots=True)

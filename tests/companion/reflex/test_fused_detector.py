@@ -254,6 +254,14 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert to_and_fro.fly() == []
 
 
+def test_a_hits_first_sample_does_not_raise_what_it_must_reach_with_its_second():
+    # Given a graze at 50 Hz that either sample shows too weakly, and the first beyond what noise ever is
+    graze = Flight(
+        lambda t: (0.0, {150: 16.0, 151: 8.0}.get((t - 500) // 20_000, 0.0), 0.0), noise=1.5, imu_every_us=20_000
+    )
+    assert [i.sample_time_boot_us for i in graze.fly()] == [3_040_000]
+
+
 def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
     def grip(t):
         return (6.0 * min(1.0, (t - HIT_US) / 150_000), 0.0, 0.0) if HIT_US < t < HIT_US + 400_000 else (0.0, 0.0, 0.0)
