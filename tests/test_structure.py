@@ -332,13 +332,14 @@ def test_help_imports_nothing_that_is_slow():
     assert not {"numpy", "pydantic", "pymavlink", "shapely", "sim_vehicle", "yaml"} & set(imported)
 
 
-def test_a_guards_start_reads_no_source_and_starts_no_process(tmp_path):
+def test_a_guards_start_reads_no_source_starts_no_process_and_loads_no_simulated_vehicle(tmp_path):
     code = f"""
-import gc, linecache
+import gc, linecache, sys
 from rebound_cli.main import main
 sys.addaudithook(lambda event, _: event in {STARTS!r} and print("started:", event))
 main(["guard", "--connect", "udpin://127.0.0.1:0", "--out", {str(tmp_path / "guarded")!r}, *{QUICK!r}])
-print(*linecache.cache, gc.isenabled(), gc.get_freeze_count())
+simulated = {{name for name in sys.modules if name.startswith("sim_vehicle.")}} - {{"sim_vehicle.errors"}}
+print(*linecache.cache, *simulated, gc.isenabled(), gc.get_freeze_count())
 """
     said = alone(code, tmp_path).stdout
     assert "no HEARTBEAT" in said

@@ -8,13 +8,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
+from typing import TYPE_CHECKING
 
 from rebound_cli.live.console import Console
-from rebound_cli.replay.recording import Followed
 from rebound_cli.results.run_folder import REPORT_NAME, TLOG_NAME
 
+if TYPE_CHECKING:
+    from rebound_cli.replay.recording import Followed
 
-def show_flight(folder: Path, followed: Followed | None) -> None:
+
+def show_flight(folder: Path, followed: "Followed | None") -> None:
     """Write its page. One that was followed is not decided again. Raises ReboundError, OSError."""
     # A drone that only offers the page never loads what makes it.
     from rebound_cli.report.page import write_page
