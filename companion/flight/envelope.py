@@ -2,7 +2,7 @@
 
 It bounds position, step, velocity, acceleration, tilt and yaw. It also bounds where the setpoint leads when no other
 follows it: off known surfaces, inside the fence, between floor and top. That is one projection onto half-spaces, of a
-velocity beside a position, and of the acceleration that is flown by attitude.
+position, of a velocity beside it, and of the acceleration that is flown by attitude.
 """
 
 import math
@@ -128,9 +128,15 @@ def is_finite(target: Target) -> bool:
 def _with_place(
     target: Target, around: Surroundings, fence: Fence, limits: SetpointLimits, reasons: list[str]
 ) -> Target:
-    """The place within the step and the fence."""
+    """The place in front of what is known, within the step and the fence."""
     place, vehicle = target.position_ned_m, around.vehicle_ned_m
     asked = place
+    # One that does not move is where a recovery or an item has it on purpose.
+    if vehicle is not None and target.velocity_ned_m_s is not None:
+        ahead = [one.surface for one in around.known if one.is_ahead(vehicle, place)]
+        # As near as the vehicle itself is.
+        place = projected(place, [(one.normal_ned, min(one.level_m, along(vehicle, one.normal_ned))) for one in ahead])
+        reasons += ["too near to what is known"] if place is not asked else []
     if around.last_ned_m is not None:
         most_m = limits.max_speed_m_s * around.since_last_s + _ROUNDING_M
         place, is_fast = _within_step(place, around.last_ned_m, most_m)

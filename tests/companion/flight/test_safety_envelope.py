@@ -263,6 +263,16 @@ def test_no_setpoint_beside_the_wall_leads_a_vehicle_that_follows_it_there_while
     assert -ROOM.max_height_m - 0.02 <= place[2] <= -ROOM.min_height_m + 0.02
 
 
+@pytest.mark.parametrize(("vehicle_off_m", "sent_off_m"), [(0.5, 0.15), (0.1, 0.1), (-0.1, -0.1), (-0.3, -0.4)])
+def test_a_place_that_moves_stays_in_front_of_the_wall_or_as_near_as_the_vehicle_is(vehicle_off_m, sent_off_m):
+    # Given a place that has moved on through the wall; one that the vehicle is behind is in a wrong place
+    asked = Target((0.9, 0.2, -1.5), 0.0, REST)
+    around = surroundings([KnownSurface(WALL)], (0.5 - vehicle_off_m, 0.0, -1.5))
+    sent, reason = bounded(asked, around, ROOM, DEFAULTS)
+    assert WALL.off_m(sent.position_ned_m) == pytest.approx(sent_off_m)
+    assert sent.position_ned_m[1:] == (0.2, -1.5) and bool(reason) is (sent_off_m > -0.4)
+
+
 @pytest.mark.parametrize("off_m_s", [-1.0, 0.0, 0.8, 2.5])
 def test_a_lean_that_is_held_leads_no_nearer_to_the_wall_than_can_be_braked(off_m_s):
     # Given a vehicle half a metre off the wall, and an acceleration to the wall and along it
