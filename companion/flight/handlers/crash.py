@@ -7,7 +7,6 @@ from companion.flight.handlers.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import SetArmed
 from companion.motion.rotation import tilt_rad
-from companion.motion.vector import along, minus
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
@@ -47,13 +46,9 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
 
 def _is_pressed(flight: FlightContext, now_us: int) -> bool:
     """Whether the time for the recovery is over, and the vehicle is still where it touches."""
-    recovery, settled = flight.reflex.in_one_recovery(), flight.mission.companion.settled
-    if not recovery or now_us - recovery[-1].detected_at_us <= settled.timeout_s * 1e6:
-        return False
-    # Not where the vehicle reports to be: a hit may have put that off by more than a metre.
-    newest, place = recovery[0], recovery[0].estimator.motion.position_ned_m
-    off_m = along(minus(place, newest.contact.position_ned_m), newest.normal.direction_ned)
-    return off_m < settled.distance_m
+    hits, settled, recovery = flight.reflex.in_one_recovery(), flight.mission.companion.settled, flight.reflex.recovery
+    is_late = bool(hits) and now_us - hits[-1].detected_at_us > settled.timeout_s * 1e6
+    return is_late and recovery is not None and recovery.off_m < settled.distance_m
 
 
 class Crashed(FixedSetpoint):

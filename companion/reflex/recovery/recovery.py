@@ -93,6 +93,11 @@ class Recovery:
         return Progress(is_rejected, rested_s, rebound_m_s, settled_s)
 
     @property
+    def off_m(self) -> float:
+        """How far the vehicle is from touching what it hit, by the belief: a report may be off by more than a metre."""
+        return self._surfaces[0].off_m(self.record.estimator.motion.position_ned_m)
+
+    @property
     def _is_known(self) -> bool:
         """Whether the motion after the hit is known, as far as the law asks for it."""
         return self.record.estimator.has_converged or not self.law.follows
