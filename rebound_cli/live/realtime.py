@@ -28,6 +28,10 @@ from rebound_cli.results.timing import LinkRate, Timing, undisturbed
 LONGEST_WAIT_S = 0.05
 # Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (link.commands).
 HANDING_OVER_US = 10_000_000
+# What needs an answer now, by the bytes of its id in a MAVLink 2 header: HIGHRES_IMU shows a hit, TIMESYNC a time. All
+# else is decided with the next of these, and waits no longer than an interval of 200 Hz.
+URGENT = (b"\x69\x00\x00", b"\x6f\x00\x00")
+LONGEST_HELD_US = 5_000
 # MAVLink's heartbeat goes as often, and a person watches no faster.
 COMPUTER_EVERY_US = 1_000_000
 
@@ -176,13 +180,26 @@ class Loop:
     def exchange(self) -> tuple[int, StepResult]:
         """Wait for bytes or the next deadline, take one step, send and record; when it was and what came of it."""
         deadline_us = self.stepped.next_deadline_us()
-        received = self.connection.receive(min((deadline_us - self.clock.now_us()) / 1e6, LONGEST_WAIT_S))
+        received = self._received(deadline_us)
         now_us = self.clock.now_us()
         self.heard.take(len(received), now_us)
         result = self._step(received, now_us)
         if (late := self.timing.stepped(deadline_us, now_us, self.clock.now_us())) is not None:
             self._note("late", late, now_us)
         return now_us, result
+
+    def _received(self, deadline_us: int) -> bytes:
+        """What has come by a deadline, and what comes after it until nothing of it may wait."""
+        left_us = deadline_us - self.clock.now_us()
+        received = more = self.connection.receive(min(left_us / 1e6, LONGEST_WAIT_S))
+        held_us = min(deadline_us, self.clock.now_us() + LONGEST_HELD_US)
+        while received and not any(urgent in more for urgent in URGENT):
+            left_us = held_us - self.clock.now_us()
+            if left_us <= 0:
+                break
+            more = self.connection.receive(left_us / 1e6)
+            received += more
+        return received
 
     def _step(self, received: bytes, now_us: int) -> StepResult:
         result = (self.step or self.stepped.step)(received, now_us)

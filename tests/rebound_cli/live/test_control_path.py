@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import sys
 import threading
 from unittest.mock import Mock
@@ -175,6 +176,41 @@ def test_a_step_that_is_late_is_told(tmp_path, late_us, notes):
     Loop(stepped, socket, socket, recorder, Console(sys.stderr), Interrupts()).exchange()
     recorder.close()
     assert [call.args for call in stepped.note.call_args_list] == notes
+
+
+IMU, PLACE = (bytes([0xFD, 0, 0, 0, 0, 1, 1, number, 0, 0, 0, 0]) for number in (105, 32))
+
+
+@pytest.mark.parametrize(
+    ("came", "deadline_us", "at_us", "heard"),
+    [
+        ([(0, IMU), (10, PLACE)], 20_000, 0, IMU),
+        ([(0, PLACE), (1_000, PLACE), (3_000, IMU), (3_100, PLACE)], 20_000, 3_000, PLACE + PLACE + IMU),
+        ([(2_000, PLACE), (9_000, IMU)], 20_000, 7_000, PLACE),
+        ([(2_000, PLACE), (9_000, IMU)], 4_000, 4_000, PLACE),
+        ([(9_000, IMU)], 4_000, 4_000, b""),
+    ],
+    ids=["a sample", "with the next sample", "no sample within 5 ms", "a setpoint is due", "nothing"],
+)
+def test_what_shows_no_hit_is_decided_with_the_next_sample(tmp_path, came, deadline_us, at_us, heard):
+    clock = [0]
+
+    def receive(timeout_s):
+        at, packet = came[0] if came else (math.inf, b"")
+        if at > clock[0] + round(1e6 * timeout_s):
+            clock[0] += round(1e6 * timeout_s)
+            return b""
+        clock[0] = max(clock[0], at)
+        del came[0]
+        return packet
+
+    socket = Mock(receive=receive, now_us=lambda: clock[0])
+    stepped = Mock(armed=True, finished=False, last_words=list, next_deadline_us=lambda: deadline_us)
+    stepped.step.return_value = StepResult((), (), ())
+    recorder = FlightRecorder(tmp_path)
+    Loop(stepped, socket, socket, recorder, Console(sys.stderr), Interrupts()).exchange()
+    recorder.close()
+    assert [call.args for call in stepped.step.call_args_list] == [(heard, at_us)]
 
 
 def test_lateness_is_measured_and_told_each_time_it_doubles():
