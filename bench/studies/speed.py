@@ -31,6 +31,7 @@ from companion.mavlink.packet import message_id_of
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connections.connection import udp_out
+from companion.shell.service_manager import ServiceManager
 from rebound_cli.background import Background
 from rebound_cli.inputs.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.live.console import Console
@@ -161,7 +162,7 @@ def timed(flight: Recorded, times: int) -> Iterator[float | None]:
 
 @contextlib.contextmanager
 def beside(run: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """A process of the same priority, killed in the end."""
+    """A process, killed in the end."""
     child = multiprocessing.get_context("fork").Process(target=run, args=arguments)
     child.start()
     try:
@@ -172,7 +173,8 @@ def beside(run: Callable[..., None], *arguments: Any) -> Iterator[None]:
 
 
 def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
-    """The child: the loop of real flights, log and all. It flies to there itself, in memory that is its own."""
+    """The child: the loop of real flights, log and all, with a service's priority. It flies to there itself, in memory
+    that is its own."""
     companion, start = Companion(flight.mission), flight.hit - LEAD
     companion.confirm_plan()
     for interval in range(start):
@@ -181,6 +183,7 @@ def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
     recorder = FlightRecorder(folder, Background("log"))
     clock = Going(now_us_of(start))
     loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())
+    ServiceManager("@nobody", None).go_first()
     with undisturbed():
         connection.send(b"\0")
         while True:
