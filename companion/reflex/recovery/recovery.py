@@ -187,9 +187,11 @@ class Recovery:
         return (n, e, max(d, here_ned_m[2] - clearance_m)) if normal[2] == 0.0 else place
 
     def _goal(self, motion: MotionState) -> Vector3:
-        """The law's goal, moved clear of surfaces and into the fence. Off what was hit eq. 3 is as far as it says."""
-        goal = self.law.goal_ned_m(self._config, self._contact, motion)
-        surfaces = self._surfaces if self.law.leans else self._surfaces[1:]
+        """The law's goal, moved clear of surfaces and into the fence. Off what was hit eq. 3 is as far as it says; of a
+        ceiling it says nothing.
+        """
+        goal, is_steep = self.law.goal_ned_m(self._config, self._contact, motion), self._contact.normal_ned[2] != 0.0
+        surfaces = self._surfaces if self.law.leans or is_steep else self._surfaces[1:]
         goal = projected(goal, [(one.normal_ned, one.level_m) for one in surfaces])
         return self._room.inside(self._contact.position_ned_m, goal)
 

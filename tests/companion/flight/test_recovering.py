@@ -110,6 +110,14 @@ def test_the_papers_goal_is_as_near_to_what_was_hit_as_eq_3_says(law):
     assert flight.collisions[-1].setpoint_ned_m == pytest.approx((AT[0] - 0.5 * 0.4, *AT[1:]))
 
 
+@pytest.mark.parametrize("law", ["adaptive", "normal", "paper"])
+def test_every_law_rests_clear_of_a_ceiling_also_where_it_was_met_slowly(law):
+    contact = Contact(HIT_US, AT, (0.0, 0.0, -0.4), (0.0, 0.0, 1.0), 0.2)
+    flight = flight_with(law=law, estimator=MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig()))
+    recover_in(flight)
+    assert flight.collisions[-1].setpoint_ned_m == pytest.approx((*AT[:2], AT[2] + 0.35), abs=0.02)
+
+
 @pytest.mark.parametrize(
     ("law", "fallen_m", "climbs_m"), [("adaptive", 0.2, 0.2), ("adaptive", 0.8, 0.35), ("normal", 0.8, 0.8)]
 )
