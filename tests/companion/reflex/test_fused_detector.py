@@ -185,6 +185,15 @@ def test_a_beam_that_only_turns_a_climbing_vehicle_is_a_hit_once_the_turn_has_st
     assert all(impact.contact_free_until_boot_us == 3_000_000 for impact in impacts)
 
 
+def test_what_turns_a_vehicle_more_and_more_does_not_hide_behind_its_own_first_steps():
+    # Given a graze that turns it about one axis after the other, by more than 2 rad/s at last
+    def graze(t_us):
+        return tuple(size * (t_us > 3_005_000 + 20_000 * n) for n, size in enumerate((1.9, 1.9, 2.7)))
+
+    impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), rates=graze).fly(until_us=3_150_000)
+    assert [(impact.evidence, impact.sample_time_boot_us) for impact in impacts] == [(Evidence.RATE_JUMP, 3_080_000)]
+
+
 def test_what_a_felt_contact_still_turns_is_no_other_hit():
     flight = Flight(pulse((-30.0, 0.0, 0.0), 3_009_000, 12_000), imu_every_us=20_000)
     flight.rates = lambda t: (3.0 if t > 3_020_000 else 0.0, 0.0, 0.0)
