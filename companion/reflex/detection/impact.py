@@ -4,12 +4,12 @@ import math
 from dataclasses import dataclass, field, replace
 
 from companion.messages import Attitude, GpsFix, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
-from companion.motion.config import STAMP_RESOLUTION_US
+from companion.motion.config import SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import Strapdown
-from companion.motion.vector import ZERO, along, minus, plus
+from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex.config import CLIPPED_SHARE, SHORT, EstimateConfig
 from companion.reflex.correction import VelocityValidity
 from companion.reflex.detection.detector import DetectorState, Evidence, Impact, Phase
@@ -56,13 +56,18 @@ class ContactForce:
     def peak_m_s2(self) -> float:
         return max(math.hypot(*force) for force in self.forces_ned_m_s2)
 
-    @property
-    def is_fully_measured(self) -> bool:
-        """Whether the force so far was measured without clipping, as far as the samples show."""
+    def is_fully_measured(self, came_ned_m_s: Vector3, is_over: bool) -> bool:
+        """Whether the force so far was measured without clipping, as far as the samples show; `came_ned_m_s` is v_c.
+
+        A contact that is over without having stopped the vehicle's way into it was clipped: raw pulses of a chattering
+        frame are short.
+        """
+        impulse_m_s = self.impulse_ned_m_s
+        leaves = along(plus(came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s)) >= -SAME_M_S
         largest = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
         least = 0.5 * along(largest, largest)
         lasting = sum(along(force, largest) >= least for force in self.forces_ned_m_s2)
-        return not self.is_clipped and lasting > SHORT
+        return not self.is_clipped and lasting > SHORT and (leaves or self.has_gap or not is_over)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +173,13 @@ class ImpactEstimator:
         contact, is_over = self.contact, state.phase is not Phase.CONTACT
         if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
             contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
-            # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
-            self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
             estimate = self._refined(estimate, contact)
+        if contact is not None:
+            # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
+            is_whole = contact.is_fully_measured(self.came_ned_m_s, is_over)
+            self.validity.assess(is_whole, sample.time_boot_us)
+            is_lower_bound = contact.has_gap or not is_whole
+            estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)
         return self.estimate if is_over else None
 
@@ -185,8 +194,6 @@ class ImpactEstimator:
             normal=self._normal(contact.impulse_ned_m_s),
             peak_specific_force_m_s2=contact.peak_m_s2,
             impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
-            is_fully_measured=contact.is_fully_measured,
-            is_lower_bound=contact.has_gap or not contact.is_fully_measured,
         )
 
     def _normal(self, impulse_ned: Vector3, is_guessed: bool = False) -> Normal:

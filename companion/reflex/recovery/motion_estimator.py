@@ -96,12 +96,13 @@ class MotionEstimator:
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
         by the force."""
+        was_measured, is_pushed = self.is_fully_measured, pushed_boot_us > self.pushed_boot_us
         self.is_fully_measured, self.normal = is_fully_measured and not self.is_second, normal
-        if pushed_boot_us > self.pushed_boot_us:
+        if is_pushed:
             self.pushed_boot_us, self._released_m_s = pushed_boot_us, self._summed_m_s
             self.after_ned_m_s, self.after_error_m_s = None, math.inf
-            if not self.is_fully_measured:
-                self._begin()
+        if not self.is_fully_measured and (is_pushed or was_measured):
+            self._begin()
 
     def imu(self, strapdown: Strapdown) -> None:
         """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
