@@ -152,7 +152,7 @@ class Reflex:
             reported_wxyz = self.monitor.estimator.strapdown.attitude_wxyz
             force_ned = body_to_ned(reported_wxyz, impact.specific_force_frd_m_s2)
             record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
-        record.estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal)
+        record.estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal, estimate.impulse_m_s)
         surfaces = [
             Surface(each.contact.position_ned_m, each.normal.direction_ned, self.law_config.clearance_m)
             for each in earlier

@@ -79,6 +79,7 @@ class MotionEstimator:
     _has_agreed: bool = False  # with the measured one, by itself
     # Since when the reported velocity, less its mean error and as it is, is the measured one.
     _agrees_since_boot_us: tuple[int | None, int | None] = (None, None)
+    _impulse_m_s: float = 0.0  # of the contact, as far as it was measured
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
     def __post_init__(self) -> None:
@@ -90,12 +91,16 @@ class MotionEstimator:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
         self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
         self.has_converged = self._has_agreed = self._was_odd = False
-        self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
+        came_m_s = math.hypot(*self.contact.velocity_ned_m_s)
+        # Beyond an elastic rebound the obstacle moved, nobody knows how fast.
+        moved_m_s = max(0.0, self._impulse_m_s - 2.0 * came_m_s)
+        self.spread_m_s = SAME_M_S + reflex.SPREAD * came_m_s + moved_m_s
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 
-    def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal) -> None:
+    def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal, impulse_m_s: float) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
-        by the force."""
+        by the force, its impulse per mass."""
+        self._impulse_m_s = impulse_m_s
         was_measured, is_pushed = self.is_fully_measured, pushed_boot_us > self.pushed_boot_us
         self.is_fully_measured, self.normal = is_fully_measured and not self.is_second, normal
         if is_pushed:
