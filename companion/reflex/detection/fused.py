@@ -121,8 +121,9 @@ class FusedState(DetectorState):
         return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
 
     def may_be_hand(self, time_us: int) -> bool:
-        """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves."""
-        return self.hovered_boot_us is not None and time_us - self.hovered_boot_us < CURRENT_US
+        """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""
+        is_slow = math.hypot(*self.velocity_ned_m_s or ZERO) < APPROACH_M_S
+        return is_slow and self.hovered_boot_us is not None and time_us - self.hovered_boot_us < CURRENT_US
 
     def jumps(self, force_frd_m_s2: Vector3) -> bool:
         """Whether the force changed over one sample, or over two, by more than a hand's does."""

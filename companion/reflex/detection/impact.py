@@ -24,6 +24,9 @@ class ContactForce:
     """The accelerometer's value without the contact."""
     averaging_us: int
     range_m_s2: float
+    came_ned_m_s: Vector3 = ZERO
+    """v_c; zero where it is not known."""
+    is_over: bool = False
     impulse_ned_m_s: Vector3 = ZERO
     forces_ned_m_s2: list[Vector3] = field(default_factory=list)
     """The contact force in samples above the threshold."""
@@ -56,18 +59,22 @@ class ContactForce:
     def peak_m_s2(self) -> float:
         return max(math.hypot(*force) for force in self.forces_ned_m_s2)
 
-    def is_fully_measured(self, came_ned_m_s: Vector3, is_over: bool) -> bool:
-        """Whether the force so far was measured without clipping, as far as the samples show; `came_ned_m_s` is v_c.
-
-        A contact that is over without having stopped the vehicle's way into it was clipped: raw pulses of a chattering
-        frame are short.
-        """
-        impulse_m_s = self.impulse_ned_m_s
-        leaves = along(plus(came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s)) >= -SAME_M_S
+    @property
+    def is_fully_measured(self) -> bool:
+        """Whether the force so far was measured without clipping, as far as the samples show."""
         largest = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
         least = 0.5 * along(largest, largest)
         lasting = sum(along(force, largest) >= least for force in self.forces_ned_m_s2)
-        return not self.is_clipped and lasting > SHORT and (leaves or self.has_gap or not is_over)
+        return not self.is_clipped and lasting > SHORT and not self._lacks_some
+
+    @property
+    def _lacks_some(self) -> bool:
+        """Whether it is over and has not even stopped the vehicle's way into it: a chattering frame's pulses are short,
+        and each is clipped.
+        """
+        impulse_m_s = self.impulse_ned_m_s
+        off_m_s = along(plus(self.came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s))
+        return self.is_over and not self.has_gap and off_m_s < -SAME_M_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,15 +145,15 @@ class ImpactEstimator:
         place, velocity, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
-        self.contact = None
+        self.contact, self.came_ned_m_s = None, velocity if self.validity.is_valid else ZERO
         # A velocity that alone shows a contact has no force of its own.
         if self.imu is not None and impact.evidence is Evidence.FORCE:
             free = minus(self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
             averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
             range_m_s2 = self.config.accelerometer_range_m_s2
-            self.contact = ContactForce(free, averaging_us, range_m_s2, is_clipped=self.hides_clipping)
+            came, hides = self.came_ned_m_s, self.hides_clipping
+            self.contact = ContactForce(free, averaging_us, range_m_s2, came, is_clipped=hides)
             self.contact.add(self.imu, self.imu.time_boot_us - free_until_us, self.strapdown.valid_wxyz)
-        self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
         self.validity.invalidate(sample_us, math.hypot(*velocity))
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
@@ -176,7 +183,8 @@ class ImpactEstimator:
             estimate = self._refined(estimate, contact)
         if contact is not None:
             # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
-            is_whole = contact.is_fully_measured(self.came_ned_m_s, is_over)
+            contact.is_over = is_over
+            is_whole = contact.is_fully_measured
             self.validity.assess(is_whole, sample.time_boot_us)
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)

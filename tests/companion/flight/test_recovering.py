@@ -40,7 +40,7 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
     if estimator is None:
         contact = Contact(HIT_US, AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
-        estimator.note_contact(True, HIT_US, estimator.normal)
+        estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
     flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator))
     return flight
 
@@ -96,7 +96,7 @@ def test_who_has_passed_the_end_of_an_obstacle_is_neither_driven_back_before_it_
     assert record.setpoint_ned_m[0] > 4.1
     assert flight.reflex.recovery.off_m > pressed_m
     # But where it is touched again it is there again
-    record.estimator.note_contact(True, HIT_US + 900_000, record.estimator.normal)
+    record.estimator.note_contact(True, HIT_US + 900_000, record.estimator.normal, 0.0)
     for since_us in (900_000, 1_000_000):
         hears(flight, recover, since_us, 4.2, 0.0)
     assert record.setpoint_ned_m[0] == pytest.approx(4.2 - 0.35, abs=0.05)
@@ -155,7 +155,7 @@ def test_a_recovery_is_over_once_it_has_stayed_by_a_position_and_counts_from_whe
 def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(after_ned_m_s, direction_ned):
     record = flight_with().collisions[0]
     half = math.sqrt(0.5)
-    record.estimator.note_contact(True, HIT_US, Normal((-half, -half, 0.0), 0.35))
+    record.estimator.note_contact(True, HIT_US, Normal((-half, -half, 0.0), 0.35), 0.0)
     assert record.normal.direction_ned == (-half, -half, 0.0)
     record.estimator.after_ned_m_s, record.estimator.after_error_m_s = after_ned_m_s, 0.05
     assert record.normal.direction_ned == pytest.approx(direction_ned, abs=0.02)
@@ -167,7 +167,7 @@ def test_the_way_off_follows_the_normal_as_it_becomes_known():
     recover, estimator = recover_in(flight), flight.collisions[0].estimator
     hears(flight, recover, 100_000, 2.95, 0.0)
     straight_m = flight.collisions[0].setpoint_ned_m[1]
-    estimator.note_contact(True, HIT_US, Normal((-0.8, 0.6, 0.0), 0.1))
+    estimator.note_contact(True, HIT_US, Normal((-0.8, 0.6, 0.0), 0.1), 0.0)
     hears(flight, recover, 120_000, 2.95, 0.0)
     assert straight_m == pytest.approx(0.0, abs=0.02) and flight.collisions[0].setpoint_ned_m[1] > 0.1
 

@@ -344,7 +344,7 @@ def test_a_receiver_that_is_silent_or_spoke_before_the_contacts_next_push_leaves
     go_on(air, found, 1.0)
     assert found.is_measured_apart
     if is_pushed:
-        found.note_contact(False, air.now_us, found.normal)
+        found.note_contact(False, air.now_us, found.normal, 0.0)
     else:
         go_on(air, found, 0.7, receives=False)
     assert not found.is_measured_apart

@@ -103,7 +103,7 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
             found.imu(strapdown)
 
     go_on(0.02, (-9.0, 0.0, 0.0))
-    found.note_contact(True, strapdown.time_boot_us, found.normal)
+    found.note_contact(True, strapdown.time_boot_us, found.normal, 0.0)
     # and a vehicle that leaves at 1 m/s to the south and 2 m/s to the west, and brakes with 3 m/s^2 from then on
     go_on(later_s, (1.0, 3.0, 0.0))
     # When the first velocity comes, soon or late
@@ -117,7 +117,7 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     found.update(LocalPosition(strapdown.time_boot_us, AT, (5.0, 5.0, 0.0)))
     assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
     # until it is pushed again
-    found.note_contact(True, strapdown.time_boot_us, found.normal)
+    found.note_contact(True, strapdown.time_boot_us, found.normal, 0.0)
     assert found.after_ned_m_s is None
 
 
@@ -209,7 +209,7 @@ def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_a
 def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(is_fully_measured, across_m_s2, wind_m_s2):
     # Given a level vehicle after a hit, and a force across its thrust
     found, strapdown = reckoned(), Strapdown()
-    found.note_contact(is_fully_measured, HIT_US, found.normal)
+    found.note_contact(is_fully_measured, HIT_US, found.normal, 0.0)
     for tick in range(1, 500):
         strapdown.imu(HIT_US + 4_000 * tick, (across_m_s2, 0.0, -9.81), ZERO)
         found.imu(strapdown)
@@ -240,7 +240,7 @@ def recovering():
 def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
     # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
     flight, record, recover = recovering()
-    record.estimator.note_contact(True, HIT_US, record.estimator.normal)
+    record.estimator.note_contact(True, HIT_US, record.estimator.normal, 0.0)
     for at_us in range(100_000, 5_000_000, 20_000):
         recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
         if record.is_over:
