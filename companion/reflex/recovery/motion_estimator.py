@@ -92,8 +92,8 @@ class MotionEstimator:
         self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
         self.has_converged = self._has_agreed = self._was_odd = False
         came_m_s = math.hypot(*self.contact.velocity_ned_m_s)
-        # Beyond an elastic rebound the obstacle moved, nobody knows how fast.
-        moved_m_s = max(0.0, self._impulse_m_s - 2.0 * came_m_s)
+        # Beyond an elastic rebound the obstacle moved, nobody knows how fast: as much again may be hidden.
+        moved_m_s = self._impulse_m_s if self._impulse_m_s > 2.0 * came_m_s else 0.0
         self.spread_m_s = SAME_M_S + reflex.SPREAD * came_m_s + moved_m_s
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
 

@@ -281,12 +281,13 @@ def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
     assert [(i.kind, i.is_collision) for i in ball] == [(ImpactKind.STRUCK, True)]
 
 
-def test_what_stops_a_vehicle_that_only_turns_back_is_no_hand():
+@pytest.mark.parametrize(("speed_m_s", "own_m_s2", "from_us"), [(0.3, -1.0, 2_400_000), (0.0, -1.5, 2_560_000)])
+def test_what_stops_a_vehicle_that_turns_back_or_has_left_its_hover_is_no_hand(speed_m_s, own_m_s2, from_us):
     def soft(t):
-        back, grip = max(0, t - 2_400_000) / 100_000, max(0, t - HIT_US) / 150_000
-        return (6.0 * min(1.0, grip) - min(1.0, back), 0.0, 0.0)
+        own, grip = max(0, t - from_us) / 100_000, max(0, t - HIT_US) / 150_000
+        return (6.0 * min(1.0, grip) + own_m_s2 * min(1.0, own), 0.0, 0.0)
 
-    touched = Flight(soft, velocity=(0.3, 0.0, 0.0)).fly(HIT_US + 150_000)
+    touched = Flight(soft, velocity=(speed_m_s, 0.0, 0.0)).fly(HIT_US + 150_000)
     assert [i.is_collision for i in touched] == [True]
 
 
