@@ -1,10 +1,23 @@
 """Has the vehicle come to rest at a place?"""
 
 import math
+from dataclasses import dataclass
 
 from companion.messages import Vector3
 from companion.motion.config import SettledConfig
 from companion.motion.vector import ZERO
+
+
+@dataclass(slots=True)
+class Lasting:
+    """For how long something has been so, by the vehicle's clock: a late step makes nothing last."""
+
+    since_us: int | None = None
+    lasts_us: int = 0
+
+    def update(self, is_so: bool, time_boot_us: int) -> None:
+        self.since_us = (time_boot_us if self.since_us is None else self.since_us) if is_so else None
+        self.lasts_us = 0 if self.since_us is None else time_boot_us - self.since_us
 
 
 class SettlingMonitor:
@@ -14,12 +27,12 @@ class SettlingMonitor:
     much again: one of which nothing is known is no rest.
     """
 
-    __slots__ = ("_config", "_since_us", "_time_us", "_velocity")
+    __slots__ = ("_config", "_still", "_time_us", "_velocity")
 
     def __init__(self, config: SettledConfig) -> None:
         self._config = config
         self._velocity, self._time_us = ZERO, 0
-        self._since_us: int | None = None
+        self._still = Lasting()
 
     def settled_since(
         self, time_boot_us: int, distance_m: float, velocity_m_s: Vector3, spread_m_s: float
@@ -29,10 +42,6 @@ class SettlingMonitor:
         (u, v, w), (n, e, d), share = self._velocity, velocity_m_s, elapsed_s / (config.smoothing_s + elapsed_s)
         self._velocity, self._time_us = (u + share * (n - u), v + share * (e - v), w + share * (d - w)), time_boot_us
         most_m_s = config.speed_m_s + min(spread_m_s, config.speed_m_s)
-        if distance_m > config.distance_m or math.hypot(*self._velocity) >= most_m_s:
-            self._since_us = None
-        elif self._since_us is None:
-            self._since_us = time_boot_us
-        elif time_boot_us - self._since_us >= config.duration_s * 1e6:
-            return self._since_us
-        return None
+        is_still = distance_m <= config.distance_m and math.hypot(*self._velocity) < most_m_s
+        self._still.update(is_still, time_boot_us)
+        return self._still.since_us if self._still.lasts_us >= config.duration_s * 1e6 else None

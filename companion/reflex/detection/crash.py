@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Sample, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import tilt_rad
+from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, towards
 from companion.reflex.config import (
     CARRIED_SHARE,
@@ -20,18 +21,6 @@ from companion.reflex.config import (
     TIPPED_RAD,
     TIPPED_US,
 )
-
-
-@dataclass(slots=True)
-class Lasting:
-    """For how long something has been so, by the vehicle's clock: a late step makes nothing last."""
-
-    since_us: int | None = None
-    lasts_us: int = 0
-
-    def update(self, is_so: bool, time_boot_us: int) -> None:
-        self.since_us = (time_boot_us if self.since_us is None else self.since_us) if is_so else None
-        self.lasts_us = 0 if self.since_us is None else time_boot_us - self.since_us
 
 
 @dataclass(slots=True)

@@ -85,7 +85,9 @@ class CollisionRecord:
             self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-            self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal, estimate.impulse_m_s)
+            self.estimator.note_contact(
+                estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal, estimate.impulse_m_s
+            )
         self.estimator.imu(strapdown)
         self.estimator.measure(source.doppler)
         is_left = strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US or self.estimator.is_measured_apart

@@ -29,6 +29,7 @@ from companion.motion.config import (
 )
 from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
+from companion.motion.settling import Lasting
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, along, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
@@ -77,8 +78,9 @@ class MotionEstimator:
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
     _has_agreed: bool = False  # with the measured one, by itself
-    # Since when the reported velocity, less its mean error and as it is, is the measured one.
-    _agrees_since_boot_us: tuple[int | None, int | None] = (None, None)
+    # For how long the reported velocity, less its mean error and as it is, has been the measured one.
+    _steady: Lasting = field(default_factory=Lasting)
+    _same: Lasting = field(default_factory=Lasting)
     _impulse_m_s: float = 0.0  # of the contact, as far as it was measured
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
@@ -89,7 +91,7 @@ class MotionEstimator:
 
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
-        self._newest, self._measured, self._agrees_since_boot_us = None, None, (None, None)
+        self._newest, self._measured, self._steady, self._same = None, None, Lasting(), Lasting()
         self.has_converged = self._has_agreed = self._was_odd = False
         came_m_s = math.hypot(*self.contact.velocity_ned_m_s)
         # Beyond an elastic rebound the obstacle moved, nobody knows how fast: as much again may be hidden.
@@ -200,7 +202,7 @@ class MotionEstimator:
     @property
     def is_known(self) -> bool:
         """Whether what is wrong of the report is known as it is now."""
-        is_steady = self._agrees_since_boot_us[0] is not None
+        is_steady = self._steady.since_us is not None
         return self.has_converged and (is_steady or not self.is_measured_apart)
 
     @property
@@ -307,14 +309,12 @@ class MotionEstimator:
         off = minus(reported_m_s, self.motion.velocity_ned_m_s)
         share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
         n, e, _ = error = towards(self._hidden_error_m_s, off, share)
-        steady_us, same_us = self._agrees_since_boot_us
-        steady_us = _since(is_known and _differs_m_s(off, error) <= SAME_M_S, steady_us, time_boot_us)
+        self._steady.update(is_known and _differs_m_s(off, error) <= SAME_M_S, time_boot_us)
         # `spread_m_s` is the measured one's.
         is_same = _differs_m_s(off, ZERO) <= math.hypot(SAME_M_S, self.spread_m_s)
-        same_us = _since(is_same, same_us, time_boot_us)
-        self._agrees_since_boot_us = (steady_us, same_us)
-        is_steady = self.fits_models and steady_us is not None and time_boot_us - steady_us > SHOWN_US
-        self._has_agreed = same_us is not None and time_boot_us - same_us > 1e6 * reflex.COMPARED_S
+        self._same.update(is_same, time_boot_us)
+        is_steady = self.fits_models and self._steady.lasts_us > SHOWN_US
+        self._has_agreed = self._same.lasts_us > 1e6 * reflex.COMPARED_S
         self.has_converged = self.has_converged or is_steady or self._has_agreed
         self._hidden_error_m_s = ZERO if self._has_agreed else (n, e, climb_error_m_s)
 
@@ -349,11 +349,6 @@ class MotionEstimator:
         place = minus(sample.position_ned_m, self.position_error_m)
         velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
         return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
-
-
-def _since(is_so: bool, since_us: int | None, time_boot_us: int) -> int | None:
-    """Since when it is so; None: it is not."""
-    return (since_us or time_boot_us) if is_so else None
 
 
 def _differs_m_s(velocity_m_s: Vector3, other_m_s: Vector3) -> float:

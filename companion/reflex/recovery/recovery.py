@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import SettledConfig
 from companion.motion.history import MotionHistory
-from companion.motion.settling import SettlingMonitor
+from companion.motion.settling import Lasting, SettlingMonitor
 from companion.motion.vector import along, minus, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.config import RecoveryConfig
@@ -69,7 +69,7 @@ class Recovery:
         self._surfaces = self._around(self._contact)
         record.setpoint_ned_m = self._told_ned_m = self._goal(record.estimator.start)
         self._has_left = self._has_passed = False
-        self._slow_since_us: int | None = None
+        self._slow = Lasting()
         self._held_since_us = record.sample_time_boot_us  # by a position
         self._monitor = SettlingMonitor(settled)
 
@@ -151,12 +151,10 @@ class Recovery:
         is_there = math.dist(motion.position_ned_m, self.record.setpoint_ned_m) <= reflex.PLACE_SPREAD_M
         # An error that PX4 corrects of a sudden makes it as fast: no more than it brakes within the clearance.
         most_m_s = brakable_m_s(self._config.clearance_m, reflex.LEAD_S)
-        is_off = not estimator.is_known or math.hypot(*estimator.velocity_error_m_s) > most_m_s
-        if is_off or not is_there or math.hypot(*motion.velocity_ned_m_s) > reflex.RESTS_M_S:
-            self._slow_since_us = None
-            return False
-        self._slow_since_us = self._slow_since_us or sample.time_boot_us
-        return sample.time_boot_us - self._slow_since_us >= 1e6 * self.rests_s
+        is_right = estimator.is_known and math.hypot(*estimator.velocity_error_m_s) <= most_m_s
+        is_slow = math.hypot(*motion.velocity_ned_m_s) <= reflex.RESTS_M_S
+        self._slow.update(is_right and is_there and is_slow, sample.time_boot_us)
+        return self._slow.lasts_us >= 1e6 * self.rests_s
 
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. While it is touched it is where the vehicle is: frames and arms fold, obstacles move."""
