@@ -90,13 +90,17 @@ def test_after_the_most_hits_of_a_flight_the_vehicle_is_given_back_to_hold(max_h
     assert air.mode == mode and air.told("not_back") == ["not given back: recovery 1 of at most 1"][max_hits - 1 :]
 
 
-def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
-    # Given a pilot who does not open the hand after a hit
+def pushed_on():
+    """A vehicle that has recovered, and whose pilot has not opened the hand since the hit."""
     air = Air(GuardConfig(then="previous"))
     air.pushed_into_the_wall()
     air.forward = 0.3
-    # When the vehicle has recovered
     air.run_to(State.GIVING_BACK, 10.0)
+    return air
+
+
+def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
+    air = pushed_on()
     air.run_for(3.0)
     # Then it is held, and told why, until the stick is released
     assert air.state is State.GIVING_BACK
@@ -108,10 +112,7 @@ def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
 
 
 def test_sticks_that_are_heard_no_more_are_not_waited_for():
-    air = Air(GuardConfig(then="previous"))
-    air.pushed_into_the_wall()
-    air.forward = 0.3
-    air.run_to(State.GIVING_BACK, 10.0)
+    air = pushed_on()
     air.stop_all()
     air.run_until(lambda: air.state is not State.GIVING_BACK, 3.0)
     assert air.mode == "AUTO.LOITER" and air.told("given_back")

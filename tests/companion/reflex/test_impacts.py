@@ -1,7 +1,6 @@
 """An impact: v_c and x(t_c), impulse and normal, each against motion made by hand; and what kind it is."""
 
 import math
-import random
 
 import pytest
 
@@ -24,14 +23,13 @@ def told(estimator, t_us, velocity_ned_m_s, position_ned_m=STILL):
     estimator.update(LocalPosition(t_us, position_ned_m, velocity_ned_m_s))
 
 
-def approaching(acceleration_m_s2=0.0, noise_m_s=0.0, seed=1, until_us=CONTACT_US):
+def approaching(acceleration_m_s2=0.0):
     """An estimator that was told of a vehicle on its way north, at x = 4 m with 2 m/s when the contact begins."""
-    rng, estimator = random.Random(seed), ImpactEstimator(CONFIG)
-    for t_us in range(CONTACT_US - 1_000_000, until_us, 20_000):
+    estimator = ImpactEstimator(CONFIG)
+    for t_us in range(CONTACT_US - 1_000_000, CONTACT_US, 20_000):
         t = (t_us - CONTACT_US) * 1e-6
-        off = [rng.gauss(0.0, noise_m_s) for _ in range(3)]
         speed_m_s, north_m = 2.0 + acceleration_m_s2 * t, 4.0 + 2.0 * t + 0.5 * acceleration_m_s2 * t * t
-        told(estimator, t_us, (speed_m_s + off[0], off[1], off[2]), (north_m, 1.0, -1.5))
+        told(estimator, t_us, (speed_m_s, 0.0, 0.0), (north_m, 1.0, -1.5))
     return estimator
 
 
@@ -45,12 +43,6 @@ def test_place_and_velocity_of_a_clean_approach_are_those_of_the_contact(acceler
     estimate = begun(approaching(acceleration))
     assert estimate.velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.05)
     assert estimate.position_ned_m == pytest.approx((4.0, 1.0, -1.5), abs=0.005)
-
-
-def test_the_stated_error_of_v_c_is_that_of_a_good_velocity_and_five_percent_of_it_at_most():
-    found = [begun(approaching(noise_m_s=0.03, seed=seed)) for seed in range(60)]
-    rms = math.sqrt(sum((each.velocity_ned_m_s[0] - 2.0) ** 2 for each in found) / len(found))
-    assert 0.5 * found[0].velocity_error_m_s < rms < 1.5 * found[0].velocity_error_m_s < 0.05 * 2.0
 
 
 @pytest.mark.parametrize("late_us", [500, 20_000, 100_000, 290_000])
@@ -80,7 +72,9 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
     assert contact.has_gap or not contact.is_fully_measured
 
 
-@pytest.mark.parametrize(("came_m_s", "every_us", "is_whole"), [(2.0, 4_000, False), (0.5, 4_000, True), (2.0, 20_000, True)])
+@pytest.mark.parametrize(
+    ("came_m_s", "every_us", "is_whole"), [(2.0, 4_000, False), (0.5, 4_000, True), (2.0, 20_000, True)]
+)
 def test_a_contact_is_clipped_that_ends_before_it_has_stopped_the_vehicle(came_m_s, every_us, is_whole):
     # Given the chatter of a rigid frame: 0.48 m/s at most in all of its samples, far below the sensor's range
     contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9, (came_m_s, 0.0, 0.0))

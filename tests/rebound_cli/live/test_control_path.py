@@ -166,15 +166,21 @@ def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
 LATE = ("late", "setpoints 3000 ms late, PX4 needs two a second")
 
 
+def exchanged(folder, receive, now_us, deadline_us):
+    """What was stepped by one exchange, of a socket and a clock that are these functions."""
+    socket = Mock(receive=receive, now_us=now_us)
+    stepped = Mock(armed=True, finished=False, last_words=list, next_deadline_us=lambda: deadline_us)
+    stepped.step.return_value = StepResult((), (), ())
+    recorder = FlightRecorder(folder)
+    Loop(stepped, socket, socket, recorder, Console(sys.stderr), Interrupts()).exchange()
+    recorder.close()
+    return stepped
+
+
 @pytest.mark.parametrize(("late_us", "notes"), [(3_000_000, [LATE]), (0, [])])
 def test_a_step_that_is_late_is_told(tmp_path, late_us, notes):
     # Given a clock that stands after a stall
-    socket = Mock(receive=lambda timeout_s: b"heard", now_us=lambda: EPOCH_US + late_us)
-    stepped = Mock(armed=True, finished=False, last_words=list, next_deadline_us=lambda: EPOCH_US)
-    stepped.step.return_value = StepResult((), (), ())
-    recorder = FlightRecorder(tmp_path)
-    Loop(stepped, socket, socket, recorder, Console(sys.stderr), Interrupts()).exchange()
-    recorder.close()
+    stepped = exchanged(tmp_path, lambda timeout_s: b"heard", lambda: EPOCH_US + late_us, EPOCH_US)
     assert [call.args for call in stepped.note.call_args_list] == notes
 
 
@@ -204,12 +210,7 @@ def test_what_shows_no_hit_is_decided_with_the_next_sample(tmp_path, came, deadl
         del came[0]
         return packet
 
-    socket = Mock(receive=receive, now_us=lambda: clock[0])
-    stepped = Mock(armed=True, finished=False, last_words=list, next_deadline_us=lambda: deadline_us)
-    stepped.step.return_value = StepResult((), (), ())
-    recorder = FlightRecorder(tmp_path)
-    Loop(stepped, socket, socket, recorder, Console(sys.stderr), Interrupts()).exchange()
-    recorder.close()
+    stepped = exchanged(tmp_path, receive, lambda: clock[0], deadline_us)
     assert [call.args for call in stepped.step.call_args_list] == [(heard, at_us)]
 
 
