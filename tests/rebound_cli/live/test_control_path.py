@@ -163,9 +163,6 @@ def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
     assert dropped >= 49 and done == list(range(len(done))) and len(done) + dropped == MOST_WAITING + 50
 
 
-LATE = ("late", "setpoints 3000 ms late, PX4 needs two a second")
-
-
 def exchanged(folder, receive, now_us, deadline_us):
     """What was stepped by one exchange, of a socket and a clock that are these functions."""
     socket = Mock(receive=receive, now_us=now_us)
@@ -177,11 +174,13 @@ def exchanged(folder, receive, now_us, deadline_us):
     return stepped
 
 
-@pytest.mark.parametrize(("late_us", "notes"), [(3_000_000, [LATE]), (0, [])])
-def test_a_step_that_is_late_is_told(tmp_path, late_us, notes):
+@pytest.mark.parametrize(
+    ("late_us", "told"), [(3_000_000, ["setpoints 3000 ms late, PX4 needs two a second"]), (0, [])]
+)
+def test_a_step_that_is_late_is_told(tmp_path, late_us, told):
     # Given a clock that stands after a stall
     stepped = exchanged(tmp_path, lambda timeout_s: b"heard", lambda: EPOCH_US + late_us, EPOCH_US)
-    assert [call.args for call in stepped.note.call_args_list] == notes
+    assert [call.args for call in stepped.note.call_args_list] == [("late", text) for text in told]
 
 
 IMU, PLACE = (bytes([0xFD, 0, 0, 0, 0, 1, 1, number, 0, 0, 0, 0]) for number in (105, 32))
