@@ -32,14 +32,10 @@ def verdict(name: str, ours: float) -> str:
 
 
 @pytest.mark.parametrize("name", AROUND)
-def test_a_tolerance_catches_a_wrong_sign_and_a_factor_of_two(name):
+def test_a_tolerance_catches_a_wrong_sign_a_factor_of_two_and_what_is_no_number(name):
     expected = float(CLAIMS[name].get("expected", 0.7))
     assert verdict(name, expected) == PASSED
-    assert {verdict(name, factor * expected) for factor in (-1.0, 2.0, 0.5)} == {FAILED}
-
-
-def test_a_row_that_is_not_a_number_differs():
-    assert {verdict(name, float("nan")) for name in CLAIMS} == {FAILED}
+    assert {verdict(name, factor * expected) for factor in (-1.0, 2.0, 0.5, float("nan"))} == {FAILED}
 
 
 def test_parameter_identification_agrees_with_eq_2():
