@@ -14,9 +14,9 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from io import RawIOBase
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Protocol
 
 from companion.autopilot.known import defaults
 from companion.errors import ConnectionSetupError
@@ -39,14 +39,6 @@ BITS_A_BYTE = 10
 SERIAL_BY_ID = Path("/dev/serial/by-id")
 
 
-class Port(Protocol):
-    """A socket or a serial port."""
-
-    def fileno(self) -> int: ...
-
-    def close(self) -> None: ...
-
-
 class Stream:
     """An open byte stream; broken once the other end has gone.
 
@@ -55,8 +47,8 @@ class Stream:
     line's rate says when the rest is there.
     """
 
-    def __init__(self, port: Port, at: str, byte_s: float = 0.0) -> None:
-        """`at` is its address or device, for people; `byte_s` is how long a byte takes."""
+    def __init__(self, port: socket.socket | RawIOBase, at: str, byte_s: float = 0.0) -> None:
+        """`port`: a socket or a serial port. `at` is its address or device, for people; `byte_s` a byte's time."""
         self._port, self.at, self._byte_s = port, at, byte_s
         self._descriptor = port.fileno()
         self.broken = False
