@@ -79,25 +79,23 @@ class TcpPort:
         listener.listen()
         listener.setblocking(False)
         self._listener, self._between = listener, between
-        self._unread: dict[socket.socket, bytearray] = {}
-        self._names: dict[socket.socket, str] = {}
+        self._clients: dict[socket.socket, tuple[str, bytearray]] = {}  # name, and what is not read yet
         self._told: set[str] = set()
 
     def sources(self) -> list[socket.socket]:
         """A client whose packets wait is not read: it waits, too."""
-        clients = [client for client, name in self._names.items() if self._between.has_room(name)]
-        return clients if len(self._names) >= MOST_CLIENTS else [self._listener, *clients]
+        clients = [client for client, (name, _) in self._clients.items() if self._between.has_room(name)]
+        return clients if len(self._clients) >= MOST_CLIENTS else [self._listener, *clients]
 
     def receive(self, now_us: int) -> None:
         for source in select.select(self.sources(), [], [], 0.0)[0]:
             if source is self._listener:
                 self._accept()
             elif content := _received(source):
-                self._between.hear(self._names[source], content)
+                self._between.hear(self._clients[source][0], content)
             else:
                 source.close()
-                del self._unread[source]
-                self._between.forget(self._names.pop(source))
+                self._between.forget(self._clients.pop(source)[0])
 
     def _accept(self) -> None:
         with suppress(OSError):
@@ -105,12 +103,11 @@ class TcpPort:
             # Packets are small and each is due now. A client that does not read for a while keeps its connection.
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             client.setblocking(False)
-            self._unread[client], self._names[client] = bytearray(), _name(sender)
+            self._clients[client] = (_name(sender), bytearray())
 
     def send(self, packets: Sequence[bytes]) -> None:
         content = b"".join(packets)
-        for client, unread in self._unread.items():
-            name = self._names[client]
+        for client, (name, unread) in self._clients.items():
             if len(unread) + len(content) <= UNREAD_BYTES:
                 unread += content
             elif name not in self._told:
@@ -121,7 +118,7 @@ class TcpPort:
                 del unread[: client.send(unread)]
 
     def close(self) -> None:
-        for source in (self._listener, *self._unread):
+        for source in (self._listener, *self._clients):
             source.close()
 
 
