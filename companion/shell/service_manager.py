@@ -78,12 +78,11 @@ def _has_passed(since_us: int | None, interval_us: int, now_us: int) -> bool:
     return since_us is None or now_us - since_us >= interval_us
 
 
-def service_manager(environment: Mapping[str, str] | None = None) -> ServiceManager | None:
+def service_manager(environment: Mapping[str, str] = os.environ) -> ServiceManager | None:
     """The one that started this process; None without, or where its socket is of a kind that no systemd here has."""
-    given = os.environ if environment is None else environment
-    address = given.get("NOTIFY_SOCKET", "")
+    address = environment.get("NOTIFY_SOCKET", "")
     if not address.startswith(("/", "@")):
         return None
-    period_us, own = given.get("WATCHDOG_USEC", ""), str(os.getpid())
-    is_watched = period_us.isdecimal() and given.get("WATCHDOG_PID", own) == own
+    period_us, own = environment.get("WATCHDOG_USEC", ""), str(os.getpid())
+    is_watched = period_us.isdecimal() and environment.get("WATCHDOG_PID", own) == own
     return ServiceManager(address, int(period_us) if is_watched else None)
