@@ -59,8 +59,8 @@ class Stepped(Generic[CoreT]):
         if identity is not None and not self._is_addressed:
             # From now on the vehicle alone is listened to and spoken to.
             self._is_addressed = True
-            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot.wire)
-            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot.wire)
+            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot)
+            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot)
         sent: list[bytes] = []
         for message in outputs.messages:
             # What cannot be packed is left out.

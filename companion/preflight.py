@@ -312,8 +312,8 @@ class Preflight:
         outgoing = advance(survey, samples, now_us)
         identity = survey.vehicle.identity
         if identity is not None and known is None:
-            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot.wire)
-            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot.wire)
+            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot)
+            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot)
         return tuple(packet for message in outgoing for packet in self._encoder.packets(message))
 
     def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:

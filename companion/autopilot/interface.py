@@ -38,16 +38,6 @@ class Remedies:
 
 
 @dataclass(frozen=True, slots=True)
-class Wire:
-    """What of MAVLink it reads, or writes, in its own way."""
-
-    casts_whole_numbers: bool
-    """A parameter that is a whole number travels as a float of its value, and not as the bytes of the number."""
-    attitude_mask: int
-    """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
-
-
-@dataclass(frozen=True, slots=True)
 class LastWords:
     """What is said to a vehicle whose companion has died near an obstacle, until it flies well by itself: a tilt."""
 
@@ -79,7 +69,10 @@ class Autopilot:
     """Of a mode that is not listed the one with these bits alone counts, where it is."""
     mode_parameters: Callable[[int], tuple[int, int]]
     """The second and the third of the command that asks for it."""
-    wire: Wire
+    casts_whole_numbers: bool
+    """A parameter that is a whole number travels as a float of its value, and not as the bytes of the number."""
+    attitude_mask: int
+    """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
     least_version: tuple[int, int, int]
     """Older ones are refused."""
     streams: tuple[SetMessageInterval, ...]

@@ -9,7 +9,8 @@ from dataclasses import replace
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.autopilot.interface import Wire
+from companion.autopilot.interface import Autopilot
+from companion.autopilot.known import ASSUMED
 from companion.mavlink.packet import (
     HEADER_V1,
     HEADER_V2,
@@ -57,10 +58,9 @@ class Decoder:
         self._has_highres_imu = False
         self._boot_us = 0  # newest 64-bit stamp
 
-    def listen_to(self, system_id: int, component_id: int, wire: Wire | None = None) -> None:
-        """`wire` None: as PX4 writes it."""
+    def listen_to(self, system_id: int, component_id: int, autopilot: Autopilot = ASSUMED) -> None:
         self._vehicle = (system_id, component_id)
-        if wire is not None and wire.casts_whole_numbers:
+        if autopilot.casts_whole_numbers:
             self._readers = {**self._readers, **ARDUPILOT_READERS}
 
     def feed(self, received: bytes) -> list[Frame]:

@@ -10,7 +10,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
-from companion.autopilot.interface import Wire
+from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED
 from companion.mavlink.packet import MAGIC_V2
 from companion.messages import (
@@ -58,12 +58,12 @@ class Encoder:
 
     def __init__(self) -> None:
         self._mavlink = dialect.MAVLink(None, DEFAULT_SYSTEM_ID, COMPONENT_ID)
-        self._text_number, self._wire = 0, ASSUMED.wire
+        self._text_number, self._autopilot = 0, ASSUMED
         self._target = (DEFAULT_SYSTEM_ID, dialect.MAV_COMP_ID_AUTOPILOT1)
 
-    def speak_to(self, system_id: int, component_id: int, wire: Wire = ASSUMED.wire) -> None:
+    def speak_to(self, system_id: int, component_id: int, autopilot: Autopilot = ASSUMED) -> None:
         """Address the vehicle, and become a component of its system."""
-        self._wire = wire
+        self._autopilot = autopilot
         self._mavlink.srcSystem = system_id
         self._target = (system_id, component_id)
 
@@ -149,7 +149,7 @@ class Encoder:
             case messages.ReadParameter(name):
                 return dialect.MAVLink_param_request_read_message(*self._target, name.encode(), -1)
             case messages.SetParameter(name, value):
-                told = (float(value), _REAL) if self._wire.casts_whole_numbers else _as_float(value)
+                told = (float(value), _REAL) if self._autopilot.casts_whole_numbers else _as_float(value)
                 return dialect.MAVLink_param_set_message(*self._target, name.encode(), *told)
 
     def _position_fields(self, setpoint: PositionSetpoint) -> tuple[Any, ...]:
@@ -170,7 +170,7 @@ class Encoder:
 
     def _attitude_fields(self, setpoint: AttitudeSetpoint) -> tuple[Any, ...]:
         """The same."""
-        head = (_time_ms(setpoint.time_us), *self._target, self._wire.attitude_mask)
+        head = (_time_ms(setpoint.time_us), *self._target, self._autopilot.attitude_mask)
         rates_rad_s = (0.0, 0.0, setpoint.yaw_rate_rad_s)
         return (*head, list(setpoint.attitude_wxyz), *rates_rad_s, setpoint.thrust_fraction)
 

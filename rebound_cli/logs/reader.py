@@ -42,7 +42,7 @@ def read_telemetry(path: Path) -> Log:
         raise LogError(f"{path}: not a telemetry log: no MAVLink packet with a time stamp in it.")
     vehicle, others = _vehicle(path, packets)
     source, decoder = (vehicle.system_id, vehicle.component_id), Decoder(GUARD_READERS)
-    decoder.listen_to(*source, vehicle.autopilot.wire)
+    decoder.listen_to(*source, vehicle.autopilot)
     heard: list[LoggedSample] = []
     kinds: set[int] = set()
     for at_us, packet in packets:

@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.ardupilot import modes, setup
-from companion.autopilot.interface import Autopilot, LastWords, Remedies, Wire
+from companion.autopilot.interface import Autopilot, LastWords, Remedies
 from companion.messages import MessageId, SetAuxFunction, SetMessageInterval, VehicleCommand
 
 # RC_Channel.h: while FORCEFLYING is high, neither the crash check nor the land detector stops the motors. A recovery
@@ -29,8 +29,9 @@ ARDUPILOT = Autopilot(
     modes=modes.MODES,
     mode_mask=-1,
     mode_parameters=lambda mode: (mode, 0),
+    casts_whole_numbers=True,
     # All three rates or none: with one that is left out alone Copter stops where it is.
-    wire=Wire(casts_whole_numbers=True, attitude_mask=0),
+    attitude_mask=0,
     least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
     # It has no CURRENT_MODE: how soon a pilot's mode is seen depends on this alone.
     streams=(SetMessageInterval(MessageId.HEARTBEAT, 50_000),),

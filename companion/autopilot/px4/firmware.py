@@ -1,11 +1,8 @@
 """PX4 behind the interface of autopilots."""
 
-from companion.autopilot.interface import Autopilot, LastWords, Remedies, Wire
+from companion.autopilot.interface import Autopilot, LastWords, Remedies
 from companion.autopilot.px4 import modes, setup
 from companion.messages import MessageId, RunChecks, VehicleCommand
-
-# ATTITUDE_TARGET_TYPEMASK: PX4's attitude loop makes the rates of roll and pitch.
-_IGNORE_ROLL_AND_PITCH_RATE = 0x03
 
 
 def _changed_law(leans: bool | None) -> VehicleCommand | None:
@@ -28,7 +25,8 @@ PX4 = Autopilot(
     modes=modes.MODES,
     mode_mask=modes.MAIN,
     mode_parameters=modes.parts,
-    wire=Wire(casts_whole_numbers=False, attitude_mask=_IGNORE_ROLL_AND_PITCH_RATE),
+    casts_whole_numbers=False,
+    attitude_mask=0x03,  # PX4's attitude loop makes the rates of roll and pitch
     least_version=(0, 0, 0),
     streams=(),
     filters_imu=False,

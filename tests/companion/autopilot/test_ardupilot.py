@@ -201,7 +201,7 @@ def test_an_attitude_has_all_three_rates():
 
 def sent(outgoing):
     encoder = Encoder()
-    encoder.speak_to(1, 1, ARDUPILOT.wire)
+    encoder.speak_to(1, 1, ARDUPILOT)
     (packet,) = encoder.packets(outgoing)
     return mav.MAVLink(None).decode(bytearray(packet))
 
@@ -209,7 +209,7 @@ def sent(outgoing):
 def heard(*messages):
     """What the last of them is heard as."""
     decoder = Decoder()
-    decoder.listen_to(1, 1, ARDUPILOT.wire)
+    decoder.listen_to(1, 1, ARDUPILOT)
     link = ardupilotmega.MAVLink(None, 1, 1)
     return [sample for message in messages for _, sample in decoder.feed(bytes(message.pack(link)))][-1]
 
