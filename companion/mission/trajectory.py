@@ -44,10 +44,10 @@ class Ramps:
         top = self.top_speed_m_s
         return self.distance_m / top + top * self._ramps_s2_per_m if top > 0.0 else 0.0
 
-    def at(self, elapsed_s: float, remaining_s: float) -> tuple[float, float, float]:
+    def at(self, elapsed_s: float) -> tuple[float, float, float]:
         """Distance covered, speed and acceleration; at a time within the duration."""
         top, growth, braking = self.top_speed_m_s, self.speeding_up_m_s2, self.braking_m_s2
-        ramp_s = top / growth
+        ramp_s, remaining_s = top / growth, self.duration_s - elapsed_s
         if elapsed_s < ramp_s:
             return 0.5 * growth * elapsed_s**2, growth * elapsed_s, growth
         if remaining_s < top / braking:
@@ -84,13 +84,10 @@ class LineProfile:
         return self._ramps.duration_s
 
     def at(self, elapsed_s: float) -> Motion:
-        ramps = self._ramps
-        remaining_s = ramps.duration_s - elapsed_s
-        if remaining_s <= 0.0:
+        if elapsed_s >= self.duration_s:
             return self.target_m, ZERO, ZERO
-        way, rate, change = ramps.at(max(0.0, elapsed_s), remaining_s)
-        distance = ramps.distance_m
-        n, e, d = (part / distance for part in minus(self.target_m, self.start_m))
+        way, rate, change = self._ramps.at(max(0.0, elapsed_s))
+        n, e, d = (part / self.distance_m for part in minus(self.target_m, self.start_m))
         return plus(self.start_m, way, (n, e, d)), (n * rate, e * rate, d * rate), (n * change, e * change, d * change)
 
 
@@ -127,11 +124,9 @@ class CircleProfile:
         return self._place(self.start_rad + self.angle_rad)
 
     def at(self, elapsed_s: float) -> Motion:
-        ramps = self._ramps
-        remaining_s = ramps.duration_s - elapsed_s
-        if remaining_s <= 0.0:
+        if elapsed_s >= self.duration_s:
             return self.target_m, ZERO, ZERO
-        way, rate, change = ramps.at(max(0.0, elapsed_s), remaining_s)
+        way, rate, change = self._ramps.at(max(0.0, elapsed_s))
         sense = math.copysign(1.0, self.angle_rad)
         angle = self.start_rad + sense * way / self.radius_m
         c, s = math.cos(angle), math.sin(angle)
