@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeAlias
 
-from companion.fence import Fence
 from companion.memory.route import route
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
@@ -127,16 +126,6 @@ def _round(item: items.OrbitItem, start_m: Vector3, limits: SpeedAndAcceleration
     return Chain((LineProfile(start_m, circle.at(0.0)[0], *limits), circle))
 
 
-def trajectory_home(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, fence: Fence) -> Chain:
-    """Up first where that is asked for, then straight to above the arming position, never above the fence."""
-    limits = speeds.limits(item.speed_m_s, None)
-    wanted_m = max(-start_m[2], item.height_m or 0.0)
-    down_m = -min(max(wanted_m, fence.min_height_m), fence.max_height_m)
-    up = (start_m[0], start_m[1], down_m)
-    home = (0.0, 0.0, down_m)
-    return Chain((LineProfile(start_m, up, *limits), LineProfile(up, home, *limits)))
-
-
 # A curve is looked at in steps of half a guard; a longer one in so many.
 LOOK_EVERY_M = 0.1
 MOST_LOOKS = 2_000
@@ -182,16 +171,19 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
 
 
 def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
-    """Home as the item says; round known obstacles, also above the vehicle."""
-    own = trajectory_home(start_m, item, speeds, known.fence)
+    """Up first where that is asked for, then straight to above the arming position, never above the fence; round known
+    obstacles, also above the vehicle.
+    """
+    limits = speeds.limits(item.speed_m_s, None)
+    wanted_m = max(-start_m[2], item.height_m or 0.0)
+    down_m = -min(max(wanted_m, known.fence.min_height_m), known.fence.max_height_m)
+    up, home = (start_m[0], start_m[1], down_m), (0.0, 0.0, down_m)
+    own = lines((start_m, up, home), limits)
     if not _is_blocked(own, known):
         return Planned(own)
-    up, across = own.parts
-    places = [start_m] if _is_blocked(up, known) else [start_m, up.target_m]
-    found = route(known, places[-1], across.target_m)
-    if found is None:
-        return Planned(None)
-    return Planned(lines([*places, *found], speeds.limits(item.speed_m_s, None)), True)
+    places = [start_m] if known.block((start_m, up)) else [start_m, up]
+    found = route(known, places[-1], home)
+    return Planned(None) if found is None else Planned(lines([*places, *found], limits), True)
 
 
 def lines(places_m: Sequence[Vector3], limits: SpeedAndAccelerations) -> Chain:
