@@ -18,7 +18,7 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
-from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, trajectory_around
+from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, stay, trajectory_around
 from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, Handover, OnCollision, OnCrash, OnDamage, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
@@ -106,15 +106,15 @@ LANDING_EXTRA_S = 3.0
 class Leg:
     """One step in mission coordinates. `lasts_s` is None for a wait without a known end.
 
-    `is_cut_off`: what is known beforehand leaves no way there; `is_detour`: the way leads round it.
+    `trajectory`: of no length where the vehicle stays; None where what is known beforehand leaves no way.
+    `is_detour`: the way leads round it.
     """
 
     step: items.Step
     start_ned_m: Vector3
     trajectory: Trajectory | None
     lasts_s: float | None
-    is_cut_off: bool = False
-    is_detour: bool = False
+    is_detour: bool
 
     @property
     def end_ned_m(self) -> Vector3:
@@ -152,7 +152,7 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     for step in items.program(mission.items):
         action = step.action
         lasts_s: float | None = 0.0
-        planned: Planned | None = None
+        planned = Planned(stay(place))
         match action:
             case items.TakeoffItem():
                 planned = Planned(climb(place, action.height_m, flight))
@@ -173,12 +173,9 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
                 lasts_s = _landing_s(place)
             case _:
                 planned = trajectory_around(action, place, speeds, known)
-        trajectory = None if planned is None else planned.trajectory
-        if trajectory is not None:
-            assert lasts_s is not None
-            lasts_s += trajectory.duration_s
-        is_cut_off = planned is not None and planned.trajectory is None
-        leg = Leg(step, place, trajectory, lasts_s, is_cut_off, planned is not None and planned.is_detour)
+        if lasts_s is not None and planned.trajectory is not None:
+            lasts_s += planned.trajectory.duration_s
+        leg = Leg(step, place, planned.trajectory, lasts_s, planned.is_detour)
         yield leg
         place = leg.end_ned_m
 

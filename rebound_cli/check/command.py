@@ -91,8 +91,8 @@ def _time(seconds: float | None) -> str:
 
 
 def _notes(flown: FlownLeg) -> Iterator[str]:
-    if flown.leg.is_cut_off or flown.leg.is_detour:
-        yield "no way round what is known" if flown.leg.is_cut_off else "round what is known"
+    if flown.leg.trajectory is None or flown.leg.is_detour:
+        yield "no way round what is known" if flown.leg.trajectory is None else "round what is known"
     if flown.meets is not None:
         north, east, down = flown.points_ned_m[flown.meets.index]
         meets = "may meet" if flown.meets.moves else "meets"
