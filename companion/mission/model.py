@@ -86,9 +86,21 @@ class Mission(StrictModel):
 
     @model_validator(mode="after")
     def _trajectories_inside_fence(self) -> Self:
-        complaint = first_complaint(self)
-        if complaint is not None:
-            raise ValueError(complaint)
+        steps_to_fly(self)  # raises ValueError, too
+        seen: set[tuple[int, Vector3]] = set()
+        for leg in _legs(self):
+            # On the way up from the ground only the end can be wrong. A repeat's laps mostly go the same ways.
+            if leg.trajectory is None or (id(leg.step.action), leg.start_ned_m) in seen:
+                continue
+            seen.add((id(leg.step.action), leg.start_ned_m))
+            number = leg.step.label.partition(" ")[0]
+            complaint = self.fence.complaint(leg.end_ned_m)
+            if complaint is not None:
+                raise ValueError(f"items: the position of item {number} ({leg.step.name}) {complaint}")
+            if not isinstance(leg.step.action, items.TakeoffItem):
+                complaint = _trajectory_complaint(self.fence, leg.trajectory)
+            if complaint is not None:
+                raise ValueError(f"items: on its way item {number} ({leg.step.name}) {complaint}")
         return self
 
 
@@ -98,7 +110,6 @@ _MOST_LOOKS = 20_000
 # A point on the boundary, computed, may lie outside by a rounding error.
 _ROUNDING_M = 1e-6
 # The second and two that it takes to be sure and to disarm come on top.
-LANDING_SPEED_M_S = defaults.LANDING_M_S
 LANDING_EXTRA_S = 3.0
 
 
@@ -181,27 +192,7 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
 
 
 def _landing_s(place: Vector3) -> float:
-    return -place[2] / LANDING_SPEED_M_S + LANDING_EXTRA_S
-
-
-def first_complaint(mission: Mission) -> str | None:
-    """What is wrong with the first way that leaves the fence, or None. Raises ValueError, too."""
-    steps_to_fly(mission)
-    seen: set[tuple[int, Vector3]] = set()
-    for leg in _legs(mission):
-        # On the way up from the ground only the end can be wrong. A repeat's laps mostly go the same ways.
-        if leg.trajectory is None or (id(leg.step.action), leg.start_ned_m) in seen:
-            continue
-        seen.add((id(leg.step.action), leg.start_ned_m))
-        number = leg.step.label.partition(" ")[0]
-        complaint = mission.fence.complaint(leg.end_ned_m)
-        if complaint is not None:
-            return f"items: the position of item {number} ({leg.step.name}) {complaint}"
-        if not isinstance(leg.step.action, items.TakeoffItem):
-            complaint = _trajectory_complaint(mission.fence, leg.trajectory)
-        if complaint is not None:
-            return f"items: on its way item {number} ({leg.step.name}) {complaint}"
-    return None
+    return -place[2] / defaults.LANDING_M_S + LANDING_EXTRA_S
 
 
 def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:
