@@ -90,11 +90,9 @@ class _Graph:
         ]
 
     def _is_free(self, here: int, there: int, line: BaseGeometry) -> bool:
-        if here != START and there != GOAL:
-            return not self._inner.intersects(line)
         # From the start and to the goal as near as those themselves are.
-        start, goal = self.places[START] if here == START else None, self.places[GOAL] if there == GOAL else None
-        return self._walls.keeps_off(line, start, goal)
+        ends = [self.places[end] for end in (here, there) if end in (START, GOAL)]
+        return self._walls.keeps_off(line, ends) if ends else not self._inner.intersects(line)
 
     def traced(self, before: dict[int, int]) -> list[Place]:
         here, places = GOAL, list[Place]()

@@ -44,13 +44,10 @@ class Walls:
         """Whether a place lies in one of them, for a vehicle that has a size."""
         return any(distance_m < self.least_m for distance_m in _distances_m(Point(place), self.cores))
 
-    def keeps_off(self, line: BaseGeometry, start: Place | None, goal: Place | None) -> bool:
-        """Whether a line keeps the clearance, or what its ends leave of it, and stays off the cores.
-
-        An end that is None does not reduce the clearance.
-        """
-        is_clear = _keeps(line, start, goal, self.areas, self.clearance_m - SLACK_M)
-        return is_clear and _keeps(line, start, goal, self.cores, self.least_m)
+    def keeps_off(self, line: BaseGeometry, ends: Sequence[Place]) -> bool:
+        """Whether a line keeps the clearance, or what these of its ends leave of it, and stays off the cores."""
+        is_clear = _keeps(line, ends, self.areas, self.clearance_m - SLACK_M)
+        return is_clear and _keeps(line, ends, self.cores, self.least_m)
 
     def grown(self, by_m: float) -> list[BaseGeometry]:
         """The assumed areas, grown by `by_m` on every side."""
@@ -80,7 +77,7 @@ class ObstacleMap:
     def is_clear(self, place_ned_m: Vector3, start_ned_m: Vector3) -> bool:
         """Whether a place keeps the whole clearance."""
         walls = self.walls(-place_ned_m[2], -place_ned_m[2], start_ned_m)
-        return walls.keeps_off(Point(place_ned_m[:2]), None, None)
+        return walls.keeps_off(Point(place_ned_m[:2]), ())
 
     def _meets(self, patch: Patch, low_m: float, high_m: float) -> bool:
         bottom_m, top_m = patch.assumed_heights_m()
@@ -108,7 +105,7 @@ class ObstacleMap:
         start, goal = places[0], places[-1]
         walls = self.walls(min(heights), max(heights), points_ned_m[0])
         line = LineString(places) if any(place != start for place in places) else Point(start)
-        return walls.holds(goal) or not walls.keeps_off(line, start, goal)
+        return walls.holds(goal) or not walls.keeps_off(line, (start, goal))
 
 
 def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
@@ -117,20 +114,17 @@ def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
     return bottom_m <= -place_ned_m[2] <= top_m and core(patch).distance(Point(place_ned_m[:2])) < 2.0 * ROUNDING_M
 
 
-def _keeps(
-    line: BaseGeometry, start: Place | None, goal: Place | None, shapes: Sequence[BaseGeometry], off_m: float
-) -> bool:
-    """Off every shape by `off_m`, or as far as both ends are; never through a shape that both ends are outside of."""
+def _keeps(line: BaseGeometry, ends: Sequence[Place], shapes: Sequence[BaseGeometry], off_m: float) -> bool:
+    """Off every shape by `off_m`, or as far as the ends are; never through a shape that the ends are outside of."""
     needs_m = [off_m] * len(shapes)
-    for end in (start, goal):
-        if end is not None:
-            ends_m = _distances_m(Point(end), shapes)
-            needs_m = [min(need_m, end_m - ROUNDING_M) for need_m, end_m in zip(needs_m, ends_m, strict=True)]
+    for end in ends:
+        ends_m = _distances_m(Point(end), shapes)
+        needs_m = [min(need_m, end_m - ROUNDING_M) for need_m, end_m in zip(needs_m, ends_m, strict=True)]
     return all(distance_m >= need_m for distance_m, need_m in zip(_distances_m(line, shapes), needs_m, strict=True))
 
 
 def _distances_m(geometry: BaseGeometry, shapes: Sequence[BaseGeometry]) -> list[float]:
-    return [float(distance_m) for distance_m in shapely.distance(geometry, shapes)] if shapes else []
+    return [float(distance_m) for distance_m in shapely.distance(geometry, shapes)]
 
 
 # Nobody knows how thick what was hit is; thinner than an inner wall is rare.
