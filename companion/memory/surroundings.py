@@ -169,8 +169,3 @@ def _wall(patch: Patch, drift_m: float) -> BaseGeometry:
             for along_m, off_m in corners
         ]
     )
-
-
-def outline(patch: Patch) -> Sequence[tuple[float, float]]:
-    """The corners of the assumed area, for drawing."""
-    return [(float(n), float(e)) for n, e in assumed_area(patch).exterior.coords]
