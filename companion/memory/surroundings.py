@@ -138,7 +138,7 @@ def assumed_area(patch: Patch) -> BaseGeometry:
     turned by that error still lies within it.
     """
     if patch.is_steep:
-        return _level(patch)
+        return core(patch)
     low_m, high_m = patch.assumed_along_m()
     touched_low_m, touched_high_m = patch.touched_along_m()
     beyond_m = max(touched_low_m - low_m, high_m - touched_high_m)
@@ -147,10 +147,8 @@ def assumed_area(patch: Patch) -> BaseGeometry:
 
 def core(patch: Patch) -> BaseGeometry:
     """The same without the normal's error: an area that a vehicle beside the wall cannot be in."""
-    return _level(patch) if patch.is_steep else _wall(patch, 0.0)
-
-
-def _level(patch: Patch) -> BaseGeometry:
+    if not patch.is_steep:
+        return _wall(patch, 0.0)
     touched = MultiPoint([place[:2] for place in patch.touches_ned_m]).convex_hull
     return touched.buffer(max(patch.assumed_beyond_m(), THICKNESS_M), quad_segs=2)
 
