@@ -2,16 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from companion.memory.patch import REACHES_M, Patch
-from companion.reflex.config import STEEP
 from companion.reflex.surface import away_from
 from companion.strict_model import NotNegative, PositionNed, Positive, StrictModel
-
-OnUnreachable: TypeAlias = Literal["land", "return", "continue", "abort"]
 
 # To a tenth of a millimetre, and without the exponents that YAML takes for text.
 _DIGITS = 4
@@ -64,7 +61,7 @@ class ObstaclesConfig(StrictModel):
     margin_m: Positive = 0.35
     """Between the guards and what is known. As recovery.clearance_m: guards 0.3 m clear, and 5 cm for the drift of
     a hover on optical flow."""
-    on_unreachable: OnUnreachable = "land"
+    on_unreachable: Literal["land", "return", "continue", "abort"] = "land"
     """continue: with the next item; abort: hand the vehicle over as `on_interrupt` says."""
 
     @model_validator(mode="after")
@@ -102,15 +99,10 @@ def describe(patch: Patch) -> str:
     """For people: what, where, how much of it."""
     n, e, d = patch.centre_ned_m
     hits = "touched once" if patch.hits == 1 else f"touched {patch.hits} times"
-    size = ""
-    if not patch.is_steep:
-        low_m, high_m = patch.assumed_along_m()
-        size = f", assumed {high_m - low_m:.1f} m wide"
-    return f"{_what(patch)} at [{n:.2f}, {e:.2f}, {d:.2f}], {hits}{size}"
-
-
-def _what(patch: Patch) -> str:
+    place = f"[{n:.2f}, {e:.2f}, {d:.2f}]"
     north, east, down = patch.normal_ned
-    if abs(down) > STEEP:
-        return "surface above" if down > 0.0 else "surface below"
-    return f"surface facing {math.degrees(math.atan2(east, north)) % 360.0:.0f} deg"
+    if patch.is_steep:
+        return f"surface {'above' if down > 0.0 else 'below'} at {place}, {hits}"
+    facing_deg = math.degrees(math.atan2(east, north)) % 360.0
+    low_m, high_m = patch.assumed_along_m()
+    return f"surface facing {facing_deg:.0f} deg at {place}, {hits}, assumed {high_m - low_m:.1f} m wide"
