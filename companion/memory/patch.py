@@ -134,20 +134,14 @@ def touch_of(
 
     ``normal`` is horizontal, steep or zero (see surface.away_from). ``reach_m``: centre to the guards' rim.
     """
-    n, e, d = velocity_ned_m_s
-    is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
-    against = away_from((-n, -e, -d)) if is_fast else ZERO
-    is_behind = _agreement(normal.direction_ned, against) < FROM_BEHIND
     if normal.direction_ned == ZERO:
         return None
+    n, e, d = velocity_ned_m_s
+    is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
+    is_behind = along(normal.direction_ned, away_from((-n, -e, -d))) < FROM_BEHIND
     surface_ned_m = plus(centre_ned_m, -reach_m, normal.direction_ned)
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
     return Patch((surface_ned_m,), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
-
-
-def _agreement(a: Vector3, b: Vector3) -> float:
-    """The cosine between unit vectors; 0 where one is zero."""
-    return max(-1.0, min(1.0, along(a, b)))
 
 
 # Error of a touch's place: the position drifts by some centimetres between two hits, and the touching part of the guard
@@ -181,9 +175,8 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     if patch.is_steep != touch.is_steep:
         return False
     errors_rad = math.hypot(patch.normal_error_rad, touch.normal_error_rad)
-    if math.acos(_agreement(patch.normal_ned, touch.normal_ned)) > min(
-        MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)
-    ):
+    angle_rad = math.acos(max(-1.0, min(1.0, along(patch.normal_ned, touch.normal_ned))))
+    if angle_rad > min(MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)):
         return False
     if patch.is_steep:
         beside_m = min(math.dist(place[:2], one[:2]) for one in patch.touches_ned_m)
