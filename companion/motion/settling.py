@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from companion.messages import Vector3
 from companion.motion.config import SettledConfig
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, towards
 
 
 @dataclass(slots=True)
@@ -39,8 +39,8 @@ class SettlingMonitor:
     ) -> int | None:
         """Take the present motion; the start (boot time) of an interval that is by now long enough, or None."""
         config, elapsed_s = self._config, max(1e-6, 1e-6 * (time_boot_us - self._time_us))
-        (u, v, w), (n, e, d), share = self._velocity, velocity_m_s, elapsed_s / (config.smoothing_s + elapsed_s)
-        self._velocity, self._time_us = (u + share * (n - u), v + share * (e - v), w + share * (d - w)), time_boot_us
+        share, self._time_us = elapsed_s / (config.smoothing_s + elapsed_s), time_boot_us
+        self._velocity = towards(self._velocity, velocity_m_s, share)
         most_m_s = config.speed_m_s + min(spread_m_s, config.speed_m_s)
         is_still = distance_m <= config.distance_m and math.hypot(*self._velocity) < most_m_s
         self._still.update(is_still, time_boot_us)
