@@ -104,8 +104,7 @@ class ObstacleMap:
         heights, places = [-point[2] for point in points_ned_m], [point[:2] for point in points_ned_m]
         start, goal = places[0], places[-1]
         walls = self.walls(min(heights), max(heights), points_ned_m[0])
-        line = LineString(places) if any(place != start for place in places) else Point(start)
-        return walls.holds(goal) or not walls.keeps_off(line, (start, goal))
+        return walls.holds(goal) or not walls.keeps_off(LineString(places), (start, goal))
 
 
 def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
