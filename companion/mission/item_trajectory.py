@@ -42,7 +42,7 @@ class SpeedLimits:
 
     def changed_to(self, item: items.SetSpeedItem) -> "SpeedLimits":
         acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
-        return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration, factor=1.0)
+        return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration)
 
     def against(self, wind_m_s2: Vector3, along: Vector3) -> "SpeedLimits":
         """With the acceleration that a head wind leaves; `wind_m_s2`: the horizontal acceleration that balances the
