@@ -181,6 +181,8 @@ def between(*items) -> dict:
         (between({"go_to": {**GO_TO, "speed_m_s": 50}}), "less than or equal to 12"),
         (between({"go_to": {**GO_TO, "speed_m_s": True}}), "valid number"),
         (between({"hold": {"duration_s": math.nan}}), "finite"),
+        (between({"expect": {"position": None}}), "exactly one key"),
+        (between({"hold": None}), "exactly one key"),
         (between({}), "exactly one key"),
         (between({**HOLD, **LANDING}), "exactly one key"),
         (between(LANDING), "item 2 is land"),
