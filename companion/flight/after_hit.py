@@ -56,12 +56,6 @@ def lands_anyway(flight: FlightContext) -> bool:
     return flight.is_landing and recoveries_from(flight.collisions) >= flight.mission.on_collision.max_hits
 
 
-def afterwards(flight: FlightContext) -> Transition:
-    """The decision as a transition."""
-    after = flight.after_recovery
-    return Transition(after.trigger, after.text, hand_over=after.trigger is Trigger.RECOVERED_TO_ABORT)
-
-
 # What goes on after a hit that was none.
 _GOES_ON = {
     State.TAKEOFF: Trigger.RECOVERED_TO_CONTINUE,
