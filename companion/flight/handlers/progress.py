@@ -20,7 +20,7 @@ from companion.mission.item_trajectory import (
     trajectory_around,
 )
 from companion.mission.trajectory import Motion, Trajectory
-from companion.motion.vector import plus
+from companion.motion.vector import ZERO, plus
 
 # A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
 BRAKES_S = 1.0
@@ -196,9 +196,9 @@ class FlyItems(_OnTrajectory):
         return self._steady_since_us is not None and now_us - self._steady_since_us >= item.steady.for_s * 1e6
 
     def _has_turned(self, now_us: int) -> bool:
-        if self._heading.is_fixed:
-            self._heading.turn(self._trajectory.target_m, (0.0, 0.0, 0.0), now_us)
-        return self._heading.is_reached
+        """To a fixed heading; one that follows the way is never late."""
+        heading = self._heading
+        return not heading.is_fixed or heading.turn(self._trajectory.target_m, ZERO, now_us) == heading.fixed_rad
 
     def _overdue(self, flight: FlightContext, now_us: int) -> Transition | None:
         item, began_us = self._step.item, flight.tally.began_us
@@ -263,11 +263,6 @@ class Heading:
     @property
     def is_fixed(self) -> bool:
         return self.centre_m is None and not self.along
-
-    @property
-    def is_reached(self) -> bool:
-        """Of a fixed heading; one that follows the way is never late."""
-        return not self.is_fixed or self.yaw_rad == self.fixed_rad
 
     def turn(self, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
         """Turn on until now, in the shorter direction."""
