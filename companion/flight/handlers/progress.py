@@ -167,10 +167,8 @@ class FlyItems(_OnTrajectory):
                 return now_us - self._started_us >= duration_s * 1e6
             case items.WaitForItem():
                 return self._has_come(self._action, flight, now_us)
-            case items.VelocityItem():
+            case items.VelocityItem() | items.SetYawItem():
                 return elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
-            case items.SetYawItem():
-                return self._has_turned(now_us)
             case _:
                 over = elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
                 if over and self._over_since_us is None:
