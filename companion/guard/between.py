@@ -36,7 +36,6 @@ _MOST_ASKED = 64
 class _Client:
     framer: Decoder
     waiting: deque[bytes] = field(default_factory=deque)
-    waiting_bytes: int = 0
     is_flood_told: bool = False
     is_gone: bool = False
 
@@ -62,7 +61,7 @@ class Between:
 
     def has_room(self, client: str) -> bool:
         """Whether more of it can be taken; what is heard in spite of it is dropped."""
-        return client not in self._clients or self._clients[client].waiting_bytes < MOST_WAITING_BYTES
+        return client not in self._clients or sum(map(len, self._clients[client].waiting)) < MOST_WAITING_BYTES
 
     @property
     def waits(self) -> bool:
@@ -82,7 +81,6 @@ class Between:
         for packet, _ in client.framer.feed(received):
             if not isinstance(packet, Stray):
                 client.waiting.append(packet)
-                client.waiting_bytes += len(packet)
 
     def forget(self, name: str) -> None:
         """A client has gone; what it has said still goes."""
@@ -98,7 +96,6 @@ class Between:
             for client in self._clients.values():
                 if client.waiting:
                     packet = client.waiting.popleft()
-                    client.waiting_bytes -= len(packet)
                     if self._lets_pass(packet):
                         self._budget_bytes -= max(len(packet), LEAST_COST_BYTES)
                         going.append(packet)
