@@ -61,7 +61,7 @@ class CollisionGuard:
         # Guards all below. MAVSDK's I/O thread and the guard's own meet here, each for less than a millisecond, but for
         # the sample that shows a hit: its setpoint is made in 3 ms, and nothing is more urgent.
         self._changed = threading.Condition()
-        self._untold: deque[Event] = deque()
+        self._untold: list[Event] = []
         self._listeners: list[Callable[[Event], None]] = []
         self._is_over = False
         self._faulty_until_us: int | None = None  # after a fault around the guard: when giving back must have ended
@@ -202,7 +202,7 @@ class CollisionGuard:
             _LOG.warning("the guard ends: %s", error)
             self._is_over = True
         if step.events:
-            self._untold.extend(step.events)
+            self._untold += step.events
             self._changed.notify_all()
 
     def _run(self) -> None:
@@ -227,8 +227,7 @@ class CollisionGuard:
                 with self._guarded():
                     self._send(self._guard.step((), self._clock.now_us()))
             self._end_after_a_fault()
-            told = list(self._untold)
-            self._untold.clear()
+            told, self._untold = self._untold, []
             self.events.extend(told)
             listeners = list(self._listeners)
         for event in told:
