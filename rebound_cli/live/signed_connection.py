@@ -63,7 +63,7 @@ def open_signed(
         return shared(open_connection(options.connect, options.peer, waits=waits))
     clock, stamps = Clock(), StampFile(options.signing_key)
     signing = Signing(read_key(options.signing_key), stamps.first(clock.now_us()))
-    connection = shared(open_connection(options.connect, options.peer, signing.is_genuine, signing.is_signed, waits))
+    connection = shared(open_connection(options.connect, options.peer, signing, waits))
     try:
         return SignedConnection(connection, signing, stamps, clock)
     except Exception:

@@ -11,9 +11,9 @@ udp://:14540                     the older form of udpin (or of udpout when a re
 import ipaddress
 import re
 import socket
-from collections.abc import Callable
 
 from companion.errors import AddressError, ConnectionSetupError
+from companion.mavlink.signing import Signing
 from companion.shell.connections.connection import ANY_HOST, Selectable, resolve, udp_in, udp_out
 from companion.shell.connections.peer import Peer
 from companion.shell.connections.streams import TcpInConnection, serial_port, tcp_out
@@ -26,11 +26,7 @@ _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOS
 
 
 def open_connection(
-    url: str,
-    peer: str | None = None,
-    is_genuine: Callable[[bytes], bool] = lambda packet: True,
-    has_key: Callable[[bytes], bool] = lambda packet: True,
-    waits: bool = False,
+    url: str, peer: str | None = None, signing: Signing | None = None, waits: bool = False
 ) -> Selectable:
     """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin, and only genuine packets pin it.
 
@@ -48,7 +44,7 @@ def open_connection(
     if scheme in ("udpout", "tcpout"):
         _check_one_host(url, scheme, host, port)
     if scheme == "udpin":
-        return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), is_genuine, has_key))
+        return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), signing))
     if scheme == "udpout":
         return udp_out(host, port)
     if scheme == "tcpout":

@@ -11,7 +11,7 @@ genuine packets pin, hold and move an address. Before, whoever has the key is an
 the vehicle learns the time from what it is sent.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import islice
 from typing import TypeAlias
 
@@ -19,6 +19,7 @@ from companion.autopilot.known import defaults
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.decode import KNOWN_IDS, checksum_holds
 from companion.mavlink.packet import message_id_of, packet_length, source_of
+from companion.mavlink.signing import Signing
 
 Address: TypeAlias = tuple[str, int]
 
@@ -35,15 +36,9 @@ class Peer:
     `only` is the host, or the host and port, that the person named: nobody else is heard, pinned or not.
     """
 
-    def __init__(
-        self,
-        only: tuple[str, int | None] | None = None,
-        is_genuine: Callable[[bytes], bool] = lambda packet: True,
-        has_key: Callable[[bytes], bool] = lambda packet: True,
-    ) -> None:
-        self._only = only
-        self._is_genuine = is_genuine
-        self._has_key = has_key
+    def __init__(self, only: tuple[str, int | None] | None = None, signing: Signing | None = None) -> None:
+        """Without `signing` all packets are genuine."""
+        self._only, self._signing = only, signing
         self._pinned: Address | None = None
         self._moved: Address | None = None  # sent the vehicle's heartbeat since the pinned one last spoke
         self._before: Address | None = None  # pinned until the last move
@@ -82,7 +77,7 @@ class Peer:
         # Of a flood beside a vehicle that is heard the first packet is enough to look at.
         for packet in islice(_packets(datagram), None if is_released else 1):
             source = source_of(packet)
-            if self._vehicle is None and self._has_key(packet):
+            if self._vehicle is None and (self._signing is None or self._signing.is_signed(packet)):
                 self.answered = sender
             is_vehicle = source[1] == AUTOPILOT_COMPONENT_ID and self._vehicle in (None, source)
             if message_id_of(packet) == HEARTBEAT and is_vehicle and self._is_genuine(packet):
@@ -90,6 +85,9 @@ class Peer:
         if is_released and sender == self._moved:
             self._pin(sender, now_us)
         return self._vehicle is None or sender == self._pinned
+
+    def _is_genuine(self, packet: bytes) -> bool:
+        return self._signing is None or self._signing.is_genuine(packet)
 
     def _pin(self, sender: Address, now_us: int) -> None:
         if self._pinned is not None:
