@@ -236,7 +236,7 @@ def _estimate(survey: Survey) -> Iterator[PreflightItem]:
     remedies = survey.vehicle.autopilot.remedies
     worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
     if worst is None:
-        name = MessageId(survey.vehicle.autopilot.estimator_message).name
+        name = survey.vehicle.autopilot.estimator_message.name
         yield PreflightItem("estimator", DOUBTFUL, f"no {name}", remedies.no_estimator)
     elif not survey.estimator[-1].horizontal_velocity_is_good:
         remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"

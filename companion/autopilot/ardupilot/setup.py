@@ -9,7 +9,6 @@ from companion.autopilot.setup import (
     PreflightItem,
     SerialLine,
     Setup,
-    Verdict,
     judged,
     judged_loss,
     judged_settings,
@@ -82,7 +81,7 @@ def _timeout(name: str, timeout_s: float, setup: Setup) -> PreflightItem:
 def _options(name: str, bits: float, setup: Setup) -> PreflightItem:
     value = int(bits) | THRUST_IS_THRUST
     if int(bits) == value:
-        return PreflightItem(name, Verdict.GOOD, f"{int(bits)}: an attitude's thrust is thrust")
+        return judged(name, f"{int(bits)}: an attitude's thrust is thrust")
     remedy = f"{name} = {value}, or recoveries are flown by position alone"
     return PreflightItem(name, DOUBTFUL, f"{int(bits)}: an attitude's thrust is a climb rate", remedy, (name, value))
 

@@ -9,7 +9,6 @@ from companion.autopilot.setup import (
     PreflightItem,
     SerialLine,
     Setup,
-    Verdict,
     judged,
     judged_loss,
     judged_settings,
@@ -148,9 +147,9 @@ def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
 
 def _radio(name: str, bits: float, setup: Setup) -> PreflightItem:
     if setup.parameters.get("COM_RC_IN_MODE") == RC_DISABLED:
-        return PreflightItem(name, Verdict.GOOD, "no radio is expected (COM_RC_IN_MODE 4)")
+        return judged(name, "no radio is expected (COM_RC_IN_MODE 4)")
     if int(bits) & RCL_EXCEPT_OFFBOARD:
-        return PreflightItem(name, Verdict.GOOD, "a lost radio does not end OFFBOARD")
+        return judged(name, "a lost radio does not end OFFBOARD")
     value = int(bits) | RCL_EXCEPT_OFFBOARD
     found = f"{int(bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
     remedy = f"{name} = {value}, if the flight may go on without a radio"
@@ -159,7 +158,7 @@ def _radio(name: str, bits: float, setup: Setup) -> PreflightItem:
 
 def _termination(name: str, breaker: float, setup: Setup) -> PreflightItem:
     if breaker == FLIGHTTERM_OFF:
-        return PreflightItem(name, Verdict.GOOD, "a hit that tips the vehicle does not stop its motors")
+        return judged(name, "a hit that tips the vehicle does not stop its motors")
     found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
     remedy = f"{name} = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
     return PreflightItem(name, DOUBTFUL, found, remedy, (name, FLIGHTTERM_OFF))
