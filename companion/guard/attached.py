@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from companion.autopilot.known import ASSUMED
 from companion.core import POLL_INTERVAL_US
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
@@ -31,6 +32,16 @@ class AttachedStep:
     events: Sequence[Event]
 
 
+class _OfPx4(GuardCore):
+    """Fields are read and sent as PX4 has them."""
+
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
+        heard, refusal = super()._hear(samples, now_us)
+        if refusal is None and self.flight.vehicle.autopilot is not ASSUMED:
+            refusal = "a guard inside a program guards PX4 alone: use `rebound guard --between`"
+        return heard, refusal
+
+
 class AttachedGuard:
     """Joins fields with the pure core; holds no clock and no thread. Times are microseconds, any epoch.
 
@@ -42,7 +53,7 @@ class AttachedGuard:
     """
 
     def __init__(self, config: GuardConfig, system_id: int, now_us: int) -> None:
-        self.core = GuardCore(config, True)
+        self.core = _OfPx4(config, True)
         self.core.begin(now_us)
         self._source = (system_id, AUTOPILOT_COMPONENT_ID)
         self._encoder = Encoder()

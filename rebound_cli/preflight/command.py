@@ -10,6 +10,7 @@ from pathlib import Path
 
 from companion.autopilot.setup import PreflightItem, SerialLine, Verdict
 from companion.errors import ConfigurationError
+from companion.link.vehicle import Vehicle
 from companion.preflight import Preflight, findings
 from companion.shell.clock import Clock
 from companion.shell.connections.addresses import serial_device
@@ -38,7 +39,7 @@ def run_preflight(options: Namespace) -> int:
         if preflight.survey.refusal is not None:
             raise ConfigurationError(preflight.survey.refusal[:1].upper() + preflight.survey.refusal[1:] + ".")
         found = findings(preflight.survey)
-        _show(console, preflight, found)
+        show(console, preflight.survey.vehicle, found)
         if options.json:
             print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
         if options.fix:
@@ -66,11 +67,10 @@ def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> Non
         connection.send(frame)
 
 
-def _show(console: Console, preflight: Preflight, found: list[PreflightItem]) -> None:
-    identity, version = preflight.survey.vehicle.identity, preflight.survey.vehicle.version
-    release = "" if version is None else " " + ".".join(map(str, version))
-    kind = identity.vehicle_type if identity is not None else "vehicle"
-    console.print(f"\nPX4{release}, {kind}")
+def show(console: Console, vehicle: Vehicle, found: list[PreflightItem]) -> None:
+    """What was met, and each finding with its remedy."""
+    kind = "vehicle" if vehicle.identity is None else f"{vehicle.autopilot_text()}, {vehicle.identity.vehicle_type}"
+    console.print(f"\n{kind}")
     show_findings(found, 20, console.print)
     counts = [sum(finding.verdict is verdict for finding in found) for verdict in Verdict]
     console.print(f"\n  {counts[0]} good, {counts[1]} worth a look, {counts[2]} in the way of a flight")

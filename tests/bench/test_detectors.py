@@ -79,15 +79,6 @@ def test_every_detector_sees_a_hard_hit_once_and_is_silent_before_it_and_when_it
     assert least_ms <= 1e-3 * (impact.impact.sample_time_boot_us - PUSHED_US) <= most_ms
 
 
-# The setpoint of `tracking` does not climb.
-@pytest.mark.parametrize("detector", sorted({*BaselineConfig.detectors} - {"tracking"}))
-def test_a_climb_with_its_thrust_told_is_no_hit(detector):
-    def climb(t):
-        return 9.81 + 3.0 * max(0.0, math.sin((t - PUSHED_US) * 4e-6)) if PUSHED_US < t < PUSHED_US + 785_000 else 9.81
-
-    assert fly(detector, lift=climb) == []
-
-
 @pytest.mark.parametrize(
     ("detector", "push", "seen"),
     [

@@ -152,13 +152,6 @@ def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
     assert copies.found == {"away": {"steps": [["first"], [9, 9, 9], [9, 9, 9]]}}
 
 
-def test_where_a_rule_changes_nothing_there_is_no_copy():
-    same = Rule("same", "", "reflex.surface:plus", says=[1.0, 0.0, 0.0])
-    with switched([same]) as copies:
-        assert surface.plus((0, 0, 0), 1.0, (1, 0, 0)) == (1.0, 0.0, 0.0)
-    assert copies.found == {}
-
-
 def test_the_table_counts_what_is_lost_without_a_rule():
     well = {"ends": True, "hits": [RECOVERED]}
     lost = [{"ends": ends, "hits": [RECOVERED | {"recovered": False}]} for ends in (False, True)]

@@ -174,6 +174,7 @@ def test_what_hovers_is_judged_by_how_it_shakes_and_not_by_how_it_wanders():
         ({"COM_OBL_RC_ACT": 7}, Verdict.BAD, 4),
         ({"CBRK_FLIGHTTERM": 0}, Verdict.DOUBTFUL, 121212),
         ({"IMU_INTEG_RATE": 100}, Verdict.DOUBTFUL, 200),
+        ({"IMU_INTEG_RATE": 0}, Verdict.DOUBTFUL, 200),
         ({"MPC_ACC_HOR": 3.0}, Verdict.DOUBTFUL, 2.0),
         ({"EKF2_EVP_GATE": 5.0}, Verdict.DOUBTFUL, 50.0),
         ({"EKF2_ACC_NOISE": 0.35}, Verdict.DOUBTFUL, 1.0),

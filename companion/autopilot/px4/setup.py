@@ -116,7 +116,8 @@ def _port(setup: Setup) -> Iterator[PreflightItem]:
 
 
 def _integration(name: str, rate_hz: float, setup: Setup) -> PreflightItem:
-    found = f"{rate_hz:g} Hz: each sample is a mean over {1e3 / rate_hz:.1f} ms"
+    mean_ms = 1e3 / rate_hz if rate_hz > 0.0 else math.inf
+    found = f"{rate_hz:g} Hz: each sample is a mean over {mean_ms:.1f} ms"
     if rate_hz < LEAST_INTEG_HZ:
         remedy = f"{name} = {LEAST_INTEG_HZ}, then reboot"
         return judged(name, found, (True, DOUBTFUL, remedy), mended=LEAST_INTEG_HZ)

@@ -3,6 +3,7 @@
 import itertools
 import math
 import struct
+import sys
 from dataclasses import replace
 
 import pytest
@@ -17,8 +18,10 @@ from companion.autopilot.interface import Pilot
 from companion.autopilot.known import MODE_NAMES
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
+from companion.guard.attached import AttachedGuard
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
+from companion.link.vehicle import Identity, Vehicle
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.moves import would_move
@@ -31,6 +34,8 @@ from companion.messages import (
     SetParameter,
 )
 from companion.reflex.config import EstimateConfig
+from rebound_cli.live.console import Console
+from rebound_cli.preflight.command import show
 from tests.companion.autopilot.fake_copter import ARM, AUX_FUNCTION, COPTER_LAND, GUIDED, SET_MODE, TAKE_OFF, FakeCopter
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, FakeVehicle, flight
 
@@ -345,7 +350,21 @@ def test_a_raw_imu_has_milli_units_and_counts_until_the_finer_one_comes():
     assert heard(raw, finer, raw) is None
 
 
+def test_a_guard_inside_a_program_refuses_it():
+    guard = AttachedGuard(GuardConfig(), 1, EPOCH_US)
+    fields = {"type": 2, "autopilot": 3, "base_mode": 0, "custom_mode": 0, "system_status": 3}
+    assert "PX4 alone" in guard.hear("HEARTBEAT", (1, 1), fields, EPOCH_US).events[-1].text
+    assert guard.core.machine.finished
+
+
 # --- preflight
+
+
+def test_preflight_says_what_it_has_met(capsys):
+    met = Vehicle(identity=Identity(1, 1, "quadrotor", ARDUPILOT), autopilot=ARDUPILOT)
+    show(Console(sys.stdout), met, [])
+    assert "ArduPilot, quadrotor" in capsys.readouterr().out
+
 
 HEALTHY = {"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": 8, "INS_ACCEL_FILTER": 20, "FENCE_ENABLE": 0, "FRAME_CLASS": 1}
 HEALTHY |= {
