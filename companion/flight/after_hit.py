@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from companion.flight.context import AfterRecovery, BeforeHit, FlightContext, Target, Transition
+from companion.flight.context import BeforeHit, FlightContext, Target, Transition
 from companion.flight.states import State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem
 from companion.mission.policy import OnCollision
@@ -21,14 +21,13 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     A hit during a recovery, or during the hold after it, belongs to the step in which the first one happened.
     """
     flight.tally.hits += 1
-    step = flight.steps[flight.tally.index]
+    step, policy = flight.steps[flight.tally.index], flight.on_collision
     own = step.item.on_collision
-    policy = own or flight.mission.on_collision
     hits = recoveries_from(flight.collisions[-flight.tally.hits :] if own else flight.collisions)
     then, reason = _verdict(flight, policy, hits)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
-    flight.after_recovery = AfterRecovery(Trigger(f"settled, then: {then}"), policy.hold_s, reason)
+    flight.after_recovery = Transition(Trigger(f"settled, then: {then}"), reason, hand_over=then == "abort")
     # What an interrupted flight resumes with.
     is_left = then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))
     flight.step_index = flight.tally.index + (1 if is_left else 0)

@@ -26,6 +26,7 @@ from companion.messages import (
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
+from companion.mission.policy import OnCollision
 from companion.mission.trajectory import Motion
 from companion.motion.motors import MotorWatch
 from companion.motion.rotation import yaw_rad
@@ -99,22 +100,13 @@ class StepTally:
 
 
 @dataclass(frozen=True, slots=True)
-class AfterRecovery:
-    """What follows once the vehicle has settled; decided at the hit."""
-
-    trigger: Trigger = Trigger.RECOVERED_TO_HOLD
-    hold_s: float = 0.0
-    text: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class BeforeHit:
     """The state before a hit, restored where the hit is rejected."""
 
     state: State
     step_index: int
     tally: StepTally
-    after_recovery: AfterRecovery
+    after_recovery: Transition
 
 
 @dataclass(slots=True)
@@ -155,7 +147,7 @@ class FlightContext:
     step_index: int = 0  # the one that is flown, or is to be flown next
     tally: StepTally = field(default_factory=StepTally)
     speeds: SpeedLimits = field(init=False)
-    after_recovery: AfterRecovery = field(default_factory=AfterRecovery)
+    after_recovery: Transition = Transition(Trigger.RECOVERED_TO_HOLD)  # decided at the hit
     returning_as: ReturnItem = field(default_factory=ReturnItem)
     going_home: bool = False
     is_landing: bool = False  # ordered, and begun again after every hit on the way down
@@ -198,6 +190,11 @@ class FlightContext:
     @property
     def step(self) -> Step:
         return self.steps[self.step_index]
+
+    @property
+    def on_collision(self) -> OnCollision:
+        """The policy for a hit in the present step: its own, or the mission's."""
+        return self.steps[self.tally.index].item.on_collision or self.mission.on_collision
 
     @property
     def height_m(self) -> float | None:

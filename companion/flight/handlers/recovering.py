@@ -3,7 +3,6 @@
 from companion.flight.after_hit import take_back
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
-from companion.flight.states import Trigger
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.collision import CollisionReport
 from companion.reflex.recovery.recovery import Progress, Recovery
@@ -92,5 +91,4 @@ class Recover:
         """What follows begins at rest at the setpoint."""
         self._recovery.record.is_over = True
         flight.target = Target(self._recovery.record.setpoint_ned_m, flight.yaw_rad)
-        after = flight.after_recovery
-        return Transition(after.trigger, after.text, hand_over=after.trigger is Trigger.RECOVERED_TO_ABORT)
+        return flight.after_recovery
