@@ -75,7 +75,7 @@ class FlyItems(_OnTrajectory):
         if flight.tally.index != flight.step_index or flight.tally.began_us is None:
             flight.tally = StepTally(flight.step_index, now_us)
         step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
-        self._step, self._action = step, step.action
+        self._action = step.action
         self._started_us, self._trajectory_began_us = now_us, flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
@@ -199,11 +199,11 @@ class FlyItems(_OnTrajectory):
         return not heading.is_fixed or heading.turn(self._trajectory.target_m, ZERO, now_us) == heading.fixed_rad
 
     def _overdue(self, flight: FlightContext, now_us: int) -> Transition | None:
-        item, began_us = self._step.item, flight.tally.began_us
+        item, began_us = flight.step.item, flight.tally.began_us
         assert began_us is not None
         if item.timeout_s is not None and now_us - began_us > item.timeout_s * 1e6:
             text = f"not done within {item.timeout_s:g} s: {describe_item(self._action)}"
-            flight.report(now_us, "timeout", f"item {self._step.label} {text}; then: {item.on_timeout}")
+            flight.report(now_us, "timeout", f"item {flight.step.label} {text}; then: {item.on_timeout}")
             if item.on_timeout == "continue":
                 self._leave(flight, now_us)
                 return self.step(flight, Inputs(), now_us)
