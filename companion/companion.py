@@ -140,7 +140,7 @@ class Companion(Stepped[FlightCore]):
     @property
     def file_awaited(self) -> str | None:
         """The file whose existence the mission waits for now; the companion itself opens none."""
-        return self.core.flight.file_awaited
+        return None if self.core.flight.file_is_there else self.core.flight.file_awaited
 
     def file_is_there(self) -> None:
         """The file that is awaited exists."""

@@ -48,7 +48,9 @@ class TakeOver:
             text = f"{name} already, the program's setpoints kept out" if outcome is None else f"{name} confirmed"
             guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return GuardTransition(Trigger.CONFIRMED)
-        self.recover.step(guard, inputs, now_us)
+        # Over it is also where the hit was none.
+        if self.recover.step(guard, inputs, now_us) is not None:
+            return GuardTransition(Trigger.SETTLED)
         if outcome is not None:
             return GuardTransition(Trigger.NOT_CONFIRMED, outcome.text)
         # A late step is no refusal: the answer may not have been read yet.

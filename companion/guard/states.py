@@ -77,6 +77,7 @@ TABLE = StateTable[State, Trigger](
             Trigger.CONFIRMED: State.RECOVERING,
             Trigger.NOT_CONFIRMED: State.GIVING_BACK,
             Trigger.POSITION_SILENT: State.GIVING_BACK,
+            Trigger.SETTLED: State.GIVING_BACK,
         },
         State.RECOVERING: {
             **_RELEASED,

@@ -58,7 +58,9 @@ class Patch:
         return along(minus(place_ned_m, self.centre_ned_m), self.normal_ned)
 
     def beside_m(self, place_ned_m: Vector3) -> float:
-        """Of a wall: how far a place is beside all touches."""
+        """How far a place is beside all touches: of a wall along it."""
+        if self.is_steep:
+            return min(math.dist(place_ned_m[:2], touch[:2]) for touch in self.touches_ned_m)
         return _outside_m(self.along_m(place_ned_m), self.touched_along_m())
 
     def bends_m(self, beside_m: float) -> float:
@@ -85,8 +87,7 @@ class Patch:
         if self.off_m(place_ned_m) <= 0.0:
             return False
         if self.is_steep:
-            away_m = min(math.dist(place_ned_m[:2], touch[:2]) for touch in self.touches_ned_m)
-            return away_m <= self.assumed_beyond_m() + beside_m
+            return self.beside_m(place_ned_m) <= self.assumed_beyond_m() + beside_m
         (left_m, right_m), (low_m, high_m) = self.assumed_along_m(), self.assumed_heights_m()
         along_m, height_m = self.along_m(place_ned_m), -place_ned_m[2]
         return left_m - beside_m <= along_m <= right_m + beside_m and low_m - beside_m <= height_m <= high_m + beside_m
@@ -171,21 +172,20 @@ def remembered(known: Sequence[Patch], touches: Sequence[Patch], clearance_m: fl
 
 def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     """Whether the touch is one more of the patch's surface."""
-    place = touch.centre_ned_m
     if patch.is_steep != touch.is_steep:
         return False
+    place = touch.centre_ned_m
+    beside_m = patch.beside_m(place)
     errors_rad = math.hypot(patch.normal_error_rad, touch.normal_error_rad)
     angle_rad = math.acos(max(-1.0, min(1.0, along(patch.normal_ned, touch.normal_ned))))
     if angle_rad > min(MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)):
         return False
     if patch.is_steep:
-        beside_m = min(math.dist(place[:2], one[:2]) for one in patch.touches_ned_m)
         is_near = beside_m <= patch.assumed_beyond_m() + 2.0 * clearance_m
     else:
-        along_m, height_m, beside_m = patch.along_m(place), -place[2], patch.beside_m(place)
         is_near = (
-            _outside_m(along_m, patch.assumed_along_m()) <= 2.0 * clearance_m
-            and _outside_m(height_m, patch.assumed_heights_m()) <= 2.0 * clearance_m
+            _outside_m(patch.along_m(place), patch.assumed_along_m()) <= 2.0 * clearance_m
+            and _outside_m(-place[2], patch.assumed_heights_m()) <= 2.0 * clearance_m
         )
     return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + patch.bends_m(beside_m)
 

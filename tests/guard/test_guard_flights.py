@@ -29,6 +29,17 @@ def recovering(**changes) -> Air:
     return air
 
 
+def mute(air: Air, *message_ids: int) -> None:
+    """Of what the guard sends, these never arrive."""
+    steps = air.guard.step
+
+    def muted(received, now_us):
+        result = steps(received, now_us)
+        return replace(result, sent_frames=tuple(frame for frame in result.sent_frames if frame[7] not in message_ids))
+
+    air.guard.step = muted
+
+
 @pytest.fixture(scope="module")
 def hit_in_posctl() -> Air:
     air = recovering(then="previous")
@@ -173,14 +184,7 @@ def test_a_mode_that_is_not_allowed_is_left_alone_and_nothing_is_streamed_in_it(
 def test_a_vehicle_that_refuses_offboard_is_asked_to_hold():
     """No setpoint arrives before the hit, so PX4 does not take OFFBOARD."""
     air = Air(GuardConfig(confirm_within_s=0.3))
-    steps = air.guard.step
-
-    def without_setpoints(received, now_us):
-        result = steps(received, now_us)
-        kept = tuple(frame for frame in result.sent_frames if frame[7] not in (82, 84))
-        return type(result)(result.received_frames, kept, result.events)
-
-    air.guard.step = without_setpoints
+    mute(air, dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET, dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED)
     air.pushed_into_the_wall()
     air.run_to(State.WATCHING, 5.0)
     assert "OFFBOARD" in air.told("refused")[0] and air.mode == "AUTO.LOITER"
@@ -219,17 +223,21 @@ def test_a_position_that_ends_while_the_guard_holds_has_the_vehicle_given_back_t
     assert "no LOCAL_POSITION_NED" in air.told("link")[0]
 
 
-def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back():
+@pytest.mark.parametrize(
+    "lost", [(), (dialect.MAVLINK_MSG_ID_COMMAND_LONG,)], ids=["taken over", "OFFBOARD never asked"]
+)
+def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back(lost):
     air = Air(GuardConfig(then="previous"))
     air.flown_by_sticks(0.1)
     air.run_for(1.0)
     air.forward = 0.0
+    mute(air, *lost)
     when = {"time_usec": air.vehicle.time_boot_us + 2_000, "fields_updated": 0x3F}
     heard = air.guard_hears(made("HIGHRES_IMU", {**when, "xacc": -40.0, "zacc": -9.8}))
     assert air.state is State.TAKING_OVER and [event.kind for event in heard].count("detection") == 1
     assert air.run_to(State.WATCHING, 3.0) < 1.0
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
-    assert air.kinds().count("unconfirmed") == 1 and air.guard.core.flight.hits == []
+    assert air.kinds().count("unconfirmed") == 1 and air.guard.core.flight.hits == [] and air.told("refused") == []
 
 
 # --- a program on another link

@@ -182,7 +182,6 @@ class FlyItems(_OnTrajectory):
             assert flight.armed_at_us is not None
             return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
         if item.steady is None:
-            flight.file_awaited = None if flight.file_is_there else flight.file_awaited
             return flight.file_is_there
         latest, target = flight.vehicle.history.latest, flight.target
         assert latest is not None and target is not None, "the flight is in the air"

@@ -89,8 +89,8 @@ def test_waiting_for_a_file():
     f.run_for(5.0)
     assert f.companion.file_awaited == "go" and f.state == "mission"
     f.companion.file_is_there()
-    f.run_to("landing", 0.1)
     assert f.companion.file_awaited is None
+    f.run_to("landing", 0.1)
 
 
 def test_whoever_is_pushed_is_not_steady():

@@ -117,6 +117,13 @@ def test_another_surface_is_another_patch(other):
     assert not is_same(wall(0.0), other, CLEARANCE_M)
 
 
+def test_a_ceiling_whose_direction_is_not_known_well_bends_beside_its_touch():
+    ceiling = Patch(((0.0, 0.0, -2.2),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
+    beside_m = ceiling.beside_m((3.0, 4.0, -1.0))
+    assert beside_m == 5.0
+    assert ceiling.bends_m(beside_m) == pytest.approx(5.0 * math.tan(ERROR_RAD))
+
+
 # --- files
 
 
