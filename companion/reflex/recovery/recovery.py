@@ -84,6 +84,7 @@ class Recovery:
         record = self.record
         is_rejected = record.is_rejected(sample.time_boot_us, self._places)
         record.estimator.update(sample)
+        self._touch(sample)
         rested_s = rebound_m_s = None
         if self.law.follows and (self.leans or not self.law.leans):
             rested_s, rebound_m_s = self._follow(sample)
@@ -93,9 +94,10 @@ class Recovery:
         return Progress(is_rejected, rested_s, rebound_m_s, settled_s)
 
     @property
-    def off_m(self) -> float:
-        """How far the vehicle is from touching what it hit, by the belief: a report may be off by more than a metre."""
-        return self._surfaces[0].off_m(self.record.estimator.motion.position_ned_m)
+    def is_pressed(self) -> bool:
+        """Whether the vehicle has not left what it hit, by the belief: a report may be off by more than a metre."""
+        off_m = self._surfaces[0].off_m(self.record.estimator.motion.position_ned_m)
+        return not self._has_left and off_m < self._settled.distance_m
 
     @property
     def _is_known(self) -> bool:
@@ -129,7 +131,6 @@ class Recovery:
 
     def _follow(self, sample: LocalPosition) -> tuple[float | None, float | None]:
         """Set the goal again by contact and motion; hand over to it once the vehicle rests."""
-        self._touch(sample)
         record, state, rested_s = self.record, self._state(), None
         self._surfaces = self._around(self._contact)
         record.setpoint_ned_m = place = self._goal(state)
