@@ -221,18 +221,17 @@ class CollisionGuard:
                 wait_s = max(wait_s, TRIED_AGAIN_S)
             if wait_s > 0.0 and not self._untold:
                 self._changed.wait(wait_s)
-            if self._is_over:
-                return False
-            if self._clock.now_us() >= self._guard.next_deadline_us():
+            if not self._is_over and self._clock.now_us() >= self._guard.next_deadline_us():
                 with self._guarded():
                     self._send(self._guard.step((), self._clock.now_us()))
             self._end_after_a_fault()
+            goes_on = not self._is_over
             told, self._untold = self._untold, []
             self.events.extend(told)
             listeners = list(self._listeners)
         for event in told:
             self._tell(event, listeners)
-        return True
+        return goes_on
 
     def _end_after_a_fault(self) -> None:
         until_us = self._faulty_until_us
