@@ -241,8 +241,8 @@ class CollisionGuard:
             self._changed.notify_all()
 
     def _tell(self, event: Event, listeners: list[Callable[[Event], None]]) -> None:
-        try:
-            for listener in [*listeners, *([self._on_event] if self._on_event is not None else [])]:
+        for listener in [*listeners, *([self._on_event] if self._on_event is not None else [])]:
+            try:
                 listener(event)
-        except Exception:
-            _LOG.exception("a listener of the guard's events failed")
+            except Exception:
+                _LOG.exception("a listener of the guard's events failed")

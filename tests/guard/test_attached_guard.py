@@ -255,9 +255,10 @@ def test_a_fault_in_the_gate_lets_no_setpoint_pass_while_the_guard_holds(monkeyp
     assert not joined.lets_a_setpoint_pass()
     joined.until_over(GIVING_BACK_US)
     assert joined.air.mode == AUTO_LOITER and joined.lets_a_setpoint_pass()
-    # And what came with the last message is told
-    joined.guard._untold = joined.air.events[:1]
-    assert not joined.guard._turn() and joined.guard.events[-1] is joined.air.events[0]
+    # And what came with the last message is told, also beside a listener that fails
+    told, joined.guard._untold, joined.guard._listeners = [], joined.air.events[:1], [fails]
+    joined.guard._on_event = told.append
+    assert not joined.guard._turn() and told == joined.air.events[:1]
 
 
 def test_a_fault_that_stays_ends_the_guard_in_time(monkeypatch):
