@@ -55,7 +55,7 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
             guard.sticks_now, guard.sticks_us = sample, now_us
     latest = guard.vehicle.history.latest
     if guard.vehicle.armed is False:
-        guard.program_elsewhere = False
+        guard.program_elsewhere = guard.is_wreck = False
     # Not while the guard has the vehicle: one forged report would move the fence.
     stands = guard.vehicle.stands and guard.expected_mode is None
     if guard.vehicle.armed is False or stands:

@@ -31,6 +31,10 @@ def test_a_crash_is_told_wherever_hits_are_answered_and_ends_with_a_disarm_or_a_
     assert {state for state in State if TABLE.moves(state, Trigger.CRASHED)} == {*HOLDING, State.WATCHING}
     ends = {trigger for trigger, state in TABLE.rows[State.CRASHED].items() if state is State.STANDING_BY}
     assert ends == {Trigger.DISARMED, Trigger.FLIES_AGAIN} and State.CRASHED not in HOLDING
+    core = GuardCore(GuardConfig(), keeps_others_out=False)
+    core.machine.state, core.flight.vehicle.armed, core.flight.is_wreck = State.CRASHED, False, True
+    core.advance((), 0)
+    assert core.machine.state is State.STANDING_BY and not core.flight.is_wreck
 
 
 def test_a_hit_is_answered_where_the_guard_watches_and_never_takes_the_vehicle_back():
