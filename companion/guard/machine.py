@@ -216,7 +216,6 @@ class GuardMachine(StateMachine):
             case State.TAKING_OVER:
                 mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode_name(guard.previous_mode)
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
-                guard.command_client.cancel()
                 return TakeOver(guard, self._recover(), now_us)
             case State.RECOVERING:
                 if transition.trigger is Trigger.HIT:

@@ -240,6 +240,16 @@ def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back(lost):
     assert air.kinds().count("unconfirmed") == 1 and air.guard.core.flight.hits == [] and air.told("refused") == []
 
 
+def test_a_hit_while_the_vehicle_changes_to_the_mode_that_it_is_given_back_to_is_recovered_from():
+    air = recovering()
+    air.run_to(State.GIVING_BACK, 10.0)
+    air.run_until(lambda: air.guard.core.flight.command_client.requested_mode is not None, 1.0)
+    when = {"time_usec": air.vehicle.time_boot_us + 2_000, "fields_updated": 0x3F}
+    air.guard_hears(made("HIGHRES_IMU", {**when, "xacc": -40.0, "zacc": -9.8}))
+    air.run_to(State.WATCHING, 10.0)
+    assert air.told("let_go") == [] and len(air.told("recovered")) == 2
+
+
 # --- a program on another link
 
 
