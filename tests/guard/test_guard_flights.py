@@ -190,13 +190,17 @@ def test_a_vehicle_that_refuses_offboard_is_asked_to_hold():
     assert "OFFBOARD" in air.told("refused")[0] and air.mode == "AUTO.LOITER"
 
 
-def test_told_to_stop_while_it_holds_it_gives_the_vehicle_to_hold_first():
+@pytest.mark.parametrize(
+    ("ends", "why"),
+    [(lambda guard: guard.stop("Ctrl-C"), "Ctrl-C"), (lambda guard: setattr(guard.core, "_notice", None), "TypeError")],
+)
+def test_told_to_stop_or_broken_while_it_holds_it_gives_the_vehicle_to_hold_and_ends(ends, why):
     air = recovering(then="previous")
     # In AUTO.LOITER PX4 would take the moving stick for a pilot's wish.
     air.run_for(0.7)
-    air.guard.stop("stopped with Ctrl-C")
+    ends(air.guard)
     air.run_until(lambda: air.guard.finished, 2.0)
-    assert (air.mode, air.guard.core.machine.outcome) == ("AUTO.LOITER", "stopped with Ctrl-C")
+    assert air.mode == "AUTO.LOITER" and why in air.guard.core.machine.outcome
 
 
 def test_a_link_that_falls_silent_while_the_guard_holds_leaves_the_vehicle_to_its_own_failsafe():
