@@ -11,7 +11,7 @@ from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
-from companion.link.vehicle import OLD_NEWS_US, Vehicle
+from companion.link.vehicle import OLD_NEWS_US, ModeReport, Vehicle
 from companion.memory.patch import Patch
 from companion.messages import (
     AttitudeSetpoint,
@@ -282,6 +282,12 @@ class FlightContext:
 
     def ask_for_mode(self, custom_mode: int) -> None:
         self.command_client.begin(self.vehicle.autopilot.set_mode(custom_mode))
+
+    def count_asked_mode(self) -> None:
+        """The vehicle is about to be in the mode that it was asked for: no report of before says otherwise."""
+        if (asked := self.command_client.requested_mode) is not None:
+            self.expected_mode, self.vehicle.mode = asked, ModeReport(asked, None, False)
+        self.command_client.cancel()
 
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
         """Advance the command client; report a failure."""

@@ -157,7 +157,7 @@ class Machine(StateMachine):
             case State.RECOVERING:
                 recovery = flight.reflex.recovery
                 assert recovery is not None, "a collision begins one"
-                flies = flight.expected_mode == flight.vehicle.autopilot.setpoints
+                flies = flight.own_modes == (flight.vehicle.autopilot.setpoints, None)
                 return Recover(flight, recovery) if flies else TakeBack(flight, recovery, now_us)
             case State.HOLDING:
                 return HoldAfterRecovery(flight, now_us)

@@ -11,7 +11,6 @@ from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
 from companion.guard.watching import OTHERS_STOPPED_US
-from companion.link.vehicle import ModeReport
 from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand
 
 # The vehicle reports its setpoint. Further than this from all that was sent, it is somebody else's: at 12 m/s a moving
@@ -33,13 +32,10 @@ class TakeOver:
     def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
         self.recover = recover
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
-        vehicle, asked = guard.vehicle, guard.command_client.requested_mode
-        guard.command_client.cancel()
-        if asked is not None and asked != vehicle.autopilot.setpoints:
-            # It was being given back: the vehicle is about to be in that mode.
-            guard.expected_mode, vehicle.mode = asked, ModeReport(asked, None, False)
-        if not vehicle.flies_setpoints:
-            guard.ask_for_mode(vehicle.autopilot.setpoints)
+        if guard.command_client.requested_mode != guard.vehicle.autopilot.setpoints:
+            guard.count_asked_mode()
+        if not guard.vehicle.flies_setpoints:
+            guard.ask_for_mode(guard.vehicle.autopilot.setpoints)
 
     def target(self, guard: GuardContext, now_us: int) -> Target | None:
         return self.recover.target(guard, now_us)

@@ -199,9 +199,10 @@ class TakeBack(Recover):
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.
         self._is_asked = flight.command_client.requested_mode == flight.vehicle.autopilot.setpoints
-        self._ask_us = now_us + (0 if self._is_asked else LEAD_US)
+        is_led = self._is_asked or flight.expected_mode == flight.vehicle.autopilot.setpoints
+        self._ask_us = now_us + (0 if is_led else LEAD_US)
         if not self._is_asked:
-            flight.command_client.cancel()
+            flight.count_asked_mode()
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if not self._is_taken and now_us >= self._ask_us:

@@ -97,13 +97,15 @@ def test_giving_up_hands_the_vehicle_over_once_it_has_settled(changes, words):
     assert f.report.outcome == "aborted" and words in f.report.reason
 
 
-def test_a_landing_is_not_put_off_for_more_hits_than_the_limit():
+@pytest.mark.parametrize("after_s", [0.0, 0.5], ids=["the land mode is asked for", "it is flown"])
+def test_a_landing_is_not_put_off_for_more_hits_than_the_limit(after_s):
     f = flight(FakeVehicle(), items=[{"takeoff": {"height_m": 4}}, LANDING], on_collision={"max_hits": 2})
     f.run_to("landing")
-    f.run_for(0.5)
+    f.run_for(after_s)
     strike(f)
     # Touched again, which is the same hit, and then once more
     f.run_for(0.4)
+    assert f.vehicle.mode == fake_vehicle.OFFBOARD
     strike(f)
     f.run_to("landing")
     f.run_for(0.5)
