@@ -163,6 +163,7 @@ class Land(FixedSetpoint):
         self._target = flight.target
         self._landing = False
         flight.is_landing = True
+        flight.count_asked_mode()
         flight.ask_for_mode(flight.vehicle.autopilot.land)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
