@@ -93,8 +93,9 @@ class AttachedGuard:
         return self._drained_us is not None
 
     def lets_pass(self, name: str, fields: Mapping[str, Any], now_us: int) -> bool:
-        """Whether a message on its way to the vehicle may go on: all but others' setpoints while the guard holds."""
-        if name not in SETPOINTS or self._gate.is_own(fields):
+        """Whether a message on its way may go on: all but others' setpoints for this vehicle while the guard holds."""
+        is_for_it = fields.get("target_system", 0) in (0, self._source[0])
+        if name not in SETPOINTS or not is_for_it or self._gate.is_own(fields):
             return True
         self.core.flight.hear_setpoint(asked_of(name, fields), now_us)
         if not self.core.machine.holds:

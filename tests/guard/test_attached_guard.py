@@ -84,6 +84,9 @@ def test_the_programs_own_heartbeats_and_time_questions_have_none_of_the_guards_
 def test_a_program_that_commands_a_mode_while_the_guard_holds_has_its_way():
     air = holding()
     air.run_for(0.2)
+    # So has one that flies another vehicle by the same MAVSDK
+    for system, passes in ((0, False), (1, False), (2, True)):
+        assert air.guard.lets_pass("SET_ATTITUDE_TARGET", {"target_system": system}, air.now_us) is passes
     air.set_mode(HOLD)
     air.run_to(State.STOOD_DOWN, 1.0)
     assert air.mode == AUTO_LOITER
