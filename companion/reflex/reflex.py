@@ -70,7 +70,8 @@ class Reflex:
 
     def restart(self, now_us: int) -> None:
         """Of a vehicle that has restarted, perhaps by a hit, nothing that was measured before is valid."""
-        self.monitor = start_monitor(self.config, now_us)
+        hides_clipping, self.monitor = self.monitor.estimator.hides_clipping, start_monitor(self.config, now_us)
+        self.monitor.estimator.hides_clipping = hides_clipping
 
     def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
         """Take the samples received since the last step, in order; call it without any, too."""

@@ -10,7 +10,7 @@ from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import goes_down, observe
 from companion.link.vehicle import ModeReport
-from companion.messages import LandedState, PositionTarget, Sticks
+from companion.messages import Heartbeat, LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
 
 
@@ -59,6 +59,16 @@ def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
 
 
 SECOND = 1_000_000
+
+
+def test_of_a_vehicle_that_falls_silent_while_it_is_met_all_that_it_is_stays_known():
+    core = GuardCore(GuardConfig(), keeps_others_out=True)
+    ardupilot = Heartbeat(1, 1, 2, 3, True, 5, 3)
+    for now_us, heard in ((SECOND, [ardupilot]), (3 * SECOND, []), (3 * SECOND + 1, [ardupilot])):
+        core.advance(heard, now_us)
+    assert core.reflex.monitor.estimator.hides_clipping
+
+
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 
 
