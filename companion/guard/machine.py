@@ -209,7 +209,7 @@ class GuardMachine(StateMachine):
                 guard.collisions[-1].is_over = True
         match self.state:
             case State.CONNECTING:
-                return GuardConnect(is_first=False)
+                return GuardConnect(isinstance(self.handler, GuardConnect) and self.handler.is_first)
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:

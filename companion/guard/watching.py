@@ -111,12 +111,12 @@ class GuardConnect(Meet[GuardTransition]):
 
     def __init__(self, is_first: bool = True) -> None:
         super().__init__()
-        self._is_first = is_first
+        self.is_first = is_first
 
     @property
     def begins(self) -> bool:
         """Whether no vehicle was met before, and it may yet be that this one can be guarded."""
-        return self._is_first and not self._is_told
+        return self.is_first and not self._is_told
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
         return [*super()._commands(flight), *own_streams(flight.vehicle.autopilot)]
@@ -126,7 +126,7 @@ class GuardConnect(Meet[GuardTransition]):
 
     def _judge(self, flight: FlightContext, now_us: int) -> GuardTransition | None:
         complaint = flight.streams.too_slow(flight.vehicle.autopilot) or flight.round_trip.complaint()
-        if complaint is not None and (flight.mission.companion.link.wait or not self._is_first):
+        if complaint is not None and (flight.mission.companion.link.wait or not self.is_first):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
             return None
         self._report_streams(flight, now_us)

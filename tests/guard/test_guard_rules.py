@@ -8,7 +8,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.guard.watching import goes_down, observe
+from companion.guard.watching import GuardConnect, goes_down, observe
 from companion.link.vehicle import ModeReport
 from companion.messages import Heartbeat, LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
@@ -67,6 +67,8 @@ def test_of_a_vehicle_that_falls_silent_while_it_is_met_all_that_it_is_stays_kno
     for now_us, heard in ((SECOND, [ardupilot]), (3 * SECOND, []), (3 * SECOND + 1, [ardupilot])):
         core.advance(heard, now_us)
     assert core.reflex.monitor.estimator.hides_clipping
+    # And a guard that has begun in flight keeps setpoints out until it has met the vehicle
+    assert isinstance(core.machine.handler, GuardConnect) and core.machine.handler.begins
 
 
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
