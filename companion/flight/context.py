@@ -287,7 +287,6 @@ class FlightContext:
         """The vehicle is about to be in the mode that it was asked for: no report of before says otherwise."""
         if (asked := self.command_client.requested_mode) is not None:
             self.expected_mode, self.vehicle.mode = asked, ModeReport(asked, None, False)
-        self.command_client.cancel()
 
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
         """Advance the command client; report a failure."""

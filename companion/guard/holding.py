@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.interface import Pilot
-from companion.flight.context import FixedSetpoint, Inputs, Target
+from companion.flight.context import FixedSetpoint, Inputs
 from companion.flight.handlers.crash import Crashed
 from companion.flight.handlers.ending import silent_position
 from companion.flight.handlers.recovering import Recover
@@ -30,15 +30,12 @@ class TakeOver:
     """The recovery began with the first setpoint. The state lasts until the vehicle reports OFFBOARD."""
 
     def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
-        self.recover = recover
+        self.recover, self.target = recover, recover.target
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
         if guard.command_client.requested_mode != guard.vehicle.autopilot.setpoints:
             guard.count_asked_mode()
         if not guard.vehicle.flies_setpoints:
             guard.ask_for_mode(guard.vehicle.autopilot.setpoints)
-
-    def target(self, guard: GuardContext, now_us: int) -> Target | None:
-        return self.recover.target(guard, now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         is_seen = guard.vehicle.flies_setpoints
@@ -66,14 +63,11 @@ class Recovering:
     """Until the vehicle rests clear of what it hit."""
 
     def __init__(self, recover: Recover, now_us: int) -> None:
-        self._recover = recover
+        self._recover, self.target = recover, recover.target
         self._since_us = now_us  # in OFFBOARD, with no step late and no silence
         self._late_us = 0
         self._foreign = 0
         self._asked_us: int | None = None  # whether the mode is still ours
-
-    def target(self, guard: GuardContext, now_us: int) -> Target | None:
-        return self._recover.target(guard, now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode: only

@@ -145,8 +145,7 @@ class GuardMachine(StateMachine):
                 return GuardTransition(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
         if inputs.refusal is not None:
             return GuardTransition(Trigger.REFUSED, inputs.refusal)
-        stopped = inputs.stop_reason or guard.fault
-        if stopped and TABLE.moves(self.state, Trigger.STOPPED):
+        if (stopped := inputs.stop_reason or guard.fault) and TABLE.moves(self.state, Trigger.STOPPED):
             return GuardTransition(Trigger.STOPPED, stopped)
         if self.state not in HOLDING:
             return self._link_restored(now_us)
