@@ -167,6 +167,7 @@ def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
         ("serial:///dev/ttyUSB0:57600", "clients come by udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"),
         ("udpout://0.0.0.0", "names no host and port"),
         ("udpout://:14540", "names no remote host and port"),
+        ("udpout://0.0.0.0:14540", "names any host"),
     ],
 )
 def test_an_address_that_is_none_for_clients_is_one_sentence(url, says):

@@ -42,7 +42,7 @@ def open_connection(
         return serial_port(*_device_and_baud(url, rest), waits)
     host, port = host_and_port(url, rest)
     if scheme in ("udpout", "tcpout"):
-        _check_one_host(url, scheme, host, port)
+        check_one_host(url, scheme, host, port)
     if scheme == "udpin":
         return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), signing))
     if scheme == "udpout":
@@ -92,7 +92,7 @@ def _meant(text: str) -> str | None:
     return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
 
 
-def _check_one_host(url: str, scheme: str, host: str, port: int) -> None:
+def check_one_host(url: str, scheme: str, host: str, port: int) -> None:
     """Only who answers from the address that was sent to is ever heard."""
     if not host or port == 0:
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")

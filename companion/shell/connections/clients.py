@@ -12,7 +12,7 @@ from typing import Any
 
 from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
-from companion.shell.connections.addresses import host_and_port, scheme_and_rest, serial_device
+from companion.shell.connections.addresses import check_one_host, host_and_port, scheme_and_rest, serial_device
 from companion.shell.connections.connection import LinkCounts, Selectable, Way, bound_socket, resolve, send_datagram
 from companion.shell.connections.streams import BITS_A_BYTE
 
@@ -213,8 +213,7 @@ def _open(url: str, between: Between) -> UdpPort | TcpPort:
         return TcpPort(bound_socket(socket.SOCK_STREAM, host, port), between)
     if scheme == "udpin":
         return UdpPort(bound_socket(socket.SOCK_DGRAM, host, port), None, between)
-    if not host or port == 0:
-        raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
+    check_one_host(url, scheme, host, port)
     family, remote = resolve(socket.SOCK_DGRAM, host, port)
     return UdpPort(socket.socket(family, socket.SOCK_DGRAM), remote, between)
 
