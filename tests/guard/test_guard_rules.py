@@ -8,7 +8,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.guard.watching import GuardConnect, goes_down, observe
+from companion.guard.watching import goes_down, observe
 from companion.link.vehicle import ModeReport
 from companion.messages import Heartbeat, LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
@@ -31,10 +31,6 @@ def test_a_crash_is_told_wherever_hits_are_answered_and_ends_with_a_disarm_or_a_
     assert {state for state in State if TABLE.moves(state, Trigger.CRASHED)} == {*HOLDING, State.WATCHING}
     ends = {trigger for trigger, state in TABLE.rows[State.CRASHED].items() if state is State.STANDING_BY}
     assert ends == {Trigger.DISARMED, Trigger.FLIES_AGAIN} and State.CRASHED not in HOLDING
-    core = GuardCore(GuardConfig(), keeps_others_out=False)
-    core.machine.state, core.flight.vehicle.armed, core.flight.is_wreck = State.CRASHED, False, True
-    core.advance((), 0)
-    assert core.machine.state is State.STANDING_BY and not core.flight.is_wreck
 
 
 def test_a_hit_is_answered_where_the_guard_watches_and_never_takes_the_vehicle_back():
@@ -61,14 +57,16 @@ def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
 SECOND = 1_000_000
 
 
-def test_of_a_vehicle_that_falls_silent_while_it_is_met_all_that_it_is_stays_known():
-    core = GuardCore(GuardConfig(), keeps_others_out=True)
-    ardupilot = Heartbeat(1, 1, 2, 3, True, 5, 3)
+def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_not_stay_for_ever():
+    core, ardupilot = GuardCore(GuardConfig(), keeps_others_out=True), Heartbeat(1, 1, 2, 3, False, 5, 3)
     for now_us, heard in ((SECOND, [ardupilot]), (3 * SECOND, []), (3 * SECOND + 1, [ardupilot])):
         core.advance(heard, now_us)
-    assert core.reflex.monitor.estimator.hides_clipping
-    # And a guard that has begun in flight keeps setpoints out until it has met the vehicle
-    assert isinstance(core.machine.handler, GuardConnect) and core.machine.handler.begins
+    assert core.reflex.monitor.estimator.hides_clipping and core.machine.handler.begins
+    core.machine.state, core.flight.is_wreck, core.flight.fault = State.CRASHED, True, "of the guard's"
+    core.advance((), 4 * SECOND)
+    assert core.machine.state is State.STANDING_BY and not core.flight.is_wreck
+    core.advance((), 5 * SECOND)
+    assert core.machine.finished
 
 
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16

@@ -120,15 +120,6 @@ def test_a_landing_is_not_put_off_for_more_hits_than_the_limit(after_s):
     assert len(f.report.collisions) == 3
 
 
-def test_a_vehicle_that_tells_its_mode_once_a_second_goes_on_landing_after_a_hit_that_was_none():
-    f = fake_vehicle.flying_in("landing")
-    f.vehicle.no_current_mode = True
-    strike(f, -40.0, samples=1)
-    f.run_to("landing")
-    f.run_for(1.0)
-    assert f.kinds()[-2:] == ["mode", "landing"] and f.vehicle.mode == LAND
-
-
 def test_a_recovery_keeps_off_what_is_known_behind_it():
     """The gap between two walls is less than the law asks for: the middle is kept, though only one has been touched."""
     slowly = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 1.0}}
