@@ -71,11 +71,11 @@ class CollisionGuard:
 
     def start(self) -> None:
         """Attach; return when the streams are fast enough, some 3 s later. Raises GuardError if they are not."""
+        self._link.intercept(self._incoming, self._outgoing)
         self._switch_interval_s = sys.getswitchinterval()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, self._switch_interval_s))
         # Looking for garbage among all that a program has loaded takes 0.1 s, on whichever thread it falls.
         gc.freeze()
-        self._link.intercept(self._incoming, self._outgoing)
         self._thread.start()
         with self._changed:
             self._changed.wait_for(lambda: self.state is not State.CONNECTING, START_TIMEOUT_S)
