@@ -30,7 +30,7 @@ class TakeOver:
     """The recovery began with the first setpoint. The state lasts until the vehicle reports OFFBOARD."""
 
     def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
-        self.recover, self.target = recover, recover.target
+        self._recover, self.target = recover, recover.target
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
         if guard.command_client.requested_mode != guard.vehicle.autopilot.setpoints:
             guard.count_asked_mode()
@@ -48,7 +48,7 @@ class TakeOver:
             guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return GuardTransition(Trigger.CONFIRMED)
         # Over it is also where the hit was none.
-        if self.recover.step(guard, inputs, now_us) is not None:
+        if self._recover.step(guard, inputs, now_us) is not None:
             return GuardTransition(Trigger.SETTLED)
         if outcome is not None:
             return GuardTransition(Trigger.NOT_CONFIRMED, outcome.text)

@@ -218,10 +218,7 @@ class GuardMachine(StateMachine):
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
                 return TakeOver(guard, self._recover(), now_us)
             case State.RECOVERING:
-                if transition.trigger is Trigger.HIT:
-                    return Recovering(self._recover(), now_us)
-                assert isinstance(self.handler, TakeOver), "the table leads here from there alone"
-                return Recovering(self.handler.recover, now_us)
+                return Recovering(self._recover(), now_us)
             case State.GIVING_BACK:
                 limit, hits = guard.config.max_hits, recoveries_from(guard.hits)
                 if hits >= limit and not guard.then_hold:
