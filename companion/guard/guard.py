@@ -47,7 +47,7 @@ class Guard(Stepped[GuardCore]):
     def hear_interval(self, asked: SetMessageInterval) -> None:
         """A client has asked the vehicle for a stream. What the guard needs more often it asks for again."""
         flight = self.core.flight
-        own = own_streams(flight.vehicle.autopilot)
+        own = (*own_streams(flight.vehicle.autopilot), *flight.vehicle.autopilot.streams)
         for request in (*[stream.request() for stream in flight.streams.streams], *own):
             is_enough = 0 < asked.interval_us <= request.interval_us
             if request.message_id == asked.message_id and not is_enough:
