@@ -277,6 +277,7 @@ class SetMessageInterval:
     """MAV_CMD_SET_MESSAGE_INTERVAL."""
 
     command_id: ClassVar[int] = 511
+    many: ClassVar[int] = -1  # for `message_id`: a group of them, as in REQUEST_DATA_STREAM
     message_id: int
     interval_us: int
 

@@ -50,5 +50,5 @@ class Guard(Stepped[GuardCore]):
         own = (*own_streams(flight.vehicle.autopilot), *flight.vehicle.autopilot.streams)
         for request in (*[stream.request() for stream in flight.streams.streams], *own):
             is_enough = 0 < asked.interval_us <= request.interval_us
-            if request.message_id == asked.message_id and not is_enough:
+            if asked.message_id in (request.message_id, asked.many) and not is_enough:
                 flight.outbox.append(SendCommand(request, 0))

@@ -120,6 +120,8 @@ def would_move(packet: bytes, autopilot: Autopilot) -> bool:
 
 def interval_asked(packet: bytes) -> SetMessageInterval | None:
     """The stream that a packet asks the vehicle for; None where it asks for none."""
+    if message_id_of(packet) == dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
+        return SetMessageInterval(SetMessageInterval.many, 0)
     fields = fields_of(packet) if message_id_of(packet) in _COMMANDS else {}
     if fields.get("command") != dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
         return None
