@@ -115,6 +115,6 @@ class Fence(StrictModel):
             leaves_at = (-b + math.sqrt(max(0.0, b * b - a * c))) / a
         if self._polygon is not None and step != (0.0, 0.0):
             line = LineString((start, end))
-            for crossing in shapely.get_coordinates(line.intersection(self._polygon.exterior)):
-                leaves_at = min(leaves_at, line.project(Point(crossing), normalized=True))
+            for outside in shapely.get_coordinates(line.difference(self._polygon)):
+                leaves_at = min(leaves_at, line.project(Point(outside), normalized=True))
         return (start[0] + leaves_at * step[0], start[1] + leaves_at * step[1])

@@ -201,10 +201,10 @@ def test_missions_that_cannot_be_flown(changes, words):
         Mission.model_validate({"name": "t", "items": [TAKEOFF, LANDING], **changes})
 
 
-def test_a_way_that_leaves_a_room_on_its_way_is_refused():
+def test_a_way_that_leaves_a_room_on_its_way_is_refused_and_one_along_its_edge_is_not():
     room = {"polygon_ne_m": [[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]]}
-    there = [{"go_to": {"position_ned_m": [5, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 5, -1.5]}}]
-    with pytest.raises(ValidationError, match=r"item 3 \(go_to\) leaves fence.polygon_ne_m at \[4.00, 1.00\]"):
+    there = [{"go_to": {"position_ned_m": [n, e, -1.5]}} for n, e in ((6, 0), (6, -2), (2, 1), (5, 0), (0, 5))]
+    with pytest.raises(ValidationError, match=r"item 6 \(go_to\) leaves fence.polygon_ne_m at \[4.00, 1.00\]"):
         Mission.model_validate({"name": "t", "items": [TAKEOFF, *there, LANDING], "fence": room})
 
 
