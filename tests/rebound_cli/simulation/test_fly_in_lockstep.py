@@ -197,7 +197,9 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
 def test_a_mission_that_waits_for_a_file_goes_on_when_it_is_there_and_replays(tmp_path):
     sign, folder = tmp_path / "go", tmp_path / "run"
     sign.touch()
-    items = f"items=[{{takeoff: {{height_m: 0.6}}}}, {{wait_for: {{file: {sign}}}}}, {{land: {{}}}}]"
+    # A name that no file can have is waited for in vain
+    waits = f"{{wait_for: {{file: {'n' * 300}}}, timeout_s: 2, on_timeout: continue}}, {{wait_for: {{file: {sign}}}}}"
+    items = f"items=[{{takeoff: {{height_m: 0.6}}}}, {waits}, {{land: {{}}}}]"
     assert fly_square("--set", items, *QUICK, "--out", folder) == 0
-    assert steps(folder) == [1, 2]
+    assert steps(folder) == [1, 2, 3]
     assert_comes_again(folder)
