@@ -197,6 +197,12 @@ class FlightContext:
         return self.steps[self.tally.index].item.on_collision or self.mission.on_collision
 
     @property
+    def is_retry(self) -> bool:
+        """Whether the present item is tried again after a hit."""
+        is_asked = self.after_recovery.trigger is Trigger.RECOVERED_TO_RETRY
+        return is_asked and self.tally.hits > 0 and not self.going_home
+
+    @property
     def height_m(self) -> float | None:
         """Above the arming position. None before that, and where other messages come and no position does of late: a
         vehicle whose estimator fails sends none.

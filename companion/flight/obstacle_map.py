@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
 from companion.flight.envelope import KnownSurface, touched
-from companion.flight.states import Trigger
 from companion.memory.patch import Patch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import ObstacleMap
@@ -35,10 +34,7 @@ def surroundings(flight: FlightContext) -> ObstacleMap:
 
     An item that is tried again shall meet what stopped it: that hit is left out, and nothing else.
     """
-    patches, tally = flight.patches, flight.tally
-    is_retry = flight.after_recovery.trigger is Trigger.RECOVERED_TO_RETRY and tally.index == flight.step_index
-    if is_retry and tally.hits:
-        patches = _with_hits(flight, len(flight.collisions) - tally.hits)
+    patches = _with_hits(flight, len(flight.collisions) - flight.tally.hits) if flight.is_retry else flight.patches
     mission = flight.mission
     return ObstacleMap(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from companion.flight.obstacle_map import surroundings
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
 from companion.motion.motors import Damage
@@ -63,8 +64,9 @@ def test_what_is_touched_again_while_it_recovers_is_the_same_hit_and_makes_the_n
 
 
 def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
-    f = at_wall(INTO_WALL, on_collision={"then": "return"})
+    f = at_wall(INTO_WALL | {"on_collision": {"then": "retry"}, "timeout_s": 4, "on_timeout": "return"})
     f.run_to("returning")
+    assert surroundings(f.companion.core.flight).patches == f.report.obstacles != ()
     f.run_for(0.3)
     strike(f)
     assert f.state == "recovering"
