@@ -15,7 +15,8 @@ from tests.simulated import simulated
 
 pytestmark = pytest.mark.flight
 
-ITEMS = [{"takeoff": {"height_m": 1.5}}, {"go_to": {"position_ned_m": [6, 0, -1.5], "speed_m_s": 2.0}}, {"land": {}}]
+PATH = {"path": {"points_ned_m": [[2, 0, -1.5], [6, 0, -1.5]], "speed_m_s": 2.0}}
+ITEMS = [{"takeoff": {"height_m": 1.5}}, PATH, {"land": {}}]
 AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro")
 
 

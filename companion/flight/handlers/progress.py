@@ -102,7 +102,7 @@ class FlyItems(_OnTrajectory):
 
     def _plan(self, flight: FlightContext, action: items.Motion, start_m: Vector3, now_us: int) -> None:
         """The item's own trajectory, or one round known obstacles; of an interrupted path what is left."""
-        behind = flight.tally.points_passed if flight.after_recovery.trigger is Trigger.RECOVERED_TO_DETOUR else 0
+        behind = 0 if flight.is_retry else flight.tally.points_passed
         if isinstance(action, items.PathItem) and 0 < behind < len(action.points_ned_m):
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
         known = surroundings(flight)
@@ -139,7 +139,6 @@ class FlyItems(_OnTrajectory):
             return Transition(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)
         while True:
             if isinstance(self._action, items.ReturnItem):
-                flight.returning_as = self._action
                 return Transition(Trigger.RETURN_DUE)
             if isinstance(self._action, items.LandItem):
                 return Transition(Trigger.LAND_DUE)
@@ -292,7 +291,7 @@ class FlyHome(_OnTrajectory):
         flight.going_home = True
         start = flight.mission_ned_m(flight.target.position_ned_m)
         wind_m_s2, homewards = flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0)
-        speeds = replace(flight.speeds, factor=1.0).against(wind_m_s2, homewards)
+        speeds = flight.speeds.against(wind_m_s2, homewards)
         planned = home_around(start, flight.returning_as, speeds, surroundings(flight))
         self._is_cut_off = planned.trajectory is None
         self._trajectory: Trajectory = planned.trajectory or stay(start)
