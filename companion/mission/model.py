@@ -152,7 +152,7 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
     there = items.GoToItem(position_ned_m=begin.start_ned_m)
     back = items.Step(at, begin.step.label, items.MissionItem(go_to=there), there)
     set_speeds = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, items.SetSpeedItem)]
-    return (steps[0], *set_speeds[-1:], back, *steps[at:])
+    return (steps[0], *set_speeds, back, *steps[at:])
 
 
 def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
