@@ -98,9 +98,9 @@ def read_obstacles(document: Document) -> None:
     """Put what the mission's `obstacles.file` holds in its place; with that a mission is whole without the file."""
     from companion.memory.stored import ObstacleFile
 
-    obstacles = document.data.get("obstacles")
-    file = obstacles.get("file") if isinstance(obstacles, dict) else None
-    if not isinstance(obstacles, dict) or not isinstance(file, str) or not file:
+    obstacles: Any = document.data.get("obstacles")
+    file, known = (obstacles.get("file"), obstacles.get("known", [])) if isinstance(obstacles, dict) else (None, None)
+    if not isinstance(file, str) or not isinstance(known, list) or not file:
         return
     given = document.override_of(("obstacles", "file"))
     folder = Path(document.name).parent if given is None else Path()
@@ -109,7 +109,7 @@ def read_obstacles(document: Document) -> None:
     except DocumentError as error:
         raise DocumentError(f"{document.place_of(('obstacles', 'file'))}: {error}") from error
     validated(ObstacleFile, stored, stored.data)
-    known = [*(obstacles.get("known") or ()), *stored.data["patches"]]
+    known = [*known, *stored.data["patches"]]
     document.data["obstacles"] = {key: value for key, value in obstacles.items() if key != "file"} | {"known": known}
 
 

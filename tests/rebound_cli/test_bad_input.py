@@ -86,6 +86,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
         (("watch", "missions"), ("no flight is there; give a run's folder",)),
         (("check", WALL, "--set", "obstacles.file=none.json"), ("none.json: no such file",)),
+        (("check", WALL, "--set", "obstacles={file: no.json, known: 5}"), ("obstacles.known: must be a list, not 5",)),
     ],
     ids=lambda given: " ".join(map(str, given[:1])),
 )
