@@ -44,7 +44,7 @@ def load_mission_document(
     if companion is not None:
         settings = load_document(companion)
         validated(CompanionConfig, settings, settings.data.get("companion") or {}, ("companion",))
-        document.data["companion"] = settings.data.get("companion")
+        document.data["companion"] = settings.data.get("companion") or {}
     _apply_options(document, sets, airframe, seed)
     return document
 
