@@ -134,7 +134,7 @@ def _told(flight: ShownFlight) -> Iterator[Message]:
     for event in flight.events:
         at_us, kind, text = float(event["time_us"]), str(event["kind"]), str(event.get("text", ""))
         yield at_us, "/event", {"kind": kind, "text": text, "data": event.get("data", {})}
-        yield _log(at_us, _WARNING if kind in HIT_KINDS else _INFO, "rebound", f"{kind}: {text}")
+        yield _log(at_us, _WARNING if HIT_KINDS.get(kind) == 1 else _INFO, "rebound", f"{kind}: {text}")
     for at_us, text in flight.log.texts:
         yield _log(at_us, _INFO, "STATUSTEXT", text)
     for impact in flight.findings.impacts:

@@ -93,7 +93,7 @@ class KeptFlight:
 
 def hits_in(lines: Sequence[str]) -> int:
     """Of lines as `event_line` writes them, which need not be parsed for it."""
-    return sum(line.count(f'"kind": "{kind}"') for line in lines for kind in run_folder.HIT_KINDS)
+    return sum(adds * line.count(f'"kind": "{kind}"') for kind, adds in run_folder.HIT_KINDS.items() for line in lines)
 
 
 def size_of(folder: Path) -> int:

@@ -10,7 +10,7 @@ from rebound_cli.inputs import documents
 from rebound_cli.inputs.documents import Document, DocumentError, DocumentPath, load_document, validated
 from rebound_cli.inputs.shipped import shipped_missions
 from rebound_cli.results import run_folder
-from rebound_cli.results.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
+from rebound_cli.results.run_folder import HIT_KINDS, RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.faults.spec import check_motor
@@ -186,7 +186,7 @@ def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
             "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
             "armed_at_us": armed["time_us"],
             "armed_boot_us": armed["data"]["time_boot_us"],
-            "hits": sum(event["kind"] == "detection" for event in events) + (flown.resume.hits if flown.resume else 0),
+            "hits": sum(HIT_KINDS.get(each["kind"], 0) for each in events) + (flown.resume.hits if flown.resume else 0),
         }
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         text = "not the events of a flight; the file is damaged"

@@ -78,7 +78,7 @@ class StatusServer:
     def hand_over(self, status: Callable[[], Status], events: Sequence[Event], running_s: float, link: str) -> None:
         """Called with every step and its events; costs a look at the clock as long as nothing is due."""
         for event in events:
-            self._hits += event.kind in HIT_KINDS
+            self._hits += HIT_KINDS.get(event.kind, 0)
             self._last_event = event.text
         now_s = time.monotonic()
         if now_s < self._due_s:

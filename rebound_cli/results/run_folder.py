@@ -43,8 +43,8 @@ VERSIONS_NAME = "versions.json"
 VEHICLE_LOG_NAME = "vehicle.log"
 OBSTACLES_NAME = "obstacles.json"
 
-# Events of a hit: one that was answered, and one that was left to the program that flies.
-HIT_KINDS = ("detection", "left_alone")
+# Events by what they add to the hits: one that was answered, one left to the program that flies, one that was none.
+HIT_KINDS = {"detection": 1, "left_alone": 1, "unconfirmed": -1}
 
 # The packages whose version can change the bytes or the figures of a flight.
 _VERSIONED = "pymavlink fastcrc numpy numba filterpy shapely pydantic pyserial matplotlib"

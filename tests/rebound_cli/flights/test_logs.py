@@ -51,13 +51,14 @@ def record(folder, steps=50, writer=None, make_room=None):
     return recorder
 
 
-def pretend(runs, name, size=BLOCK, hits=0, summary=None):
+def pretend(runs, name, size=BLOCK, hits=0, unconfirmed=0, summary=None):
     """A folder with the files by which a flight is known."""
     folder = runs / name
     folder.mkdir(parents=True)
     (folder / run_folder.TLOG_NAME).write_bytes(bytes(size))
     lines = ['{"time_us": 1000000, "kind": "connected", "text": "connected", "data": {}}']
     lines += ['{"time_us": 3500000, "kind": "detection", "text": "hit", "data": {}}'] * hits
+    lines += ['{"time_us": 3500000, "kind": "unconfirmed", "text": "not a hit", "data": {}}'] * unconfirmed
     (folder / run_folder.EVENTS_NAME).write_text("\n".join(lines) + "\n")
     if summary is not None:
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
@@ -71,7 +72,7 @@ LAST = "20260103T000000Z-guard"
 def runs(tmp_path):
     runs = tmp_path / "runs"
     pretend(runs, "20260101T000000Z-square", 1_000_000, summary={"outcome": "completed", "reason": "landed"})
-    pretend(runs, "20260102T000000Z-guard", 500_000, hits=2)
+    pretend(runs, "20260102T000000Z-guard", 500_000, hits=3, unconfirmed=1)
     folder = runs / LAST
     folder.mkdir()
     record(folder)
@@ -98,7 +99,7 @@ def test_show_is_of_the_last_flight_and_has_its_events_in_order(runs, capsys):
     assert told.index("connected") < told.index("a step came late")
     assert logs("show", "20260102T000000Z-guard", "--runs", runs) == 0
     told = capsys.readouterr().out
-    assert told.startswith("20260102T000000Z-guard: cut off; 2 hits") and told.count("detection") == 2
+    assert told.startswith("20260102T000000Z-guard: cut off; 2 hits") and told.count("detection") == 3
 
 
 def test_without_flights_here_those_of_the_service_are_meant(runs, tmp_path, monkeypatch, capsys):
