@@ -52,11 +52,11 @@ def _speeds(options: Namespace) -> Iterator[tuple[float | None, list[str]]]:
     actions = [
         (f"items.{n}.{name}", keys) for n, item in enumerate(document.data["items"]) for name, keys in item.items()
     ]
-    with_speed = [(path, keys) for path, keys in actions if isinstance(keys, dict) and "speed_m_s" in keys]
+    with_speed = [(path, keys) for path, keys in actions if isinstance(keys, dict) and keys.get("speed_m_s")]
     if not with_speed:
         raise ConfigurationError(f"--speeds: no item of {options.mission} has a speed_m_s.")
     path, keys = max(with_speed, key=lambda found: float(found[1]["speed_m_s"]))
     for speed_m_s in options.speeds:
         factor = speed_m_s / keys["speed_m_s"]
         scaled = {"speed_m_s": factor, "acceleration_m_s2": factor**2}
-        yield speed_m_s, [f"{path}.{key}={keys[key] * by:g}" for key, by in scaled.items() if key in keys]
+        yield speed_m_s, [f"{path}.{key}={keys[key] * by:g}" for key, by in scaled.items() if keys.get(key)]

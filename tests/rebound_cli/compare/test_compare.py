@@ -44,7 +44,7 @@ def test_a_dask_scheduler_s_workers_fly_as_this_machine_s_cores_do(tmp_path):
 def test_what_cannot_be_compared_is_one_sentence_before_anything_is_flown(tmp_path):
     for words, said in (
         (("wall", "--laws", "papr"), "must be 'adaptive'"),
-        (("hover", "--speeds", "1"), "no item of"),
+        (("hover", "--speeds", "1", "--set", "items.4={return: {speed_m_s: null}}"), "no item of"),
         (("wall", "--airframe", "foldible"), "did you mean foldable?"),
         (("wall", "--out", tmp_path), f"{tmp_path} exists already"),
         (("wall", "--scheduler", "tcp://127.0.0.1:1", "--out", tmp_path / "none"), "no Dask scheduler answers there"),
