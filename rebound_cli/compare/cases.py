@@ -37,7 +37,7 @@ def cases_of(options: Namespace) -> list[Case]:
         document = inputs.load_mission_document(options.mission, changed, options.airframe)
         inputs.mission_from(document, inputs.world_from(document))
         found += [Case(law, speed_m_s, seed, changed) for seed in range(1, options.seeds + 1)]
-    return found
+    return list(dict.fromkeys(found))
 
 
 def _speeds(options: Namespace) -> Iterator[tuple[float | None, list[str]]]:

@@ -15,7 +15,7 @@ from tests.rebound_cli.command import assert_one_clear_sentence, run_here
 @pytest.mark.flight
 def test_two_laws_are_flown_told_of_and_kept(tmp_path):
     out = tmp_path / "compared"
-    done = run_here("compare", "wall", "--laws", "paper,adaptive", "--speeds", "1.5", "--seeds", "1", "--out", out)
+    done = run_here("compare", "wall", "--laws", "paper,adaptive", "--speeds", "1.5,1.5", "--seeds", "1", "--out", out)
     assert done.returncode == 0, done.stderr
     # Then there was progress, in a pipe as on a terminal
     assert "1 of 2," in done.stdout and "2 of 2,    0 s to go:" in done.stdout
