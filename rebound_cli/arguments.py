@@ -64,7 +64,7 @@ def speeds_m_s(text: str) -> list[float]:
     try:
         found = [float(first) + step for step in range(int(float(last) - float(first)) + 1)] if dots else []
         found = found or [float(word) for word in text.split(",")]
-    except ValueError:
+    except (ValueError, OverflowError):
         found = []
     if not found or min(found) <= 0 or not math.isfinite(sum(found)):
         raise argparse.ArgumentTypeError(f"{text!r} is not speeds: give 1..4 or a list such as 1,2.5, in m/s")
