@@ -17,6 +17,7 @@ from companion.reflex.config import RecoveryConfig
 
 # The position gain asks for gamma * v_c of it backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = round(1.0 / defaults.POSITION_GAIN_PER_S, 2)
+_AFTER = {"land": "land", "return": "return and land", "continue": "the next item", "abort": "abort"}
 
 
 def describe_item(action: items.Action) -> str:
@@ -82,8 +83,7 @@ def describe_after_recovery(on_collision: OnCollision) -> str:
 
 
 def describe_limit(on_collision: OnCollision) -> str:
-    after = {"return": "return and land", "land": "land", "abort": "abort"}[on_collision.after_max_hits]
-    return f"hit {on_collision.max_hits}: {after}"
+    return f"hit {on_collision.max_hits}: {_AFTER[on_collision.after_max_hits]}"
 
 
 def describe_modifiers(item: items.MissionItem) -> str:
@@ -159,13 +159,12 @@ def _fastest_m_s(mission: Mission) -> float:
 
 
 def _damage_lines(on_damage: OnDamage) -> list[str]:
-    after = {"land": "land", "return": "return and land"}
-    return [f"On damage  a motor that works harder than before a hit: {after[on_damage]}"] if on_damage in after else []
+    what = "On damage  a motor that works harder than before a hit"
+    return [] if on_damage == "tell" else [f"{what}: {_AFTER[on_damage]}"]
 
 
 def _obstacle_lines(obstacles: ObstaclesConfig) -> list[str]:
-    after = {"land": "land", "return": "return and land", "continue": "the next item", "abort": "abort"}
-    lines = [f"Obstacles  keep {obstacles.margin_m:g} m off what is known; no way: {after[obstacles.on_unreachable]}"]
+    lines = [f"Obstacles  keep {obstacles.margin_m:g} m off what is known; no way: {_AFTER[obstacles.on_unreachable]}"]
     return lines + [f"Known      {describe_patch(patch)}" for patch in obstacles.patches()]
 
 

@@ -175,14 +175,12 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
                 speeds = speeds.changed_to(action)
             case items.SetYawItem():
                 lasts_s = 180.0 / action.rate_deg_s
-            case items.ExpectItem():
-                pass
             case items.ReturnItem():
                 planned = home_around(place, action, speeds, known)
                 lasts_s = _landing_s(place if planned.trajectory is None else planned.trajectory.target_m)
             case items.LandItem():
                 lasts_s = _landing_s(place)
-            case _:
+            case items.GoToItem() | items.VelocityItem() | items.PathItem() | items.OrbitItem():
                 planned = trajectory_around(action, place, speeds, known)
         if lasts_s is not None and planned.trajectory is not None:
             lasts_s += planned.trajectory.duration_s

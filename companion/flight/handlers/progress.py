@@ -290,8 +290,7 @@ class FlyHome(_OnTrajectory):
         self._trajectory_began_us = flight.trajectory_us
         flight.going_home = True
         start = flight.mission_ned_m(flight.target.position_ned_m)
-        wind_m_s2, homewards = flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0)
-        speeds = flight.speeds.against(wind_m_s2, homewards)
+        speeds = flight.speeds.against(flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0))
         planned = home_around(start, flight.returning_as, speeds, surroundings(flight))
         self._is_cut_off = planned.trajectory is None
         self._trajectory: Trajectory = planned.trajectory or stay(start)
