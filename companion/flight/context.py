@@ -181,7 +181,7 @@ class FlightContext:
         config = self.mission.companion
         self.reflex = start_reflex(config, self.mission.recovery, config.settled, 0)
         self.streams = StreamMonitor(config.streams, tuple(self.reflex.monitor.detector.losses))
-        self.speeds = SpeedLimits.of(config.flight)
+        self.speeds = SpeedLimits.of(config.flight, self.mission.limits.max_speed_m_s)
         self.steps = steps_to_fly(self.mission)
         self.patches = self.mission.obstacles.patches()
         if self.steps and isinstance(last := self.steps[-1].action, ReturnItem):

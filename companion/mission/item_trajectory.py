@@ -36,9 +36,10 @@ class SpeedLimits:
     speeding_up_m_s2: float = math.inf
 
     @classmethod
-    def of(cls, config: FlightConfig) -> "SpeedLimits":
-        """With which a mission begins."""
-        return cls(config.cruise_speed_m_s, config.cruise_acceleration_m_s2, speeding_up_m_s2=config.speeding_up_m_s2)
+    def of(cls, config: FlightConfig, most_m_s: float) -> "SpeedLimits":
+        """With which a mission begins whose setpoints are no faster than `most_m_s`."""
+        speed_m_s = min(config.cruise_speed_m_s, most_m_s)
+        return cls(speed_m_s, config.cruise_acceleration_m_s2, speeding_up_m_s2=config.speeding_up_m_s2)
 
     def changed_to(self, item: items.SetSpeedItem) -> "SpeedLimits":
         acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2

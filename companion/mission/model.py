@@ -159,7 +159,7 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
     known = ObstacleMap(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     flight = mission.companion.flight
-    speeds = SpeedLimits.of(flight)
+    speeds = SpeedLimits.of(flight, mission.limits.max_speed_m_s)
     for step in items.program(mission.items):
         action = step.action
         lasts_s: float | None = 0.0
