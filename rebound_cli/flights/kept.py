@@ -126,7 +126,7 @@ def flight_named(runs: Path, name: str) -> KeptFlight:
         return flights[-1]
     if name == "last":
         raise FlightError(f"No flight of a vehicle is in {runs}.{simulated_text(runs)}")
-    for folder in (runs / name, Path(name)):
+    for folder in (runs / name, Path(name).resolve()):
         if (folder / TLOG_NAME).is_file():
             return KeptFlight(folder, size_of(folder))
     near = nearest(name, [flight.name for flight in flights])
