@@ -186,10 +186,12 @@ def parse_override(text: str) -> Override:
     return Override(f"--set {text}", tuple(int(part) if part.isdecimal() else part for part in parts), value)
 
 
-def apply_overrides(document: Document, texts: Sequence[str]) -> None:
-    """Apply every `--set` in order. Raises DocumentError."""
-    for text in texts:
-        document.put(parse_override(text))
+def apply_overrides(document: Document, texts: Sequence[str], part: str | None = None) -> None:
+    """Apply every `--set` in order; where only one `part` counts, to that. Raises DocumentError."""
+    for override in map(parse_override, texts):
+        if part not in (None, override.path[0]):
+            raise DocumentError(f"{override.text}: only what begins with {part}. counts here.")
+        document.put(override)
 
 
 def validated(model: type[Model], document: Document, data: Any, prefix: DocumentPath = ()) -> Model:

@@ -57,7 +57,7 @@ def companion_settings(path: Path | None, sets: Sequence[str] = ()) -> "Companio
     from companion.mission.config import CompanionConfig
 
     document = load_document(path) if path is not None else Document("no mission file")
-    documents.apply_overrides(document, sets)
+    documents.apply_overrides(document, sets, "companion")
     return validated(CompanionConfig, document, document.data.get("companion") or {}, ("companion",))
 
 
@@ -136,11 +136,9 @@ def world_from(document: Document) -> SimulatedWorld:
 
 def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, seed: int | None) -> SimulatedWorld:
     """For the simulated vehicle alone: of the mission file, if there is one, only the `sim:` part counts."""
-    for override in map(documents.parse_override, sets):
-        if override.path[0] != "sim":
-            raise DocumentError(f"{override.text}: only what begins with sim. counts here, such as sim.seed=7.")
     document = Document("no mission file") if path is None else load_document(path, shipped_missions())
-    _apply_options(document, sets, airframe, seed)
+    documents.apply_overrides(document, sets, "sim")
+    _apply_options(document, (), airframe, seed)
     return world_from(document)
 
 
