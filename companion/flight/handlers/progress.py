@@ -90,7 +90,7 @@ class FlyItems(_OnTrajectory):
                 flight.file_awaited, flight.file_is_there = file, False
             case items.SetSpeedItem():
                 flight.speeds = flight.speeds.changed_to(self._action)
-        factor = flight.tally.pace_factor
+        factor = flight.tally.pace_factor if isinstance(self._action, items.Motion) else 1.0
         again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
