@@ -203,7 +203,7 @@ def read_text(path: Path) -> str:
 
 def read_summary(folder: Path) -> dict[str, Any] | None:
     """None of a flight that is not over, or was cut off."""
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError, TypeError):
         return dict(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8")))
     return None
 
