@@ -52,7 +52,7 @@ def sys_status(state: Telemetry) -> Message:
         enabled,
         health,
         _LOAD_PER_MILLE,
-        round(1e3 * battery.voltage_v),
+        _millivolts(battery.voltage_v),
         round(100 * battery.current_a),
         math.ceil(100 * battery.remaining),
         *_NO_LINK_STATISTICS,

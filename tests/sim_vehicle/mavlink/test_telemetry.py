@@ -126,6 +126,9 @@ def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_
     assert late.battery_remaining == 50 and late.voltages[0] < flying.voltages[0] - 300
     assert late.current_consumed > 30
     assert client.last("SYS_STATUS").battery_remaining == 50
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"BAT1_V_CHARGED", 1e30, 9))
+    client.run(2.1)
+    assert client.last("SYS_STATUS").voltage_battery == client.last("BATTERY_STATUS").voltages[0] == 65_534
 
 
 def test_the_world_lies_where_the_parameters_say():
