@@ -48,9 +48,10 @@ class Origin:
             return Place(self.place.latitude_deg, self.place.longitude_deg, altitude_m)
         sin_0, cos_0 = self._sin_cos
         sin, cos = math.sin(angle), math.cos(angle)
-        latitude = math.asin(cos * sin_0 + north * sin * cos_0 / angle)
-        longitude = math.atan2(east * sin, angle * cos_0 * cos - north * sin_0 * sin)
-        return Place(math.degrees(latitude), self.place.longitude_deg + math.degrees(longitude), altitude_m)
+        latitude = math.asin(min(max(cos * sin_0 + north * sin * cos_0 / angle, -1.0), 1.0))
+        turned_deg = math.degrees(math.atan2(east * sin, angle * cos_0 * cos - north * sin_0 * sin))
+        longitude_deg = math.remainder(self.place.longitude_deg + turned_deg, 360.0)
+        return Place(math.degrees(latitude), longitude_deg, altitude_m)
 
     def position_of(self, place: Place) -> Vector3:
         """The local position of a geographic place, metres NED."""

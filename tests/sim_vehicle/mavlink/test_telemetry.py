@@ -132,14 +132,18 @@ def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_
 
 
 def test_the_world_lies_where_the_parameters_say():
-    there = {"SIH_LOC_LAT0": -33.9, "SIH_LOC_LON0": 151.2, "SIH_LOC_H0": 20.0}
+    there = {"SIH_LOC_LAT0": -32.5, "SIH_LOC_LON0": 151.2, "SIH_LOC_H0": 20.0}
     client = Client(parameters=there)
     client.run(2.0)
     for name in ("GLOBAL_POSITION_INT", "GPS_RAW_INT"):
         told = client.last(name)
-        assert (told.lat, told.lon) == pytest.approx((-339_000_000, 1_512_000_000), abs=100)
+        assert (told.lat, told.lon) == pytest.approx((-325_000_000, 1_512_000_000), abs=100)
         assert told.alt == pytest.approx(20_000, abs=500)
     assert client.last("ALTITUDE").altitude_monotonic == pytest.approx(20.0, abs=3.0)
+    client.take_off(6.0)
+    client.command(192, -1, 1, 0, math.nan, 90.0, -100.0, math.nan)
+    client.run(1.0)
+    assert client.last("POSITION_TARGET_GLOBAL_INT").lat_int == 900_000_000
 
 
 @pytest.fixture(scope="module")
