@@ -107,6 +107,7 @@ class Commander:
 
     def _disarmed(self, reason: Reason) -> None:
         self.texts.say(Severity.INFO, f"Disarmed by {reason}")
+        self.parameters.set("COM_FLIGHT_UUID", self.parameters["COM_FLIGHT_UUID"] + 1)
         self.navigator.view.armed = False
         self.navigator.disarmed()
         self.modes.apply(ModeEvent.DISARMED, self._conditions)

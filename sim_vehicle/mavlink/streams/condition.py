@@ -128,10 +128,10 @@ def autopilot_version(state: Telemetry) -> Message:
 
 
 def flight_information(state: Telemetry) -> Message:
+    """Times since boot, whatever the fields are called (FLIGHT_INFORMATION.hpp)."""
     arming = state.autopilot.arming
-    epoch_us = state.epoch_at_boot_us
-    armed_us = epoch_us + arming.armed_at_us if arming.armed else 0
-    taken_off_us = epoch_us + arming.taken_off_at_us if arming.armed and arming.taken_off else 0
+    armed_us = arming.armed_at_us if arming.armed else 0
+    taken_off_us = arming.taken_off_at_us if arming.armed and arming.taken_off else 0
     return dialect.MAVLink_flight_information_message(
         boot_ms(state.sample), armed_us, taken_off_us, int(state.parameter("COM_FLIGHT_UUID"))
     )

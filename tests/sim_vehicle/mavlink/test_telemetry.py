@@ -44,7 +44,7 @@ def test_each_links_set_is_sent_at_its_rates(kind):
 @pytest.fixture(scope="module")
 def hovering() -> Client:
     """A vehicle that has taken off and holds, with everything asked for that is not sent unasked."""
-    client = Client()
+    client = Client(epoch_at_boot_us=10**15)
     client.take_off(14.0)
     return client
 
@@ -62,6 +62,7 @@ def test_every_message_can_be_asked_for(hovering, kind):
             break
     kinds = [message.get_type() for _, message in hovering.received]
     assert kinds.index(dialect.mavlink_map[kind.message_id].msgname) < kinds.index("COMMAND_ACK")
+    assert kind.message_id != 264 or hovering.last("FLIGHT_INFORMATION").takeoff_time_utc < 14e6
 
 
 def test_places_agree(hovering):
@@ -127,8 +128,10 @@ def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_
     assert late.current_consumed > 30
     assert client.last("SYS_STATUS").battery_remaining == 50
     client.send(dialect.MAVLink_param_set_message(1, 1, b"BAT1_V_CHARGED", 1e30, 9))
+    client.command(400, 0, 21196)
     client.run(2.1)
     assert client.last("SYS_STATUS").voltage_battery == client.last("BATTERY_STATUS").voltages[0] == 65_534
+    assert client.vehicle.parameters["COM_FLIGHT_UUID"] == 1
 
 
 def test_the_world_lies_where_the_parameters_say():
