@@ -77,6 +77,13 @@ def test_what_is_meant_for_others_is_passed_on_between_links():
     assert [packet for packet in companion.packets if packet[7] == 76] == [asked]
     # And somebody who was never heard gets nothing
     assert asked not in silent.packets
+    # When the ground station is gone in the middle of an upload, the companion may begin one
+    station.send(dialect.MAVLink_mission_count_message(1, 1, 2))
+    vehicle.run(0.05)
+    vehicle.vehicle.remove_link(vehicle.links[1])
+    companion.send(dialect.MAVLink_mission_count_message(1, 1, 2))
+    vehicle.run(0.05)
+    assert companion.last("MISSION_REQUEST_INT").seq == 0
 
 
 def test_a_ping_comes_back_to_its_sender():
