@@ -168,8 +168,8 @@ class TcpServerPort(SocketPort):
         self._clients: list[_Client] = []
 
     def receive(self) -> None:
-        # Nobody waits to be let in, or has gone again before he was.
-        with contextlib.suppress(BlockingIOError, ConnectionError):
+        # Nobody waits to be let in, or has gone again before he was; or there are more than this process may open.
+        with contextlib.suppress(OSError):
             connection, _ = self._socket.accept()
             self._clients.append(_Client(connection, connected(self._vehicle, self._kind)))
         for client in self._clients:
