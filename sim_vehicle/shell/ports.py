@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import socket
+import time
 from typing import TypeAlias
 
 import serial
@@ -79,8 +80,8 @@ def send_datagrams(link: socket.socket, packets: tuple[bytes, ...], remote: Addr
             link.sendto(packet, remote)
 
 
-# A client silent for this time has gone; ground stations send a heartbeat a second.
-CLIENT_GONE_AFTER_US = 30_000_000
+# A client silent for this time has gone; ground stations send a heartbeat a second of the machine's time.
+CLIENT_GONE_AFTER_S = 30.0
 # More clients than this are no ground stations: somebody sends from ever new ports.
 MOST_CLIENTS = 32
 
@@ -130,21 +131,21 @@ class UdpServerPort(SocketPort):
         self._vehicle = vehicle
         self._kind = kind
         self._clients: dict[Address, Link] = {}
-        self._heard_us: dict[Address, int] = {}
+        self._heard_s: dict[Address, float] = {}
 
     def receive(self) -> None:
-        now_us = self._vehicle.time_boot_us
+        now_s = time.monotonic()
         for datagram, sender in received_datagrams(self._socket):
             link = self._clients.get(sender)
             if link is None:
                 if len(self._clients) >= MOST_CLIENTS:
                     continue
                 link = self._clients[sender] = connected(self._vehicle, self._kind)
-            self._heard_us[sender] = now_us
+            self._heard_s[sender] = now_s
             link.push(datagram)
-        for address, heard_us in list(self._heard_us.items()):
-            if now_us - heard_us > CLIENT_GONE_AFTER_US:
-                del self._heard_us[address]
+        for address, heard_s in list(self._heard_s.items()):
+            if now_s - heard_s > CLIENT_GONE_AFTER_S:
+                del self._heard_s[address]
                 self._vehicle.remove_link(self._clients.pop(address))
 
     def send(self) -> None:
