@@ -65,7 +65,9 @@ class SimulatedVehicle:
         self.texts: tuple[StatusText, ...] = ()
         self._links_so_far = 0
         self._companion_link: Link | None = None
-        self.parameters = Parameters({**defaults_from(airframe), **(parameters or {})})
+        self.parameters = Parameters(defaults_from(airframe))
+        for name, value in (parameters or {}).items():
+            self.parameters.set(name, value)
         self._plant = Plant(with_parameters(airframe, self.parameters), scene, seed, keeps_path)
         self.state, self.constants = self._plant.state, self._plant.constants
         self.truth = self._plant.truth

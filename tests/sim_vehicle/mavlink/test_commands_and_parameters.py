@@ -199,6 +199,7 @@ def test_what_is_out_of_range_is_stored_but_does_not_count(value, counts):
     parameters.set("MPC_Z_VEL_MAX_UP", value)
     assert str(parameters.stored("MPC_Z_VEL_MAX_UP")) == str(value)
     assert parameters["MPC_Z_VEL_MAX_UP"] == counts
+    assert Client(parameters={"MPC_Z_VEL_MAX_UP": value}).vehicle.parameters["MPC_Z_VEL_MAX_UP"] == counts
 
 
 @pytest.mark.parametrize("name", built_in_airframes())
@@ -210,9 +211,9 @@ def test_the_loops_begin_with_the_gains_that_the_parameters_tell(name):
 
 
 def test_a_gain_changes_how_the_vehicle_flies():
-    # Given two vehicles that are asked 2 m to the side, one with half of the gain
+    # Given two vehicles that are asked 2 m to the side, of which one keeps the lower gain with which it begins
     def distance_after(gain: float) -> float:
-        client = Client()
+        client = Client(parameters={"MPC_XY_P": 0.5})
         set_to(client, "MPC_XY_P", gain, REAL32)
         client.take_off(8.0)
         client.run(0.2, lambda: client.setpoint(2.0, 0.0, -2.0))
