@@ -42,7 +42,7 @@ class Takeoff:
             self.state = TakeoffState.READY
         if self.state is TakeoffState.READY and wants_takeoff:
             self.state, self._since_us = TakeoffState.RAMP_UP, now_us
-        if self.state is TakeoffState.RAMP_UP and self._passed_s(now_us) >= self._parameters["MPC_TKO_RAMP_T"]:
+        elif self.state is TakeoffState.RAMP_UP and self._passed_s(now_us) >= self._parameters["MPC_TKO_RAMP_T"]:
             self.state = TakeoffState.FLIGHT
         elif self.state is TakeoffState.FLIGHT and landed:
             self.state = TakeoffState.READY
@@ -69,7 +69,8 @@ class Takeoff:
     def _ramp_climb_m_s(self, now_us: int) -> float:
         """From where the velocity control would take the whole weight off the motors to MPC_Z_VEL_MAX_UP."""
         start = -GRAVITY_M_S2 / self._parameters["MPC_Z_VEL_P_ACC"]
-        progress = self._passed_s(now_us) / self._parameters["MPC_TKO_RAMP_T"]
+        ramp_s = self._parameters["MPC_TKO_RAMP_T"]
+        progress = self._passed_s(now_us) / ramp_s if ramp_s > 0.0 else 1.0
         return start + progress * (self._parameters["MPC_Z_VEL_MAX_UP"] - start)
 
     def _passed_s(self, now_us: int) -> float:
