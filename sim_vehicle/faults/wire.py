@@ -52,7 +52,6 @@ class Wire:
         self._faults_so_far = 0
         self._held: list[tuple[int, int, bytes]] = []
         self._count = 0
-        self.lost = 0
         for fault in faults:
             self.add(fault)
 
@@ -84,7 +83,6 @@ class Wire:
         for stretch in acting:
             if stretch.hits(frame):
                 copies = [fate for due_us, copy in copies for fate in stretch.fates(copy, due_us)]
-        self.lost += not copies
         for due_us, copy in copies:
             # Numbered, so that what arrives together keeps its order.
             heapq.heappush(self._held, (due_us, self._count, copy))

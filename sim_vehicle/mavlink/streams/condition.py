@@ -80,16 +80,11 @@ def battery_status(state: Telemetry) -> Message:
 
 
 def servo_output_raw(state: Telemetry) -> Message:
-    motors = _pulse_widths(state)
+    fractions = state.sample.motor_fractions if state.autopilot.arming.armed else ()
+    motors = [round(PWM_LEAST_US + PWM_SPAN_US * fraction) for fraction in fractions]
     return dialect.MAVLink_servo_output_raw_message(
         state.sample.time_boot_us & 0xFFFFFFFF, 0, *motors, *([PWM_OFF_US] * (OUTPUTS - len(motors)))
     )
-
-
-def _pulse_widths(state: Telemetry) -> list[int]:
-    if not state.autopilot.arming.armed:
-        return [PWM_OFF_US] * 4
-    return [round(PWM_LEAST_US + PWM_SPAN_US * fraction) for fraction in state.sample.motor_fractions]
 
 
 def manual_control(state: Telemetry) -> Message:

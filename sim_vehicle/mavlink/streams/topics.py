@@ -3,10 +3,9 @@
 from enum import IntEnum
 
 from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.autopilot.offboard import STATUS_PERIOD_US
 from sim_vehicle.mavlink.telemetry import Telemetry
 
-# vehicle_status is published when it changes and at least at 2 Hz.
-STATUS_PERIOD_US = 500_000
 NEVER_SENT = -1
 
 
