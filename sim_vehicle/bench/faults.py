@@ -68,7 +68,7 @@ _HAVE_TO_END = ("gust", "battery_sag", "push")
 
 def sensor_dropout(sensor: Literal["imu", "gps"] = "imu") -> FaultRequest:
     """A sensor gives nothing. `imu`: no inertial message is sent; `gps`: as `gps_loss`."""
-    return other("imu_dropout") if sensor == "imu" else gps_loss()
+    return gps_loss() if sensor == "gps" else other(f"{sensor}_dropout")
 
 
 def gps_loss(drift_m_s2: float = 0.1) -> FaultRequest:

@@ -129,6 +129,7 @@ def test_an_estimate_is_reset_and_says_so() -> None:
         (faults.other("payload_drop", mass_kg=0.1), 2.0, "payload_drop cannot be undone"),
         (faults.link_cut(), 0.0, "for_s must be more than 0"),
         (faults.other("gremlins"), None, "gremlins"),
+        (faults.sensor_dropout("baro"), None, "baro_dropout"),  # type: ignore[arg-type]
     ],
 )
 def test_what_cannot_be_injected_is_one_sentence(request_: FaultRequest, for_s: float | None, words: str) -> None:
