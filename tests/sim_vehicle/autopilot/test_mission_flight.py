@@ -160,6 +160,7 @@ def test_flown_again_after_landing_it_begins_with_the_first_item():
     [
         ([LAND_AT_HOME, NORTH], "Mission rejected: starts with landing"),
         ([NORTH, TAKEOFF], "Mission rejected: takeoff not first waypoint item"),
+        ([item(kinds.ARM_DISARM), TAKEOFF], "Mission rejected: takeoff not first waypoint item"),
         ([item(kinds.TAKEOFF, up_m=-1.0)], "Mission rejected: Takeoff altitude below home altitude!"),
     ],
 )
