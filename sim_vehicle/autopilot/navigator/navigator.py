@@ -165,6 +165,8 @@ class Navigator:
             return
         self._updated_us = view.now_us
         self.notice_changes()
+        # What was not flown at once is out of date (loiter.cpp), as where the mode was refused.
+        self._reposition = None
         was_breached = self.fence.breached
         self.fence.update(view, self._holds_after_breach)
         if self.fence.breached and not was_breached and view.armed:

@@ -6,7 +6,7 @@ from sim_vehicle.autopilot.commander import failsafe_table
 from sim_vehicle.autopilot.commander.failsafe import MODE_OF, Failsafe
 from sim_vehicle.autopilot.commander.failsafe_table import OFFBOARD_LOSS, Action, FailsafeSituation, FailsafeTrigger
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, INJECT_FAILURE
-from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
+from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION, DO_REPOSITION
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
@@ -187,6 +187,9 @@ def test_one_that_sees_the_ground_lands_without_gps_and_holds_again_with_it():
     lose_gps(flight)
     flight.fly(5.1)
     assert (flown(flight), flight.autopilot.modes.intended) == (Mode.LAND, Mode.LOITER)
+    assert flight.ask(DO_REPOSITION, -1, 1, 0, 0, 47.398, 8.5456) is Result.TEMPORARILY_REJECTED
+    flight.fly(0.6)
     assert flight.ask(INJECT_FAILURE, 4, 0) is Result.ACCEPTED
-    flight.fly(0.1)
-    assert flown(flight) is Mode.LOITER
+    flight.fly(5.0)
+    # Where it is, and not where it was refused to go
+    assert flown(flight) is Mode.LOITER and abs(flight.state.position_ned_m[0]) < 1.0
