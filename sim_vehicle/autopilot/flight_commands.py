@@ -23,7 +23,7 @@ DO_REPOSITION = 192
 MISSION_START = 300
 
 _SWITCH_MODE = 1
-"""MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: without it, or with any other flag, PX4 does not do it."""
+"""MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: else the commander refuses, yet a navigator that holds goes (loiter.cpp)."""
 
 
 def from_mission(given: StoredItem) -> Command:
@@ -37,10 +37,10 @@ def _take_off(command: Command, commander: Commander) -> Result:
 
 
 def _reposition(command: Command, commander: Commander) -> Result:
-    if int(_given(command.param2) or 0) != _SWITCH_MODE:
-        return Result.UNSUPPORTED
     if commander.arming.armed and not commander.navigator.hold_at(_repositioned(command, commander)):
         commander.texts.say(Severity.CRITICAL, "Reposition is outside geofence")
+    if int(_given(command.param2) or 0) != _SWITCH_MODE:
+        return Result.UNSUPPORTED
     return commander.request_mode(Mode.LOITER)
 
 

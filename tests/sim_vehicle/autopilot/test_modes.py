@@ -248,8 +248,11 @@ def test_a_reposition_of_nothing_stops_the_vehicle():
 
 
 @pytest.mark.parametrize("flags", [0, 2, 3])
-def test_a_reposition_without_the_change_of_mode_is_not_supported(flags):
-    assert hovering(5.0).ask(DO_REPOSITION, -1, flags, 0, NAN, NAN, NAN, NAN) is Result.UNSUPPORTED
+def test_a_reposition_without_the_change_of_mode_is_not_supported_and_flown_in_hold(flags):
+    flight = hovering(5.0)
+    assert flight.ask(DO_REPOSITION, -1, flags, 0, NAN, *place(3.0, 0.0), NAN) is Result.UNSUPPORTED
+    flight.fly(8.0)
+    assert math.dist(north_east(flight), (3.0, 0.0)) < 0.1
 
 
 @pytest.mark.parametrize("radius_m", [10.0, -10.0])
