@@ -130,26 +130,24 @@ class UdpServerPort(SocketPort):
         super().__init__(socket.SOCK_DGRAM, host, port)
         self._vehicle = vehicle
         self._kind = kind
-        self._clients: dict[Address, Link] = {}
-        self._heard_s: dict[Address, float] = {}
+        # With the time at which each was heard last.
+        self._clients: dict[Address, tuple[Link, float]] = {}
 
     def receive(self) -> None:
         now_s = time.monotonic()
         for datagram, sender in received_datagrams(self._socket):
-            link = self._clients.get(sender)
-            if link is None:
-                if len(self._clients) >= MOST_CLIENTS:
-                    continue
-                link = self._clients[sender] = connected(self._vehicle, self._kind)
-            self._heard_s[sender] = now_s
+            if sender not in self._clients and len(self._clients) >= MOST_CLIENTS:
+                continue
+            link = self._clients[sender][0] if sender in self._clients else connected(self._vehicle, self._kind)
+            self._clients[sender] = link, now_s
             link.push(datagram)
-        for address, heard_s in list(self._heard_s.items()):
+        for address, (link, heard_s) in list(self._clients.items()):
             if now_s - heard_s > CLIENT_GONE_AFTER_S:
-                del self._heard_s[address]
-                self._vehicle.remove_link(self._clients.pop(address))
+                del self._clients[address]
+                self._vehicle.remove_link(link)
 
     def send(self) -> None:
-        for address, link in self._clients.items():
+        for address, (link, _) in self._clients.items():
             send_datagrams(self._socket, link.take(), address)
 
 
