@@ -136,10 +136,10 @@ class MissionFlight:
         if self._work is Work.ITEM:
             if command == kinds.LAND:
                 return view.landed
-            if command == kinds.LOITER_UNLIMITED:
-                return False
             if command not in kinds.WITH_POSITION:
                 return True
+            if command == kinds.LOITER_UNLIMITED or not math.isfinite(item.place.altitude_m):
+                return False
         return self._arrival.is_reached(self.target, self._acceptance(item, view), view, self._parameters)
 
     def _acceptance(self, item: StoredItem, view: View) -> Acceptance:
@@ -196,7 +196,10 @@ class MissionFlight:
         place = place_of(item, self._origin, view.home_ned_m)
         north, east, _ = view.position_ned_m
         before, self._work = self._work, Work.ITEM
-        if before is Work.ITEM and self._climb_down_m is not None:
+        if not math.isfinite(place[2]):
+            # FlightTaskAuto stays where it is.
+            self.target, self._climb_down_m = NavigatorTarget(Kind.HOLD, view.position_ned_m), None
+        elif before is Work.ITEM and self._climb_down_m is not None:
             self._work = Work.CLIMB
             height_m = view.home_ned_m[2] - self._climb_down_m
             self._texts.say(Severity.INFO, f"Climb to {height_m:.1f} meters above home")

@@ -114,12 +114,13 @@ def test_return_as_an_item_returns():
     assert flight.autopilot.modes.intended is Mode.LOITER
 
 
-def test_an_item_without_autocontinue_is_stayed_at():
-    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, autocontinue=0), NORTH)
-    reached(flight, 1)
-    flight.fly(10.0)
-    assert flight.autopilot.missions.current == 1
-    assert math.dist(north_east(flight), (10.0, 0.0)) < 0.1
+@pytest.mark.parametrize("stays", [{"autocontinue": 0}, {"up_m": math.inf}, {"up_m": math.nan}])
+def test_an_item_without_autocontinue_is_stayed_at_and_before_one_of_no_height(stays):
+    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, **stays), NORTH)
+    reached(flight, 0)
+    flight.fly(20.0)
+    assert flight.autopilot.missions.current == 1 and flight.height_m == pytest.approx(5.0, abs=0.9)
+    assert math.dist(north_east(flight), (0.0 if "up_m" in stays else 10.0, 0.0)) < 0.1
 
 
 def test_pause_holds_and_resume_goes_on_with_the_same_item():
