@@ -88,6 +88,7 @@ def test_armed_and_left_alone_it_stays_on_the_ground_and_disarms():
         assert waited_s == pytest.approx(11.0, abs=0.02)
         assert flight.height_m == 0.0
         assert flight.autopilot.texts[-1].text == "Disarmed by auto preflight disarming"
+        assert flight.parameters["COM_FLIGHT_UUID"] == 1
 
 
 def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground():

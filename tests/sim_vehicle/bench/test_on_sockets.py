@@ -99,12 +99,11 @@ def test_a_pause_stands_still_and_goes_on_where_it_stood() -> None:
 
 
 def test_its_speed_can_be_changed() -> None:
-    with start_vehicle(speed=1.0) as vehicle:
+    with start_vehicle(speed=1.0) as vehicle, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         assert took_s(lambda: passes(vehicle, 0.2)) > 0.19
         vehicle.speed = 0
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
-            End(lambda raw: client.sendto(raw, (HERE, vehicle.udp_port))).heartbeat()
-            assert took_s(lambda: passes(vehicle, 35.0)) < 25.0
+        End(lambda raw: client.sendto(raw, (HERE, vehicle.udp_port))).heartbeat()
+        assert took_s(lambda: passes(vehicle, 35.0)) < 25.0
         # For a client on the machine's clock it was a moment
         assert len(vehicle._bench.vehicle._links) == 1
         vehicle.speed = 2.0

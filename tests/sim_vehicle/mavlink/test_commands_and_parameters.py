@@ -69,11 +69,9 @@ def test_answers_on_the_ground(client, number, params, answers):
     assert results(client, number, *params) == answers
 
 
-@pytest.mark.parametrize(
-    ("target", "ours"), [((0, 0), True), ((0, 1), True), ((1, 0), True), ((2, 1), False), ((1, 191), False)]
-)
-def test_only_what_is_addressed_to_us_is_answered(client, target, ours):
-    assert bool(results(client, SET_MODE, 1, 4, 3, target=target)) is ours
+@pytest.mark.parametrize("target", [(0, 0), (0, 1), (1, 0), (2, 1), (1, 191)])
+def test_only_what_is_addressed_to_us_is_answered(client, target):
+    assert bool(results(client, SET_MODE, 1, 4, 3, target=target)) is (target[0] < 2 and target[1] < 2)
 
 
 @pytest.mark.parametrize("custom", [(1, 4, 4), (1, 4, 6), (1, 4, 5), (1, 3)])

@@ -239,10 +239,7 @@ def test_a_fence_has_three_corners_at_least():
         (wire_item(0, params=(5.0, 2.0, 3.0, -90.0)), (5.0, 2.0, 0.0, 270.0)),
         (wire_item(0, commands.LOITER_TIME, params=(5.0, 2.0, 3.0, 4.0)), (5.0, 1.0, 3.0, 1.0)),
         (wire_item(0, commands.LAND, params=(1.0, 0.0, 3.0, 10.0)), (0.0, 0.0, 0.0, 10.0)),
-        (
-            wire_item(0, commands.DO_CHANGE_SPEED, frame=commands.FRAME_MISSION, params=(2.0, 3.0, 0.0, 0.0)),
-            (2.0, 3.0, 0.0, 0.0),
-        ),
+        (wire_item(0, commands.DO_CHANGE_SPEED, frame=2, params=(2.0, 3.0, 0.0, 0.0)), (2.0, 3.0, 0.0, 0.0)),
     ],
 )
 def test_what_px4_keeps_of_an_items_parameters(sent, stored):
