@@ -55,18 +55,15 @@ class Arming:
                 self.taken_off, self.taken_off_at_us = True, now_us
             self._landed_since_us = None
             return None
-        if not self.taken_off:
-            # PX4 counts both for an armed vehicle on which nobody acts; a time of 0 or less switches it off.
-            allowed_s = self._parameters["COM_DISARM_PRFLT"]
-            waited_s = (now_us - self.armed_at_us) / 1e6
-            if allowed_s <= 0 or waited_s < allowed_s + self._parameters["COM_SPOOLUP_TIME"]:
-                return None
-            self.armed = False
-            return Reason.INACTION
         if self._landed_since_us is None:
             self._landed_since_us = now_us
-        wait_s = self._parameters["COM_DISARM_LAND"]
-        if wait_s <= 0 or (now_us - self._landed_since_us) / 1e6 < wait_s:
+        since_us, wait_s, more_s = self._landed_since_us, self._parameters["COM_DISARM_LAND"], 0.0
+        if not self.taken_off:
+            # PX4 counts both for an armed vehicle on which nobody acts.
+            since_us, wait_s = self.armed_at_us, self._parameters["COM_DISARM_PRFLT"]
+            more_s = self._parameters["COM_SPOOLUP_TIME"]
+        # A time of 0 or less switches it off.
+        if wait_s <= 0 or (now_us - since_us) / 1e6 < wait_s + more_s:
             return None
         self.armed = False
-        return Reason.LANDING
+        return Reason.LANDING if self.taken_off else Reason.INACTION

@@ -122,7 +122,7 @@ class Commander:
         if self.sticks.sticks is not None:
             self.sticks.update(now_us)
             self._obey_sticks()
-        if self.modes.flown in _ENDS_BY_ITSELF and not self._detector.landed:
+        if self.modes.flown in (Mode.MISSION, Mode.TAKEOFF) and not self._detector.landed:
             over = self._what_is_over()
             if over is not None and self.modes.apply(over, self._conditions):
                 self._judge()
@@ -254,6 +254,3 @@ class Commander:
         if self.arming.armed:
             return SystemStatus.FAILSAFE if self.failsafe.acts else SystemStatus.ACTIVE
         return SystemStatus.STANDBY if self.checks_pass else SystemStatus.NOT_READY
-
-
-_ENDS_BY_ITSELF = (Mode.MISSION, Mode.TAKEOFF)
