@@ -56,7 +56,8 @@ def _set_mode(command: Command, commander: Commander) -> Result:
     base, main, sub = _byte(command.param1), _byte(command.param2), _byte(command.param3)
     mode = mode_from_request(base, main, sub)
     if mode is not None:
-        return commander.request_mode(mode)
+        # MAV_COMP_ID_MISSIONPLANNER: a ground station is told, others are not.
+        return commander.request_mode(mode, tells=command.source_component == 190)
     kind = "base" if not base & CUSTOM_FLAG else "auto" if main == AUTO_MAIN_MODE else "main"
     commander.texts.say(Severity.CRITICAL, f"Unsupported {kind} mode")
     return Result.TEMPORARILY_REJECTED

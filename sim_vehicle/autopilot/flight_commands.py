@@ -64,7 +64,7 @@ def _change_speed(command: Command, commander: Commander) -> Result:
 
 
 def _orbit(command: Command, commander: Commander) -> Result:
-    result = commander.request_mode(Mode.ORBIT)
+    result = commander.request_mode(Mode.ORBIT, tells=False)
     if result is not Result.ACCEPTED:
         commander.texts.say(Severity.CRITICAL, "Orbit command rejected")
         return result

@@ -13,6 +13,7 @@ from sim_vehicle.autopilot.commander.failsafe_table import FailsafeSituation
 from sim_vehicle.autopilot.commander.watching import GroundStation, ManualInput, Positioning
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText, Texts
+from sim_vehicle.autopilot.mode_numbers import NUMBERS
 from sim_vehicle.autopilot.modes import (
     NEEDS,
     NOT_ARMABLE,
@@ -69,10 +70,12 @@ class Commander:
 
     # --- requests --------------------------------------------------------------------------------------------
 
-    def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
-        """Change the mode as a command asks; ``says_so`` is the text for a change that was accepted."""
+    def request_mode(self, mode: Mode, says_so: str | None = None, tells: bool = True) -> Result:
+        """Change the mode as a command asks; ``says_so``: the text for a change; ``tells``: a refusal has one."""
         self._ever_requested = True
         if not self.modes.apply(ModeEvent.REQUEST, self._conditions, mode):
+            if tells:
+                self.texts.say(Severity.CRITICAL, f"Switching to {NUMBERS[mode].title} is currently not available")
             return Result.TEMPORARILY_REJECTED
         self._judge()
         if says_so is not None:
@@ -140,10 +143,8 @@ class Commander:
         return ModeEvent.TAKEOFF_REACHED if self.navigator.takeoff_is_over else None
 
     def _obey_sticks(self) -> None:
-        if self.sticks.sticks is None:
-            return
         if not self.arming.armed:
-            if not self._ever_requested:
+            if not self._ever_requested and self.sticks.sticks is not None:
                 # As long as nobody has chosen a mode, sticks that arrive choose theirs.
                 self._ever_requested = True
                 self.modes.mean(Mode.POSCTL)

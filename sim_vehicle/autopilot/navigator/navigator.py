@@ -165,8 +165,7 @@ class Navigator:
             return
         self._updated_us = view.now_us
         self.notice_changes()
-        # What was not flown at once is out of date (loiter.cpp), as where the mode was refused.
-        self._reposition = None
+        self._reposition = None  # what was not flown at once is out of date, as after a refusal (loiter.cpp)
         was_breached = self.fence.breached
         self.fence.update(view, self._holds_after_breach)
         if self.fence.breached and not was_breached and view.armed:

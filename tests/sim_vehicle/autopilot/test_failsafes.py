@@ -185,8 +185,8 @@ def test_one_that_sees_the_ground_lands_without_gps_and_holds_again_with_it():
     flight.fly(5.1)
     assert (flown(flight), flight.autopilot.modes.intended) == (Mode.LAND, Mode.LOITER)
     assert flight.ask(DO_REPOSITION, -1, 1, 0, 0, 47.398, 8.5456) is Result.TEMPORARILY_REJECTED
+    assert flight.texts()[-1] == "Switching to Hold is currently not available"
     flight.fly(0.6)
     assert flight.ask(INJECT_FAILURE, 4, 0) is Result.ACCEPTED
     flight.fly(5.0)
-    # Where it is, and not where it was refused to go
     assert flown(flight) is Mode.LOITER and abs(flight.state.position_ned_m[0]) < 1.0

@@ -104,7 +104,6 @@ def test_its_speed_can_be_changed() -> None:
         vehicle.speed = 0
         End(lambda raw: client.sendto(raw, (HERE, vehicle.udp_port))).heartbeat()
         assert took_s(lambda: passes(vehicle, 35.0)) < 25.0
-        # For a client on the machine's clock it was a moment
         assert len(vehicle._bench.vehicle._links) == 1
         vehicle.speed = 2.0
         assert vehicle.speed == 2.0
