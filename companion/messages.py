@@ -217,17 +217,11 @@ class CommandAck(Sample):
 
 
 @dataclass(frozen=True, slots=True)
-class TimeSyncRequest(Sample):
-    """TIMESYNC with tc1 = 0: the vehicle asks for our time."""
+class TimeSync(Sample, Outgoing):
+    """TIMESYNC, either way: who asks sends its own time, which whoever answers sends back with its own."""
 
-    vehicle_time_ns: int
-
-
-@dataclass(frozen=True, slots=True)
-class TimeSyncAnswer(Sample):
-    """TIMESYNC that answers ours, by the time we sent."""
-
-    companion_time_ns: int
+    asked_ns: int
+    answered_ns: int | None = None  # of a question
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,19 +347,6 @@ class OnboardHeartbeat(Outgoing):
     """Our own HEARTBEAT as an onboard computer; `active` while a flight is under way."""
 
     active: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TimeSyncReply(Outgoing):
-    vehicle_time_ns: int
-    companion_time_ns: int
-
-
-@dataclass(frozen=True, slots=True)
-class TimeSyncAsk(Outgoing):
-    """TIMESYNC of our own; the vehicle echoes the time."""
-
-    companion_time_ns: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -138,9 +138,9 @@ def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> 
             survey.parameters[name] = value
         case messages.EstimatorStatus():
             survey.estimator.append(sample)
-        case messages.TimeSyncRequest(vehicle_time_ns):
-            outgoing.append(messages.TimeSyncReply(vehicle_time_ns, now_us * 1000))
-        case messages.TimeSyncAnswer():
+        case messages.TimeSync(asked_ns, None):
+            outgoing.append(messages.TimeSync(asked_ns, now_us * 1000))
+        case messages.TimeSync():
             survey.round_trip.update(sample, now_us)
         case messages.ImuSample() if listens:
             survey.imu.append(sample)

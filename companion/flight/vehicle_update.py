@@ -49,10 +49,11 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             continue
         elif isinstance(sample, messages.Parameter) and sample.name in vehicle.autopilot.attitude_parameters:
             _note_attitude_parameter(flight, sample, now_us)
-        elif isinstance(sample, messages.TimeSyncRequest):
-            flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
-        elif isinstance(sample, messages.TimeSyncAnswer):
-            flight.round_trip.update(sample, now_us)
+        elif isinstance(sample, messages.TimeSync):
+            if sample.answered_ns is None:
+                flight.outbox.append(messages.TimeSync(sample.asked_ns, now_us * 1000))
+            else:
+                flight.round_trip.update(sample, now_us)
         was_known = vehicle.is_mode_known
         vehicle.update(sample, now_us, flight.own_modes)
         if type(sample) in _FLYING:

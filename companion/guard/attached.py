@@ -14,7 +14,7 @@ from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.encode import Encoder
 from companion.mavlink.moves import SETPOINTS, asked_of
 from companion.mavlink.readers import sample_from
-from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk
+from companion.messages import OnboardHeartbeat, Sample, TimeSync
 from companion.report import Event
 
 # Own setpoints that are remembered until they pass the gate: one for each IMU sample of a second, in which PX4 holds
@@ -77,7 +77,7 @@ class AttachedGuard:
         self._arrived.clear()
         sent: list[tuple[str, Mapping[str, Any]]] = []
         for message in outputs.messages:
-            if not isinstance(message, OnboardHeartbeat | TimeSyncAsk):
+            if not isinstance(message, OnboardHeartbeat | TimeSync):
                 sent += self._encoder.fields(message)
         for name, fields in sent:
             if name in SETPOINTS:

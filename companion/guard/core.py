@@ -10,7 +10,7 @@ from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
 from companion.guard.watching import GuardConnect, goes_down, observe, why_not
-from companion.messages import PositionTarget, Sample, Sticks, TimeSyncRequest
+from companion.messages import PositionTarget, Sample, Sticks, TimeSync
 from companion.reflex.detection.detector import Situation
 
 
@@ -39,7 +39,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         if self.flight.keeps_others_out:
             # A program behind the guard answers, by its own clock: two answers are two times.
-            samples = [sample for sample in samples if not isinstance(sample, TimeSyncRequest)]
+            samples = [one for one in samples if not isinstance(one, TimeSync) or one.answered_ns is not None]
         return samples, observe(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:

@@ -7,7 +7,7 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from statistics import median_low
 
-from companion.messages import TimeSyncAnswer, TimeSyncAsk
+from companion.messages import TimeSync
 
 # Until a first answer as often as PX4 asks by itself (its TIMESYNC stream has 10 Hz): a lost packet delays nothing, and
 # a slow link is judged by several answers at once. Then as often as a HEARTBEAT.
@@ -34,15 +34,15 @@ class RoundTrip:
     _asked_ns: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_ON_THE_WAY))  # not yet answered
     _is_told: bool = False
 
-    def ask(self, now_us: int) -> TimeSyncAsk:
+    def ask(self, now_us: int) -> TimeSync:
         """The next request."""
         self.due_us = now_us + (INTERVAL_US if self._recent_us else FIRST_INTERVAL_US)
         self._asked_ns.append(now_us * 1000)
-        return TimeSyncAsk(now_us * 1000)
+        return TimeSync(now_us * 1000)
 
-    def update(self, answer: TimeSyncAnswer, now_us: int) -> None:
+    def update(self, answer: TimeSync, now_us: int) -> None:
         """Take an answer; only the first to each request counts."""
-        asked_ns = answer.companion_time_ns
+        asked_ns = answer.asked_ns
         if asked_ns not in self._asked_ns:
             self.ignored += 1
             return

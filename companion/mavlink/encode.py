@@ -142,10 +142,8 @@ class Encoder:
                 return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
             case ComputerStatus():
                 return _computer(outgoing)
-            case messages.TimeSyncReply(vehicle_time_ns, companion_time_ns):
-                return dialect.MAVLink_timesync_message(companion_time_ns, vehicle_time_ns)
-            case messages.TimeSyncAsk(companion_time_ns):
-                return dialect.MAVLink_timesync_message(0, companion_time_ns)
+            case messages.TimeSync(asked_ns, answered_ns):
+                return dialect.MAVLink_timesync_message(answered_ns or 0, asked_ns)
             case messages.ReadParameter(name):
                 return dialect.MAVLink_param_request_read_message(*self._target, name.encode(), -1)
             case messages.SetParameter(name, value):

@@ -229,7 +229,7 @@ def _command_ack(command: int, result: int, target_component: int) -> Sample | N
 
 
 def _timesync(tc1: int, ts1: int) -> Sample:
-    return messages.TimeSyncRequest(ts1) if tc1 == 0 else messages.TimeSyncAnswer(ts1)
+    return messages.TimeSync(ts1, tc1 or None)
 
 
 def _parameter(param_id: bytes | str, param_value: float, param_type: int) -> Sample | None:

@@ -6,7 +6,7 @@ import pytest
 
 from companion import messages
 from companion.autopilot.setup import SerialLine, Verdict
-from companion.messages import Attitude, LocalPosition, Parameter, ReadParameter, Sample, TimeSyncAnswer, TimeSyncAsk
+from companion.messages import Attitude, LocalPosition, Parameter, ReadParameter, Sample, TimeSync
 from companion.mission.config import CompanionConfig
 from companion.preflight import Preflight, Survey, advance, findings
 
@@ -80,9 +80,9 @@ def surveyed(
             samples += [Parameter(name, value) for name, value in parameters.items()]
             samples += [replace(PX4, armed=flies), messages.ExtendedState(messages.LandedState(2 if flies else 1))]
         if asked and now_us - asked[0] // 1000 >= trip_us:
-            samples.append(TimeSyncAnswer(asked.pop(0)))
+            samples.append(TimeSync(asked.pop(0), 1))
         sent = advance(survey, samples, now_us)
-        asked += [message.companion_time_ns for message in sent if isinstance(message, TimeSyncAsk)]
+        asked += [message.asked_ns for message in sent if isinstance(message, TimeSync)]
     assert survey.finished
     return survey
 

@@ -6,7 +6,7 @@ import pytest
 
 from bench.fly.virtual_time import EPOCH_US
 from companion.link.round_trip import RoundTrip
-from companion.messages import TimeSyncAnswer, TimeSyncAsk
+from companion.messages import TimeSync
 from rebound_cli.live.console import state_fields
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.flight.test_companion_authority import heartbeat
@@ -237,7 +237,7 @@ def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told_once(los
 TICK_US = 4_000
 
 
-def asked_over(trip: RoundTrip, seconds: float, start_us: int = EPOCH_US) -> list[TimeSyncAsk]:
+def asked_over(trip: RoundTrip, seconds: float, start_us: int = EPOCH_US) -> list[TimeSync]:
     times = range(start_us, start_us + round(seconds * 1e6), TICK_US)
     return [trip.ask(now_us) for now_us in times if now_us >= trip.due_us]
 
@@ -245,8 +245,8 @@ def asked_over(trip: RoundTrip, seconds: float, start_us: int = EPOCH_US) -> lis
 def test_it_asks_ten_times_a_second_until_a_first_answer_and_then_once():
     trip = RoundTrip()
     first = asked_over(trip, 2.0)
-    assert [b.companion_time_ns - a.companion_time_ns for a, b in itertools.pairwise(first)] == [100_000_000] * 19
-    trip.update(TimeSyncAnswer(first[-1].companion_time_ns), EPOCH_US + 2_000_000)
+    assert [b.asked_ns - a.asked_ns for a, b in itertools.pairwise(first)] == [100_000_000] * 19
+    trip.update(TimeSync(first[-1].asked_ns, 1), EPOCH_US + 2_000_000)
     assert len(asked_over(trip, 5.0, EPOCH_US + 2_000_000)) == 5
 
 
@@ -259,10 +259,10 @@ def test_an_answer_to_nobodys_question_and_a_second_answer_are_counted_and_no_mo
     trip = RoundTrip()
     question = trip.ask(EPOCH_US)
     # When another's answer comes, then its own twice
-    trip.update(TimeSyncAnswer(question.companion_time_ns - 5_000_000_000), EPOCH_US + 1_000)
+    trip.update(TimeSync(question.asked_ns - 5_000_000_000, 1), EPOCH_US + 1_000)
     assert trip.present_us is None
-    trip.update(TimeSyncAnswer(question.companion_time_ns), EPOCH_US + 3_000)
-    trip.update(TimeSyncAnswer(question.companion_time_ns), EPOCH_US + 900_000)
+    trip.update(TimeSync(question.asked_ns, 1), EPOCH_US + 3_000)
+    trip.update(TimeSync(question.asked_ns, 1), EPOCH_US + 900_000)
     # Then one counts
     assert (trip.present_us, trip.summary_ms()) == (3_000, trip_ms(3.0, 3.0, 2))
 
@@ -273,7 +273,7 @@ def test_the_alarm_is_given_once_while_it_lasts_and_again_after_five_short_ones(
     # Given questions two seconds apart, each answered after so long
     for number, trip_us in enumerate(trips_us):
         now_us = EPOCH_US + 2_000_000 * number
-        trip.update(TimeSyncAnswer(trip.ask(now_us).companion_time_ns), now_us + trip_us)
+        trip.update(TimeSync(trip.ask(now_us).asked_ns, 1), now_us + trip_us)
         if trip.alarm() is not None:
             told.append(number)
     assert told == [7, 26]

@@ -59,8 +59,8 @@ CASES = [
         mav.MAVLink_command_ack_message(400, 1, 0, 0, 1, 191),
         ours.CommandAck(400, ours.CommandResult.TEMPORARILY_REJECTED),
     ),
-    (mav.MAVLink_timesync_message(0, 777), ours.TimeSyncRequest(777)),
-    (mav.MAVLink_timesync_message(5, 777), ours.TimeSyncAnswer(777)),
+    (mav.MAVLink_timesync_message(0, 777), ours.TimeSync(777)),
+    (mav.MAVLink_timesync_message(5, 777), ours.TimeSync(777, 5)),
     (mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", 0.5, 9, 900, 12), ours.Parameter("COM_OF_LOSS_T", 0.5)),
     # The bytes of a whole number travel in the float's place
     (
@@ -332,9 +332,9 @@ def test_commands_carry_their_parameters_and_zeros(command, number, parameters):
     ("outgoing", "fields"),
     [
         (ours.OnboardHeartbeat(True), {"type": 18, "autopilot": 8}),
-        (ours.TimeSyncReply(777, 12345), {"ts1": 777, "tc1": 12345}),
+        (ours.TimeSync(777, 12345), {"ts1": 777, "tc1": 12345}),
         # Our own question is told from an answer by its zero
-        (ours.TimeSyncAsk(12345), {"ts1": 12345, "tc1": 0}),
+        (ours.TimeSync(12345), {"ts1": 12345, "tc1": 0}),
         (ours.ReadParameter("COM_OF_LOSS_T"), {"target_system": 7, "param_id": "COM_OF_LOSS_T", "param_index": -1}),
         (ours.NamedValue(1_500_000, "rb_thresh", 4.25), {"name": "rb_thresh", "value": 4.25, "time_boot_ms": 1500}),
         (
