@@ -116,7 +116,8 @@ class Machine(StateMachine):
             self._take(transition, now_us)
             # The answers and positions of this step belong to the state that asked for them.
             transition = self.handler.step(self.flight, Inputs(), now_us)
-        if self.flight.expectations:
+        # A hit may be taken back until its recovery is over.
+        if self.state is not State.RECOVERING:
             expectations.review(self.flight, now_us)
         return self.handler is not before
 

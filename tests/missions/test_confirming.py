@@ -63,7 +63,7 @@ def spoil(air: Flight, kind: str, change: Callable[[Any], None], seconds: float)
 def cruising(*sets: str) -> Flight:
     """Flown once, and looked at in children alone."""
     keys = {"on_collision": {"then": "continue", "max_hits": 2}, "companion": {"streams": {"window_s": 0.5}}}
-    air = simulated(ITEMS, *sets, **keys)
+    air = simulated([ITEMS[0], {"expect": {"no_collision": {}}}, *ITEMS[1:]], *sets, **keys)
     air.run_until(lambda: air.state == "mission" and (air.companion.status().position_ned_m or (0,))[0] > 2.5)
     return air
 
@@ -80,6 +80,7 @@ def assert_goes_on(air: Flight, unconfirmed: int) -> None:
     air.run_to("landing", 4.0)
     assert motion(air)[0] == pytest.approx(6.0, abs=0.3)
     assert (air.report.collisions, air.report.unconfirmed, air.report.obstacles) == ((), unconfirmed, ())
+    assert air.told("expect") == []
 
 
 @pytest.mark.parametrize("force_m_s2", [-100.0, -10.0, -5.0, 40.0])
