@@ -21,7 +21,6 @@ from companion.guard.states import TABLE as GUARD
 from companion.mavlink import encode, readers
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from companion.state_table import StateTable
 from rebound_cli.check.schema import DescribedSchema
 from rebound_cli.main import TABLE
 from sim_vehicle.airframe import Airframe, load_built_in
@@ -223,20 +222,20 @@ def states() -> dict[str, str]:
     }
 
 
-def mermaid_diagram(states: StateTable[Any, Any]) -> str:
+def mermaid_diagram(states: Mapping[Any, Mapping[Any, Any]]) -> str:
     """Which state leads to which, each arrow once; a state's words are one name there."""
-    names = {state: str(state.value).replace(" ", "_") for state in states.rows}
+    names = {state: str(state.value).replace(" ", "_") for state in states}
     arrows = [f"    [*] --> {next(iter(names.values()))}"]
-    for state, row in states.rows.items():
+    for state, row in states.items():
         arrows += [f"    {names[state]} --> {names[target]}" for target in row.values() if target is not state]
-    arrows += [f"    {names[state]} --> [*]" for state in states.rows if state in states.final]
+    arrows += [f"    {names[state]} --> [*]" for state, row in states.items() if not row]
     return "\n".join(["stateDiagram-v2", *dict.fromkeys(arrows)]) + "\n"
 
 
-def transitions(states: StateTable[Any, Any]) -> str:
+def transitions(states: Mapping[Any, Mapping[Any, Any]]) -> str:
     """A row a trigger and what it leads to, with the states in which it does."""
     sources: dict[tuple[str, str], list[str]] = {}
-    for state, row in states.rows.items():
+    for state, row in states.items():
         for trigger, target in row.items():
             sources.setdefault((trigger.value, target.value), []).append(state.value)
     rows = [(trigger, ", ".join(inside), target) for (trigger, target), inside in sources.items()]

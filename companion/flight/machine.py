@@ -104,7 +104,7 @@ class Machine(StateMachine):
             if how is not None:
                 self._take(Transition(Trigger.CRASHED, how), now_us)
         for estimate in inputs.impacts:
-            if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
+            if Trigger.COLLISION in TABLE[self.state] and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
                     self.handler.interrupt(self.flight)
                 note_before(self.flight, self.state)
@@ -130,9 +130,9 @@ class Machine(StateMachine):
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
     def _take(self, transition: Transition, now_us: int) -> None:
-        if not TABLE.moves(self.state, transition.trigger):
+        if transition.trigger not in TABLE[self.state]:
             return
-        previous, self.state = self.state, TABLE.next_state(self.state, transition.trigger)
+        previous, self.state = self.state, TABLE[self.state][transition.trigger]
         self.handler = self._begin(previous, transition, now_us)
 
     def _begin(self, previous: State, transition: Transition, now_us: int) -> Handler:

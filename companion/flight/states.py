@@ -1,8 +1,7 @@
 """The flight's state machine: one table, from which everything else follows."""
 
+from collections.abc import Mapping
 from enum import Enum
-
-from companion.state_table import StateTable
 
 
 class State(Enum):
@@ -60,33 +59,34 @@ _ON_THE_GROUND = {
     Trigger.REFUSED: State.ABORTED,
     Trigger.LINK_RESTORED: State.CONNECT,
 }
-TABLE = StateTable[State, Trigger](
-    {
-        State.CONNECT: {**_ON_THE_GROUND, Trigger.VEHICLE_READY: State.READY},
-        State.READY: {**_ON_THE_GROUND, Trigger.PLAN_CONFIRMED: State.TAKEOFF},
-        State.TAKEOFF: {**_IN_THE_AIR, Trigger.REFUSED: State.ABORTED, Trigger.TAKEN_OFF: State.MISSION},
-        State.MISSION: {**_IN_THE_AIR, Trigger.RETURN_DUE: State.RETURNING, Trigger.LAND_DUE: State.LANDING},
-        State.RECOVERING: {
-            **_IN_THE_AIR,
-            Trigger.RECOVERED_TO_HOLD: State.HOLDING,
-            Trigger.RECOVERED_TO_CONTINUE: State.MISSION,
-            Trigger.RECOVERED_TO_RETRY: State.MISSION,
-            Trigger.RECOVERED_TO_DETOUR: State.MISSION,
-            Trigger.RECOVERED_TO_RETURN: State.RETURNING,
-            Trigger.RECOVERED_TO_LAND: State.LANDING,
-            Trigger.RECOVERED_TO_ABORT: State.ABORTED,
-        },
-        State.HOLDING: {**_IN_THE_AIR, Trigger.HOLD_ENDED: State.MISSION},
-        State.RETURNING: {**_IN_THE_AIR, Trigger.HOME_REACHED: State.LANDING, Trigger.LAND_DUE: State.LANDING},
-        State.LANDING: {**_IN_THE_AIR, Trigger.DISARMED: State.DONE},
-        State.DONE: {},
-        State.ABORTED: {},
-        State.CRASHED: {
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.DISARMED: State.ABORTED,
-            Trigger.FLIES_AGAIN: State.ABORTED,
-        },
-    }
-)
+# Of each state what moves it on, and to where; the first one is where it begins. Other triggers leave it where it is.
+TABLE: Mapping[State, Mapping[Trigger, State]] = {
+    State.CONNECT: {**_ON_THE_GROUND, Trigger.VEHICLE_READY: State.READY},
+    State.READY: {**_ON_THE_GROUND, Trigger.PLAN_CONFIRMED: State.TAKEOFF},
+    State.TAKEOFF: {**_IN_THE_AIR, Trigger.REFUSED: State.ABORTED, Trigger.TAKEN_OFF: State.MISSION},
+    State.MISSION: {**_IN_THE_AIR, Trigger.RETURN_DUE: State.RETURNING, Trigger.LAND_DUE: State.LANDING},
+    State.RECOVERING: {
+        **_IN_THE_AIR,
+        Trigger.RECOVERED_TO_HOLD: State.HOLDING,
+        Trigger.RECOVERED_TO_CONTINUE: State.MISSION,
+        Trigger.RECOVERED_TO_RETRY: State.MISSION,
+        Trigger.RECOVERED_TO_DETOUR: State.MISSION,
+        Trigger.RECOVERED_TO_RETURN: State.RETURNING,
+        Trigger.RECOVERED_TO_LAND: State.LANDING,
+        Trigger.RECOVERED_TO_ABORT: State.ABORTED,
+    },
+    State.HOLDING: {**_IN_THE_AIR, Trigger.HOLD_ENDED: State.MISSION},
+    State.RETURNING: {**_IN_THE_AIR, Trigger.HOME_REACHED: State.LANDING, Trigger.LAND_DUE: State.LANDING},
+    State.LANDING: {**_IN_THE_AIR, Trigger.DISARMED: State.DONE},
+    State.DONE: {},
+    State.ABORTED: {},
+    State.CRASHED: {
+        Trigger.INTERRUPTED: State.ABORTED,
+        Trigger.DISARMED: State.ABORTED,
+        Trigger.FLIES_AGAIN: State.ABORTED,
+    },
+}
 
-FINAL_STATES, MAY_CRASH = TABLE.final, TABLE.from_which(Trigger.CRASHED)
+# Few, and looked for in each step: in a tuple by identity, in a set by the hash of an Enum, which is slow.
+FINAL_STATES = tuple(state for state, row in TABLE.items() if not row)
+MAY_CRASH = tuple(state for state, row in TABLE.items() if Trigger.CRASHED in row)

@@ -87,7 +87,7 @@ class GuardMachine(StateMachine):
                 self.flight.left_alone += 1
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
                 self.flight.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
-            elif TABLE.moves(self.state, Trigger.HIT):
+            elif Trigger.HIT in TABLE[self.state]:
                 is_first = self.state is State.WATCHING
                 if is_first:
                     self._remember_mode()
@@ -95,7 +95,7 @@ class GuardMachine(StateMachine):
                 record_collision(self.flight, estimate, now_us)
                 self._take(GuardTransition(Trigger.HIT), now_us)
         transition = self._led_back() or self.handler.step(self.flight, inputs, now_us)
-        while transition is not None and TABLE.moves(self.state, transition.trigger):
+        while transition is not None and transition.trigger in TABLE[self.state]:
             self._take(transition, now_us)
             # The answers and positions of this step belong to the state that asked for them.
             transition = self.handler.step(self.flight, Inputs(), now_us)
@@ -137,7 +137,7 @@ class GuardMachine(StateMachine):
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
         guard = self.flight
         guard.was_silent |= guard.is_silent(now_us)
-        if guard.vehicle.armed is False and TABLE.moves(self.state, Trigger.DISARMED):
+        if guard.vehicle.armed is False and Trigger.DISARMED in TABLE[self.state]:
             return GuardTransition(Trigger.DISARMED, "disarmed")
         if self.state in HOLDING:
             lost = self._taken_by_another(inputs) or silent_link(guard, now_us)
@@ -145,7 +145,7 @@ class GuardMachine(StateMachine):
                 return GuardTransition(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
         if inputs.refusal is not None:
             return GuardTransition(Trigger.REFUSED, inputs.refusal)
-        if (stopped := inputs.stop_reason or guard.fault) and TABLE.moves(self.state, Trigger.STOPPED):
+        if (stopped := inputs.stop_reason or guard.fault) and Trigger.STOPPED in TABLE[self.state]:
             return GuardTransition(Trigger.STOPPED, stopped)
         if self.state not in HOLDING:
             return self._link_restored(now_us)
@@ -189,9 +189,9 @@ class GuardMachine(StateMachine):
         return GuardTransition(Trigger.STREAMS_GONE, LINK_RESTORED)
 
     def _take(self, transition: GuardTransition | None, now_us: int) -> None:
-        if transition is None or not TABLE.moves(self.state, transition.trigger):
+        if transition is None or transition.trigger not in TABLE[self.state]:
             return
-        self.state = TABLE.next_state(self.state, transition.trigger)
+        self.state = TABLE[self.state][transition.trigger]
         guard = self.flight
         if transition.text:
             guard.report(now_us, _KINDS.get(transition.trigger, "guard"), transition.text)

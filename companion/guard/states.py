@@ -1,8 +1,7 @@
 """The guard's state machine: one table, from which everything else follows."""
 
+from collections.abc import Mapping
 from enum import Enum
-
-from companion.state_table import StateTable
 
 
 class State(Enum):
@@ -49,63 +48,62 @@ _RELEASED = {
     Trigger.CONTROL_LOST: State.STOOD_DOWN,
     Trigger.CRASHED: State.CRASHED,
 }
-TABLE = StateTable[State, Trigger](
-    {
-        State.CONNECTING: {
-            Trigger.REFUSED: State.ENDED,
-            Trigger.STOPPED: State.ENDED,
-            Trigger.STREAMS_GONE: State.CONNECTING,
-            Trigger.CONNECTED: State.STANDING_BY,
-        },
-        State.STANDING_BY: {
-            Trigger.STOPPED: State.ENDED,
-            Trigger.WORTH_GUARDING: State.WATCHING,
-            Trigger.STREAMS_GONE: State.CONNECTING,
-        },
-        State.WATCHING: {
-            Trigger.DISARMED: State.STANDING_BY,
-            Trigger.STOPPED: State.ENDED,
-            Trigger.CRASHED: State.CRASHED,
-            Trigger.HIT: State.TAKING_OVER,
-            Trigger.LEADS_BACK: State.GIVING_BACK,
-            Trigger.NOT_TO_GUARD: State.STANDING_BY,
-        },
-        State.TAKING_OVER: {
-            **_RELEASED,
-            Trigger.STOPPED: State.GIVING_BACK,
-            Trigger.HIT: State.TAKING_OVER,
-            Trigger.CONFIRMED: State.RECOVERING,
-            Trigger.NOT_CONFIRMED: State.GIVING_BACK,
-            Trigger.POSITION_SILENT: State.GIVING_BACK,
-            Trigger.SETTLED: State.GIVING_BACK,
-        },
-        State.RECOVERING: {
-            **_RELEASED,
-            Trigger.STOPPED: State.GIVING_BACK,
-            Trigger.HIT: State.RECOVERING,
-            Trigger.POSITION_SILENT: State.GIVING_BACK,
-            Trigger.CROSSED: State.GIVING_BACK,
-            Trigger.SETTLED: State.GIVING_BACK,
-        },
-        State.GIVING_BACK: {
-            **_RELEASED,
-            Trigger.HIT: State.TAKING_OVER,
-            Trigger.GIVEN_BACK: State.WATCHING,
-        },
-        State.STOOD_DOWN: {
-            Trigger.DISARMED: State.STANDING_BY,
-            Trigger.STOPPED: State.ENDED,
-            Trigger.ENABLED: State.STANDING_BY,
-        },
-        State.ENDED: {},
-        State.CRASHED: {
-            Trigger.DISARMED: State.STANDING_BY,
-            Trigger.STOPPED: State.ENDED,
-            Trigger.FLIES_AGAIN: State.STANDING_BY,
-        },
-    }
-)
+# Of each state what moves it on, and to where; the first one is where it begins. Other triggers leave it where it is.
+TABLE: Mapping[State, Mapping[Trigger, State]] = {
+    State.CONNECTING: {
+        Trigger.REFUSED: State.ENDED,
+        Trigger.STOPPED: State.ENDED,
+        Trigger.STREAMS_GONE: State.CONNECTING,
+        Trigger.CONNECTED: State.STANDING_BY,
+    },
+    State.STANDING_BY: {
+        Trigger.STOPPED: State.ENDED,
+        Trigger.WORTH_GUARDING: State.WATCHING,
+        Trigger.STREAMS_GONE: State.CONNECTING,
+    },
+    State.WATCHING: {
+        Trigger.DISARMED: State.STANDING_BY,
+        Trigger.STOPPED: State.ENDED,
+        Trigger.CRASHED: State.CRASHED,
+        Trigger.HIT: State.TAKING_OVER,
+        Trigger.LEADS_BACK: State.GIVING_BACK,
+        Trigger.NOT_TO_GUARD: State.STANDING_BY,
+    },
+    State.TAKING_OVER: {
+        **_RELEASED,
+        Trigger.STOPPED: State.GIVING_BACK,
+        Trigger.HIT: State.TAKING_OVER,
+        Trigger.CONFIRMED: State.RECOVERING,
+        Trigger.NOT_CONFIRMED: State.GIVING_BACK,
+        Trigger.POSITION_SILENT: State.GIVING_BACK,
+        Trigger.SETTLED: State.GIVING_BACK,
+    },
+    State.RECOVERING: {
+        **_RELEASED,
+        Trigger.STOPPED: State.GIVING_BACK,
+        Trigger.HIT: State.RECOVERING,
+        Trigger.POSITION_SILENT: State.GIVING_BACK,
+        Trigger.CROSSED: State.GIVING_BACK,
+        Trigger.SETTLED: State.GIVING_BACK,
+    },
+    State.GIVING_BACK: {
+        **_RELEASED,
+        Trigger.HIT: State.TAKING_OVER,
+        Trigger.GIVEN_BACK: State.WATCHING,
+    },
+    State.STOOD_DOWN: {
+        Trigger.DISARMED: State.STANDING_BY,
+        Trigger.STOPPED: State.ENDED,
+        Trigger.ENABLED: State.STANDING_BY,
+    },
+    State.ENDED: {},
+    State.CRASHED: {
+        Trigger.DISARMED: State.STANDING_BY,
+        Trigger.STOPPED: State.ENDED,
+        Trigger.FLIES_AGAIN: State.STANDING_BY,
+    },
+}
 
 # While it is in one of these the vehicle flies, or is about to fly, by the guard's setpoints.
 HOLDING = (State.TAKING_OVER, State.RECOVERING, State.GIVING_BACK)
-MAY_CRASH = TABLE.from_which(Trigger.CRASHED)
+MAY_CRASH = tuple(state for state, row in TABLE.items() if Trigger.CRASHED in row)

@@ -89,7 +89,7 @@ def test_the_python_api_names_what_there_is_and_its_arguments(module):
 def test_diagram_and_table_show_every_transition(states):
     diagram = mermaid_diagram(states)
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in transitions(states).splitlines()]
-    for state, row in states.rows.items():
+    for state, row in states.items():
         for trigger, target in row.items():
             arrow = f"{state.value} --> {target.value}\n".replace(" ", "_").replace("_-->_", " --> ")
             assert state is target or arrow in diagram
