@@ -102,8 +102,8 @@ class FlyItems(_OnTrajectory):
 
     def _plan(self, flight: FlightContext, action: items.Motion, start_m: Vector3, now_us: int) -> None:
         """The item's own trajectory, or one round known obstacles; of an interrupted path what is left."""
-        behind = 0 if flight.is_retry else flight.tally.points_passed
-        if isinstance(action, items.PathItem) and 0 < behind < len(action.points_ned_m):
+        if isinstance(action, items.PathItem) and not flight.is_retry:
+            behind = min(flight.tally.points_passed, len(action.points_ned_m) - 1)
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
         known = surroundings(flight)
         speeds = replace(flight.speeds, factor=flight.tally.pace_factor)
