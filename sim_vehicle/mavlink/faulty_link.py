@@ -70,7 +70,8 @@ class FaultyLink(Link):
         packets = super().take()
         offset_us = round(1e6 * sum(jump.jump_s for jump in self._jumps if jump.window_s[0] <= self.now_us / 1e6))
         if offset_us:
-            packets = tuple(restamped(packet, offset_us) for packet in packets)
+            us = bytes(self._board.identity)  # others' packets, which are passed on, keep their stamps
+            packets = tuple(restamped(packet, offset_us) if packet[5:7] == us else packet for packet in packets)
         return self._outbound.carry(packets, self.now_us)
 
 

@@ -197,8 +197,7 @@ class MissionFlight:
         north, east, _ = view.position_ned_m
         before, self._work = self._work, Work.ITEM
         if not math.isfinite(place[2]):
-            # FlightTaskAuto stays where it is.
-            self.target, self._climb_down_m = NavigatorTarget(Kind.HOLD, view.position_ned_m), None
+            self.target, self._climb_down_m = NavigatorTarget(Kind.HOLD, view.position_ned_m), None  # FlightTaskAuto
         elif before is Work.ITEM and self._climb_down_m is not None:
             self._work = Work.CLIMB
             height_m = view.home_ned_m[2] - self._climb_down_m
