@@ -3,6 +3,7 @@
 `LockstepVehicle` flies it on virtual time: bytes in, bytes out, the same bits every time, as fast as the machine goes.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -143,10 +144,10 @@ class Bench:
         """Swing a plate at the vehicle: it touches at that speed 20 ms from now, coming from there,
         clockwise from the nose (90 is the right) or from above (elevation 90). Returns the name the hit will have.
 
-        The speed is against the vehicle as it moves now. Raises SceneError for none.
+        The speed is against the vehicle as it moves now. Raises SceneError for what is no speed or angle.
         """
-        if not speed_m_s > 0.0:
-            raise SceneError(f"a hit needs a speed of more than 0 m/s, not {speed_m_s:g}.")
+        if not (speed_m_s > 0.0 and math.isfinite(speed_m_s + bearing_deg + elevation_deg)):
+            raise SceneError(f"a hit needs a speed of more than 0 m/s and angles, not {speed_m_s:g} m/s.")
         self._strikes += 1
         name, vehicle = f"strike {self._strikes}", self.vehicle
         plate = strike(vehicle.state, vehicle.constants, speed_m_s, bearing_deg, elevation_deg, name)

@@ -59,10 +59,9 @@ class Arming:
             self._landed_since_us = now_us
         since_us, wait_s, more_s = self._landed_since_us, self._parameters["COM_DISARM_LAND"], 0.0
         if not self.taken_off:
-            # PX4 counts both for an armed vehicle on which nobody acts.
+            # PX4 counts both for an armed vehicle on which nobody acts; a time of 0 or less switches it off.
             since_us, wait_s = self.armed_at_us, self._parameters["COM_DISARM_PRFLT"]
             more_s = self._parameters["COM_SPOOLUP_TIME"]
-        # A time of 0 or less switches it off.
         if wait_s <= 0 or (now_us - since_us) / 1e6 < wait_s + more_s:
             return None
         self.armed = False
