@@ -73,7 +73,7 @@ def begun(
     case: GroundCase, built: BenchVehicle, airframe: Airframe, sink_m_s: float, rng: np.random.Generator
 ) -> tuple[GuardedFlight, float]:
     """In HOLD at a height, or on the ground before a mission; and how much too high it takes itself to be."""
-    parameters = {"MPC_LAND_SPEED": sink_m_s, "MAN_DEADZONE": 0.0, "MAN_ARM_GESTURE": 0}
+    parameters = {"MPC_LAND_SPEED": sink_m_s, "MAN_DEADZONE": 0.0}
     parameters |= {"RTL_RETURN_ALT": 2.0, "RTL_DESCEND_ALT": 1.5, "MPC_LAND_ALT2": 10.0, "MPC_LAND_ALT1": 11.0}
     error_m = float(rng.uniform(*HEIGHT_ERROR_M)) if rng.random() < 0.5 and case.way != "mission" else 0.0
     faults: list[dict[str, Any]] = []
