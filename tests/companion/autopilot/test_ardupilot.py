@@ -47,16 +47,8 @@ def commanded(f, number):
 # --- a flight
 
 
-def test_a_mission_is_flown_in_guided_and_landed_in_its_land_mode():
-    f = flight(FakeCopter(), items=SQUARE_ITEMS)
-    assert f.run_to_end().outcome == "completed"
-    assert [int(message.param2) for _, message in commanded(f, SET_MODE)] == [6, 4]  # as the fake has translated them
-    modes_seen = [event.data["custom_mode"] for event in f.events if event.kind == "mode"]
-    assert modes_seen[-2:] == [GUIDED, COPTER_LAND]
-
-
 def test_it_is_told_to_take_off_and_hears_no_setpoint_until_it_is_up():
-    f = flight(FakeCopter(), items=[TAKEOFF, LANDING])
+    f = flight(FakeCopter(), items=SQUARE_ITEMS)
     f.run_until(lambda: commanded(f, TAKE_OFF))
     ((told_us, message),) = commanded(f, TAKE_OFF)
     assert message.param7 == 1.5
@@ -64,6 +56,10 @@ def test_it_is_told_to_take_off_and_hears_no_setpoint_until_it_is_up():
     assert [t for t, _ in f.vehicle.setpoints if t > told_us] == []
     assert f.run_to_end().outcome == "completed"
     assert f.vehicle.setpoints[-1][0] > told_us
+    # And it is flown in GUIDED and landed in LAND, which the fake has translated
+    assert [int(message.param2) for _, message in commanded(f, SET_MODE)] == [6, 4]
+    modes_seen = [event.data["custom_mode"] for event in f.events if event.kind == "mode"]
+    assert modes_seen[-2:] == [GUIDED, COPTER_LAND]
 
 
 @pytest.mark.parametrize(("vehicle", "may_be_whole"), [(FakeVehicle, True), (FakeCopter, False)])
@@ -85,6 +81,7 @@ def leaning(vehicle):
     """A flight that recovers from a hit by attitude: the scripted vehicles tell nothing of their thrust."""
     f = flight(vehicle, items=[TAKEOFF, INTO_WALL, LANDING])
     f.run_to("mission")
+    assert f.companion.last_words() == [], "none is left before a hit"
     thrust = f.companion.core.reflex.thrust
     thrust.known_s, thrust.full_m_s2 = 1.0, 20.0
     f.run_to("recovering")
@@ -116,25 +113,20 @@ def test_the_last_words_of_a_companion_are_a_lean_and_a_place_off_what_was_hit()
     assert sent.get_type() == "SET_POSITION_TARGET_LOCAL_NED" and sent.type_mask & 0x1FF == 0x1F8
     # Its wrong tilt moves it by 2 m before it turns
     assert f.vehicle.position[0] - sent.x == pytest.approx(4.0, abs=0.3)
-
-
-def test_the_thrust_of_the_last_words_carries_it_however_it_leans_now():
-    # Given a vehicle that leans by 35 degrees when its companion dies
-    f = leaning(FakeCopter(wall_north_m=3.0))
-    flown = f.companion.core.flight.target
-    leans = replace(flown.lean, belief=replace(flown.lean.belief, attitude_wxyz=(0.954, 0.0, 0.301, 0.0)))
-    f.companion.core.flight.target = replace(flown, lean=leans)
-    # Then the thrust is gravity's, of 20 m/s^2 at most: what carries it at 35 degrees would lift it by 2 m/s^2
-    (_, lean), *_ = f.companion.last_words()
-    assert mav.MAVLink(None).decode(bytearray(lean)).thrust == pytest.approx(9.81 / 20.0, abs=0.01)
-
-
-def test_a_vehicle_that_holds_no_attitude_for_any_time_is_told_one_as_often_as_a_setpoint_is_sent():
-    # GUID_TIMEOUT 0, which Copter takes
-    f = leaning(FakeCopter(wall_north_m=3.0))
+    # A Copter that holds an attitude for no time, GUID_TIMEOUT 0, is told one as often as a setpoint is sent
     f.companion.core.reflex.loss_s = 0.0
     first, second, *_ = f.companion.last_words()
     assert second[0] - first[0] == pytest.approx(0.02)
+    # Where it leans by 35 degrees, the thrust is gravity's, of 20 m/s^2 at most: what carries it at 35 degrees would
+    # lift it by 2 m/s^2
+    flown = f.companion.core.flight.target
+    leans = replace(flown.lean, belief=replace(flown.lean.belief, attitude_wxyz=(0.954, 0.0, 0.301, 0.0)))
+    f.companion.core.flight.target = replace(flown, lean=leans)
+    (_, lean), *_ = f.companion.last_words()
+    assert mav.MAVLink(None).decode(bytearray(lean)).thrust == pytest.approx(9.81 / 20.0, abs=0.01)
+    # And none is left where the next setpoint is a place: the hit was taken back while the mode is not known
+    f.companion.core.flight.target = flown.at_rest()
+    assert f.companion.last_words() == []
 
 
 def test_to_a_px4_the_last_words_are_a_lean_that_brakes_until_its_own_velocity_is_right():
@@ -165,19 +157,6 @@ def test_words_are_left_until_a_vehicle_flies_well_by_itself(vehicle, later_s, s
     f = leaning(vehicle())
     f.companion.core.reflex.hits[-1].sample_time_boot_us -= round(1e6 * later_s)
     assert [at_s for at_s, _ in f.companion.last_words()] == pytest.approx(said_s)
-
-
-def test_no_word_is_left_before_a_hit():
-    f = flight(FakeCopter(), items=[TAKEOFF, INTO_WALL, LANDING])
-    f.run_to("mission")
-    assert f.companion.last_words() == []
-
-
-def test_no_word_is_left_where_the_next_setpoint_is_a_place():
-    # Given a hit that is taken back while the mode is not known: no setpoint has followed yet
-    f = leaning(FakeCopter(wall_north_m=3.0))
-    f.companion.core.flight.target = f.companion.core.flight.target.at_rest()
-    assert f.companion.last_words() == []
 
 
 def test_a_word_that_is_not_sent_counts_for_no_packet():
