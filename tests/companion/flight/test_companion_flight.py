@@ -69,6 +69,12 @@ def test_a_mission_without_a_hit_completes():
     assert [k for k in f.kinds() if k not in ("mode", "item", "loss")] == [
         *("connected", "streams", "plan", "takeoff", "armed", "detector", "landing", "contact", "disarmed", "done")
     ]
+    # Our heartbeat goes out every second from the first step to the last
+    times = [t for t, _ in f.vehicle.heartbeats]
+    assert times[0] <= 5_000_000 + 2 * 4000
+    assert {b - a for a, b in itertools.pairwise(times)} == {1_000_000}
+    m = f.vehicle.heartbeats[0][1]
+    assert (m.type, m.get_srcComponent()) == (18, 191)
 
 
 def test_coordinates_are_relative_to_where_the_vehicle_is_when_it_arms():
@@ -268,7 +274,7 @@ def test_a_text_of_any_length_arrives_whole(length):
     assert {message.severity for message in messages} == {4}
 
 
-def test_the_operator_reads_hit_recovery_and_outcome():
+def test_the_operator_reads_hit_recovery_and_outcome_and_has_the_detectors_state_to_plot():
     f = at_wall(INTO_WALL)
     f.run_to_end()
     texts = [message.text for _, message in f.messages("STATUSTEXT")]
@@ -278,18 +284,7 @@ def test_the_operator_reads_hit_recovery_and_outcome():
     assert recovered.startswith(f"Recovered in {collision.settled_after_s:.2f} s, ") and recovered.endswith("too far")
     assert texts[0] == "Mission test begins" and texts[-1] == "Mission test completed, hits: 1"
     assert all(len(text) <= 50 for text in texts)
-
-
-def test_a_vehicle_hit_while_it_hovers_is_pushed():
-    f = hovering()
-    f.vehicle.push_m_s2 = (0.0, -12.0)
-    f.step()
-    assert f.messages("STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
-
-
-def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_the_end():
-    f = at_wall(INTO_WALL)
-    f.run_to_end()
+    # The state comes twice a second, and no more after the end
     f.run_for(2.0)
     phases = [(t, m.value) for t, m in f.messages("NAMED_VALUE_FLOAT") if m.name == "rb_phase"]
     gaps = [b - a for (a, _), (b, _) in itertools.pairwise(phases)]
@@ -302,6 +297,13 @@ def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_t
     v_c = [m for _, m in f.messages("DEBUG_VECT") if m.name == "rb_v_c"]
     assert v_c[0].x == pytest.approx(2.0, abs=0.1)
     assert phases[-1][0] <= f.report.ended_at_us
+
+
+def test_a_vehicle_hit_while_it_hovers_is_pushed():
+    f = hovering()
+    f.vehicle.push_m_s2 = (0.0, -12.0)
+    f.step()
+    assert f.messages("STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
 
 
 @pytest.mark.parametrize(
