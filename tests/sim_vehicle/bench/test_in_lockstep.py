@@ -90,11 +90,12 @@ def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -
     pilot = hovering()
     loss = pilot.vehicle.inject(faults.gps_loss(drift_m_s2=0.5))
     pilot.fly(4.0)
-    assert pilot.all("GPS_RAW_INT")[-1].fix_type < 3
+    assert pilot.all("GPS_RAW_INT")[-1].fix_type == 0
+    assert not pilot.all("SYS_STATUS")[-1].onboard_control_sensors_health & 0x20
     assert astray_m(pilot) > 0.2
     loss.remove()
     pilot.fly(1.0)
-    assert pilot.all("GPS_RAW_INT")[-1].fix_type >= 3
+    assert pilot.all("GPS_RAW_INT")[-1].fix_type == 3
     assert astray_m(pilot) < 0.1
 
 
