@@ -167,17 +167,12 @@ def test_a_state_is_held_back_until_what_was_said_is_heard_and_answered(sitl: Si
     assert sitl.vehicle.time_boot_us == 2000
 
 
-def test_a_strangers_packet_moves_nothing(sitl: Sitl) -> None:
+def test_a_strangers_packet_and_pulses_that_are_said_once_more_move_nothing(sitl: Sitl) -> None:
     sitl.states.sendto(b"nothing of ours", ("127.0.0.1", sitl.json_port))
-    sitl.sends(0)
-    assert sitl.vehicle.step(b"") == []
-    assert sitl.vehicle.time_boot_us == 1000
-
-
-def test_pulses_that_are_said_once_more_move_nothing(sitl: Sitl) -> None:
     for count in (0, 0, 1):
         sitl.sends(count)
-    sitl.vehicle.step(b"")
+    assert sitl.vehicle.step(b"") == []
+    assert sitl.vehicle.time_boot_us == 1000
     sitl.vehicle.step(b"")
     assert sitl.vehicle.time_boot_us == 2000
     assert [sitl.state() is None for _ in range(3)] == [False, False, True]
