@@ -69,7 +69,7 @@ def test_an_example_is_written_under_its_own_name_or_another(tmp_path, monkeypat
     assert "No example 'guarded' ships with the program; did you mean guard" in capsys.readouterr().err
 
 
-def test_a_new_key_is_its_owners_alone_random_and_never_shown(tmp_path: Path):
+def test_a_new_key_is_its_owners_alone_random_never_shown_and_written_for_px4(tmp_path: Path):
     first, second = tmp_path / "first", tmp_path / "second"
     shown = [run_here("key", "new", file) for file in (first, second)]
     keys = [file.read_text().strip() for file in (first, second)]
@@ -80,6 +80,11 @@ def test_a_new_key_is_its_owners_alone_random_and_never_shown(tmp_path: Path):
     # And it replaces none
     assert_one_clear_sentence(run_here("key", "new", first), first, "exists already")
     assert first.read_text().strip() == keys[0]
+    # PX4 gets 32 bytes of key and 8 of time stamp
+    card = tmp_path / "mavlink-signing-key.bin"
+    assert run_here("key", "px4", first, "--card", card).returncode == 0
+    assert card.read_bytes() == bytes.fromhex(keys[0]) + bytes(8)
+    assert stat.S_IMODE(card.stat().st_mode) == 0o600
 
 
 def test_a_passphrase_makes_the_key_that_ground_stations_make_of_it(tmp_path: Path):
@@ -87,14 +92,6 @@ def test_a_passphrase_makes_the_key_that_ground_stations_make_of_it(tmp_path: Pa
     shown = subprocess.run(command, cwd=ROOT, input="correct horse\n", text=True, capture_output=True, timeout=60)
     assert shown.returncode == 0 and "correct horse" not in shown.stdout
     assert (tmp_path / "key").read_text().strip() == hashlib.sha256(b"correct horse").hexdigest()
-
-
-def test_px4_gets_32_bytes_of_key_and_8_of_time_stamp(tmp_path: Path):
-    run_here("key", "new", tmp_path / "key")
-    card = tmp_path / "mavlink-signing-key.bin"
-    assert run_here("key", "px4", tmp_path / "key", "--card", card).returncode == 0
-    assert card.read_bytes() == bytes.fromhex((tmp_path / "key").read_text()) + bytes(8)
-    assert stat.S_IMODE(card.stat().st_mode) == 0o600
 
 
 COMMANDS = {"fly": ("fly", SQUARE, *HOP), "guard": ("guard",), "preflight": ("preflight",)}
@@ -161,7 +158,7 @@ def exchange(
 
 
 def test_the_simulated_vehicle_is_found_ready_but_for_what_a_fresh_px4_leaves_open():
-    preflight, _ = surveyed()
+    preflight, vehicle = surveyed()
     found = {finding.item: finding for finding in findings(preflight.survey)}
     assert preflight.survey.vehicle.identity is not None
     assert not [item for item, finding in found.items() if finding.verdict is Verdict.BAD]
@@ -173,6 +170,12 @@ def test_the_simulated_vehicle_is_found_ready_but_for_what_a_fresh_px4_leaves_op
     assert found["packets"].verdict is found["arrival"].verdict is Verdict.GOOD
     # and 247 of the 250 samples a second arrive: PX4's link loses 1.2 %
     assert found["HIGHRES_IMU"].found.startswith("247 Hz")
+    # A remedy that is taken is taken by the vehicle
+    exchange(preflight, vehicle, preflight.set_parameter("COM_RCL_EXCEPT", 4, vehicle.time_boot_us))
+    for _ in range(25):
+        exchange(preflight, vehicle)
+    assert preflight.survey.parameters["COM_RCL_EXCEPT"] == 4
+    assert {finding.item: finding for finding in findings(preflight.survey)}["COM_RCL_EXCEPT"].verdict is Verdict.GOOD
 
 
 def test_packets_that_are_lost_or_damaged_on_the_way_are_counted():
@@ -201,12 +204,3 @@ def test_what_the_line_goes_through_is_read_where_linux_tells_it(tmp_path):
     assert serial_line("serial:///dev/ttyAMA0:921600", tmp_path) == SerialLine(921_600, None)
     assert serial_line("serial:///dev/ttyACM0:57600", tmp_path) == SerialLine(None, None)
     assert serial_line("udpin://0.0.0.0:14540", tmp_path) is None
-
-
-def test_a_remedy_that_is_taken_is_taken_by_the_vehicle():
-    preflight, vehicle = surveyed()
-    exchange(preflight, vehicle, preflight.set_parameter("COM_RCL_EXCEPT", 4, vehicle.time_boot_us))
-    for _ in range(25):
-        exchange(preflight, vehicle)
-    assert preflight.survey.parameters["COM_RCL_EXCEPT"] == 4
-    assert {finding.item: finding for finding in findings(preflight.survey)}["COM_RCL_EXCEPT"].verdict is Verdict.GOOD
