@@ -45,13 +45,18 @@ def stat(linux, *cores):
     (linux / "proc/stat").write_text("\n".join([*lines, "intr 1 2 3", "ctxt 5"]) + "\n")
 
 
-def test_memory_disk_temperature_and_time_are_the_systems(linux):
+def test_memory_disk_time_and_temperature_if_there_is_a_sensor_are_the_systems(linux):
     stat(linux, (0, 0, 0, 100, 0, 0, 0, 0, 0, 0))
     status = ComputerReader(linux, linux).read(1_000)
     assert (status.at_us, status.uptime_ms, status.temperature_deg_c) == (1_000, 90_500, 61)
     # 3883008 and 3051520 kB are 3792 and 2980 MiB; what caches hold is not used
     assert (status.memory_used_mib, status.memory_total_mib) == (812, 3792)
     assert (status.disk_used_mib, status.disk_total_mib) == (10 * 1024, 30 * 1024)
+    first, second = sorted((linux / "sys/class/thermal").glob("*/temp"))
+    second.write_text("unknown")
+    assert ComputerReader(linux, linux).read(0).temperature_deg_c == 48
+    first.unlink()
+    assert ComputerReader(linux, linux).read(0).temperature_deg_c is None
 
 
 def test_the_load_of_each_core_is_that_since_the_last_reading(linux):
@@ -64,15 +69,6 @@ def test_the_load_of_each_core_is_that_since_the_last_reading(linux):
     # Then waiting for the disk is no work, and a guest's time counts once
     assert first.cpu_percent == (50, 10)
     assert second.cpu_percent == (0, 50)
-
-
-def test_a_computer_without_a_sensor_has_no_temperature(linux):
-    stat(linux, (0, 0, 0, 100, 0, 0, 0, 0, 0, 0))
-    first, second = sorted((linux / "sys/class/thermal").glob("*/temp"))
-    second.write_text("unknown")
-    assert ComputerReader(linux, linux).read(0).temperature_deg_c == 48
-    first.unlink()
-    assert ComputerReader(linux, linux).read(0).temperature_deg_c is None
 
 
 @pytest.mark.parametrize(
