@@ -312,23 +312,6 @@ def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
 
 
 @pytest.mark.parametrize(
-    ("command", "number", "parameters"),
-    [
-        (ours.SetMode(4 << 16 | 6 << 24, "AUTO.LAND", (4, 6)), 176, (1, 4, 6)),
-        (ours.SetArmed(True), 400, (1, 0, 0)),
-        (ours.SetArmed(False), 400, (0, 0, 0)),
-        (ours.SetArmed(False, True), 400, (0, 21196, 0)),
-        (ours.SetMessageInterval(105, 4000), 511, (105, 4000, 0)),
-        (ours.RequestMessage(148), 512, (148, 0, 0)),
-    ],
-)
-def test_commands_carry_their_parameters_and_zeros(command, number, parameters):
-    m = sent(ours.SendCommand(command, 3))
-    assert (m.command, m.confirmation, m.target_system, m.target_component) == (number, 3, 7, 1)
-    assert tuple(getattr(m, f"param{index}") for index in range(1, 8)) == (*parameters, 0, 0, 0, 0)
-
-
-@pytest.mark.parametrize(
     ("outgoing", "fields"),
     [
         (ours.OnboardHeartbeat(True), {"type": 18, "autopilot": 8}),
