@@ -189,8 +189,6 @@ def test_a_system_that_is_unfit_is_one_sentence(system, monkeypatch):
 
 def test_exit_codes_that_no_restart_mends_end_the_service():
     assert values(unit(), "RestartPreventExitStatus") == ["2 78"]
-    assert main(["guard", "--connect", "nowhere"]) == exit_codes.CONFIGURATION
-    assert main(["guard", "--connect", UDP, "--config", "none.yaml"]) == exit_codes.CONFIGURATION
     # A cable that is not there yet is no fault of the configuration.
     assert main(["guard", "--connect", "serial:///dev/ttyNONE:57600"]) == exit_codes.ERROR
 
