@@ -53,8 +53,8 @@ def whole(wall_folder):
     return all_of(Tail(wall_folder))
 
 
-def test_ten_rows_a_second_tell_where_the_vehicle_was(wall_folder, whole):
-    rows, _ = whole
+def test_ten_rows_a_second_tell_where_the_vehicle_was_and_events_come_as_they_are_written(wall_folder, whole):
+    rows, events = whole
     log = read_flight_log(wall_folder / "flight.tlog")
     path = np.array(rows["path"])
     assert np.diff(path[:, 0]).min() >= 0.1 and np.diff(path[:, 0]).max() < 0.15
@@ -63,10 +63,6 @@ def test_ten_rows_a_second_tell_where_the_vehicle_was(wall_folder, whole):
     # and no peak between two rows is lost
     peak = np.hypot(*log.specific_force_frd_m_s2[:, :2].T).max()
     assert max(row[1] for row in rows["force"]) == pytest.approx(peak, abs=1e-4)
-
-
-def test_events_come_as_they_are_written(wall_folder, whole):
-    _, events = whole
     written = [json.loads(line) for line in (wall_folder / "events.jsonl").read_text().splitlines()]
     assert [(event["kind"], event["text"]) for event in events] == [(one["kind"], one["text"]) for one in written]
     (hit,) = [event for event in events if event["kind"] == "detection"]

@@ -157,15 +157,13 @@ def test_what_is_in_it_is_what_was_recorded(wall_folder, opened):
     assert np.allclose(places, log.setpoint_ned_m, atol=0.00051, equal_nan=True)
 
 
-def test_it_says_first_what_was_hit_how_fast_when_and_how_it_ended(wall_folder, opened):
+def test_it_says_first_what_was_hit_and_a_hit_has_its_place_its_normal_with_its_error_and_its_reasons(
+    wall_folder, opened
+):
     (hit,) = json.loads((wall_folder / "summary.json").read_text())["collisions"]
     told = opened.data["sentence"]
     assert told.startswith(f"Hit a wall at {hit['impact_speed_m_s']:.2f} ± 0.0")
     assert f"{hit['detected_at_s']:.2f} s into the flight; completed: landed and disarmed." in told
-
-
-def test_a_hit_has_its_place_its_normal_with_its_error_and_its_reasons(wall_folder, opened):
-    (hit,) = json.loads((wall_folder / "summary.json").read_text())["collisions"]
     (moment,) = (moment for moment in opened.data["moments"] if moment["kind"] == "hit")
     assert moment["t"] == hit["detected_at_s"]
     assert np.allclose(moment["normal"], hit["normal_ned"], atol=0.05) and 10.0 < moment["error_deg"] < 20.0
