@@ -70,15 +70,12 @@ def turned(deg: float):
 # --- from a hit to a touch
 
 
-def test_the_surface_is_a_guards_reach_ahead_of_the_centre():
+def test_the_surface_is_a_guards_reach_ahead_of_the_centre_or_behind_one_that_it_pushes_on():
     touch = touch_of((3.8, 1.0, -1.5), (2.0, 0.0, 0.0), Normal(SOUTH, ERROR_RAD), 0.2, 7)
     assert touch.centre_ned_m == pytest.approx((4.0, 1.0, -1.5))
     assert (touch.normal_ned, touch.normal_error_rad) == (SOUTH, ERROR_RAD)
     assert touch.reaches_m == REACHES_M and touch.found_at_us == 7
-
-
-def test_what_pushes_a_vehicle_on_came_after_it_and_is_no_wall():
-    """A screen that overtakes is behind the vehicle, where it comes from, and not in its way."""
+    # A screen that overtakes is behind the vehicle, where it comes from, and not in its way
     touch = touch_of((3.0, 1.0, -1.5), (1.0, 0.0, 0.0), Normal(NORTH, ERROR_RAD), 0.2, 0)
     assert touch.centre_ned_m == pytest.approx((2.8, 1.0, -1.5))
     assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
