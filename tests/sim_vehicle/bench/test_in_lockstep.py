@@ -97,6 +97,10 @@ def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -
     pilot.fly(1.0)
     assert pilot.all("GPS_RAW_INT")[-1].fix_type == 3
     assert astray_m(pilot) < 0.1
+    # And it has none where a client injects the failure
+    pilot.command(420, 4, 1, 0)
+    pilot.fly(1.0)
+    assert pilot.all("GPS_RAW_INT")[-1].fix_type == 0
 
 
 def astray_m(pilot: Pilot) -> float:
