@@ -49,7 +49,7 @@ def test_a_mission_may_be_started_in_whatever_interval_its_upload_ends(steps):
     assert flight.ask(MISSION_START, 0) is Result.ACCEPTED
 
 
-def test_a_mission_from_the_ground_and_back_disarms_and_says_so():
+def test_a_mission_from_the_ground_and_back_disarms_says_so_and_begins_anew():
     flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
     for number, there in ((0, (0.0, 0.0)), (1, (20.0, 0.0)), (2, (20.0, 20.0))):
         reached(flight, number)
@@ -62,6 +62,11 @@ def test_a_mission_from_the_ground_and_back_disarms_and_says_so():
     for text in ("Executing Mission", "Takeoff detected", "Mission finished, landed", "Disarmed by landing"):
         assert text in said
     assert said.index("Mission finished, landed") < said.index("Disarmed by landing")
+    # Flown again it begins with the first item
+    flight.fly(1.0)
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    assert flight.autopilot.missions.current == 0
+    reached(flight, 1)
 
 
 def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
@@ -147,15 +152,6 @@ def test_a_mission_cleared_in_flight_is_a_failsafe():
     assert flight.autopilot.commander.system_status == 5
 
 
-def test_flown_again_after_landing_it_begins_with_the_first_item():
-    flight = begun(TAKEOFF, NORTH, LAND_AT_HOME)
-    flight.fly_until(lambda: not flight.autopilot.arming.armed, 90.0)
-    flight.fly(1.0)
-    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
-    assert flight.autopilot.missions.current == 0
-    reached(flight, 1)
-
-
 @pytest.mark.parametrize(
     ("items", "text"),
     [
@@ -211,9 +207,18 @@ def test_what_shapes_allow(shape, inside, outside):
     assert not found.allows(*outside)
 
 
-def test_a_breach_is_found_within_a_fifth_of_a_second_and_held_where_it_was_found():
+def test_places_outside_the_fence_are_refused_and_a_breach_is_found_within_a_fifth_of_a_second_and_held_there():
     flight = hovering(5.0)
     upload(flight, *KEEP_IN, kind=MissionType.FENCE)
+    flight.ask(DO_REPOSITION, -1, 1, 0, math.nan, *place(50.0, 0.0), math.nan)
+    assert "Reposition is outside geofence" in flight.texts()
+    flight.fly(5.0)
+    assert abs(flight.state.position_ned_m[0]) < 0.1
+    # And a mission that leads there cannot be flown
+    upload(flight, item(kinds.WAYPOINT, 10.0), item(kinds.WAYPOINT, 30.0))
+    assert "Geofence violation for waypoint 2" in flight.texts()
+    assert not flight.autopilot.missions.progress.valid
+    # When it is flown out all the same, then that is found
     outward(flight, 2.0, 5.0)
     away = kinematic_plant.target(velocity=(2.0, 0.0, 0.0))
     flight.fly_until(lambda: flight.autopilot.modes.flown is not Mode.OFFBOARD, 10.0, away)
@@ -237,19 +242,6 @@ def test_a_fence_that_excludes_home_or_the_vehicle_is_left_out():
     upload(flight, *KEEP_IN, kind=MissionType.FENCE)
     assert "Geofence invalid, doesn't contain current vehicle position" in flight.texts()
     assert not flight.autopilot.navigator.fence.breached
-
-
-def test_places_outside_the_fence_are_refused():
-    flight = hovering(5.0)
-    upload(flight, *KEEP_IN, kind=MissionType.FENCE)
-    flight.ask(DO_REPOSITION, -1, 1, 0, math.nan, *place(50.0, 0.0), math.nan)
-    assert "Reposition is outside geofence" in flight.texts()
-    flight.fly(5.0)
-    assert abs(flight.state.position_ned_m[0]) < 0.1
-    # And a mission that leads there cannot be flown
-    upload(flight, item(kinds.WAYPOINT, 10.0), item(kinds.WAYPOINT, 30.0))
-    assert "Geofence violation for waypoint 2" in flight.texts()
-    assert not flight.autopilot.missions.progress.valid
 
 
 def test_outside_its_fence_a_vehicle_is_not_armed():

@@ -44,13 +44,10 @@ def test_what_is_refused_and_in_which_words(setpoint, why):
     assert (refusal is None) is (why is None) and (why or "") in (refusal.text if refusal else "")
 
 
-def test_forward_with_the_nose_east_is_east():
+def test_forward_with_the_nose_east_is_east_and_an_acceleration_turns_with_the_whole_attitude():
     setpoint = target(frame=8, velocity=(2.0, 0.0, 0.5))
     assert offboard.trajectory_setpoint(setpoint, NORTH).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.5))
     assert offboard.trajectory_setpoint(setpoint, EAST).velocity_ned_m_s == pytest.approx((0.0, 2.0, 0.5))
-
-
-def test_a_body_acceleration_turns_with_the_whole_attitude():
     # Given the right wing down: the body's z axis points left of down, to the west with the nose north
     rolled = (math.cos(0.25), math.sin(0.25), 0.0, 0.0)
     setpoint = target(frame=8, acceleration_m_s2=(0.0, 0.0, 1.0))

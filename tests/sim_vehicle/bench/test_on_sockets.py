@@ -131,17 +131,13 @@ def took_s(what: Callable[[], None]) -> float:
     return time.monotonic() - begun_s
 
 
-def test_waiting_in_vain_is_an_assertion_and_a_broken_condition_the_callers_problem() -> None:
+def test_a_condition_may_ask_and_change_the_vehicle_but_not_wait_for_it_in_vain_or_break() -> None:
     with start_vehicle(speed=0.0, seed=11) as vehicle:
         with pytest.raises(ConditionNotMet, match=r"within 0.5 s \(seed 11\)"):
             vehicle.wait_until(lambda truth: truth.hits, within_s=0.5)
         with pytest.raises(ZeroDivisionError):
             vehicle.wait_until(lambda truth: 1 / 0, within_s=0.5)
         passes(vehicle, 0.1)
-
-
-def test_a_condition_may_ask_and_change_the_vehicle_but_not_wait_for_it() -> None:
-    with start_vehicle(speed=0.0) as vehicle:
         swung: list[str] = []
 
         def struck(truth: Truth) -> bool:

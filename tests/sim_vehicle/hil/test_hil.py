@@ -122,15 +122,9 @@ def test_an_answer_to_an_older_sample_gives_its_commands_but_not_the_turn():
     exchange.sent(12_000, 8_000)
     exchange.received(answer(8_000, armed=False))
     assert exchange.phase is ExchangePhase.AWAITING
+    assert exchange.motor_fractions == MOTORS_STOPPED, "disarmed, whatever it says of them"
     exchange.received(answer(12_000))
     assert exchange.phase is ExchangePhase.READY
-
-
-def test_a_disarmed_px4_stops_the_motors_whatever_it_says_of_them():
-    exchange = in_lockstep()
-    exchange.sent(8_000, 0)
-    exchange.received(answer(8_000, armed=False))
-    assert exchange.motor_fractions == MOTORS_STOPPED
 
 
 def test_an_answer_that_does_not_come_is_given_up_after_the_timeout_and_told_once():

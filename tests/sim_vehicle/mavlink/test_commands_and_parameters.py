@@ -122,7 +122,7 @@ def set_to(client: Client, name: str, value: float, kind: int, target: tuple[int
     return told(client, dialect.MAVLink_param_set_message(*target, name.encode(), value, kind))
 
 
-def test_the_list_is_whole_and_in_order_and_each_comes_by_its_name_or_index():
+def test_the_list_is_whole_and_in_order_and_each_is_told_by_name_or_index_and_when_it_is_set():
     client = Client()
     client.send(dialect.MAVLink_param_request_list_message(1, 1))
     client.run(0.5)
@@ -139,21 +139,17 @@ def test_the_list_is_whole_and_in_order_and_each_comes_by_its_name_or_index():
     assert whole_of(whole) == 1310988
     (name_of_sixteen,) = request(client, "MPC_XY_VEL_P_ACC")
     assert name_of_sixteen.param_id == "MPC_XY_VEL_P_ACC"
+    first, second = set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)
+    assert first.param_value == second.param_value == 4.0
+    assert client.vehicle.parameters["MIS_TAKEOFF_ALT"] == 4.0
+    # The same once more is answered, but nothing has changed
+    assert len(set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)) == 1
 
 
 @pytest.mark.parametrize("target", [(2, 1), (0, 1), (1, 191)])
 def test_a_request_for_another_or_for_everybody_is_not_answered(target):
     assert request(Client(), "MPC_XY_P", target=target) == []
     assert set_to(Client(), "MPC_XY_P", 1.0, REAL32, target) == []
-
-
-def test_a_value_is_set_told_and_told_again():
-    client = Client()
-    first, second = set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)
-    assert first.param_value == second.param_value == 4.0
-    assert client.vehicle.parameters["MIS_TAKEOFF_ALT"] == 4.0
-    # The same once more is answered, but nothing has changed
-    assert len(set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)) == 1
 
 
 # Among them numbers that are signalling NaNs as floats

@@ -148,6 +148,16 @@ def sending() -> Exchange:
 def test_an_uploaded_list_comes_back_as_it_went():
     exchange = Exchange()
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
+    # The last acknowledgement is given again
+    acks = exchange.ask(sent(SQUARE[3]))
+    assert MissionResult.ACCEPTED in [ack.type for ack in of_type(acks, "MISSION_ACK")]
+    (ack,) = exchange.ask(sent(SQUARE[1]))
+    assert ack.type == MissionResult.ERROR
+    # Cancelling the next upload frees the vehicle and keeps the list
+    exchange.ask(said("count", 2, MISSION))
+    exchange.ask(said("ack", MissionResult.CANCELLED, MISSION))
+    assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
+    assert len(exchange.store.mission) == 4
     back = exchange.download()
     assert [(item.seq, item.command) for item in back] == [(0, 22), (1, 16), (2, 16), (3, 21)]
     assert [item.x for item in back] == [wire_item(n).x for n in range(4)]
@@ -268,24 +278,6 @@ def test_silence_ends_a_transfer_after_five_seconds(begin):
         exchange.step()
     assert exchange.now_us - start_us == pytest.approx(TIMEOUT_US, abs=2 * STEP_US)
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
-
-
-def test_the_last_acknowledgement_is_given_again():
-    exchange = Exchange()
-    exchange.upload(SQUARE)
-    acks = exchange.ask(sent(SQUARE[3]))
-    assert MissionResult.ACCEPTED in [ack.type for ack in of_type(acks, "MISSION_ACK")]
-    (ack,) = exchange.ask(sent(SQUARE[1]))
-    assert ack.type == MissionResult.ERROR
-
-
-def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
-    exchange = Exchange()
-    exchange.upload(SQUARE)
-    exchange.ask(said("count", 2, MISSION))
-    exchange.ask(said("ack", MissionResult.CANCELLED, MISSION))
-    assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
-    assert len(exchange.store.mission) == 4
 
 
 @pytest.mark.parametrize(

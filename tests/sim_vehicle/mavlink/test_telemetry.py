@@ -65,7 +65,7 @@ def test_every_message_can_be_asked_for(hovering, kind):
     assert kind.message_id != 264 or hovering.last("FLIGHT_INFORMATION").takeoff_time_utc < 14e6
 
 
-def test_places_agree(hovering):
+def test_what_a_hovering_vehicle_says_of_itself_and_of_its_place_agrees(hovering):
     local, place = hovering.last("LOCAL_POSITION_NED"), hovering.last("GLOBAL_POSITION_INT")
     home, fix = hovering.last("HOME_POSITION"), hovering.last("GPS_RAW_INT")
     origin = hovering.last("GPS_GLOBAL_ORIGIN")
@@ -80,9 +80,6 @@ def test_places_agree(hovering):
     assert hovering.last("ALTITUDE").altitude_relative == pytest.approx(home.z - local.z, abs=0.05)
     assert hovering.last("VFR_HUD").alt == pytest.approx(place.alt / 1e3, abs=0.05)
     assert (fix.fix_type, fix.satellites_visible) == (3, 10)
-
-
-def test_what_a_hovering_vehicle_says_of_itself(hovering):
     assert 50 < hovering.last("VFR_HUD").throttle < 100
     motors = hovering.last("SERVO_OUTPUT_RAW")
     assert all(1500 < width < 2000 for width in (motors.servo1_raw, motors.servo4_raw))
