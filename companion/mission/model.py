@@ -60,29 +60,20 @@ class Mission(StrictModel):
             raise ValueError(f"items: the first item must be takeoff, not {names[0]}")
         if names[-1] not in ("land", "return"):
             raise ValueError(f"items: the last item must be land or return, not {names[-1]}")
-        for number, item in enumerate(self.items[1:-1], start=2):
-            self._check_between(str(number), item)
-        self._check_speed(str(len(names)), self.items[-1])
+        for step in items.program(self.items):
+            number, action = step.label.partition(" ")[0], step.action
+            if step.name in ("takeoff", "land", "return") and number not in ("1", f"{len(names)}"):
+                where = "first" if step.name == "takeoff" else "last"
+                raise ValueError(f"items: item {number} is {step.name}, which may only come {where}")
+            if isinstance(action, items.VelocityItem):
+                speed_m_s = math.hypot(*action.velocity_ned_m_s)
+            else:
+                speed_m_s = getattr(action, "speed_m_s", None) or 0.0
+            limit_m_s = self.limits.max_speed_m_s
+            if speed_m_s > limit_m_s:
+                flies = f"item {number} ({step.name}) flies at {speed_m_s:g} m/s"
+                raise ValueError(f"items: {flies}, above limits.max_speed_m_s = {limit_m_s:g}")
         return self
-
-    def _check_between(self, number: str, item: MissionItem) -> None:
-        if item.name in ("takeoff", "land", "return"):
-            where = "first" if item.name == "takeoff" else "last"
-            raise ValueError(f"items: item {number} is {item.name}, which may only come {where}")
-        self._check_speed(number, item)
-        for inner, below in enumerate(item.repeat.items if item.repeat else (), start=1):
-            self._check_between(f"{number}.{inner}", below)
-
-    def _check_speed(self, number: str, item: MissionItem) -> None:
-        speed_m_s = 0.0
-        if item.velocity is not None:
-            speed_m_s = math.hypot(*item.velocity.velocity_ned_m_s)
-        elif item.repeat is None:
-            speed_m_s = getattr(item.action, "speed_m_s", None) or 0.0
-        limit_m_s = self.limits.max_speed_m_s
-        if speed_m_s > limit_m_s:
-            flies = f"item {number} ({item.name}) flies at {speed_m_s:g} m/s"
-            raise ValueError(f"items: {flies}, above limits.max_speed_m_s = {limit_m_s:g}")
 
     @model_validator(mode="after")
     def _trajectories_inside_fence(self) -> Self:
