@@ -3,16 +3,13 @@
 import math
 import struct
 from dataclasses import astuple
-from operator import itemgetter
 from typing import Any
 
-from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
 from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED
-from companion.mavlink.packet import MAGIC_V2
 from companion.messages import (
     AttitudeSetpoint,
     ComputerStatus,
@@ -45,14 +42,6 @@ _FORCE = 21196.0
 TEXT_LENGTH = 50
 
 
-# What leaves most often, and at once after a hit, goes round pymavlink's objects: the same fields to the same bytes.
-_PLACE = dialect.MAVLink_set_position_target_local_ned_message
-_PLACE_IN_WIRE_ORDER = itemgetter(*map(_PLACE.fieldnames.index, _PLACE.ordered_fieldnames))
-_ATTITUDE = dialect.MAVLink_set_attitude_target_message
-# Length, two bytes of flags, sequence, system, component, message id.
-_HEADER = struct.Struct("<BHBBBHB")
-
-
 class Encoder:
     """Counts the packets it makes; otherwise without memory."""
 
@@ -69,11 +58,6 @@ class Encoder:
 
     def packets(self, outgoing: Outgoing) -> list[bytes]:
         """All that it takes; of most messages one."""
-        if isinstance(outgoing, PositionSetpoint):
-            return [self._pack_fields(_PLACE, _PLACE_IN_WIRE_ORDER(self._position_fields(outgoing)))]
-        if isinstance(outgoing, AttitudeSetpoint):
-            time_ms, *target, type_mask, attitude, roll, pitch, yaw, thrust = self._attitude_fields(outgoing)
-            return [self._pack_fields(_ATTITUDE, (time_ms, *attitude, roll, pitch, yaw, thrust, *target, type_mask))]
         return [self._pack(message) for message in self._messages(outgoing)]
 
     def unsent(self, outgoing: Outgoing) -> bytes:
@@ -97,16 +81,6 @@ class Encoder:
         self._mavlink.seq = (self._mavlink.seq + 1) % 256
         return packet
 
-    def _pack_fields(self, kind: Any, in_wire_order: tuple[Any, ...]) -> bytes:
-        """MAVLink 2 leaves out the zeros at a payload's end."""
-        link = self._mavlink
-        payload = kind.unpacker.pack(*in_wire_order).rstrip(b"\0")
-        header = _HEADER.pack(len(payload), 0, link.seq, link.srcSystem, link.srcComponent, kind.id, 0)
-        link.seq = (link.seq + 1) % 256
-        checksum: int = mcrf4xx(header + payload + bytes((kind.crc_extra,)))
-        packet: bytes = bytes((MAGIC_V2,)) + header + payload + checksum.to_bytes(2, "little")
-        return packet
-
     def _chunks(self, status: StatusText) -> list[Any]:
         """A text that fits has no number; the parts of one that does not share theirs, never 0 (the message's spec)."""
         text = status.text.encode()
@@ -124,9 +98,13 @@ class Encoder:
     def _message(self, outgoing: Outgoing) -> Any:
         match outgoing:
             case PositionSetpoint():
-                return _PLACE(*self._position_fields(outgoing))
-            case AttitudeSetpoint():
-                return _ATTITUDE(*self._attitude_fields(outgoing))
+                return self._position(outgoing)
+            case AttitudeSetpoint(time_us, attitude_wxyz, thrust_fraction, yaw_rate_rad_s):
+                head = (_time_ms(time_us), *self._target, self._autopilot.attitude_mask)
+                rates_rad_s = (0.0, 0.0, yaw_rate_rad_s)
+                return dialect.MAVLink_set_attitude_target_message(
+                    *head, list(attitude_wxyz), *rates_rad_s, thrust_fraction
+                )
             case SendCommand(command, confirmation):
                 return dialect.MAVLink_command_long_message(
                     *self._target, command.command_id, confirmation, *_parameters(command)
@@ -150,8 +128,7 @@ class Encoder:
                 told = (float(value), _REAL) if self._autopilot.casts_whole_numbers else _as_float(value)
                 return dialect.MAVLink_param_set_message(*self._target, name.encode(), *told)
 
-    def _position_fields(self, setpoint: PositionSetpoint) -> tuple[Any, ...]:
-        """The fields as pymavlink orders them."""
+    def _position(self, setpoint: PositionSetpoint) -> Any:
         type_mask, yaw = IGNORE_YAW_RATE, setpoint.yaw_rad
         velocity, acceleration = setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2
         if velocity is None:
@@ -164,13 +141,9 @@ class Encoder:
             type_mask |= IGNORE_YAW
             yaw = NAN
         head = (_time_ms(setpoint.time_us), *self._target, dialect.MAV_FRAME_LOCAL_NED, type_mask)
-        return (*head, *setpoint.position_ned_m, *velocity, *acceleration, yaw, NAN)
-
-    def _attitude_fields(self, setpoint: AttitudeSetpoint) -> tuple[Any, ...]:
-        """The same."""
-        head = (_time_ms(setpoint.time_us), *self._target, self._autopilot.attitude_mask)
-        rates_rad_s = (0.0, 0.0, setpoint.yaw_rate_rad_s)
-        return (*head, list(setpoint.attitude_wxyz), *rates_rad_s, setpoint.thrust_fraction)
+        return dialect.MAVLink_set_position_target_local_ned_message(
+            *head, *setpoint.position_ned_m, *velocity, *acceleration, yaw, NAN
+        )
 
 
 def _time_ms(time_us: int) -> int:

@@ -210,7 +210,7 @@ def breaks(*arguments):
 
 
 ON_THE_WAY_OUT = ["companion.core.bounded", "companion.core.status_text"]
-ON_THE_WAY_OUT += ["companion.mavlink.encode.Encoder._position_fields"]
+ON_THE_WAY_OUT += ["companion.mavlink.encode.Encoder._position"]
 
 
 @pytest.mark.parametrize(
