@@ -7,7 +7,7 @@ are the vehicle's own boot clock. None means "not given"; MAVLink's NaN and type
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import ClassVar, TypeAlias
+from typing import TypeAlias
 
 Vector3: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
@@ -247,70 +247,39 @@ class AutopilotVersion(Sample):
 
 
 @dataclass(frozen=True, slots=True)
-class SetMode:
-    """MAV_CMD_DO_SET_MODE; how it names the mode differs between autopilots (see interface.Autopilot)."""
+class VehicleCommand:
+    """COMMAND_LONG: MAV_CMD and its first parameters; all others are 0, as PX4 wants them. `text` is for people."""
 
-    command_id: ClassVar[int] = 176
-    custom_mode: int
-    name: str
-    parameters: tuple[int, int]
-    """The second and the third of the command."""
-
-
-@dataclass(frozen=True, slots=True)
-class SetArmed:
-    """MAV_CMD_COMPONENT_ARM_DISARM; `is_forced`: also where PX4 does not know that it has landed."""
-
-    command_id: ClassVar[int] = 400
-    armed: bool
-    is_forced: bool = False
+    command_id: int
+    parameters: tuple[float, ...]
+    text: str
+    custom_mode: int | None = None
+    """Of one that asks for a mode; how it names the mode differs between autopilots (see interface.Autopilot)."""
 
 
-@dataclass(frozen=True, slots=True)
-class SetMessageInterval:
+# MAV_CMD_COMPONENT_ARM_DISARM. By force: also where PX4 does not know that it has landed.
+ARM = VehicleCommand(400, (1.0,), "arm")
+DISARM = VehicleCommand(400, (0.0,), "disarm")
+DISARM_BY_FORCE = VehicleCommand(400, (0.0, 21196.0), "disarm")
+
+
+# In the place of a message's id: those of a group, as REQUEST_DATA_STREAM asks for them.
+MANY_MESSAGES = -1
+
+
+def set_message_interval(message_id: int, interval_us: int) -> VehicleCommand:
     """MAV_CMD_SET_MESSAGE_INTERVAL."""
-
-    command_id: ClassVar[int] = 511
-    many: ClassVar[int] = -1  # for `message_id`: a group of them, as in REQUEST_DATA_STREAM
-    message_id: int
-    interval_us: int
+    return VehicleCommand(511, (message_id, interval_us), f"message {message_id} every {interval_us / 1000:g} ms")
 
 
-@dataclass(frozen=True, slots=True)
-class RequestMessage:
+def request_message(message_id: int) -> VehicleCommand:
     """MAV_CMD_REQUEST_MESSAGE."""
-
-    command_id: ClassVar[int] = 512
-    message_id: int
+    return VehicleCommand(512, (message_id,), f"message {message_id}")
 
 
-@dataclass(frozen=True, slots=True)
-class RunChecks:
-    """MAV_CMD_RUN_PREARM_CHECKS, which changes nothing in flight: PX4's commander acts on any command at once."""
-
-    command_id: ClassVar[int] = 401
-
-
-@dataclass(frozen=True, slots=True)
-class TakeOff:
+def take_off(height_m: float) -> VehicleCommand:
     """MAV_CMD_NAV_TAKEOFF, upwards from here: of an autopilot that no setpoint lifts off the ground."""
-
-    command_id: ClassVar[int] = 22
-    height_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class SetAuxFunction:
-    """MAV_CMD_DO_AUX_FUNCTION: a switch of ArduPilot's, as a transmitter has it; level 0 is low, 2 is high."""
-
-    command_id: ClassVar[int] = 218
-    function: int
-    level: int
-
-
-VehicleCommand: TypeAlias = (
-    SetMode | SetArmed | SetMessageInterval | RequestMessage | RunChecks | TakeOff | SetAuxFunction
-)
+    return VehicleCommand(22, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m), f"take-off to {height_m:g} m")
 
 
 @dataclass(frozen=True, slots=True)

@@ -161,11 +161,11 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
     commands: list[messages.VehicleCommand] = []
     autopilot = survey.vehicle.autopilot
     if survey.vehicle.version is None:
-        commands.append(messages.RequestMessage(MessageId.AUTOPILOT_VERSION))
+        commands.append(messages.request_message(MessageId.AUTOPILOT_VERSION))
     if survey.listening_since_us is None:
         commands += [stream.request() for stream in survey.streams.streams]
         commands += autopilot.streams
-        commands.append(messages.SetMessageInterval(autopilot.estimator_message, 1_000_000))
+        commands.append(messages.set_message_interval(autopilot.estimator_message, 1_000_000))
     outgoing += [SendCommand(command, 0) for command in commands]
 
 

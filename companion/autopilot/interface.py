@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from companion.autopilot.setup import PreflightItem, SerialLine, Setup
-from companion.messages import MessageId, SetMessageInterval, SetMode, VehicleCommand
+from companion.messages import MessageId, VehicleCommand
 
 
 class Pilot(Enum):
@@ -75,7 +75,7 @@ class Autopilot:
     """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
     least_version: tuple[int, int, int]
     """Older ones are refused."""
-    streams: tuple[SetMessageInterval, ...]
+    streams: tuple[VehicleCommand, ...]
     """Asked for beside those that all autopilots have."""
     filters_imu: bool
     """Its inertial samples are filtered: none shows that the raw ones were clipped."""
@@ -126,8 +126,10 @@ class Autopilot:
         mode = self._mode(custom_mode)
         return f"mode {self.mode_parameters(custom_mode)[0]}" if mode is None else mode.name
 
-    def set_mode(self, custom_mode: int) -> SetMode:
-        return SetMode(custom_mode, self.mode_name(custom_mode), self.mode_parameters(custom_mode))
+    def set_mode(self, custom_mode: int) -> VehicleCommand:
+        """MAV_CMD_DO_SET_MODE, whose first parameter says that a custom mode follows."""
+        parameters = (1, *self.mode_parameters(custom_mode))
+        return VehicleCommand(176, parameters, f"mode {self.mode_name(custom_mode)}", custom_mode)
 
     def _mode(self, custom_mode: int) -> Mode | None:
         return self.modes.get(custom_mode) or self.modes.get(custom_mode & self.mode_mask)

@@ -69,7 +69,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         flight.report(now_us, "disarmed", "disarmed")
     if is_mode_lost and not vehicle.is_mode_known:
         # PX4 answers within milliseconds; its next report by itself may take half a second.
-        flight.outbox.append(messages.SendCommand(messages.RequestMessage(MessageId.HEARTBEAT), 0))
+        flight.outbox.append(messages.SendCommand(messages.request_message(MessageId.HEARTBEAT), 0))
     if vehicle.identity is not None and now_us >= flight.round_trip.due_us:
         _measure_round_trip(flight, now_us)
     return None

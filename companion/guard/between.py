@@ -13,7 +13,7 @@ from companion.autopilot.known import ASSUMED
 from companion.mavlink.decode import Decoder, checksum_holds
 from companion.mavlink.moves import SETPOINT_IDS, asked_by, fields_of, interval_asked, would_move
 from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, message_id_of
-from companion.messages import Asked, SetMessageInterval
+from companion.messages import Asked
 
 # Of a client, still to be sent: a download of all parameters or a long mission is less.
 MOST_WAITING_BYTES = 64_000
@@ -49,7 +49,7 @@ class Between:
         self.awaits_choice = False  # setpoints are kept out until somebody asks for a mode
         self.autopilot = ASSUMED  # whose modes are told apart
         self.kept_out = 0  # packets
-        self.intervals: list[SetMessageInterval] = []  # asked for by clients, and not yet told to the guard
+        self.intervals: list[tuple[int, int]] = []  # asked for by clients, and not yet told to the guard
         self._setpoint: Asked | None = None
         self._told_us = 0
         self._rate = bytes_per_s

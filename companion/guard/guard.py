@@ -10,7 +10,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.watching import GuardConnect, own_streams
 from companion.mavlink.readers import GUARD_READERS
-from companion.messages import Asked, LandedState, SendCommand, SetMessageInterval
+from companion.messages import MANY_MESSAGES, Asked, LandedState, SendCommand
 
 
 class Guard(Stepped[GuardCore]):
@@ -35,20 +35,21 @@ class Guard(Stepped[GuardCore]):
         if (setpoint := between.new_setpoint(now_us)) is not None:
             self.hear_setpoint(setpoint)
             yield "setpoint", asdict(setpoint)
-        for asked in between.intervals:
-            self.hear_interval(asked)
-            yield "interval", asdict(asked)
+        for message_id, interval_us in between.intervals:
+            self.hear_interval(message_id, interval_us)
+            yield "interval", {"message_id": message_id, "interval_us": interval_us}
         between.intervals.clear()
 
     def hear_setpoint(self, asked: Asked) -> None:
         """A client's has been on its way since the last step."""
         self.core.flight.hear_setpoint(asked, self.core.now_us)
 
-    def hear_interval(self, asked: SetMessageInterval) -> None:
+    def hear_interval(self, message_id: int, interval_us: int) -> None:
         """A client has asked the vehicle for a stream. What the guard needs more often it asks for again."""
         flight = self.core.flight
         own = (*own_streams(flight.vehicle.autopilot), *flight.vehicle.autopilot.streams)
         for request in (*[stream.request() for stream in flight.streams.streams], *own):
-            is_enough = 0 < asked.interval_us <= request.interval_us
-            if asked.message_id in (request.message_id, asked.many) and not is_enough:
+            own_id, own_interval_us = request.parameters
+            is_enough = 0 < interval_us <= own_interval_us
+            if message_id in (own_id, MANY_MESSAGES) and not is_enough:
                 flight.outbox.append(SendCommand(request, 0))

@@ -11,7 +11,7 @@ from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
 from companion.guard.watching import OTHERS_STOPPED_US
-from companion.messages import MessageId, PositionTarget, RequestMessage, SendCommand
+from companion.messages import MessageId, PositionTarget, SendCommand, request_message
 
 # The vehicle reports its setpoint. Further than this from all that was sent, it is somebody else's: at 12 m/s a moving
 # setpoint advances 0.24 m from one to the next.
@@ -82,7 +82,7 @@ class Recovering:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES and asked_us is None:
             self._asked_us = now_us
-            guard.outbox.append(SendCommand(RequestMessage(MessageId.HEARTBEAT), 0))
+            guard.outbox.append(SendCommand(request_message(MessageId.HEARTBEAT), 0))
         # Over it is also where the hit was none.
         is_over = self._recover.step(guard, inputs, now_us) is not None
         return GuardTransition(Trigger.SETTLED) if is_over else None

@@ -15,9 +15,9 @@ from companion.messages import (
     MessageId,
     PositionTarget,
     Sample,
-    SetMessageInterval,
     Sticks,
     VehicleCommand,
+    set_message_interval,
 )
 from companion.motion.config import SAME_M_S
 from companion.reflex.detection.detector import NO_POSITION, ON_THE_GROUND
@@ -33,11 +33,11 @@ OTHERS_STOPPED_US = 1_000_000
 STREAMS_GONE_US = 3_000_000
 
 
-def own_streams(autopilot: Autopilot) -> tuple[SetMessageInterval, ...]:
+def own_streams(autopilot: Autopilot) -> tuple[VehicleCommand, ...]:
     """What a guard asks for beside what a flight does."""
     return (
-        SetMessageInterval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
-        SetMessageInterval(autopilot.sticks_message, round(1e6 / STICKS_HZ)),
+        set_message_interval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
+        set_message_interval(autopilot.sticks_message, round(1e6 / STICKS_HZ)),
     )
 
 

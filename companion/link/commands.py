@@ -40,37 +40,20 @@ class CommandOutcome:
     refused: bool = False
 
 
-def describe(command: messages.VehicleCommand) -> str:
-    match command:
-        case messages.SetMode():
-            return f"mode {command.name}"
-        case messages.SetArmed(armed):
-            return "arm" if armed else "disarm"
-        case messages.SetMessageInterval(message_id, interval_us):
-            return f"message {message_id} every {interval_us / 1000:g} ms"
-        case messages.RequestMessage(message_id):
-            return f"message {message_id}"
-        case messages.RunChecks():
-            return "run checks"
-        case messages.TakeOff(height_m):
-            return f"take-off to {height_m:g} m"
-        case messages.SetAuxFunction(function, level):
-            return f"auxiliary function {function} at {level}"
-
-
 def needs_confirmation(command: messages.VehicleCommand) -> bool:
     """PX4 may accept a mode and reject it in a second answer: modes and arming count when they are seen.
 
     Disarming does not: before the next HEARTBEAT a vehicle that has just armed still looks disarmed.
     """
-    return isinstance(command, messages.SetMode) or (isinstance(command, messages.SetArmed) and command.armed)
+    return command.custom_mode is not None or command == messages.ARM
 
 
 def is_final(command: messages.VehicleCommand, result: CommandResult) -> bool:
     """Whether repeating is useless. A refused disarm is final: the vehicle flies."""
     if result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED):
         return True
-    return result is CommandResult.TEMPORARILY_REJECTED and isinstance(command, messages.SetArmed) and not command.armed
+    is_disarm = command in (messages.DISARM, messages.DISARM_BY_FORCE)
+    return is_disarm and result is CommandResult.TEMPORARILY_REJECTED
 
 
 class CommandClient:
@@ -82,8 +65,7 @@ class CommandClient:
     @property
     def requested_mode(self) -> int | None:
         """The requested mode that is not confirmed yet."""
-        command = None if self.pending is None else self.pending.command
-        return command.custom_mode if isinstance(command, messages.SetMode) else None
+        return None if self.pending is None else self.pending.command.custom_mode
 
     def begin(self, command: messages.VehicleCommand) -> None:
         """Take up a command, dropping any other; it goes out in the next `step`."""
@@ -125,7 +107,7 @@ class CommandClient:
     def _end(self, pending: Pending, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
         self.pending = None
         refused = not succeeded and pending.last_result is not None and pending.last_result not in TAKEN_UP
-        return None, CommandOutcome(succeeded, f"{describe(pending.command)}: {text}", refused)
+        return None, CommandOutcome(succeeded, f"{pending.command.text}: {text}", refused)
 
 
 def _why_given_up(pending: Pending) -> str:

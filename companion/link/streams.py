@@ -18,8 +18,8 @@ class RequestedStream:
     asked_hz: float
     min_hz: float
 
-    def request(self) -> messages.SetMessageInterval:
-        return messages.SetMessageInterval(self.message_id, round(1e6 / self.asked_hz))
+    def request(self) -> messages.VehicleCommand:
+        return messages.set_message_interval(self.message_id, round(1e6 / self.asked_hz))
 
 
 def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -> tuple[RequestedStream, ...]:

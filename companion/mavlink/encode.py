@@ -2,7 +2,6 @@
 
 import math
 import struct
-from dataclasses import astuple
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
@@ -35,8 +34,6 @@ NAN = math.nan
 _UNUSED_INT8, _UNUSED_UINT8, _UNUSED_INT16, _UNUSED_UINT32 = 0x7F, 0xFF, 0x7FFF, 0xFFFFFFFF
 _CORES = 8
 _REAL = dialect.MAV_PARAM_TYPE_REAL32
-# ARM_DISARM's parameter 2, by MAVLink's definition of the command.
-_FORCE = 21196.0
 
 # STATUSTEXT's field.
 TEXT_LENGTH = 50
@@ -106,9 +103,9 @@ class Encoder:
                     *head, list(attitude_wxyz), *rates_rad_s, thrust_fraction
                 )
             case SendCommand(command, confirmation):
-                return dialect.MAVLink_command_long_message(
-                    *self._target, command.command_id, confirmation, *_parameters(command)
-                )
+                parameters = (*command.parameters, *(0.0,) * (7 - len(command.parameters)))
+                head = (*self._target, command.command_id, confirmation)
+                return dialect.MAVLink_command_long_message(*head, *parameters)
             case messages.OnboardHeartbeat(active):
                 status = dialect.MAV_STATE_ACTIVE if active else dialect.MAV_STATE_STANDBY
                 return dialect.MAVLink_heartbeat_message(
@@ -187,20 +184,3 @@ def _as_float(value: int | float) -> tuple[float, int]:
     if isinstance(value, int):
         return struct.unpack("<f", struct.pack("<i", value))[0], dialect.MAV_PARAM_TYPE_INT32
     return value, _REAL
-
-
-def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
-    """COMMAND_LONG's seven parameters; those without a meaning are 0, as PX4 wants them."""
-    match command:
-        case messages.SetMode():
-            used: tuple[float, ...] = (dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *command.parameters)
-        case messages.SetArmed(armed, is_forced):
-            used = (1.0 if armed else 0.0, _FORCE if is_forced else 0.0)
-        case messages.TakeOff(height_m):
-            used = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m)
-        case (
-            messages.SetMessageInterval() | messages.RequestMessage() | messages.SetAuxFunction() | messages.RunChecks()
-        ):
-            # Their fields are the first parameters, in their order.
-            used = astuple(command)
-    return used + (0.0,) * (7 - len(used))

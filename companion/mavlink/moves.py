@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.autopilot.interface import Autopilot, Pilot
 from companion.mavlink.packet import message_id_of, payload_of, source_of
-from companion.messages import Asked, SetMessageInterval, Vector3
+from companion.messages import MANY_MESSAGES, Asked, Vector3
 
 Source: TypeAlias = tuple[int, int]
 Fields: TypeAlias = Mapping[str, Any]
@@ -50,7 +50,7 @@ def _command_moves(fields: Fields, source: Source, autopilot: Autopilot) -> bool
     """A reposition to no place is how QGroundControl stops the vehicle."""
     match fields["command"]:
         case dialect.MAV_CMD_DO_SET_MODE:
-            return bool(fields["param2"] == autopilot.set_mode(autopilot.setpoints).parameters[0])
+            return bool(fields["param2"] == autopilot.mode_parameters(autopilot.setpoints)[0])
         case dialect.MAV_CMD_NAV_GUIDED_ENABLE:
             return bool(fields["param1"] > 0.0)
         case dialect.MAV_CMD_DO_REPOSITION | dialect.MAV_CMD_DO_CHANGE_ALTITUDE:
@@ -118,13 +118,13 @@ def would_move(packet: bytes, autopilot: Autopilot) -> bool:
     return test is not None and test(fields_of(packet), source_of(packet), autopilot)
 
 
-def interval_asked(packet: bytes) -> SetMessageInterval | None:
-    """The stream that a packet asks the vehicle for; None where it asks for none."""
+def interval_asked(packet: bytes) -> tuple[int, int] | None:
+    """The message that a packet asks the vehicle to stream, and its interval; None where it asks for none."""
     if message_id_of(packet) == dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
-        return SetMessageInterval(SetMessageInterval.many, 0)
+        return MANY_MESSAGES, 0
     fields = fields_of(packet) if message_id_of(packet) in _COMMANDS else {}
     if fields.get("command") != dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
         return None
     stream, interval_us = fields["param1"], fields["param2"]
     is_given = math.isfinite(stream) and math.isfinite(interval_us)
-    return SetMessageInterval(int(stream), int(interval_us)) if is_given else None
+    return (int(stream), int(interval_us)) if is_given else None

@@ -17,7 +17,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
-from companion.messages import Asked, ComputerStatus, SetMessageInterval, Vector3
+from companion.messages import Asked, ComputerStatus, Vector3
 from companion.mission.model import Mission
 from companion.reflex.detection.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
@@ -218,7 +218,7 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
         case {"kind": "setpoint"}, Guard():
             stepped.hear_setpoint(Asked(_vector(record["place_ned_m"]), _vector(record["velocity_ned_m_s"])))
         case {"kind": "interval", "message_id": int(message_id), "interval_us": int(interval_us)}, Guard():
-            stepped.hear_interval(SetMessageInterval(message_id, interval_us))
+            stepped.hear_interval(message_id, interval_us)
         case {"kind": "computer"}, _:
             try:
                 status = ComputerStatus(**record["status"] | {"cpu_percent": tuple(record["status"]["cpu_percent"])})

@@ -4,7 +4,7 @@ import math
 
 from companion.autopilot.ardupilot import modes, setup
 from companion.autopilot.interface import Autopilot, LastWords, Remedies
-from companion.messages import MessageId, SetAuxFunction, SetMessageInterval, VehicleCommand
+from companion.messages import MessageId, VehicleCommand, set_message_interval
 
 # RC_Channel.h: while FORCEFLYING is high, neither the crash check nor the land detector stops the motors. A recovery
 # leans further from its target, and shakes more, than they allow in the air.
@@ -13,8 +13,9 @@ _LOW, _HIGH = 0, 2
 
 
 def _changed_law(leans: bool | None) -> VehicleCommand:
-    """High while it is flown by attitude, low before and after."""
-    return SetAuxFunction(_FORCE_FLYING, _HIGH if leans else _LOW)
+    """MAV_CMD_DO_AUX_FUNCTION, a transmitter's switch: high while it is flown by attitude, low before and after."""
+    level = _HIGH if leans else _LOW
+    return VehicleCommand(218, (_FORCE_FLYING, level), f"auxiliary function {_FORCE_FLYING} at {level}")
 
 
 ARDUPILOT = Autopilot(
@@ -34,7 +35,7 @@ ARDUPILOT = Autopilot(
     attitude_mask=0,
     least_version=(4, 3, 0),  # GUID_TIMEOUT, GUID_OPTIONS bit 3
     # It has no CURRENT_MODE: how soon a pilot's mode is seen depends on this alone.
-    streams=(SetMessageInterval(MessageId.HEARTBEAT, 50_000),),
+    streams=(set_message_interval(MessageId.HEARTBEAT, 50_000),),
     filters_imu=True,  # INS_ACCEL_FILTER
     lesser_imu=MessageId.RAW_IMU,
     estimator_message=MessageId.EKF_STATUS_REPORT,

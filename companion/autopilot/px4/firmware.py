@@ -2,16 +2,17 @@
 
 from companion.autopilot.interface import Autopilot, LastWords, Remedies
 from companion.autopilot.px4 import modes, setup
-from companion.messages import MessageId, RunChecks, VehicleCommand
+from companion.messages import MessageId, VehicleCommand
 
 
 def _changed_law(leans: bool | None) -> VehicleCommand | None:
     """Have PX4 change between its controllers of position and of attitude.
 
     Within OFFBOARD it does so with its status, twice a second (Commander.cpp, updateControlMode): until then both
-    fly the vehicle, or neither does.
+    fly the vehicle, or neither does. MAV_CMD_RUN_PREARM_CHECKS changes nothing in flight, and the commander acts on any
+    command at once.
     """
-    return None if leans is None else RunChecks()
+    return None if leans is None else VehicleCommand(401, (), "run checks")
 
 
 PX4 = Autopilot(

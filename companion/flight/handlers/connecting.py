@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
 from typing import Generic, TypeVar
 
@@ -9,7 +10,7 @@ from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Trans
 from companion.flight.handlers.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
-from companion.messages import LandedState, MessageId, RequestMessage, SetMessageInterval, VehicleCommand
+from companion.messages import LandedState, MessageId, VehicleCommand, request_message
 
 MoveT = TypeVar("MoveT")
 
@@ -35,7 +36,7 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
         """What is asked of a vehicle that has just been met."""
         requested = [stream.request() for stream in flight.streams.streams]
-        return [RequestMessage(MessageId.AUTOPILOT_VERSION), *requested, *flight.vehicle.autopilot.streams]
+        return [request_message(MessageId.AUTOPILOT_VERSION), *requested, *flight.vehicle.autopilot.streams]
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> MoveT | None:
         identity, companion = flight.vehicle.identity, flight.mission.companion
@@ -81,9 +82,10 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
 
     def _in_its_place(self, flight: FlightContext) -> Iterator[VehicleCommand]:
         """Of a stream that the vehicle does not have."""
-        asked, imu = self._asked, flight.vehicle.autopilot.lesser_imu
-        if isinstance(asked, SetMessageInterval) and asked.message_id == MessageId.HIGHRES_IMU and imu is not None:
-            yield SetMessageInterval(imu, asked.interval_us)
+        imu = flight.vehicle.autopilot.lesser_imu
+        for stream in flight.streams.streams:
+            if stream.message_id is MessageId.HIGHRES_IMU and self._asked == stream.request() and imu is not None:
+                yield replace(stream, message_id=imu).request()
 
     def _ask_again(self, flight: FlightContext, text: str, now_us: int) -> None:
         """What is missing may come: a vehicle that has just started has no position."""

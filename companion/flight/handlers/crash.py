@@ -5,7 +5,7 @@ import math
 from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Transition
 from companion.flight.handlers.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
-from companion.messages import SetArmed
+from companion.messages import DISARM, DISARM_BY_FORCE
 from companion.motion.rotation import tilt_rad
 
 
@@ -77,7 +77,7 @@ class Crashed(FixedSetpoint):
         if not watch.lies:
             client.cancel()
         elif flight.mission.on_crash == "disarm" and client.pending is None and now_us >= self._ask_us:
-            client.begin(SetArmed(False, self._is_forced))
+            client.begin(DISARM_BY_FORCE if self._is_forced else DISARM)
         outcome = flight.command_outcome(inputs, False, now_us)
         if outcome is not None:
             self._ask_us, self._is_forced = now_us + DISARM_NEWS_US, watch.is_carried and not outcome.succeeded

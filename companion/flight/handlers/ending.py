@@ -7,7 +7,7 @@ from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Targe
 from companion.flight.states import State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
 from companion.link.vehicle import ModeReport
-from companion.messages import LandedState, SetArmed, Vector3
+from companion.messages import DISARM, LandedState, Vector3
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
 ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
@@ -201,7 +201,7 @@ class HandOver:
         self._disarming = flight.arming_requested and flight.armed_at_us is None
         flight.command_client.cancel()
         if self._disarming:
-            flight.command_client.begin(SetArmed(False))
+            flight.command_client.begin(DISARM)
 
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
         return None if self.finished or now_us - self._began_us >= LONGEST_US else self._target

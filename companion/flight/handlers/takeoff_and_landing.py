@@ -6,8 +6,7 @@ from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Targe
 from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
-from companion.messages import SetArmed, Vector3
-from companion.messages import TakeOff as TakeOffCommand
+from companion.messages import ARM, Vector3, take_off
 from companion.mission.item_trajectory import climb
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
@@ -73,7 +72,7 @@ class TakeOff:
         flight.expected_mode = flight.vehicle.autopilot.setpoints
         self._now = self._arm
         flight.arming_requested = True
-        flight.command_client.begin(SetArmed(True))
+        flight.command_client.begin(ARM)
         return self._arm(flight, Inputs(), now_us)
 
     def _arm(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
@@ -85,7 +84,7 @@ class TakeOff:
         self._now = self._climb
         if self._is_told:
             self._now, flight.target = self._leave_ground, None
-            flight.command_client.begin(TakeOffCommand(self._item.height_m))
+            flight.command_client.begin(take_off(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us
         self._ground_ned_m = mean_position(flight)
