@@ -117,7 +117,7 @@ class Machine(StateMachine):
             # The answers and positions of this step belong to the state that asked for them.
             transition = self.handler.step(self.flight, Inputs(), now_us)
         # A hit may be taken back until its recovery is over.
-        if self.state is not State.RECOVERING:
+        if self.flight.expectations and self.state is not State.RECOVERING:
             expectations.review(self.flight, now_us)
         return self.handler is not before
 

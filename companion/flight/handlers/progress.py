@@ -169,12 +169,13 @@ class FlyItems(_OnTrajectory):
             case items.VelocityItem() | items.SetYawItem():
                 return elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
             case _:
-                over = elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
-                if over and self._over_since_us is None:
+                if elapsed_s < self._trajectory.duration_s or not self._has_turned(now_us):
+                    return False
+                if self._over_since_us is None:
                     self._over_since_us = now_us
                 ahead = (flight.steps[number].action for number in range(flight.step_index + 1, len(flight.steps)))
                 lands = isinstance(next(one for one in ahead if not isinstance(one, items.ExpectItem)), items.LandItem)
-                return over and self._arrived(flight, BRAKES_S if lands else 0.0)
+                return self._arrived(flight, BRAKES_S if lands else 0.0)
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
