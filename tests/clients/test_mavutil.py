@@ -1,4 +1,4 @@
-"""pymavlink's own helpers on the simulated vehicle: heartbeat, modes, arming."""
+"""pymavlink's own helpers on the simulated vehicle: heartbeat, modes, arming, parameters, its log reader."""
 
 import os
 import time
@@ -45,3 +45,20 @@ def test_heartbeat_modes_arming_takeoff_and_land(vehicle):
     assert height_m == pytest.approx(2.5, abs=0.5)
     vehicle.set_mode("LAND")
     vehicle.motors_disarmed_wait()
+
+
+def has_all(connection) -> bool:
+    value = connection.recv_match(type="PARAM_VALUE", blocking=True, timeout=1)
+    return value is not None and len(connection.params) >= value.param_count
+
+
+def test_parameters(vehicle):
+    vehicle.wait_heartbeat(timeout=5)
+    vehicle.param_fetch_all()
+    wait_until(lambda: has_all(vehicle), 15, "all parameters")
+    assert vehicle.params["MIS_TAKEOFF_ALT"] == 2.5
+    for _ in range(5):
+        # As a ground station does: again where the answer was lost
+        vehicle.param_set_send("MIS_TAKEOFF_ALT", 4.0, mavutil.mavlink.MAV_PARAM_TYPE_REAL32)
+        vehicle.recv_match(type="PARAM_VALUE", blocking=True, timeout=2)
+    assert vehicle.params["MIS_TAKEOFF_ALT"] == 4.0
