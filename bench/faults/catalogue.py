@@ -2,6 +2,7 @@
 
 import math
 import random
+import signal
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -76,8 +77,8 @@ DOES: dict[str, Callable[..., Injector]] = {
     "jumped": lambda c, jump_s: Injector(When.flying(c), ahead_s=jump_s),
     "anew": lambda c: _once(lambda air: air.inject(clock_jump(-air.now_s)), c),
     "stalled": lambda c, seconds, moment="flying": _once(lambda air: setattr(air, "stall_s", seconds), c, moment),
-    "signalled": lambda c, reason, moment="flying": _once(
-        lambda air: setattr(air.interrupts, "reason", reason), c, moment
+    "signalled": lambda c, name, moment="flying": _once(
+        lambda air: air.interrupts.on_signal(signal.Signals[name], None), c, moment
     ),
     "killed": partial(_once, Air.kill),
     "step_breaks": partial(_once, injectors.break_step),

@@ -35,14 +35,14 @@ class Interrupts:
         # Only a program's main thread may hear signals; a flight in another one, as in a worker of Dask, has none.
         is_main = threading.current_thread() is threading.main_thread()
         for number in _REASONS if is_main else ():
-            self._previous[number] = signal.signal(number, self._on_signal)
+            self._previous[number] = signal.signal(number, self.on_signal)
         return self
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)  # type: ignore[arg-type]
 
-    def _on_signal(self, number: int, _: FrameType | None) -> None:
+    def on_signal(self, number: int, _: FrameType | None) -> None:
         if self._count > 0 and not self._may_insist:
             raise KeyboardInterrupt
         self._count += 1
