@@ -263,10 +263,6 @@ DISARM = VehicleCommand(400, (0.0,), "disarm")
 DISARM_BY_FORCE = VehicleCommand(400, (0.0, 21196.0), "disarm")
 
 
-# In the place of a message's id: those of a group, as REQUEST_DATA_STREAM asks for them.
-MANY_MESSAGES = -1
-
-
 def set_message_interval(message_id: int, interval_us: int) -> VehicleCommand:
     """MAV_CMD_SET_MESSAGE_INTERVAL."""
     return VehicleCommand(511, (message_id, interval_us), f"message {message_id} every {interval_us / 1000:g} ms")

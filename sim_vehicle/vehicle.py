@@ -15,7 +15,6 @@ from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.hil.slow_sensors import SlowSensors
 from sim_vehicle.mavlink.faulty_link import FaultyLink, check_messages, needs_faulty_link
 from sim_vehicle.mavlink.link import Link
-from sim_vehicle.mavlink.services.mission_transfer import TIMEOUT_US
 from sim_vehicle.mavlink.services.service import Board
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
@@ -127,9 +126,9 @@ class SimulatedVehicle:
         return link
 
     def remove_link(self, link: Link) -> None:
-        """The connection has ended. A mission that was coming in over it has timed out, so that another link's may."""
+        """The connection has ended."""
         self._links.remove(link)
-        link.update(self.time_boot_us + 2 * TIMEOUT_US, ())
+        link.close()
 
     # --- what may be changed between two intervals ---------------------------------------------------------
 

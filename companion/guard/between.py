@@ -49,7 +49,7 @@ class Between:
         self.awaits_choice = False  # setpoints are kept out until somebody asks for a mode
         self.autopilot = ASSUMED  # whose modes are told apart
         self.kept_out = 0  # packets
-        self.intervals: list[tuple[int, int]] = []  # asked for by clients, and not yet told to the guard
+        self.intervals: list[tuple[int | None, int]] = []  # asked for by clients, and not yet told to the guard
         self._setpoint: Asked | None = None
         self._told_us = 0
         self._rate = bytes_per_s

@@ -56,7 +56,6 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         moved = self.machine.step(inputs, now_us)
         if moved and self.machine.state is State.CONNECTING:
             guard.reflex.restart(now_us)
-            guard.reflex.loss_s = None
             guard.vehicle.attitude_parameters.clear()
         return moved
 

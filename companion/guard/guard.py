@@ -10,7 +10,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.watching import GuardConnect, own_streams
 from companion.mavlink.readers import GUARD_READERS
-from companion.messages import MANY_MESSAGES, Asked, LandedState, SendCommand
+from companion.messages import Asked, LandedState, SendCommand
 
 
 class Guard(Stepped[GuardCore]):
@@ -44,12 +44,14 @@ class Guard(Stepped[GuardCore]):
         """A client's has been on its way since the last step."""
         self.core.flight.hear_setpoint(asked, self.core.now_us)
 
-    def hear_interval(self, message_id: int, interval_us: int) -> None:
-        """A client has asked the vehicle for a stream. What the guard needs more often it asks for again."""
+    def hear_interval(self, message_id: int | None, interval_us: int) -> None:
+        """A client has asked the vehicle for a stream, or for a group: None. What the guard needs more often it asks
+        for again.
+        """
         flight = self.core.flight
         own = (*own_streams(flight.vehicle.autopilot), *flight.vehicle.autopilot.streams)
         for request in (*[stream.request() for stream in flight.streams.streams], *own):
             own_id, own_interval_us = request.parameters
             is_enough = 0 < interval_us <= own_interval_us
-            if message_id in (own_id, MANY_MESSAGES) and not is_enough:
+            if message_id in (own_id, None) and not is_enough:
                 flight.outbox.append(SendCommand(request, 0))

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.autopilot.interface import Autopilot, Pilot
 from companion.mavlink.packet import message_id_of, payload_of, source_of
-from companion.messages import MANY_MESSAGES, Asked, Vector3
+from companion.messages import Asked, Vector3
 
 Source: TypeAlias = tuple[int, int]
 Fields: TypeAlias = Mapping[str, Any]
@@ -118,10 +118,12 @@ def would_move(packet: bytes, autopilot: Autopilot) -> bool:
     return test is not None and test(fields_of(packet), source_of(packet), autopilot)
 
 
-def interval_asked(packet: bytes) -> tuple[int, int] | None:
-    """The message that a packet asks the vehicle to stream, and its interval; None where it asks for none."""
+def interval_asked(packet: bytes) -> tuple[int | None, int] | None:
+    """The message that a packet asks the vehicle to stream, None for a group of them, and its interval; None where it
+    asks for none.
+    """
     if message_id_of(packet) == dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
-        return MANY_MESSAGES, 0
+        return None, 0
     fields = fields_of(packet) if message_id_of(packet) in _COMMANDS else {}
     if fields.get("command") != dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
         return None

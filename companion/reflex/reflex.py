@@ -72,6 +72,7 @@ class Reflex:
         """Of a vehicle that has restarted, perhaps by a hit, nothing that was measured before is valid."""
         hides_clipping, self.monitor = self.monitor.estimator.hides_clipping, start_monitor(self.config, now_us)
         self.monitor.estimator.hides_clipping = hides_clipping
+        self.loss_s = None
 
     def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
         """Take the samples received since the last step, in order; call it without any, too."""

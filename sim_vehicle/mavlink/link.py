@@ -112,6 +112,11 @@ class Link:
             service.update(now_us)
         self.streams.update()
 
+    def close(self) -> None:
+        """Whoever was at the other end has gone."""
+        for service in self._services:
+            service.close()
+
     def _has_heard(self, system: int, component: int) -> bool:
         sources = self._decoder.sources
         if system == EVERY_ID:

@@ -234,6 +234,15 @@ def test_a_stream_that_a_program_slows_down_is_asked_for_again_and_one_that_it_s
     assert [message_id for message_id, _ in again] == [31, 105]
     assert all(0 < interval_us <= 20_000 for _, interval_us in again)
     assert [kind for kind, _ in air.told_by_clients] == ["interval"] * 4
+    # A group of them, which slows each down on an ArduPilot: all are asked for again
+    asked_s = air.time_s
+    air.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
+    air.run_for(0.1)
+    again = {round(m.param1) for m in air.sent_by("guard", "COMMAND_LONG", asked_s)}
+    assert again >= {31, 32, 85, 105} and air.told_by_clients[-1] == (
+        "interval",
+        {"message_id": None, "interval_us": 0},
+    )
 
 
 def test_the_vehicles_questions_of_the_time_are_the_programs_to_answer_and_the_guards_answers_are_its_own():

@@ -347,6 +347,7 @@ def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_
     air.run_to(State.STANDING_BY, 10.0)
     monitor = air.guard.core.reflex.monitor
     monitor.state = replace(monitor.state, phase=Phase.CONTACT, last_loud_boot_us=10**12)
+    known_s, air.guard.core.reflex.loss_s = air.guard.core.reflex.loss_s, 99.0
     # When the vehicle is restarted, and sends what it sends by default
     air.restart_vehicle()
     air.run_to(State.CONNECTING, 8.0)
@@ -356,6 +357,7 @@ def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_
     rates = [event.data for event in air.events if event.kind == "streams"]
     assert len(rates) == 2 and rates[1]["HIGHRES_IMU"] == pytest.approx(250, abs=10)
     assert air.guard.core.reflex.monitor.state.phase is not Phase.CONTACT
+    assert air.guard.core.reflex.loss_s == known_s
     if kind is AttachedFlight:
         # And the next flight's hit is answered: this ends when the guard holds
         air.fly_into_the_wall()

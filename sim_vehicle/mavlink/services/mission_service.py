@@ -37,6 +37,9 @@ class MissionService(Service):
         self._report(now_us)
         self._transfer.update(now_us)
 
+    def close(self) -> None:
+        self._transfer.end()
+
     def _report(self, now_us: int) -> None:
         """What is due now, nearly always nothing."""
         store, progress = self._store, self._store.progress

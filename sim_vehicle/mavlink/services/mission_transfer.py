@@ -65,7 +65,7 @@ class MissionTransfer:
         if self.state is TransferState.IDLE:
             return
         if now_us - self._heard_us > TIMEOUT_US:
-            self._end()
+            self.end()
         elif now_us - self._sent_us > RETRY_US and self.state is TransferState.RECEIVING:
             self._ask_for_next()
         elif now_us - self._sent_us > RETRY_US and self._next == 0:
@@ -157,10 +157,10 @@ class MissionTransfer:
             return
         item = wire.parse(message)
         if isinstance(item, MissionResult):
-            self._end(item)
+            self.end(item)
             return
         if not wire.fits(item, self._type):
-            self._end(MissionResult.ERROR)
+            self.end(MissionResult.ERROR)
             return
         self._items.append(item)
         if message.current:
@@ -175,7 +175,7 @@ class MissionTransfer:
         # The same list once more changes nothing; compared as text, because a heading of NaN is the same then, too.
         if repr(tuple(self._items)) != repr(self._store.plan(self._type)):
             self._store.replace(MissionType(self._type), tuple(self._items), self._marked)
-        self._end(MissionResult.ACCEPTED)
+        self.end(MissionResult.ACCEPTED)
 
     def _acknowledge_again(self, message: Packet) -> None:
         """After the last item: its sender may not have got our acknowledgement."""
@@ -185,9 +185,9 @@ class MissionTransfer:
 
     def _give_up(self, message: Packet) -> None:
         if _peer(message) == self._peer and message.type == MissionResult.CANCELLED:
-            self._end()
+            self.end()
 
-    def _end(self, result: MissionResult | None = None) -> None:
+    def end(self, result: MissionResult | None = None) -> None:
         """Of an upload the list is stored, or refused in whole; None: nobody is there to be told."""
         self._store.uploading = self._store.uploading and self.state is not TransferState.RECEIVING
         self.state = TransferState.IDLE

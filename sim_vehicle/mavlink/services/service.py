@@ -47,3 +47,6 @@ class Service:
 
     def update(self, now_us: int) -> None:
         """Called at every interval, after the control and before the streams: answers, repeats, time-outs."""
+
+    def close(self) -> None:
+        """The link has ended: what was going on over it does not hold up another one."""

@@ -101,6 +101,10 @@ def test_who_has_passed_the_end_of_an_obstacle_is_neither_driven_back_before_it_
         hears(flight, recover, since_us, 4.2, 0.0)
     assert record.setpoint_ned_m[0] == pytest.approx(4.2 - 0.35, abs=0.05)
     assert flight.reflex.recovery.is_pressed
+    # And who hovers just off it, as in a gap, has left it
+    for since_us in range(1_100_000, 1_500_000, 20_000):
+        hears(flight, recover, since_us, 4.15, -0.1)
+    assert not flight.reflex.recovery.is_pressed
 
 
 @pytest.mark.parametrize("law", ["normal", "paper"])

@@ -197,7 +197,7 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
 def test_a_mission_that_waits_for_a_file_goes_on_when_it_is_there_and_replays(tmp_path):
     sign, folder = tmp_path / "go", tmp_path / "run"
     sign.touch()
-    # A name that no file can have is waited for in vain
+    # A name that no file can have is never there
     waits = f"{{wait_for: {{file: {'n' * 300}}}, timeout_s: 2, on_timeout: continue}}, {{wait_for: {{file: {sign}}}}}"
     items = f"items=[{{takeoff: {{height_m: 0.6}}}}, {waits}, {{land: {{}}}}]"
     assert fly_square("--set", items, *QUICK, "--out", folder) == 0
