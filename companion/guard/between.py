@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from companion.autopilot.known import ASSUMED
 from companion.mavlink.decode import Decoder, checksum_holds
-from companion.mavlink.moves import SETPOINT_IDS, asked_by, fields_of, interval_asked, would_move
+from companion.mavlink.moves import SETPOINT_IDS, asked_by, fields_of, interval_asked, is_for, would_move
 from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, message_id_of
 from companion.messages import Asked
 
@@ -48,6 +48,7 @@ class Between:
         self.is_closed = True  # until the guard has met the vehicle
         self.awaits_choice = False  # setpoints are kept out until somebody asks for a mode
         self.autopilot = ASSUMED  # whose modes are told apart
+        self.system_id: int | None = None  # the vehicle's; what is for another passes
         self.kept_out = 0  # packets
         self.intervals: list[tuple[int | None, int]] = []  # asked for by clients, and not yet told to the guard
         self._setpoint: Asked | None = None
@@ -136,6 +137,8 @@ class Between:
         return self._news.popleft() if self._news else None
 
     def _lets_pass(self, packet: bytes) -> bool:
+        if not is_for(packet, self.system_id):
+            return True
         self._setpoint = asked_by(packet) or self._setpoint
         if (self.is_closed or self.awaits_choice) and would_move(packet, self.autopilot):
             if self.is_closed or message_id_of(packet) in SETPOINT_IDS:

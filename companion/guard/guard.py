@@ -8,7 +8,7 @@ from companion.companion import Stepped
 from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
-from companion.guard.watching import GuardConnect, own_streams
+from companion.guard.watching import GuardConnect
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, LandedState, SendCommand
 
@@ -24,6 +24,7 @@ class Guard(Stepped[GuardCore]):
         between.is_closed = self.core.machine.holds
         handler, vehicle = self.core.machine.handler, self.core.flight.vehicle
         between.autopilot = vehicle.autopilot
+        between.system_id = None if vehicle.identity is None else vehicle.identity.system_id
         begins = isinstance(handler, GuardConnect) and handler.begins
         if vehicle.armed is False:
             between.awaits_choice = False
@@ -48,10 +49,7 @@ class Guard(Stepped[GuardCore]):
         """A client has asked the vehicle for a stream, or for a group: None. What the guard needs more often it asks
         for again.
         """
-        flight = self.core.flight
-        own = (*own_streams(flight.vehicle.autopilot), *flight.vehicle.autopilot.streams)
-        for request in (*[stream.request() for stream in flight.streams.streams], *own):
-            own_id, own_interval_us = request.parameters
-            is_enough = 0 < interval_us <= own_interval_us
+        for own_id, request in self.core.flight.streams.asked.items():
+            is_enough = 0 < interval_us <= request.parameters[1]
             if message_id in (own_id, None) and not is_enough:
-                flight.outbox.append(SendCommand(request, 0))
+                self.core.flight.outbox.append(SendCommand(request, 0))

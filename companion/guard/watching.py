@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from companion.autopilot.interface import Autopilot, Pilot
+from companion.autopilot.interface import Pilot
 from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target
 from companion.flight.envelope import unattended_text
 from companion.flight.handlers.connecting import Meet
@@ -31,14 +31,6 @@ THROTTLE = 2
 OTHERS_STOPPED_US = 1_000_000
 # A vehicle that was restarted has forgotten what it was asked for; three of its heartbeats tell that it is up again.
 STREAMS_GONE_US = 3_000_000
-
-
-def own_streams(autopilot: Autopilot) -> tuple[VehicleCommand, ...]:
-    """What a guard asks for beside what a flight does."""
-    return (
-        set_message_interval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
-        set_message_interval(autopilot.sticks_message, round(1e6 / STICKS_HZ)),
-    )
 
 
 def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str | None:
@@ -119,7 +111,9 @@ class GuardConnect(Meet[GuardTransition]):
         return self.is_first and not self._is_told
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
-        return [*super()._commands(flight), *own_streams(flight.vehicle.autopilot)]
+        echoes = set_message_interval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ))
+        sticks = set_message_interval(flight.vehicle.autopilot.sticks_message, round(1e6 / STICKS_HZ))
+        return [*super()._commands(flight), echoes, sticks]
 
     def _refused(self, text: str) -> GuardTransition:
         return GuardTransition(Trigger.REFUSED, text)

@@ -48,10 +48,11 @@ def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -
 class StreamMonitor:
     """Counts received messages. Rates are means over the companion's time, so lost packets lower them."""
 
-    __slots__ = ("_counts", "_started_us", "_until_us", "streams")
+    __slots__ = ("_counts", "_started_us", "_until_us", "asked", "streams")
 
     def __init__(self, config: StreamsConfig, for_detector: Collection[MessageId] = ()) -> None:
         self.streams = wanted_streams(config, for_detector)
+        self.asked: dict[float, messages.VehicleCommand] = {}  # by message, and what stands in for one, too
         self._counts: dict[type, int] = {stream.sample_type: 0 for stream in self.streams}
         self._started_us: int | None = None
         self._until_us = 0

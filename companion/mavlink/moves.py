@@ -5,6 +5,7 @@ Everything else passes, a person's words above all: sticks, every mode but OFFBO
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import accumulate
 from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
@@ -28,10 +29,11 @@ _COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND
 
 
 def fields_of(packet: bytes) -> dict[str, Any]:
-    """Of a whole packet of this dialect whose message has no array: its fields by name."""
+    """Of a whole packet of this dialect: its fields by name; of an array the first value."""
     message, payload = dialect.mavlink_map[message_id_of(packet)], payload_of(packet)
     values = message.unpacker.unpack(payload.ljust(message.unpacker.size, b"\0")[: message.unpacker.size])
-    return dict(zip(message.ordered_fieldnames, values, strict=False))
+    places = accumulate(message.lengths, initial=0)
+    return {name: values[place] for name, place in zip(message.ordered_fieldnames, places, strict=False)}
 
 
 def _always(fields: Fields, source: Source, autopilot: Autopilot) -> bool:
@@ -88,6 +90,12 @@ KEPT_OUT: Mapping[int, tuple[Test, str]] = {
 SETPOINT_IDS = frozenset(number for number, (_, reason) in KEPT_OUT.items() if reason is _SETPOINT)
 # The same by name, for MAVSDK.
 SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
+
+
+def is_for(packet: bytes, system_id: int | None) -> bool:
+    """Whether a whole packet is for that system; so is one that names none, and while none is known every one."""
+    fields = fields_of(packet) if message_id_of(packet) in dialect.mavlink_map else {}
+    return system_id is None or fields.get("target_system", fields.get("target", 0)) in (0, system_id)
 
 
 def asked_by(packet: bytes) -> Asked | None:

@@ -304,6 +304,21 @@ def test_of_commands_sticks_and_modes_only_what_would_move_the_vehicle_is_kept_o
     assert would_move(packet, PX4) is is_kept_out
 
 
+def test_what_is_for_another_vehicle_on_the_same_link_passes_and_is_not_taken_for_this_ones():
+    between = Between(LINK_BYTES_S)
+    between.system_id = 1
+    others = [
+        packet_of(dialect.MAVLink_set_position_target_local_ned_message(1, 2, 1, 1, 0xDC7, *[0.0] * 11)),
+        packet_of(dialect.MAVLink_set_attitude_target_message(1, 2, 1, 7, [1, 0, 0, 0], 0, 0, 0, 0.5)),
+        packet_of(dialect.MAVLink_command_long_message(2, 1, 511, 0, 105, -1, 0, 0, 0, 0, 0)),
+        packet_of(dialect.MAVLink_command_long_message(2, 1, 176, 0, 1, 6, 0, 0, 0, 0, 0)),
+        packet_of(dialect.MAVLink_manual_control_message(2, 500, 0, 500, 0, 0), (1, 191)),
+    ]
+    between.hear("program", b"".join(others))
+    assert between.to_vehicle(1_000_000) == others
+    assert between.new_setpoint(1_000_000) is None and between.intervals == []
+
+
 # --- bytes
 
 

@@ -74,6 +74,8 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
             return
         self._asked = request = next(requests, None)
         if request is not None:
+            if len(request.parameters) == 2:  # how often it is to come
+                flight.streams.asked[request.parameters[0]] = request
             flight.command_client.begin(request)
             flight.command_outcome(Inputs(), False, now_us)
         else:

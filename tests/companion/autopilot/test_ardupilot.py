@@ -31,6 +31,7 @@ from companion.messages import (
     Parameter,
     PositionSetpoint,
     Refused,
+    SendCommand,
     SetParameter,
 )
 from companion.reflex.config import EstimateConfig
@@ -310,11 +311,20 @@ def test_a_radios_pulses_are_the_pilots_sticks():
     assert heard(mav.MAVLink_rc_channels_message(0, 0, *(0xFFFF,) * 18, 255)) is None
 
 
-def test_a_board_without_highres_imu_is_flown_by_its_raw_one():
-    def ack(command, count):
-        return [2] if command == 511 and count == 1 else [0]  # the first stream asked for is the inertial sensor's
+def without_highres_imu(command, count):
+    return [2] if command == 511 and count == 1 else [0]  # the first stream asked for is the inertial sensor's
 
-    f = flight(FakeCopter(ack=ack), items=[TAKEOFF, LANDING])
+
+@pytest.mark.parametrize("asked", [(27, 1_000_000), (None, 0)])
+def test_a_client_that_slows_down_what_stands_in_for_highres_imu_is_noticed(asked):
+    guard = guarded(FakeCopter(ack=without_highres_imu), lambda guard: guard.status().state == "standing by")
+    guard.hear_interval(*asked)
+    again = [sent.command.parameters[0] for sent in guard.core.flight.outbox if isinstance(sent, SendCommand)]
+    assert again == [27] if asked[0] else {27, 65} <= {*again}
+
+
+def test_a_board_without_highres_imu_is_flown_by_its_raw_one():
+    f = flight(FakeCopter(ack=without_highres_imu), items=[TAKEOFF, LANDING])
     f.run_to("takeoff")
     first, second = ((int(message.param1), message.param2) for _, message in commanded(f, 511)[:2])
     assert (first, second) == ((105, first[1]), (27, first[1]))
