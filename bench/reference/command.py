@@ -206,7 +206,7 @@ def _commands(program: str, commands: Mapping[str, Any]) -> Iterator[tuple[str, 
 
 def messages() -> dict[str, str]:
     """What is sent: by pymavlink's encoders and classes that the encoder names."""
-    read = [(code(name), ", ".join(map(code, reader._names))) for name, reader in sorted(readers._BY_NAME.items())]
+    read = sorted((code(one.name), ", ".join(map(code, one._names))) for one in readers.GUARD_READERS.values())
     found = re.findall(r"\.(?:MAVLink_(\w+)_message|(\w+)_encode)\b", inspect.getsource(encode))
     sent = sorted({(of_class or of_call).upper() for of_class, of_call in found})
     return {"received": table(("message", "fields"), read), "sent": ", ".join(map(code, sent))}

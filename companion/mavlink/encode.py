@@ -55,7 +55,8 @@ class Encoder:
 
     def packets(self, outgoing: Outgoing) -> list[bytes]:
         """All that it takes; of most messages one."""
-        return [self._pack(message) for message in self._messages(outgoing)]
+        messages = self._chunks(outgoing) if isinstance(outgoing, StatusText) else [self._message(outgoing)]
+        return [self._pack(message) for message in messages]
 
     def unsent(self, outgoing: Outgoing) -> bytes:
         """The packets, which do not count as long as they are not sent."""
@@ -63,15 +64,6 @@ class Encoder:
         packets = b"".join(self.packets(outgoing))
         self._mavlink.seq = seq
         return packets
-
-    def _messages(self, outgoing: Outgoing) -> list[Any]:
-        """The same, as pymavlink has them before they are bytes."""
-        return self._chunks(outgoing) if isinstance(outgoing, StatusText) else [self._message(outgoing)]
-
-    def fields(self, outgoing: Outgoing) -> list[tuple[str, dict[str, Any]]]:
-        """The same packets as names and fields, for MAVSDK, which makes the bytes itself; NaN as None."""
-        found = self._messages(outgoing)
-        return [(one.get_type(), {name: _plain(getattr(one, name)) for name in one.fieldnames}) for one in found]
 
     def _pack(self, message: Any) -> bytes:
         packet = bytes(message.pack(self._mavlink))
@@ -145,12 +137,6 @@ class Encoder:
 
 def _time_ms(time_us: int) -> int:
     return time_us // 1000 & 0xFFFFFFFF
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value.decode() if isinstance(value, bytes) else value
 
 
 def _computer(status: ComputerStatus) -> Any:

@@ -100,24 +100,17 @@ def is_for(packet: bytes, system_id: int | None) -> bool:
 
 def asked_by(packet: bytes) -> Asked | None:
     """Where a setpoint leads; None of what is no setpoint."""
-    message_id = message_id_of(packet)
-    return asked_of(dialect.mavlink_map[message_id].msgname, fields_of(packet)) if message_id in SETPOINT_IDS else None
+    message_id, fields = message_id_of(packet), {}
+    if message_id == dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED:
+        fields = fields_of(packet)
+    if fields.get("coordinate_frame") != dialect.MAV_FRAME_LOCAL_NED:
+        return Asked() if message_id in SETPOINT_IDS else None
+    place, velocity = (fields["x"], fields["y"], fields["z"]), (fields["vx"], fields["vy"], fields["vz"])
+    return Asked(_unless(fields["type_mask"] & _NO_PLACE, place), _unless(fields["type_mask"] & _NO_VELOCITY, velocity))
 
 
-def asked_of(name: str, fields: Mapping[str, Any]) -> Asked:
-    """The same of names and fields."""
-    if name != "SET_POSITION_TARGET_LOCAL_NED" or fields.get("coordinate_frame") != dialect.MAV_FRAME_LOCAL_NED:
-        return Asked()
-    mask = fields.get("type_mask", _NO_PLACE | _NO_VELOCITY)
-    place, velocity = (_vector([fields.get(name) for name in names]) for names in (("x", "y", "z"), ("vx", "vy", "vz")))
-    return Asked(None if mask & _NO_PLACE else place, None if mask & _NO_VELOCITY else velocity)
-
-
-def _vector(values: list[float | None]) -> Vector3 | None:
-    north, east, down = values
-    if north is None or east is None or down is None or not all(map(math.isfinite, (north, east, down))):
-        return None
-    return (north, east, down)
+def _unless(ignored: int, vector: Vector3) -> Vector3 | None:
+    return None if ignored or not all(map(math.isfinite, vector)) else vector
 
 
 def would_move(packet: bytes, autopilot: Autopilot) -> bool:

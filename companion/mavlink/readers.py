@@ -56,11 +56,6 @@ class Reader:
             fields = self._pick(fields)
         return self._make(source, *fields) if self._takes_source else self._make(*fields)
 
-    def from_fields(self, values: Mapping[str, Any], source: tuple[int, int]) -> Sample | None:
-        """Raises KeyError, TypeError, ValueError where the fields are not those of this dialect."""
-        fields = [values[name] for name in self._names]
-        return self._make(source, *fields) if self._takes_source else self._make(*fields)
-
 
 def _imu(
     time_usec: int,
@@ -367,22 +362,3 @@ ARDUPILOT_READERS = _readers(
         dialect.MAVLink_raw_imu_message: _raw_imu,
     }
 )
-
-_BY_NAME = {reader.name: reader for reader in GUARD_READERS.values()}
-# Names of the messages that become samples.
-HEARD = frozenset(_BY_NAME)
-
-
-def sample_from(name: str, source: tuple[int, int], fields: Mapping[str, Any]) -> Sample | None:
-    """Of a message handed over as name and fields; None where it has no sample, or its fields are not of this dialect.
-
-    A None field is NaN. An answer to a command is taken as one to ours: who asked is not told apart here.
-    """
-    reader = _BY_NAME.get(name)
-    if reader is None:
-        return None
-    values = {key: math.nan if value is None else value for key, value in fields.items()}
-    try:
-        return reader.from_fields({**values, "target_component": 0}, source)
-    except (KeyError, TypeError, ValueError):
-        return None

@@ -2,7 +2,6 @@
 
 import asyncio
 import gc
-import json
 import logging
 import sys
 import threading
@@ -11,11 +10,12 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Self
 
-from companion.guard.attached import AttachedGuard, AttachedStep
+from companion.companion import StepResult
+from companion.guard.attached import AttachedGuard
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINTS
-from companion.mavlink.readers import HEARD
+from companion.mavlink.named import packet_from
 from companion.reflex.recovery.collision import CollisionReport
 from companion.report import Event
 from companion.shell.clock import Clock
@@ -56,7 +56,7 @@ class CollisionGuard:
     ) -> None:
         self._link = MavsdkLink(mavsdk, system)
         self._clock = Clock()
-        self._guard = AttachedGuard(config or GuardConfig(), self._link.system_id, self._clock.now_us())
+        self._guard = AttachedGuard(config or GuardConfig(), self._link.system_id)
         self._on_event = on_event
         # Guards all below. MAVSDK's I/O thread and the guard's own meet here, each for less than a millisecond, but for
         # the sample that shows a hit: its setpoint is made in 3 ms, and nothing is more urgent.
@@ -163,11 +163,11 @@ class CollisionGuard:
 
     def _incoming(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
         """On MAVSDK's thread: the sample, and at once what follows from it."""
-        if name in HEARD:
+        if packet := packet_from(name, source, fields_json):
             with self._changed:
                 if not self._is_over:
                     with self._guarded():
-                        self._send(self._guard.hear(name, source, json.loads(fields_json), self._clock.now_us()))
+                        self._send(self._guard.step(packet, self._clock.now_us()))
         return True
 
     @contextmanager
@@ -190,13 +190,13 @@ class CollisionGuard:
             passes = self._is_over or not self.holds
             if not self._is_over:
                 with self._guarded():
-                    passes = self._guard.lets_pass(name, json.loads(fields_json), self._clock.now_us())
+                    passes = self._guard.lets_pass(packet_from(name, source, fields_json))
             return passes
 
-    def _send(self, step: AttachedStep) -> None:
+    def _send(self, step: StepResult) -> None:
         try:
-            for name, fields in step.sent:
-                self._link.send(name, fields)
+            for packet in step.sent_frames:
+                self._link.send(packet)
         except RuntimeError as error:
             # The program has destroyed its MAVSDK: there is no connection left to guard on.
             _LOG.warning("the guard ends: %s", error)
@@ -223,7 +223,7 @@ class CollisionGuard:
                 self._changed.wait(wait_s)
             if not self._is_over and self._clock.now_us() >= self._guard.next_deadline_us():
                 with self._guarded():
-                    self._send(self._guard.step((), self._clock.now_us()))
+                    self._send(self._guard.step(b"", self._clock.now_us()))
             self._end_after_a_fault()
             goes_on = not self._is_over
             told, self._untold = self._untold, []

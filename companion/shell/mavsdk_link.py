@@ -6,11 +6,11 @@ I/O thread, the outgoing one on every message just before it is sent.
 """
 
 import ctypes
-import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from companion.errors import ReboundError
+from companion.mavlink.named import named
 
 # Message name, (system, component) it comes from, its fields still as JSON; whether it may go on.
 Interceptor = Callable[[str, tuple[int, int], bytes], bool]
@@ -62,9 +62,10 @@ class MavsdkLink:
         function.restype = result
         return function
 
-    def send(self, name: str, fields: Mapping[str, Any]) -> None:
+    def send(self, packet: bytes) -> None:
         """As the program itself would; from any thread. Raises RuntimeError once MAVSDK is gone."""
-        self._direct.send_message(self._message_class(name, fields_json=json.dumps(fields)))
+        name, fields_json = named(packet)
+        self._direct.send_message(self._message_class(name, fields_json=fields_json))
 
     def release(self) -> None:
         """Not to be called while holding what an interceptor waits for."""

@@ -4,7 +4,6 @@
 own connection, through which both send names and fields, as by MAVSDK.
 """
 
-import json
 import math
 from collections.abc import Callable
 from typing import Any
@@ -15,10 +14,12 @@ from bench.fly import commanded
 from bench.fly.commanded import MANUAL_POSITION, OFFBOARD, REPEATED_EVERY_S, Commanded
 from bench.fly.packets import GROUND_STATION, decoded
 from bench.fly.virtual_time import EPOCH_US
-from companion.guard.attached import AttachedGuard, AttachedStep
+from companion.companion import StepResult
+from companion.guard.attached import AttachedGuard
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.guard.states import State
+from companion.mavlink.named import named, packet_from
 from companion.report import Event
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
@@ -27,6 +28,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 from tests.flying import Told
 
 VELOCITY_ONLY = 0xDC7
+PROGRAM = (245, 190)
 
 
 class Watched(Told, Commanded):
@@ -170,15 +172,15 @@ class AttachedFlight(Watched):
 
     def __init__(self, config: GuardConfig | None = None) -> None:
         super().__init__("foldable", None)
-        self.guard = AttachedGuard(config or GuardConfig(), 1, EPOCH_US)
-        self.outgoing: list[tuple[str, str, dict[str, Any]]] = []
+        self.guard = AttachedGuard(config or GuardConfig(), 1)
+        self.outgoing: list[tuple[str, bytes]] = []
 
     @property
     def mode(self) -> int | None:
         return self.guard.core.flight.vehicle.custom_mode
 
     def send(self, message: Any) -> None:
-        self.outgoing.append(("program", message.get_type(), fields_of(message)))
+        self.outgoing.append(("program", message.pack(dialect.MAVLink(None, *PROGRAM))))
 
     def fly_by(self, north_m_s: float, east_m_s: float = 0.0) -> Callable[[], None]:
         """That velocity in OFFBOARD; what is returned ends the setpoints."""
@@ -194,33 +196,21 @@ class AttachedFlight(Watched):
         self.run_until(lambda: self.guard.core.machine.holds, 20.0)
 
     def _exchange(self) -> None:
-        self.take(self.guard.step((), self.now_us))
+        self.take(self.guard.step(b"", self.now_us))
         packets, self.outgoing, outgoing = b"", [], self.outgoing
-        for sender, name, fields in outgoing:
-            if self.guard.lets_pass(name, fields, self.now_us):
-                packets += packet_of(name, fields)
-                self.passes(sender, packet_of(name, fields))
+        for sender, packet in outgoing:
+            if self.guard.lets_pass(packet):
+                packets += packet
+                self.passes(sender, packet)
         for packet in self.vehicle.step(packets):
-            self.hear(decoded(packet), self.now_us)
+            self.take(self.guard.step(by_name(packet), self.now_us))
 
-    def hear(self, message: Any, now_us: int) -> None:
-        self.take(self.guard.hear(message.get_type(), (1, 1), fields_of(message), now_us))
-
-    def take(self, step: AttachedStep) -> None:
-        self.outgoing += [("guard", name, json.loads(json.dumps(dict(fields)))) for name, fields in step.sent]
+    def take(self, step: StepResult) -> None:
+        self.outgoing += [("guard", by_name(packet, PROGRAM) or packet) for packet in step.sent_frames]
         self.events += step.events
 
 
-def fields_of(message: Any) -> dict[str, Any]:
-    """As libmav has them, by way of JSON: NaN is null, text is text, an array is a list."""
-    values = {name: getattr(message, name) for name in message.fieldnames}
-    is_unset = {name: isinstance(value, float) and not math.isfinite(value) for name, value in values.items()}
-    return json.loads(json.dumps({name: None if is_unset[name] else value for name, value in values.items()}))
-
-
-def packet_of(name: str, fields: dict[str, Any]) -> bytes:
-    kind = getattr(dialect, f"MAVLink_{name.lower()}_message")
-    values = [math.nan if fields[field] is None else fields[field] for field in kind.fieldnames]
-    message = kind(*[value.encode() if isinstance(value, str) else value for value in values])
-    packet: bytes = message.pack(dialect.MAVLink(None, 245, 190))
-    return packet
+def by_name(packet: bytes, source: tuple[int, int] = (1, 1)) -> bytes:
+    """By way of MAVSDK's names and fields; empty where the guard looks at nothing of it."""
+    name, fields_json = named(packet)
+    return packet_from(name, source, fields_json.encode())

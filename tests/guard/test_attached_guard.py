@@ -1,6 +1,5 @@
 """The guard on a program's own connection: none of the program's setpoints reaches the vehicle while it holds."""
 
-import json
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,26 +7,28 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
-from bench.fly.packets import decoded
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.core import POLL_INTERVAL_US
-from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
 from companion.guard.holding import is_foreign
 from companion.guard.onward import stop
 from companion.guard.states import State
-from companion.mavlink.decode import Decoder
-from companion.mavlink.readers import GUARD_READERS, sample_from
-from companion.messages import LocalPosition, PositionTarget, Refused
+from companion.mavlink.moves import SETPOINT_IDS
+from companion.mavlink.named import named, packet_from
+from companion.mavlink.packet import message_id_of
+from companion.messages import LocalPosition, PositionTarget
 from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
-from sim_vehicle.airframe import load_built_in
-from sim_vehicle.scene import Scene
-from sim_vehicle.vehicle import SimulatedVehicle
-from tests.guard.flying import AttachedFlight, fields_of, packet_of
+from tests.guard.flying import PROGRAM, AttachedFlight, by_name
 
 RUN_CHECKS = 401
 STALL_S = 1.6  # more than the silence after which the guard lets go (link.silence_s)
+
+
+def setpoint(system_id: int = 1) -> bytes:
+    """One of the program's."""
+    message = dialect.MAVLink_set_position_target_local_ned_message(7, system_id, 1, 1, 0xDF8, *[1.0] * 11)
+    return message.pack(dialect.MAVLink(None, *PROGRAM))
 
 
 def holding(config: GuardConfig | None = None) -> AttachedFlight:
@@ -85,7 +86,7 @@ def test_a_program_that_commands_a_mode_while_the_guard_holds_has_its_way():
     air = holding()
     air.run_for(0.2)
     # So has one that flies another vehicle by the same MAVSDK
-    assert air.guard.lets_pass("SET_ATTITUDE_TARGET", {"target_system": 2}, air.now_us)
+    assert air.guard.lets_pass(setpoint(system_id=2)) and not air.guard.lets_pass(setpoint())
     air.set_mode(HOLD)
     air.run_to(State.STOOD_DOWN, 1.0)
     assert air.mode == AUTO_LOITER
@@ -111,13 +112,10 @@ def test_the_guard_makes_way_for_a_programs_setpoints_before_its_offboard_and_af
 
 
 def test_the_gate_knows_its_own_by_content_and_each_but_once():
-    gate = Gate()
-    own = {"time_boot_ms": 7, "type_mask": 0xDF8, "x": 1.0, "y": 2.0, "z": -3.0}
-    gate.sends(own)
-    assert not gate.is_own({**own, "x": 1.1})
-    assert not gate.is_own({**own, "time_boot_ms": 8})
-    assert gate.is_own({**own, "x": 1.0000000298})
-    assert not gate.is_own(own)
+    air = holding()
+    own = [packet for sender, packet in air.outgoing if sender == "guard" and message_id_of(packet) in SETPOINT_IDS]
+    assert own and not air.guard.lets_pass(setpoint())
+    assert [air.guard.lets_pass(own[0]) for _ in range(2)] == [True, False]
 
 
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
@@ -138,27 +136,10 @@ def test_it_is_stopped_where_it_comes_to_rest_by_the_two_metres_a_second_squared
 # --- names and fields
 
 
-def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
-    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
-    decoder = Decoder(GUARD_READERS)
-    decoder.listen_to(1, 1)
-    kinds = set()
-    for _ in range(1000):
-        for packet in vehicle.step(b""):
-            sample = decoder.feed(packet)[0][1]
-            message = decoded(packet)
-            by_fields = sample_from(message.get_type(), (1, 1), fields_of(message))
-            assert by_fields == sample, message.get_type()
-            kinds.add(type(sample).__name__)
-    assert kinds >= {"ImuSample", "LocalPosition", "Attitude", "AttitudeTarget", "Heartbeat", "PositionTarget"}
-
-
-def test_fields_of_another_dialect_make_no_sample_and_no_error():
-    assert sample_from("HIGHRES_IMU", (1, 1), {"message_id": 105}) is None
-    assert sample_from("HEARTBEAT", (1, 1), {"type": None, "custom_mode": None}) is None
-    assert sample_from("NO_SUCH_MESSAGE", (1, 1), {}) is None
-    imu = {"time_usec": 1, "xacc": None, "yacc": 0.0, "zacc": 0.0, "xgyro": 0.0, "ygyro": 0.0, "zgyro": 0.0}
-    assert isinstance(sample_from("HIGHRES_IMU", (1, 1), {**imu, "fields_updated": 63}), Refused)
+def test_fields_of_another_dialect_make_no_packet_and_no_error():
+    assert packet_from("HIGHRES_IMU", (1, 1), b'{"message_id": 105}') == b""
+    assert packet_from("HEARTBEAT", (1, 1), b'{"type": null, "custom_mode": null}') == b""
+    assert packet_from("NO_SUCH_MESSAGE", (1, 1), b"{}") == b""
 
 
 # --- when the process stalls, or something around the guard fails
@@ -173,10 +154,10 @@ def test_after_a_stall_all_that_has_arrived_is_heard_before_silence_is_judged():
     since = len(air.events)
     air.outgoing.clear()
     # When the guard's own thread wakes first, and what arrived is heard one message after the other
-    air.take(air.guard.step((), air.now_us))
+    air.take(air.guard.step(b"", air.now_us))
     assert air.guard.next_deadline_us() == air.now_us + POLL_INTERVAL_US, "its thread waits meanwhile"
     for number, packet in enumerate(packets):
-        air.hear(decoded(packet), air.now_us + number * POLL_INTERVAL_US // len(packets))
+        air.take(air.guard.step(by_name(packet), air.now_us + number * POLL_INTERVAL_US // len(packets)))
     # Then nothing has been judged or sent by what was old; then the guard stands down for the pilot, not for a silence
     assert len(air.events) == since and air.outgoing == []
     air.run_for(0.3)
@@ -190,10 +171,10 @@ class Linked:
     system_id = 1
 
     def __init__(self, *_: object):
-        self.sent: list[tuple[str, Any]] = []
+        self.sent: list[bytes] = []
 
-    def send(self, name, fields):
-        self.sent.append((name, json.loads(json.dumps(dict(fields)))))
+    def send(self, packet):
+        self.sent.append(packet)
 
 
 class Joined:
@@ -212,14 +193,14 @@ class Joined:
         """One interval of the vehicle's; whether there is to be another turn."""
         goes_on = self.guard._turn()
         sent, self.link.sent = self.link.sent, []
-        for packet in self.air.vehicle.step(b"".join(packet_of(*one) for one in sent)):
-            message = decoded(packet)
-            name, fields = message.get_type(), json.dumps(fields_of(message)).encode()
-            assert self.guard._incoming(name, (1, 1), fields)
+        for packet in self.air.vehicle.step(b"".join(sent)):
+            name, fields_json = named(packet)
+            assert self.guard._incoming(name, (1, 1), fields_json.encode())
         return goes_on
 
     def lets_a_setpoint_pass(self):
-        return self.guard._outgoing("SET_POSITION_TARGET_LOCAL_NED", (245, 190), b"{}")
+        name, fields_json = named(setpoint())
+        return self.guard._outgoing(name, PROGRAM, fields_json.encode())
 
     def until_over(self, at_most_us: int) -> int:
         """How long it took, in microseconds."""
@@ -233,17 +214,16 @@ def fails(*_):
     raise ValueError("nobody thought of this")
 
 
-@pytest.mark.parametrize("broken", ["step", "hear"])
-def test_a_fault_on_either_thread_gives_the_vehicle_back(monkeypatch, broken):
+def test_a_fault_in_a_step_gives_the_vehicle_back(monkeypatch):
     # Given a guard that holds, and a step that fails once
     joined = Joined(monkeypatch)
-    works, calls = getattr(joined.air.guard, broken), []
+    works, calls = joined.air.guard.step, []
 
     def fails_once(*arguments):
         calls.append(arguments)
         return fails() if len(calls) == 1 else works(*arguments)
 
-    monkeypatch.setattr(joined.air.guard, broken, fails_once)
+    monkeypatch.setattr(joined.air.guard, "step", fails_once)
     # When it goes on
     joined.until_over(GIVING_BACK_US)
     # Then the vehicle holds by itself, it is told why, and the program's setpoints pass again

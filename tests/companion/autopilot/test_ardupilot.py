@@ -340,10 +340,10 @@ def test_a_raw_imu_has_milli_units_and_counts_until_the_finer_one_comes():
 
 
 def test_a_guard_inside_a_program_refuses_it():
-    guard = AttachedGuard(GuardConfig(), 1, EPOCH_US)
-    fields = {"type": 2, "autopilot": 3, "base_mode": 0, "custom_mode": 0, "system_status": 3}
-    assert "PX4 alone" in guard.hear("HEARTBEAT", (1, 1), fields, EPOCH_US).events[-1].text
-    assert guard.core.machine.finished
+    guard, heartbeat = AttachedGuard(GuardConfig(), 1), mav.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3)
+    guard.step(heartbeat.pack(mav.MAVLink(None, 1, 1)), EPOCH_US)
+    guard.step(b"", guard.next_deadline_us())
+    assert "PX4 alone" in guard.core.machine.outcome and guard.core.machine.finished
 
 
 # --- preflight

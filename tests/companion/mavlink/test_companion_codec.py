@@ -3,6 +3,7 @@
 import copy
 import functools
 import inspect
+import json
 import math
 import struct
 
@@ -13,6 +14,7 @@ from companion import messages as ours
 from companion.autopilot.px4.firmware import PX4
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
+from companion.mavlink.named import named
 from companion.mavlink.packet import payload_of
 from companion.mavlink.readers import GUARD_READERS, Reader
 
@@ -269,10 +271,10 @@ def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs
     link.seq = sequence
     for _ in range(sequence):
         encoder.packets(ours.OnboardHeartbeat(True))
-    ((name, fields),) = encoder.fields(setpoint)
-    kind = mav.mavlink_map[mav.__dict__[f"MAVLINK_MSG_ID_{name}"]]
-    theirs = kind(**{key: math.nan if value is None else value for key, value in fields.items()})
     (packet,) = encoder.packets(setpoint)
+    name, fields_json = named(packet)
+    kind = mav.mavlink_map[mav.__dict__[f"MAVLINK_MSG_ID_{name}"]]
+    theirs = kind(**{key: math.nan if value is None else value for key, value in json.loads(fields_json).items()})
     assert packet == theirs.pack(link)
     assert mav.MAVLink(None).decode(bytearray(packet)).get_type() == name
 

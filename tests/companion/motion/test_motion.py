@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from companion.mavlink.readers import sample_from
+from companion.mavlink.readers import _gps_raw
 from companion.messages import GpsFix, LocalPosition, Refused
 from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, SAME_M_S, SettledConfig
 from companion.motion.delay import RECEIVER, Delay
@@ -352,7 +352,7 @@ def test_a_receiver_that_is_silent_or_spoke_before_the_contacts_next_push_leaves
 
 def gps(**fields):
     place = {"lat": 471234567, "lon": -81234567, "alt": 488_000}
-    return sample_from("GPS_RAW_INT", (1, 1), {"fix_type": 3, "vel": 250, "cog": 9000, **place, **fields})
+    return _gps_raw(**{"fix_type": 3, "vel": 250, "cog": 9000, **place, **fields})
 
 
 def test_gps_raw_int_is_read_as_a_velocity_and_a_place():
