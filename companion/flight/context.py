@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import NamedTuple
 
 from companion.autopilot.known import defaults
@@ -68,9 +69,12 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """A trigger and its reason. `hand_over`: hand the vehicle to hold or land before the transition."""
+    """A trigger, of the flight's table or the guard's, and its reason; "" where the state reports its own events.
 
-    trigger: Trigger
+    `hand_over`: hand the vehicle to hold or land before the transition.
+    """
+
+    trigger: Enum
     text: str = ""
     hand_over: bool = False
 

@@ -48,19 +48,19 @@ class Trigger(Enum):
 
 
 # What ends a flight wherever it is in the air, and what interrupts it.
-_IN_THE_AIR = {
+_IN_THE_AIR: Mapping[Enum, State] = {
     Trigger.CONTROL_LOST: State.ABORTED,
     Trigger.INTERRUPTED: State.ABORTED,
     Trigger.CRASHED: State.CRASHED,
     Trigger.COLLISION: State.RECOVERING,
 }
-_ON_THE_GROUND = {
+_ON_THE_GROUND: Mapping[Enum, State] = {
     Trigger.INTERRUPTED: State.ABORTED,
     Trigger.REFUSED: State.ABORTED,
     Trigger.LINK_RESTORED: State.CONNECT,
 }
 # Of each state what moves it on, and to where; the first one is where it begins. Other triggers leave it where it is.
-TABLE: Mapping[State, Mapping[Trigger, State]] = {
+TABLE: Mapping[State, Mapping[Enum, State]] = {
     State.CONNECT: {**_ON_THE_GROUND, Trigger.VEHICLE_READY: State.READY},
     State.READY: {**_ON_THE_GROUND, Trigger.PLAN_CONFIRMED: State.TAKEOFF},
     State.TAKEOFF: {**_IN_THE_AIR, Trigger.REFUSED: State.ABORTED, Trigger.TAKEN_OFF: State.MISSION},

@@ -6,20 +6,11 @@ from dataclasses import dataclass, field
 from companion.autopilot.known import defaults
 from companion.flight.context import FlightContext
 from companion.guard.config import GuardConfig
-from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks, Vector3
 from companion.motion.vector import minus
 
 # Setpoints are lost when there is none for so long.
 LONGEST_BETWEEN_S = defaults.LOSS_US * 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class GuardTransition:
-    """A trigger and its reason; "" where the state reports its own events."""
-
-    trigger: Trigger
-    text: str = ""
 
 
 @dataclass(slots=True)

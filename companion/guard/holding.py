@@ -3,11 +3,10 @@
 import math
 
 from companion.autopilot.interface import Pilot
-from companion.flight.context import FixedSetpoint, Inputs
-from companion.flight.handlers.crash import Crashed
+from companion.flight.context import FixedSetpoint, Inputs, Transition
 from companion.flight.handlers.ending import silent_position
 from companion.flight.handlers.recovering import Recover
-from companion.guard.context import GuardContext, GuardTransition
+from companion.guard.context import GuardContext
 from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
 from companion.guard.watching import OTHERS_STOPPED_US
@@ -37,7 +36,7 @@ class TakeOver:
         if not guard.vehicle.flies_setpoints:
             guard.ask_for_mode(guard.vehicle.autopilot.setpoints)
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         is_seen = guard.vehicle.flies_setpoints
         outcome = guard.command_outcome(inputs, is_seen, now_us)
         took_ms = (now_us - self._began_us) / 1e3
@@ -46,16 +45,16 @@ class TakeOver:
             name = guard.vehicle.mode_name
             text = f"{name} already, the program's setpoints kept out" if outcome is None else f"{name} confirmed"
             guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
-            return GuardTransition(Trigger.CONFIRMED)
+            return Transition(Trigger.CONFIRMED)
         # Over it is also where the hit was none.
         if self._recover.step(guard, inputs, now_us) is not None:
-            return GuardTransition(Trigger.SETTLED)
+            return Transition(Trigger.SETTLED)
         if outcome is not None:
-            return GuardTransition(Trigger.NOT_CONFIRMED, outcome.text)
+            return Transition(Trigger.NOT_CONFIRMED, outcome.text)
         # A late step is no refusal: the answer may not have been read yet.
         if guard.trajectory_us - self._trajectory_began_us > guard.config.confirm_within_s * 1e6:
             name = guard.vehicle.autopilot.mode_name(guard.vehicle.autopilot.setpoints)
-            return GuardTransition(Trigger.NOT_CONFIRMED, f"{name} not seen within {guard.config.confirm_within_s:g} s")
+            return Transition(Trigger.NOT_CONFIRMED, f"{name} not seen within {guard.config.confirm_within_s:g} s")
         return None
 
 
@@ -69,7 +68,7 @@ class Recovering:
         self._foreign = 0
         self._asked_us: int | None = None  # whether the mode is still ours
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode: only
         # a later report that says OFFBOARD makes them a program's.
         self._forget_what_was_late(guard, now_us)
@@ -77,7 +76,7 @@ class Recovering:
         if asked_us is not None and vehicle.mode_received_us > asked_us and vehicle.is_mode_known:
             guard.program_elsewhere = True
             text = "another program's setpoints reach the vehicle, on a link of its own"
-            return GuardTransition(Trigger.CROSSED, text)
+            return Transition(Trigger.CROSSED, text)
         if vehicle.is_mode_known and now_us - self._since_us > ECHO_STALE_US:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES and asked_us is None:
@@ -85,7 +84,7 @@ class Recovering:
             guard.outbox.append(SendCommand(request_message(MessageId.HEARTBEAT), 0))
         # Over it is also where the hit was none.
         is_over = self._recover.step(guard, inputs, now_us) is not None
-        return GuardTransition(Trigger.SETTLED) if is_over else None
+        return Transition(Trigger.SETTLED) if is_over else None
 
     def _forget_what_was_late(self, guard: GuardContext, now_us: int) -> None:
         """The echoes that waited for a late step are older than what is known to have been sent. Without the guard's
@@ -159,7 +158,7 @@ class GiveBack(FixedSetpoint):
         if guard.vehicle.custom_mode != self.wish:
             guard.ask_for_mode(self.wish)
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self._waits(guard, inputs, now_us):
             return None
         if not self._is_asked:
@@ -174,12 +173,12 @@ class GiveBack(FixedSetpoint):
             name = guard.vehicle.mode_name
             text = f"given back to {name} after {took_ms:.0f} ms"
             guard.report(now_us, "given_back", text, mode=name, after_ms=took_ms)
-            return GuardTransition(Trigger.GIVEN_BACK)
+            return Transition(Trigger.GIVEN_BACK)
         if outcome is None:
             return None
         self._wishes.pop(0)
         if not self._wishes:
-            return GuardTransition(Trigger.CONTROL_LOST, "the vehicle takes no mode; setpoints stopped")
+            return Transition(Trigger.CONTROL_LOST, "the vehicle takes no mode; setpoints stopped")
         self._ask(guard)
         # The answers of this step were to the mode before.
         return self.step(guard, Inputs(positions=inputs.positions), now_us)
@@ -202,21 +201,10 @@ class StandDown(FixedSetpoint):
         """Whether the pilot does not have the vehicle yet."""
         return self._target is not None
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self._target is not None:
             outcome = guard.command_outcome(inputs, not guard.vehicle.flies_setpoints, now_us)
             if outcome is not None or now_us > self._until_us:
                 self._target = None
                 guard.command_client.cancel()
-        return GuardTransition(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None
-
-
-class GuardCrashed(FixedSetpoint):
-    """The same as of a flight; after it the guard stands by, and for the next flight watches again."""
-
-    def __init__(self, guard: GuardContext) -> None:
-        self._crashed = Crashed(guard)
-
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        over = self._crashed.step(guard, inputs, now_us)
-        return None if over is None else GuardTransition(Trigger[over.trigger.name], over.text)
+        return Transition(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None

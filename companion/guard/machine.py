@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from companion.flight.after_hit import note_before
-from companion.flight.context import Inputs
-from companion.flight.handlers.crash import crashed
+from companion.flight.context import Inputs, Transition
+from companion.flight.handlers.crash import Crashed, crashed
 from companion.flight.handlers.ending import LINK_RESTORED, Holder, Released, silent_link, silent_position, who_decided
 from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.machine import StateMachine
 from companion.flight.states import State as FlightState
-from companion.guard.context import GuardContext, GuardTransition
-from companion.guard.holding import GiveBack, GuardCrashed, Recovering, StandDown, TakeOver
+from companion.guard.context import GuardContext
+from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
 from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
 from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down
@@ -49,7 +49,7 @@ _TO_HOLD = (
 
 # What is done in a state; one object is made each time the state is entered (see flight.machine).
 Handler: TypeAlias = (
-    GuardConnect | StandBy | Watching | TakeOver | Recovering | GiveBack | StandDown | GuardCrashed | Released
+    GuardConnect | StandBy | Watching | TakeOver | Recovering | GiveBack | StandDown | Crashed | Released
 )
 
 
@@ -79,7 +79,7 @@ class GuardMachine(StateMachine):
         if self.state in MAY_CRASH:
             meant = self.state not in HOLDING and goes_down(self.flight, now_us)
             if crashed(self.flight, meant, now_us) is not None:
-                self._take(GuardTransition(Trigger.CRASHED), now_us)
+                self._take(Transition(Trigger.CRASHED), now_us)
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over
@@ -93,16 +93,15 @@ class GuardMachine(StateMachine):
                     self._remember_mode()
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
-                self._take(GuardTransition(Trigger.HIT), now_us)
+                self._take(Transition(Trigger.HIT), now_us)
         transition = self._led_back() or self.handler.step(self.flight, inputs, now_us)
-        while transition is not None and transition.trigger in TABLE[self.state]:
-            self._take(transition, now_us)
+        while self._take(transition, now_us):
             # The answers and positions of this step belong to the state that asked for them.
             transition = self.handler.step(self.flight, Inputs(), now_us)
         return self.handler is not before
 
     def _give_away(self, text: str, now_us: int) -> None:
-        self._take(GuardTransition(Trigger.STOPPED, text), now_us)
+        self._take(Transition(Trigger.STOPPED, text), now_us)
 
     def _release(self, text: str) -> None:
         self.state, self.handler, self.outcome = State.ENDED, Released(), text
@@ -113,7 +112,7 @@ class GuardMachine(StateMachine):
         flies = is_watching and guard.vehicle.flies_setpoints and not guard.keeps_others_out
         return flies or (guard.program_elsewhere and (is_watching or self.state is State.GIVING_BACK))
 
-    def _led_back(self) -> GuardTransition | None:
+    def _led_back(self) -> Transition | None:
         """A program that was given back to, and would hit the same again."""
         guard, asked = self.flight, self.flight.asked
         was_given = guard.config.then == "previous" and guard.hits and guard.vehicle.flies_setpoints
@@ -124,7 +123,7 @@ class GuardMachine(StateMachine):
             return None
         self._remember_mode()
         guard.target = stop(guard)
-        return GuardTransition(Trigger.LEADS_BACK, "taking over: the program's setpoints lead into what was hit")
+        return Transition(Trigger.LEADS_BACK, "taking over: the program's setpoints lead into what was hit")
 
     def _remember_mode(self) -> None:
         guard = self.flight
@@ -133,24 +132,24 @@ class GuardMachine(StateMachine):
         attitude = guard.vehicle.attitude
         guard.yaw_rad = None if attitude is None else yaw_rad(attitude.attitude_wxyz)
 
-    def _from_outside(self, inputs: Inputs, now_us: int) -> GuardTransition | None:
+    def _from_outside(self, inputs: Inputs, now_us: int) -> Transition | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
         guard = self.flight
         guard.was_silent |= guard.is_silent(now_us)
         if guard.vehicle.armed is False and Trigger.DISARMED in TABLE[self.state]:
-            return GuardTransition(Trigger.DISARMED, "disarmed")
+            return Transition(Trigger.DISARMED, "disarmed")
         if self.state in HOLDING:
             lost = self._taken_by_another(inputs) or silent_link(guard, now_us)
             if lost is not None:
-                return GuardTransition(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
+                return Transition(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
         if inputs.refusal is not None:
-            return GuardTransition(Trigger.REFUSED, inputs.refusal)
+            return Transition(Trigger.REFUSED, inputs.refusal)
         if (stopped := inputs.stop_reason or guard.fault) and Trigger.STOPPED in TABLE[self.state]:
-            return GuardTransition(Trigger.STOPPED, stopped)
+            return Transition(Trigger.STOPPED, stopped)
         if self.state not in HOLDING:
             return self._link_restored(now_us)
         silent = silent_position(guard)
-        return None if silent is None else GuardTransition(Trigger.POSITION_SILENT, silent)
+        return None if silent is None else Transition(Trigger.POSITION_SILENT, silent)
 
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight
@@ -180,26 +179,28 @@ class GuardMachine(StateMachine):
         who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot or a program"
         return f"{who} took over in {guard.vehicle.mode_name}"
 
-    def _link_restored(self, now_us: int) -> GuardTransition | None:
+    def _link_restored(self, now_us: int) -> Transition | None:
         """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
         guard = self.flight
         may_be_restarted = self.state is State.CONNECTING or guard.vehicle.armed is False
         if not may_be_restarted or guard.is_silent(now_us) or not guard.was_silent:
             return None
-        return GuardTransition(Trigger.STREAMS_GONE, LINK_RESTORED)
+        return Transition(Trigger.STREAMS_GONE, LINK_RESTORED)
 
-    def _take(self, transition: GuardTransition | None, now_us: int) -> None:
-        if transition is None or transition.trigger not in TABLE[self.state]:
-            return
-        self.state = TABLE[self.state][transition.trigger]
+    def _take(self, transition: Transition | None, now_us: int) -> bool:
+        """Whether it moves the guard on. A trigger of a flight's counts by its name."""
+        if transition is None or (trigger := Trigger[transition.trigger.name]) not in TABLE[self.state]:
+            return False
+        self.state = TABLE[self.state][trigger]
         guard = self.flight
         if transition.text:
-            guard.report(now_us, _KINDS.get(transition.trigger, "guard"), transition.text)
-        if transition.trigger in _TO_HOLD:
-            guard.then_hold = transition.text or transition.trigger.value
+            guard.report(now_us, _KINDS.get(trigger, "guard"), transition.text)
+        if trigger in _TO_HOLD:
+            guard.then_hold = transition.text or trigger.value
         self.handler = self._begin(transition, now_us)
+        return True
 
-    def _begin(self, transition: GuardTransition, now_us: int) -> Handler:
+    def _begin(self, transition: Transition, now_us: int) -> Handler:
         guard = self.flight
         if self.state not in HOLDING:
             guard.command_client.cancel()
@@ -229,7 +230,7 @@ class GuardMachine(StateMachine):
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)
             case State.CRASHED:
-                return GuardCrashed(guard)
+                return Crashed(guard)
             case State.ENDED:
                 self.outcome = transition.text
                 return Released()

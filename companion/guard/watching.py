@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from companion.autopilot.interface import Pilot
-from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target
+from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition
 from companion.flight.envelope import unattended_text
 from companion.flight.handlers.connecting import Meet
 from companion.flight.vehicle_update import update_vehicle
-from companion.guard.context import GuardContext, GuardTransition
+from companion.guard.context import GuardContext
 from companion.guard.states import Trigger
 from companion.link.vehicle import OLD_NEWS_US
 from companion.messages import (
@@ -95,11 +95,13 @@ def why_not(guard: GuardContext) -> str | None:
     return None if name in guard.config.modes else f"{name} is not among the modes that may be taken over"
 
 
-class GuardConnect(Meet[GuardTransition]):
+class GuardConnect(Meet):
     """The vehicle may be flying.
 
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
     """
+
+    refused = Trigger.REFUSED
 
     def __init__(self, is_first: bool = True) -> None:
         super().__init__()
@@ -115,10 +117,7 @@ class GuardConnect(Meet[GuardTransition]):
         sticks = set_message_interval(flight.vehicle.autopilot.sticks_message, round(1e6 / STICKS_HZ))
         return [*super()._commands(flight), echoes, sticks]
 
-    def _refused(self, text: str) -> GuardTransition:
-        return GuardTransition(Trigger.REFUSED, text)
-
-    def _judge(self, flight: FlightContext, now_us: int) -> GuardTransition | None:
+    def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
         complaint = flight.streams.too_slow(flight.vehicle.autopilot) or flight.round_trip.complaint()
         if complaint is not None and (flight.mission.companion.link.wait or not self.is_first):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
@@ -126,7 +125,7 @@ class GuardConnect(Meet[GuardTransition]):
         self._report_streams(flight, now_us)
         unattended = unattended_text(flight.vehicle.autopilot, flight.mission.limits.max_speed_m_s)
         flight.report(now_us, "unattended", unattended)
-        return GuardTransition(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
+        return Transition(Trigger.CONNECTED) if complaint is None else Transition(self.refused, complaint)
 
 
 class StandBy(FixedSetpoint):
@@ -135,17 +134,17 @@ class StandBy(FixedSetpoint):
     def __init__(self) -> None:
         self._told: str | None = None
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         vehicle = guard.vehicle
         position_us = vehicle.last_position_us
         if position_us is not None and vehicle.last_received_us - position_us > STREAMS_GONE_US:
-            return GuardTransition(Trigger.STREAMS_GONE, "streams ended, asking for them again")
+            return Transition(Trigger.STREAMS_GONE, "streams ended, asking for them again")
         reason = why_not(guard)
         if reason is None and guard.round_trip.complaint() is not None:
             reason = "the round trip to the vehicle takes too long"
         if reason is None:
             assert vehicle.custom_mode is not None
-            return GuardTransition(Trigger.WORTH_GUARDING, f"watching {vehicle.mode_name}")
+            return Transition(Trigger.WORTH_GUARDING, f"watching {vehicle.mode_name}")
         if reason != self._told:
             self._told = reason
             guard.report(now_us, "standing_by", f"standing by: {reason}", reason=reason)
@@ -165,10 +164,10 @@ class Watching:
             return None
         return Target(latest.position_ned_m, None)
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         # Where the mode needs no stream, one that has left it may have been sent somewhere once.
         streams = guard.vehicle.flies_setpoints and guard.vehicle.autopilot.wants_setpoints_first
         if streams and not guard.keeps_others_out:
             guard.program_elsewhere = True
         reason = why_not(guard)
-        return None if reason is None else GuardTransition(Trigger.NOT_TO_GUARD, reason)
+        return None if reason is None else Transition(Trigger.NOT_TO_GUARD, reason)

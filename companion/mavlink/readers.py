@@ -227,8 +227,8 @@ def _timesync(tc1: int, ts1: int) -> Sample:
     return messages.TimeSync(ts1, tc1 or None)
 
 
-def _parameter(param_id: bytes | str, param_value: float, param_type: int) -> Sample | None:
-    name = param_id if isinstance(param_id, str) else param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
+def _parameter(param_id: bytes, param_value: float, param_type: int) -> Sample | None:
+    name = param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
     # PX4 has two kinds; the bytes of a whole number travel in the float's place.
     if param_type == dialect.MAV_PARAM_TYPE_INT32:
         return messages.Parameter(name, struct.unpack("<i", struct.pack("<f", param_value))[0])
@@ -277,8 +277,8 @@ def _unbounded_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], t
     return _attitude_target(time_boot_ms, type_mask, q, 0.0 if -1.0 <= thrust < 0.0 else thrust)
 
 
-def _cast_parameter(param_id: bytes | str, param_value: float, param_type: int) -> Sample | None:
-    name = param_id if isinstance(param_id, str) else param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
+def _cast_parameter(param_id: bytes, param_value: float, param_type: int) -> Sample | None:
+    name = param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
     if not math.isfinite(param_value):
         return None
     is_real = param_type == dialect.MAV_PARAM_TYPE_REAL32

@@ -57,12 +57,11 @@ class CollisionGuard:
         self._link = MavsdkLink(mavsdk, system)
         self._clock = Clock()
         self._guard = AttachedGuard(config or GuardConfig(), self._link.system_id)
-        self._on_event = on_event
         # Guards all below. MAVSDK's I/O thread and the guard's own meet here, each for less than a millisecond, but for
         # the sample that shows a hit: its setpoint is made in 3 ms, and nothing is more urgent.
         self._changed = threading.Condition()
         self._untold: list[Event] = []
-        self._listeners: list[Callable[[Event], None]] = []
+        self._listeners = [] if on_event is None else [on_event]
         self._is_over = False
         self._faulty_until_us: int | None = None  # after a fault around the guard: when giving back must have ended
         self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
@@ -241,7 +240,7 @@ class CollisionGuard:
             self._changed.notify_all()
 
     def _tell(self, event: Event, listeners: list[Callable[[Event], None]]) -> None:
-        for listener in [*listeners, *([self._on_event] if self._on_event is not None else [])]:
+        for listener in listeners:
             try:
                 listener(event)
             except Exception:

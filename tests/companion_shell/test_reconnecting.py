@@ -203,11 +203,11 @@ def test_a_router_that_was_restarted_is_connected_to_again(closing):
 def test_a_client_that_closed_is_followed_by_the_next_at_once(closing):
     # Given a server that has had no client yet, which is no reconnect
     server = closing(open_connection(f"tcpin://{LOCAL}:0"))
-    with socket.create_connection((LOCAL, server.local_port)) as first:
+    with socket.create_connection((LOCAL, server._listener.getsockname()[1])) as first:
         first.sendall(b"first")
         assert until_heard(server) == b"first" and server.counts.reconnects == 0
     # When it goes and another comes
-    second = closing(socket.create_connection((LOCAL, server.local_port)))
+    second = closing(socket.create_connection((LOCAL, server._listener.getsockname()[1])))
     second.sendall(b"second")
     # Then that one is heard and answered
     assert until_heard(server) == b"second" and server.counts.reconnects == 1

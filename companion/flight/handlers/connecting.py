@@ -3,8 +3,8 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace
+from enum import Enum
 from itertools import chain
-from typing import Generic, TypeVar
 
 from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Transition
 from companion.flight.handlers.ending import battery_complaint
@@ -12,11 +12,12 @@ from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MessageId, VehicleCommand, request_message
 
-MoveT = TypeVar("MoveT")
 
-
-class Meet(FixedSetpoint, ABC, Generic[MoveT]):
+class Meet(FixedSetpoint, ABC):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
+
+    refused: Enum = Trigger.REFUSED
+    """The vehicle, or nobody, is there."""
 
     def __init__(self) -> None:
         self._started_us: int | None = None
@@ -26,11 +27,7 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
         self._is_told = False  # what is waited for
 
     @abstractmethod
-    def _refused(self, text: str) -> MoveT:
-        """The vehicle, or nobody, is there."""
-
-    @abstractmethod
-    def _judge(self, flight: FlightContext, now_us: int) -> MoveT | None:
+    def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
         """Once the streams have been measured."""
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
@@ -38,7 +35,7 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
         requested = [stream.request() for stream in flight.streams.streams]
         return [request_message(MessageId.AUTOPILOT_VERSION), *requested, *flight.vehicle.autopilot.streams]
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> MoveT | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         identity, companion = flight.vehicle.identity, flight.mission.companion
         if identity is None:
             wait_s = companion.link.heartbeat_wait_s
@@ -47,7 +44,7 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
                 return None
             text = f"no HEARTBEAT from an autopilot within {wait_s:g} s"
             if not companion.link.wait:
-                return self._refused(f"{text}; is the address right?")
+                return Transition(self.refused, f"{text}; is the address right?")
             self._is_told = True
             flight.report(now_us, "link", f"{text}: waiting for it")
             return None
@@ -63,7 +60,7 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
         if now_us - self._measuring_since_us < companion.streams.window_s * 1e6 or flight.is_silent(now_us):
             return None
         too_old = flight.vehicle.version_complaint()
-        return self._judge(flight, now_us) if too_old is None else self._refused(too_old)
+        return self._judge(flight, now_us) if too_old is None else Transition(self.refused, too_old)
 
     def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
@@ -103,11 +100,8 @@ class Meet(FixedSetpoint, ABC, Generic[MoveT]):
         flight.report(now_us, "streams", f"streams in Hz over {window_s:g} s: {text}", **rates)
 
 
-class Connect(Meet[Transition]):
+class Connect(Meet):
     """On the ground, with a vehicle that nobody flies."""
-
-    def _refused(self, text: str) -> Transition:
-        return Transition(Trigger.REFUSED, text)
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
         too_slow = flight.streams.too_slow(flight.vehicle.autopilot)
@@ -116,7 +110,7 @@ class Connect(Meet[Transition]):
             return None
         self._report_streams(flight, now_us)
         complaint = too_slow or ground_check(flight)
-        return Transition(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
+        return Transition(Trigger.VEHICLE_READY) if complaint is None else Transition(self.refused, complaint)
 
 
 class Ready(FixedSetpoint):

@@ -233,10 +233,6 @@ class TcpInConnection(StreamConnection):
         self._listener.settimeout(RETRY_S)
         super().__init__(None, self._client)
 
-    @property
-    def local_port(self) -> int:
-        return int(self._listener.getsockname()[1])
-
     def _client(self) -> Stream:
         client, address = self._listener.accept()
         _set_up(client)
