@@ -4,6 +4,7 @@ docs/tutorials/mavsdk.md.
 
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
-from companion.shell.mavsdk_guard import CollisionGuard, GuardError
+from companion.shell.mavsdk_guard import CollisionGuard
+from companion.shell.mavsdk_link import GuardError
 
 __all__ = ["CollisionGuard", "GuardConfig", "GuardError", "State"]

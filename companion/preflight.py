@@ -177,7 +177,8 @@ def spread(vectors: Sequence[Vector3]) -> float:
 def findings(survey: Survey) -> list[PreflightItem]:
     """All items, in the order in which they would be mended."""
     autopilot, setup = survey.vehicle.autopilot, survey.setup
-    found = [*autopilot.judge_vehicle(setup), *_delivery(survey), *_streams(survey)]
+    found = [item for judge in autopilot.judge_vehicle for item in judge(setup)]
+    found += [*_delivery(survey), *_streams(survey)]
     found += autopilot.judge_parameters(setup)
     found += [*_estimate(survey), *_vibration(survey), _time(survey), _battery(survey)]
     return [*found, autopilot.sight(setup)] if setup.imu_hz else found

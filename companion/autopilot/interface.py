@@ -106,7 +106,7 @@ class Autopilot:
     """The smallest hit that shows."""
     asked: Callable[[SerialLine | None], tuple[str, ...]]
     """Parameters that preflight reads."""
-    judge_vehicle: Callable[[Setup], Iterable[PreflightItem]]
+    judge_vehicle: tuple[Callable[[Setup], Iterable[PreflightItem]], ...]
     judge_parameters: Callable[[Setup], Iterable[PreflightItem]]
     remedies: Remedies
     loss_text: Callable[[Mapping[str, int | float]], str]

@@ -15,10 +15,8 @@ from companion.reflex.detection.detector import Situation
 
 
 class GuardCore(Core[GuardContext, GuardMachine]):
-    """`keeps_others_out`: see GuardContext."""
-
-    def __init__(self, config: GuardConfig, keeps_others_out: bool) -> None:
-        guard = GuardContext(config.as_mission(), config=config, keeps_others_out=keeps_others_out)
+    def __init__(self, config: GuardConfig) -> None:
+        guard = GuardContext(config.as_mission(), config=config, keeps_others_out=bool(config.between))
         super().__init__(guard, GuardMachine(guard, GuardConnect()))
         self.is_enabled = False  # asked for, and not yet taken up
 

@@ -17,7 +17,7 @@ class Guard(Stepped[GuardCore]):
     """On a link of its own, or between the vehicle and its clients, whose packets pass it (see guard.between)."""
 
     def __init__(self, config: GuardConfig) -> None:
-        super().__init__(GuardCore(config, bool(config.between)), GUARD_READERS)
+        super().__init__(GuardCore(config), GUARD_READERS)
 
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""

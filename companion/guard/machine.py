@@ -40,12 +40,7 @@ STICKS = "the pilot moved the sticks"
 # after the next one. Its mode is reported every 0.1 s. A failsafe that lasts for twice all that is for another reason.
 RETURNS_US = 400_000
 # After these the vehicle is given back to hold whatever is configured.
-_TO_HOLD = (
-    Trigger.STOPPED,
-    Trigger.NOT_CONFIRMED,
-    Trigger.POSITION_SILENT,
-    Trigger.CROSSED,
-)
+_TO_HOLD = (Trigger.STOPPED, Trigger.NOT_CONFIRMED, Trigger.POSITION_SILENT, Trigger.CROSSED)
 
 # What is done in a state; one object is made each time the state is entered (see flight.machine).
 Handler: TypeAlias = (

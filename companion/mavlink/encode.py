@@ -9,14 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 from companion import messages
 from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED
-from companion.messages import (
-    AttitudeSetpoint,
-    ComputerStatus,
-    Outgoing,
-    PositionSetpoint,
-    SendCommand,
-    StatusText,
-)
+from companion.messages import AttitudeSetpoint, ComputerStatus, Outgoing, PositionSetpoint, SendCommand, StatusText
 
 COMPONENT_ID = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
 # Before the vehicle is known: PX4's own default MAV_SYS_ID.

@@ -28,7 +28,7 @@ def packet_from(name: str, source: tuple[int, int], fields_json: bytes) -> bytes
         if name == "COMMAND_ACK":
             values["target_component"] = 0
         return bytes(kind(**values).pack(dialect.MAVLink(None, *source)))
-    except (struct.error, TypeError, ValueError):
+    except (struct.error, OverflowError, TypeError, ValueError):
         return b""
 
 

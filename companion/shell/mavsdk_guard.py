@@ -21,8 +21,6 @@ from companion.report import Event
 from companion.shell.clock import Clock
 from companion.shell.mavsdk_link import GuardError, MavsdkLink
 
-__all__ = ["CollisionGuard", "GuardError"]
-
 _LOG = logging.getLogger(__name__)
 # Heartbeat within ten seconds, ten streams asked for, two seconds of measuring.
 START_TIMEOUT_S = 20.0

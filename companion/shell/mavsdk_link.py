@@ -27,19 +27,16 @@ class MavsdkLink:
         direct = _mavlink_direct()
         # The asyncio wrappers hold the synchronous objects.
         self._mavsdk = getattr(mavsdk, "_mavsdk", mavsdk)
-        self._system = getattr(system, "_system", system)
-        if not hasattr(self._mavsdk, "_handle") or not hasattr(self._system, "get_system_id"):
+        system = getattr(system, "_system", system)
+        if not hasattr(self._mavsdk, "_handle") or not hasattr(system, "get_system_id"):
             raise GuardError(
                 "CollisionGuard wants MAVSDK's Mavsdk object and a System of it: CollisionGuard(mavsdk, system)."
             )
         self._message_class = direct.MavlinkMessage
         self._callback_class = ctypes.CFUNCTYPE(ctypes.c_int, direct.MavlinkMessageCStruct, ctypes.c_void_p)
-        self._direct = direct.MavlinkDirect(self._system)
+        self._direct = direct.MavlinkDirect(system)
+        self.system_id = int(system.get_system_id())
         self._handles: list[Any] = []
-
-    @property
-    def system_id(self) -> int:
-        return int(self._system.get_system_id())
 
     def intercept(self, incoming: Interceptor, outgoing: Interceptor) -> None:
         """From now on; both are called on MAVSDK's I/O thread and must not call `release`."""

@@ -58,7 +58,7 @@ SECOND = 1_000_000
 
 
 def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_not_stay_for_ever():
-    core, ardupilot = GuardCore(GuardConfig(), keeps_others_out=True), Heartbeat(1, 1, 2, 3, False, 5, 3)
+    core, ardupilot = GuardCore(GuardConfig(between=("udpin://:14540",))), Heartbeat(1, 1, 2, 3, False, 5, 3)
     for now_us, heard in ((SECOND, [ardupilot]), (3 * SECOND, []), (3 * SECOND + 1, [ardupilot])):
         core.advance(heard, now_us)
     assert core.reflex.monitor.estimator.hides_clipping and core.machine.handler.begins
@@ -73,7 +73,7 @@ ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 
 
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
-    guard = GuardCore(GuardConfig(), keeps_others_out=False).flight
+    guard = GuardCore(GuardConfig()).flight
     guard.vehicle.mode, guard.vehicle.landed = ModeReport(mode, None, False), landed
     guard.vehicle.pilot = PX4.pilot(mode)
     observe(guard, samples, 0)

@@ -44,7 +44,7 @@ BAUDS = {57_600: 57, 115_200: 115, 230_400: 230, 460_800: 460, 500_000: 500, COM
 OF_A_LINE = tuple(f"SERIAL{number}_{what}" for number in SERIALS for what in ("PROTOCOL", "BAUD"))
 
 
-def _frame(setup: Setup) -> Iterator[PreflightItem]:
+def frame(setup: Setup) -> Iterator[PreflightItem]:
     number = setup.parameters.get("FRAME_CLASS")
     if number is not None:
         named, kind = CLASSES.get(int(number), "another frame"), setup.vehicle_type
@@ -53,7 +53,7 @@ def _frame(setup: Setup) -> Iterator[PreflightItem]:
         yield judged("FRAME_CLASS", found, (named != kind, DOUBTFUL, remedy))
 
 
-def _port(setup: Setup) -> Iterator[PreflightItem]:
+def port(setup: Setup) -> Iterator[PreflightItem]:
     """The port that this line is plugged into, by its baud rate."""
     told, line = setup.parameters, setup.line
     if line is None or line.baud is None:
@@ -148,11 +148,6 @@ PARAMETERS = (*_SETTINGS, YAW, "FRAME_CLASS", *JERKS, *LEANS, *CHECKS)
 def asked(line: SerialLine | None) -> tuple[str, ...]:
     """The parameters to be read."""
     return PARAMETERS if line is None or line.baud is None else (*PARAMETERS, *OF_A_LINE)
-
-
-def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
-    yield from _frame(setup)
-    yield from _port(setup)
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:

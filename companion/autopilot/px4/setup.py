@@ -54,7 +54,7 @@ OF_A_LINE = (
 OF_USB = ("CBRK_USB_CHK",)
 
 
-def _rotors(setup: Setup) -> Iterator[PreflightItem]:
+def rotors(setup: Setup) -> Iterator[PreflightItem]:
     """Where PX4's control allocation has them; before 1.13 it had no such parameters."""
     told = setup.parameters
     if not all(name in told for name in ROTORS):
@@ -80,7 +80,7 @@ def _rotors(setup: Setup) -> Iterator[PreflightItem]:
     )
 
 
-def _port(setup: Setup) -> Iterator[PreflightItem]:
+def port(setup: Setup) -> Iterator[PreflightItem]:
     """The port of PX4's that this line is plugged into, by its baud rate."""
     told, line = setup.parameters, setup.line
     if line is None:
@@ -197,11 +197,6 @@ def asked(line: SerialLine | None) -> tuple[str, ...]:
     if line is None:
         return PARAMETERS
     return (*PARAMETERS, *(OF_USB if line.baud is None else OF_A_LINE))
-
-
-def judge_vehicle(setup: Setup) -> Iterator[PreflightItem]:
-    yield from _rotors(setup)
-    yield from _port(setup)
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:

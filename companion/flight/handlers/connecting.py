@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import replace
 from enum import Enum
 from itertools import chain
 
@@ -10,7 +9,7 @@ from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Trans
 from companion.flight.handlers.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
-from companion.messages import LandedState, MessageId, VehicleCommand, request_message
+from companion.messages import LandedState, MessageId, VehicleCommand, request_message, set_message_interval
 
 
 class Meet(FixedSetpoint, ABC):
@@ -22,7 +21,7 @@ class Meet(FixedSetpoint, ABC):
     def __init__(self) -> None:
         self._started_us: int | None = None
         self._requests: Iterator[VehicleCommand] | None = None
-        self._asked: VehicleCommand | None = None  # last
+        self._asked: float | None = None  # the last message
         self._measuring_since_us: int | None = None
         self._is_told = False  # what is waited for
 
@@ -64,13 +63,15 @@ class Meet(FixedSetpoint, ABC):
 
     def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
-        outcome = flight.command_outcome(inputs, False, now_us)
-        if outcome is not None and outcome.refused:
-            requests = self._requests = chain(self._in_its_place(flight), requests)
+        outcome, imu = flight.command_outcome(inputs, False, now_us), flight.vehicle.autopilot.lesser_imu
+        has_none = outcome is not None and outcome.refused and self._asked == MessageId.HIGHRES_IMU
+        if has_none and imu is not None:
+            _, interval_us = flight.streams.asked[MessageId.HIGHRES_IMU].parameters
+            requests = self._requests = chain([set_message_interval(imu, round(interval_us))], requests)
         if flight.command_client.pending is not None:
             return
-        self._asked = request = next(requests, None)
-        if request is not None:
+        if (request := next(requests, None)) is not None:
+            self._asked = request.parameters[0]
             if len(request.parameters) == 2:  # how often it is to come
                 flight.streams.asked[request.parameters[0]] = request
             flight.command_client.begin(request)
@@ -78,13 +79,6 @@ class Meet(FixedSetpoint, ABC):
         else:
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
-
-    def _in_its_place(self, flight: FlightContext) -> Iterator[VehicleCommand]:
-        """Of a stream that the vehicle does not have."""
-        imu = flight.vehicle.autopilot.lesser_imu
-        for stream in flight.streams.streams:
-            if stream.message_id is MessageId.HIGHRES_IMU and self._asked == stream.request() and imu is not None:
-                yield replace(stream, message_id=imu).request()
 
     def _ask_again(self, flight: FlightContext, text: str, now_us: int) -> None:
         """What is missing may come: a vehicle that has just started has no position."""

@@ -91,7 +91,11 @@ class TcpPort:
         for source in select.select(self.sources(), [], [], 0.0)[0]:
             if source is self._listener:
                 self._accept()
-            elif content := _received(source):
+                continue
+            content = b""
+            with suppress(OSError):
+                content = source.recv(READ_BYTES)
+            if content:
                 self._between.hear(self._clients[source][0], content)
             else:
                 source.close()
@@ -120,14 +124,6 @@ class TcpPort:
     def close(self) -> None:
         for source in (self._listener, *self._clients):
             source.close()
-
-
-def _received(client: socket.socket) -> bytes:
-    """Empty where the client has gone."""
-    try:
-        return client.recv(READ_BYTES)
-    except OSError:
-        return b""
 
 
 class SharedConnection:

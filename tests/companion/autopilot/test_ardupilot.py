@@ -374,7 +374,7 @@ def setup_of(parameters, line=None):
 
 def judged(parameters, line=None):
     told = setup_of(parameters, line)
-    return {item.item: item for item in (*setup.judge_vehicle(told), *setup.judge_parameters(told))}
+    return {item.item: item for item in (*setup.frame(told), *setup.port(told), *setup.judge_parameters(told))}
 
 
 def test_a_healthy_copter_has_nothing_to_mend():
