@@ -7,6 +7,7 @@ from typing import Annotated, Self
 import shapely
 from pydantic import Field, model_validator
 from shapely import LineString, Point, Polygon
+from shapely.ops import nearest_points
 
 from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel
 
@@ -16,6 +17,8 @@ NorthEast = tuple[Number, Number]
 DEFAULT_RADIUS_M = 15.0
 # A corner nearer to another than this is the same corner typed twice.
 LEAST_EDGE_M = 0.01
+# Of a quarter of a circle: straight edges within it are nowhere further inside than 0.01 % of the radius.
+_ARC_SEGMENTS = 64
 
 
 class Fence(StrictModel):
@@ -101,6 +104,10 @@ class Fence(StrictModel):
         distance_m = math.hypot(*place)
         if self.radius_m is not None and distance_m > self.radius_m:
             place = (place[0] * self.radius_m / distance_m, place[1] * self.radius_m / distance_m)
+            if self._polygon is not None and not self._polygon.covers(Point(place)):
+                both = self._polygon.intersection(Point(0.0, 0.0).buffer(self.radius_m, quad_segs=_ARC_SEGMENTS))
+                nearest = nearest_points(both, Point(north_m, east_m))[0]
+                place = (nearest.x, nearest.y)
         return place
 
     def shortened(self, start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float]:

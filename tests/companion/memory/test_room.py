@@ -22,6 +22,8 @@ from companion.reflex.surface import Normal
 # An L: the room to the north-east is not ours.
 ROOM = Fence(polygon_ne_m=[[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]], max_height_m=3)
 ROUND = Fence(radius_m=5)
+# One that bends round the room to the north-east, and a circle that cuts it.
+HOOK = Fence(radius_m=5, polygon_ne_m=[[-1, -1], [2, -1], [2, 3], [8, 3], [8, 6], [-1, 6]])
 COORDINATE = st.floats(-12, 12)
 
 
@@ -39,7 +41,7 @@ def test_fences_that_make_no_sense(polygon, words):
         Fence(polygon_ne_m=polygon)
 
 
-@given(COORDINATE, COORDINATE, st.sampled_from([ROOM, ROUND, Fence(radius_m=4, polygon_ne_m=ROOM.polygon_ne_m)]))
+@given(COORDINATE, COORDINATE, st.sampled_from([ROOM, ROUND, HOOK]))
 def test_ways_from_home_end_inside(north_m, east_m, fence):
     """And what was inside already is left alone."""
     end = fence.shortened((0.0, 0.0), (north_m, east_m))
