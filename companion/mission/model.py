@@ -140,7 +140,8 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
     if at >= len(steps):
         raise ValueError(f"resume.at_step: the mission has {len(steps)} steps, counted from 0; there is no {at}")
     begin = tuple(_legs(mission))[at]
-    there = items.GoToItem(position_ned_m=begin.start_ned_m)
+    headings = [yaw for step in steps[:at] if isinstance(yaw := getattr(step.action, "yaw_deg", None), float | int)]
+    there = items.GoToItem(position_ned_m=begin.start_ned_m, yaw_deg=headings[-1] if headings else None)
     back = items.Step(at, begin.step.label, items.MissionItem(go_to=there), there)
     set_speeds = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, items.SetSpeedItem)]
     return (steps[0], *set_speeds, back, *steps[at:])
