@@ -144,6 +144,8 @@ class Machine(StateMachine):
             case State.CONNECT:
                 # A plan that has been shown is made anew, and agreed to anew.
                 flight.plan_confirmed &= previous is not State.READY
+                flight.reflex.restart(now_us)
+                flight.vehicle.attitude_parameters.clear()
                 return Connect()
             case State.READY:
                 return Ready()
