@@ -153,6 +153,8 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
     own = trajectory_of(item, start_m, speeds)
     if isinstance(item, items.VelocityItem) or not _is_blocked(own, known):
         return Planned(own)
+    if isinstance(item, items.OrbitItem) and item.turns > 1.0:
+        return _turn_by_turn(item, start_m, speeds, known)
     points = _points_of(item, own)
     places, left_out = [start_m], 0
     for point in points:
@@ -169,6 +171,23 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
         if not _is_blocked(curve, known) and _is_inside(curve, known):
             return Planned(curve, True, left_out)
     return Planned(lines(places, limits), True, left_out)
+
+
+def _turn_by_turn(item: items.OrbitItem, start_m: Vector3, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
+    """At rest after each turn. Turns that begin at the same place are planned once: no setpoint is sent meanwhile."""
+    planned, left_out, place = dict[tuple[float, ...], Planned](), 0, start_m
+    flown: list[Trajectory] = []
+    for number in range(math.ceil(item.turns)):
+        turn = item.model_copy(update={"turns": min(1.0, item.turns - number)})
+        key = (turn.turns, *[round(axis_m, 3) for axis_m in place])
+        if key not in planned:
+            planned[key] = trajectory_around(turn, place, speeds, known)
+        left_out += planned[key].left_out
+        trajectory = planned[key].trajectory
+        if trajectory is not None:
+            flown.append(trajectory)
+            place = trajectory.target_m
+    return Planned(Chain(flown), True, left_out) if flown else Planned(None)
 
 
 def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
@@ -216,6 +235,8 @@ def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
         return any(_is_blocked(part, known) for part in trajectory.parts)
     if isinstance(trajectory, LineProfile):
         return known.block((trajectory.start_m, trajectory.target_m))
+    if isinstance(trajectory, CircleProfile):
+        trajectory = replace(trajectory, angle_rad=max(-math.tau, min(math.tau, trajectory.angle_rad)))
     return known.block(looks(trajectory, trajectory.duration_s))
 
 

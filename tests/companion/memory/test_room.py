@@ -206,11 +206,12 @@ def test_a_paths_point_in_a_wall_is_left_out_but_not_its_last():
     assert trajectory_around(into, START, PACE, around(wall(0.0))).trajectory is None
 
 
-def test_an_orbit_is_flown_round_what_stands_in_it():
-    item = OrbitItem(centre_ned_m=(4.0, 3.0, -1.5), radius_m=3.0)
+@pytest.mark.parametrize("turns", [1.0, 999.5])
+def test_an_orbit_is_flown_round_what_stands_in_it(turns):
+    item = OrbitItem(centre_ned_m=(4.0, 3.0, -1.5), radius_m=3.0, turns=turns)
     known = around(wall(0.0, north_m=4.0), fence=Fence(radius_m=12))
     planned = trajectory_around(item, START, PACE, known)
-    assert planned.is_detour and planned.left_out >= 1
+    assert planned.is_detour and planned.left_out >= turns
     places = [planned.trajectory.at(planned.trajectory.duration_s * n / 400)[0] for n in range(401)]
     assert min(Point(place[:2]).distance(core(known.patches[0])) for place in places) > REACH_M + LEAST_FREE_M
     assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
