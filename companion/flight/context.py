@@ -26,6 +26,7 @@ from companion.messages import (
 )
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
+from companion.mission.items import Motion as MotionItem
 from companion.mission.model import Mission, steps_to_fly
 from companion.mission.policy import OnCollision
 from companion.mission.trajectory import Motion
@@ -100,7 +101,7 @@ class StepTally:
     began_us: int | None = None
     hits: int = 0
     pace_factor: float = 1.0
-    points_passed: int = 0  # of a path, when it was interrupted
+    left: MotionItem | None = None  # of the item's motion, when it was interrupted
 
 
 @dataclass(frozen=True, slots=True)

@@ -211,15 +211,25 @@ def lines(places_m: Sequence[Vector3], limits: SpeedAndAccelerations) -> Chain:
     return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
 
-def passed(item: items.PathItem, trajectory: Trajectory, elapsed_s: float) -> int:
-    """How many of a path's points lie behind the vehicle: all up to the last one that the trajectory passed."""
-    flown = looks(trajectory, min(elapsed_s, trajectory.duration_s))
-    numbers = [
-        number
-        for number, point in enumerate(item.points_ned_m, start=1)
-        if any(math.dist(point, place) < PASSED_M for place in flown)
-    ]
-    return max(numbers, default=0)
+def left_of(item: items.Motion, trajectory: Trajectory, elapsed_s: float) -> items.Motion:
+    """What is left of an interrupted item. Of a path: the points behind the last one that the trajectory passed."""
+    left_s = trajectory.duration_s - elapsed_s
+    if left_s <= 0.0:
+        return items.GoToItem(position_ned_m=trajectory.target_m)
+    match item, trajectory:
+        case items.VelocityItem(), _:
+            return item.model_copy(update={"duration_s": left_s})
+        case items.OrbitItem(), Chain(parts=[_, CircleProfile(duration_s=round_s)]):
+            return item.model_copy(update={"turns": item.turns * min(1.0, left_s / round_s)})
+        case items.PathItem(points_ned_m=points), _:
+            flown = looks(trajectory, elapsed_s)
+            near = [
+                number
+                for number, point in enumerate(points[:-1], start=1)
+                if min(math.dist(point, place) for place in flown) < PASSED_M
+            ]
+            return item.model_copy(update={"points_ned_m": points[max(near, default=0) :]})
+    return item
 
 
 def looks(trajectory: Trajectory, until_s: float) -> list[Vector3]:

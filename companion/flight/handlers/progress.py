@@ -15,7 +15,7 @@ from companion.mission.item_trajectory import (
     climb,
     first_leg,
     home_around,
-    passed,
+    left_of,
     stay,
     trajectory_around,
 )
@@ -76,11 +76,12 @@ class FlyItems(_OnTrajectory):
             flight.tally = StepTally(flight.step_index, now_us)
         step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
         self._action = step.action
-        self._started_us, self._trajectory_began_us = now_us, flight.trajectory_us
+        self._trajectory_began_us = flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
         self._steady_since_us: int | None = None
         self._trajectory: Trajectory = stay(start)
+        self._motion: items.Motion | None = None
         self._out_of_reach = ""
         match self._action:
             case items.TakeoffItem():
@@ -101,10 +102,10 @@ class FlyItems(_OnTrajectory):
             self._plan(flight, self._action, start, now_us)
 
     def _plan(self, flight: FlightContext, action: items.Motion, start_m: Vector3, now_us: int) -> None:
-        """The item's own trajectory, or one round known obstacles; of an interrupted path what is left."""
-        if isinstance(action, items.PathItem) and not flight.is_retry:
-            behind = min(flight.tally.points_passed, len(action.points_ned_m) - 1)
-            action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
+        """The item's own trajectory, or one round known obstacles; of an interrupted item what is left."""
+        if flight.tally.left is not None and not flight.is_retry:
+            action = flight.tally.left
+        self._motion = action
         known = surroundings(flight)
         speeds = replace(flight.speeds, factor=flight.tally.pace_factor)
         speeds = speeds.against(flight.reflex.sustained_force.wind_m_s2, first_leg(action, start_m))
@@ -123,11 +124,10 @@ class FlyItems(_OnTrajectory):
             flight.report(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
 
     def interrupt(self, flight: FlightContext) -> None:
-        """A hit ends the present trajectory: note its heading, and which points of a path were passed."""
+        """A hit ends the present trajectory: note its heading, and what is left of the item."""
         flight.yaw_rad = self._heading.yaw_rad
-        if isinstance(self._action, items.PathItem):
-            points = passed(self._action, self._trajectory, self._elapsed_s(flight))
-            flight.tally.points_passed = max(flight.tally.points_passed, points)
+        if self._motion is not None:
+            flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight))
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
         wanted_rad = self._heading.turn(motion[0], motion[1], now_us)
@@ -163,7 +163,8 @@ class FlyItems(_OnTrajectory):
             case items.SetSpeedItem() | items.ExpectItem():
                 return True
             case items.HoldItem(duration_s=duration_s):
-                return now_us - self._started_us >= duration_s * 1e6
+                began_us = flight.tally.began_us
+                return began_us is not None and now_us - began_us >= duration_s * 1e6
             case items.WaitForItem():
                 return self._has_come(self._action, flight, now_us)
             case items.VelocityItem() | items.SetYawItem():

@@ -14,8 +14,8 @@ from companion.memory.patch import REACHES_M, Patch, is_same, remembered, touch_
 from companion.memory.route import route
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
 from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
-from companion.mission.item_trajectory import SpeedLimits, passed, trajectory_around
-from companion.mission.items import OrbitItem, PathItem
+from companion.mission.item_trajectory import SpeedLimits, left_of, trajectory_around
+from companion.mission.items import GoToItem, OrbitItem, PathItem
 from companion.mission.trajectory import CurveProfile
 from companion.reflex.surface import Normal
 
@@ -217,10 +217,14 @@ def test_an_orbit_is_flown_round_what_stands_in_it(turns):
     assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
 
 
-def test_what_has_been_flown_of_a_path_is_not_flown_again():
-    path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), (6.0, 0.0, -1.5)))
+@pytest.mark.parametrize("last", [(6.0, 0.0, -1.5), START])
+def test_what_has_been_flown_of_a_path_is_not_flown_again(last):
+    """Also of one that ends where it begins."""
+    path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), last))
     trajectory = CurveProfile((START, *path.points_ned_m), 1.5, 2.0)
-    assert [passed(path, trajectory, trajectory.duration_s * part) for part in (0.1, 0.5, 1.0)] == [0, 1, 3]
+    left = [left_of(path, trajectory, trajectory.duration_s * part) for part in (0.1, 0.5, 1.0)]
+    assert [item.points_ned_m for item in left[:2]] == [path.points_ned_m, path.points_ned_m[1:]]
+    assert left[2] == GoToItem(position_ned_m=last)
 
 
 # --- touch after touch
