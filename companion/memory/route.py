@@ -46,20 +46,22 @@ def _search(known: ObstacleMap, walls: Walls, start: Place, goal: Place) -> list
     if walls.holds(goal):
         return None
     graph = _Graph(known.fence, walls, start, goal)
-    queue: list[tuple[float, int]] = [(math.dist(start, goal), START)]
-    lengths, before, done = {START: 0.0}, {START: START}, set[int]()
+    # Of each entry: how long a way over its last place is at least, that place, and the way to it.
+    queue: list[tuple[float, int, list[Place]]] = [(math.dist(start, goal), START, [])]
+    lengths, done = {START: 0.0}, set[int]()
     while queue:
-        _, here = heapq.heappop(queue)
+        _, here, way = heapq.heappop(queue)
+        if here == GOAL:
+            return way
         if here in done:
             continue
-        if here == GOAL:
-            return graph.traced(before)
         done.add(here)
         for there in graph.seen_from(here, done):
-            length_m = lengths[here] + math.dist(graph.places[here], graph.places[there])
+            place = graph.places[there]
+            length_m = lengths[here] + math.dist(graph.places[here], place)
             if length_m < lengths.get(there, math.inf):
-                lengths[there], before[there] = length_m, here
-                heapq.heappush(queue, (length_m + math.dist(graph.places[there], goal), there))
+                lengths[there] = length_m
+                heapq.heappush(queue, (length_m + math.dist(place, goal), there, [*way, place]))
     return None
 
 
@@ -93,13 +95,6 @@ class _Graph:
         # From the start and to the goal as near as those themselves are.
         ends = [self.places[end] for end in (here, there) if end in (START, GOAL)]
         return self._walls.keeps_off(line, ends) if ends else not self._inner.intersects(line)
-
-    def traced(self, before: dict[int, int]) -> list[Place]:
-        here, places = GOAL, list[Place]()
-        while here != START:
-            places.append(self.places[here])
-            here = before[here]
-        return places[::-1]
 
 
 def _fence_shape(fence: Fence) -> BaseGeometry:
