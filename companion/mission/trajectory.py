@@ -292,9 +292,10 @@ def _curvature(tangents: Floats, pieces_m: Floats) -> Floats:
 
 def _within_acceleration(top_m_s: Floats, pieces_m: Floats, speeding_up_m_s2: float, braking_m_s2: float) -> Floats:
     """The fastest speeds from rest to rest below `top` whose change along the way stays within the limits."""
-    squares = top_m_s**2
+    # Lists: one number of an array takes several times as long to look at.
+    squares = (top_m_s**2).tolist()
     squares[0] = squares[-1] = 0.0
-    gain, loss = 2.0 * speeding_up_m_s2 * pieces_m, 2.0 * braking_m_s2 * pieces_m
+    gain, loss = ((2.0 * change_m_s2 * pieces_m).tolist() for change_m_s2 in (speeding_up_m_s2, braking_m_s2))
     for k in range(len(gain)):
         squares[k + 1] = min(squares[k + 1], squares[k] + gain[k])
     for k in range(len(loss) - 1, -1, -1):
@@ -313,4 +314,4 @@ def _distinct(points_m: Sequence[Vector3]) -> list[Vector3]:
 
 
 def _tuples(rows: Floats) -> list[Vector3]:
-    return [(float(n), float(e), float(d)) for n, e, d in rows]
+    return [(n, e, d) for n, e, d in rows.tolist()]
