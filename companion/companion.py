@@ -140,11 +140,11 @@ class Companion(Stepped[FlightCore]):
     @property
     def file_awaited(self) -> str | None:
         """The file whose existence the mission waits for now; the companion itself opens none."""
-        return None if self.core.flight.file_is_there else self.core.flight.file_awaited
+        return self.core.flight.file_awaited
 
     def file_is_there(self) -> None:
         """The file that is awaited exists."""
-        self.core.flight.file_is_there = True
+        self.core.flight.file_awaited = None
 
     def obstacles(self) -> tuple[Patch, ...]:
         """What is known of the surroundings by now: from before, and from this flight's hits. Mission coordinates."""

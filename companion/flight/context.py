@@ -25,7 +25,7 @@ from companion.messages import (
     Vector3,
 )
 from companion.mission.item_trajectory import SpeedLimits
-from companion.mission.items import ExpectItem, ReturnItem, Step
+from companion.mission.items import ExpectItem, Step
 from companion.mission.items import Motion as MotionItem
 from companion.mission.model import Mission, steps_to_fly
 from companion.mission.policy import OnCollision
@@ -153,11 +153,9 @@ class FlightContext:
     tally: StepTally = field(default_factory=StepTally)
     speeds: SpeedLimits = field(init=False)
     after_recovery: Transition = Transition(Trigger.RECOVERED_TO_HOLD)  # decided at the hit
-    returning_as: ReturnItem = field(default_factory=ReturnItem)
     going_home: bool = False
     is_landing: bool = False  # ordered, and begun again after every hit on the way down
-    file_awaited: str | None = None
-    file_is_there: bool = False
+    file_awaited: str | None = None  # until it is there
     expectations: list[Expectation] = field(default_factory=list)
     before_hit: BeforeHit | None = None
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
@@ -189,8 +187,6 @@ class FlightContext:
         self.speeds = SpeedLimits.of(config.flight, self.mission.limits.max_speed_m_s)
         self.steps = steps_to_fly(self.mission)
         self.patches = self.mission.obstacles.patches()
-        if self.steps and isinstance(last := self.steps[-1].action, ReturnItem):
-            self.returning_as = last
 
     @property
     def step(self) -> Step:

@@ -1,6 +1,5 @@
 """The plan a person confirms, and the words for mission items."""
 
-import math
 
 from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED, defaults
@@ -8,15 +7,15 @@ from companion.fence import Fence
 from companion.flight.context import FlightContext, as_text
 from companion.flight.envelope import unattended_text
 from companion.flight.expectations import describe
-from companion.memory.stored import ObstaclesConfig
 from companion.memory.stored import describe as describe_patch
 from companion.mission import items
 from companion.mission.model import Mission
-from companion.mission.policy import AbortWhen, OnCollision, OnDamage
+from companion.mission.policy import AbortWhen, OnCollision
 from companion.reflex.config import RecoveryConfig
 
 # The position gain asks for gamma * v_c of it backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = round(1.0 / defaults.POSITION_GAIN_PER_S, 2)
+_DAMAGED = "On damage  a motor that works harder than before a hit"
 _AFTER = {"land": "land", "return": "return and land", "continue": "the next item", "abort": "abort"}
 
 
@@ -121,13 +120,14 @@ def mission_lines(mission: Mission, autopilot: Autopilot = ASSUMED) -> list[str]
     lines = []
     for number, item in enumerate(mission.items, start=1):
         lines += _item_lines(f"{number}.", item, "Items" if number == 1 else "")
-    on_hit = mission.on_collision
+    on_hit, obstacles = mission.on_collision, mission.obstacles
     lines += [
         f"Fence      setpoints stay {describe_fence(mission.fence)}",
         f"On a hit   detector {mission.companion.detector}, recovery law {_law(mission.recovery)}; "
         f"then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
-        *_damage_lines(mission.on_damage),
-        *_obstacle_lines(mission.obstacles),
+        *([] if mission.on_damage == "tell" else [f"{_DAMAGED}: {_AFTER[mission.on_damage]}"]),
+        f"Obstacles  keep {obstacles.margin_m:g} m off what is known; no way: {_AFTER[obstacles.on_unreachable]}",
+        *[f"Known      {describe_patch(patch)}" for patch in obstacles.patches()],
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
         f"Unattended {unattended_text(autopilot, _fastest_m_s(mission))}",
@@ -148,24 +148,10 @@ def _law(recovery: RecoveryConfig) -> str:
 
 def _fastest_m_s(mission: Mission) -> float:
     """The highest speed that an item asks for."""
-    speeds = []
-    for step in items.program(mission.items):
-        match step.action:
-            case items.VelocityItem(velocity_ned_m_s=velocity):
-                speeds.append(math.hypot(*velocity))
-            case items.GoToItem() | items.PathItem() | items.OrbitItem() | items.ReturnItem() | items.SetSpeedItem():
-                speeds.append(step.action.speed_m_s or mission.companion.flight.cruise_speed_m_s)
-    return max(speeds, default=mission.companion.flight.takeoff_speed_m_s)
-
-
-def _damage_lines(on_damage: OnDamage) -> list[str]:
-    what = "On damage  a motor that works harder than before a hit"
-    return [] if on_damage == "tell" else [f"{what}: {_AFTER[on_damage]}"]
-
-
-def _obstacle_lines(obstacles: ObstaclesConfig) -> list[str]:
-    lines = [f"Obstacles  keep {obstacles.margin_m:g} m off what is known; no way: {_AFTER[obstacles.on_unreachable]}"]
-    return lines + [f"Known      {describe_patch(patch)}" for patch in obstacles.patches()]
+    flight, actions = mission.companion.flight, [step.action for step in items.program(mission.items)]
+    moving = [action for action in actions if hasattr(action, "speed_m_s") or isinstance(action, items.VelocityItem)]
+    speeds = [items.speed_m_s(action) or flight.cruise_speed_m_s for action in moving]
+    return max(speeds, default=flight.takeoff_speed_m_s)
 
 
 def _item_lines(number: str, item: items.MissionItem, lead: str = "") -> list[str]:

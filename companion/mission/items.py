@@ -3,6 +3,7 @@
 Coordinates: NED, relative to the arming position.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self, TypeAlias
@@ -280,6 +281,14 @@ Motion: TypeAlias = GoToItem | VelocityItem | PathItem | OrbitItem
 Action: TypeAlias = (
     TakeoffItem | Motion | HoldItem | WaitForItem | SetSpeedItem | SetYawItem | ExpectItem | ReturnItem | LandItem
 )
+
+
+def speed_m_s(action: Action) -> float | None:
+    """The one that it asks for by itself, of whatever has one."""
+    if isinstance(action, VelocityItem):
+        return math.hypot(*action.velocity_ned_m_s)
+    speed: float | None = getattr(action, "speed_m_s", None)
+    return speed
 
 
 # A mission longer than this once its repeats are written out is a slip of the pen.

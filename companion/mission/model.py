@@ -61,14 +61,11 @@ class Mission(StrictModel):
         if names[-1] not in ("land", "return"):
             raise ValueError(f"items: the last item must be land or return, not {names[-1]}")
         for step in items.program(self.items):
-            number, action = step.label.partition(" ")[0], step.action
+            number = step.label.partition(" ")[0]
             if step.name in ("takeoff", "land", "return") and number not in ("1", f"{len(names)}"):
                 where = "first" if step.name == "takeoff" else "last"
                 raise ValueError(f"items: item {number} is {step.name}, which may only come {where}")
-            if isinstance(action, items.VelocityItem):
-                speed_m_s = math.hypot(*action.velocity_ned_m_s)
-            else:
-                speed_m_s = getattr(action, "speed_m_s", None) or 0.0
+            speed_m_s = items.speed_m_s(step.action) or 0.0
             limit_m_s = self.limits.max_speed_m_s
             if speed_m_s > limit_m_s:
                 flies = f"item {number} ({step.name}) flies at {speed_m_s:g} m/s"

@@ -88,7 +88,7 @@ class FlyItems(_OnTrajectory):
                 # tried again after a hit in the climb
                 self._trajectory = climb(start, self._action.height_m, flight.mission.companion.flight)
             case items.WaitForItem(file=file):
-                flight.file_awaited, flight.file_is_there = file, False
+                flight.file_awaited = file
             case items.SetSpeedItem():
                 flight.speeds = flight.speeds.changed_to(self._action)
         factor = flight.tally.pace_factor if isinstance(self._action, items.Motion) else 1.0
@@ -184,7 +184,7 @@ class FlyItems(_OnTrajectory):
             assert flight.armed_at_us is not None
             return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
         if item.steady is None:
-            return flight.file_is_there
+            return item.file is not None and flight.file_awaited is None
         latest, target = flight.vehicle.history.latest, flight.target
         assert latest is not None and target is not None, "the flight is in the air"
         is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
@@ -294,7 +294,9 @@ class FlyHome(_OnTrajectory):
         flight.going_home = True
         start = flight.mission_ned_m(flight.target.position_ned_m)
         speeds = flight.speeds.against(flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0))
-        planned = home_around(start, flight.returning_as, speeds, surroundings(flight))
+        last = flight.steps[-1].action
+        asked = last if isinstance(last, items.ReturnItem) else items.ReturnItem()
+        planned = home_around(start, asked, speeds, surroundings(flight))
         self._is_cut_off = planned.trajectory is None
         self._trajectory: Trajectory = planned.trajectory or stay(start)
         if self._is_cut_off:
