@@ -17,7 +17,7 @@ from companion.flight.handlers.connecting import Connect
 from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
-from companion.flight.states import FINAL_STATES, State
+from companion.flight.states import FINAL_STATES, IN_THE_AIR, ON_THE_WAY, State
 from companion.flight.vehicle_update import note_height, situation_of, update_vehicle
 from companion.link.commands import CommandClient
 from companion.messages import (
@@ -43,11 +43,6 @@ from companion.report import Event, Status
 HEARTBEAT_INTERVAL_US = 1_000_000
 # All timeouts are noticed within this, when nothing arrives.
 POLL_INTERVAL_US = 50_000
-
-# States between take-off and landing, in which the fence's floor counts.
-ON_THE_WAY = (State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
-# States in which hits are detected. Climb and descent belong to them; the height decides about the ground.
-DETECTING_STATES = (*ON_THE_WAY, State.TAKEOFF, State.LANDING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,7 +353,7 @@ class FlightCore(Core[FlightContext, Machine]):
 
     def situation(self) -> Situation:
         state = self.machine.state
-        off_state = None if state in DETECTING_STATES else state.value
+        off_state = None if state in IN_THE_AIR else state.value
         return situation_of(self.flight, off_state, state is State.LANDING, is_held=True)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:

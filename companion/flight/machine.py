@@ -16,7 +16,7 @@ from companion.flight.handlers.progress import FlyHome, FlyItems, HoldAfterRecov
 from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.handlers.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.flight.obstacle_map import remember
-from companion.flight.states import FINAL_STATES, MAY_CRASH, TABLE, State, Trigger
+from companion.flight.states import FINAL_STATES, IN_THE_AIR, TABLE, State, Trigger
 from companion.mission.items import TakeoffItem
 
 
@@ -99,12 +99,12 @@ class Machine(StateMachine):
             ended = early_end(self.flight, self.state, inputs, now_us)
             if ended is not None:
                 self._take(ended, now_us)
-        if self.state in MAY_CRASH:
+        if self.state in IN_THE_AIR:
             how = crashed(self.flight, self.state is State.LANDING, now_us)
             if how is not None:
                 self._take(Transition(Trigger.CRASHED, how), now_us)
         for estimate in inputs.impacts:
-            if Trigger.COLLISION in TABLE[self.state] and not lands_anyway(self.flight):
+            if self.state in IN_THE_AIR and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
                     self.handler.interrupt(self.flight)
                 note_before(self.flight, self.state)

@@ -1,6 +1,5 @@
 """The plan a person confirms, and the words for mission items."""
 
-
 from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED, defaults
 from companion.fence import Fence

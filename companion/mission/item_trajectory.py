@@ -168,7 +168,8 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
     limits = speeds.limits(item.speed_m_s, item.acceleration_m_s2)
     if not isinstance(item, items.GoToItem):
         curve = CurveProfile(places, *limits)
-        if not _is_blocked(curve, known) and _is_inside(curve, known):
+        places_on_it = looks(curve, curve.duration_s)
+        if not known.block(places_on_it) and all(known.fence.complaint(place) is None for place in places_on_it):
             return Planned(curve, True, left_out)
     return Planned(lines(places, limits), True, left_out)
 
@@ -248,12 +249,6 @@ def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
     if isinstance(trajectory, CircleProfile):
         trajectory = replace(trajectory, angle_rad=max(-math.tau, min(math.tau, trajectory.angle_rad)))
     return known.block(looks(trajectory, trajectory.duration_s))
-
-
-def _is_inside(trajectory: Trajectory, known: ObstacleMap) -> bool:
-    places = looks(trajectory, trajectory.duration_s)
-    fence = known.fence
-    return all(fence.contains(n, e) and fence.min_height_m <= -d <= fence.max_height_m for n, e, d in places)
 
 
 def _points_of(item: items.GoToItem | items.PathItem | items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:

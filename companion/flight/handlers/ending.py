@@ -4,13 +4,13 @@ import math
 from enum import Enum
 
 from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition
-from companion.flight.states import State, Trigger
+from companion.flight.states import ON_THE_WAY, State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
 from companion.link.vehicle import ModeReport
 from companion.messages import DISARM, LandedState, Vector3
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
-ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
+ON_SETPOINTS = (State.TAKEOFF, *ON_THE_WAY)
 
 # After a hit the setpoint jumps, and the vehicle takes its time.
 FOLLOWING = (State.MISSION, State.HOLDING, State.RETURNING)
