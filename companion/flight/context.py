@@ -32,6 +32,7 @@ from companion.mission.policy import OnCollision
 from companion.mission.trajectory import Motion
 from companion.motion.motors import MotorWatch
 from companion.motion.rotation import yaw_rad
+from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus, plus
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
@@ -172,7 +173,7 @@ class FlightContext:
     flew_us: int | None = None  # when it last did
     may_crash: bool = False  # flies, or did a moment ago: whose motors stop in the air says at once that it has landed
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
-    no_data_since_us: int | None = None  # the detector, while it is on
+    blind: Lasting = field(default_factory=Lasting)  # the detector, while it is on
     plan_confirmed: bool = False
     stop_put_off: str | None = None  # the reason of a stop that waits until the vehicle is clear of what it has hit
     outcome: Outcome | None = None

@@ -113,16 +113,14 @@ class ExpectItem(StrictModel):
 
     @model_validator(mode="after")
     def _exactly_one_key(self) -> Self:
-        if len(self._given()) != 1:
+        if len(self.model_dump(exclude_none=True)) != 1:
             raise ValueError(f"an expectation has exactly one key: {', '.join(ExpectItem.model_fields)}")
         return self
 
-    def _given(self) -> list[Check]:
-        return [check for _, check in self if check is not None]
-
     @property
     def check(self) -> Check:
-        return self._given()[0]
+        check: Check = next(check for _, check in self if check is not None)
+        return check
 
 
 # PX4 flies no faster: a larger wish is a slip of the pen.

@@ -131,8 +131,7 @@ def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
     if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
         return f"flight time above {when.flight_time_above_s:g} s"
-    since_us = flight.no_data_since_us
-    if when.blind_for_s is not None and since_us is not None and now_us - since_us > when.blind_for_s * 1e6:
+    if when.blind_for_s is not None and flight.blind.lasts_us > when.blind_for_s * 1e6:
         return f"the detector has been blind for {when.blind_for_s:g} s"
     if when.setpoint_missed_by_m is not None and state in FOLLOWING and flight.target is not None:
         missed_m = math.dist(place_ned_m, flight.target.position_ned_m)

@@ -20,6 +20,7 @@ from companion.mission.item_trajectory import (
     trajectory_around,
 )
 from companion.mission.trajectory import Motion, Trajectory
+from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, plus
 
 # A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
@@ -79,7 +80,7 @@ class FlyItems(_OnTrajectory):
         self._trajectory_began_us = flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
-        self._steady_since_us: int | None = None
+        self._steady = Lasting()
         self._trajectory: Trajectory = stay(start)
         self._motion: items.Motion | None = None
         self._out_of_reach = ""
@@ -188,11 +189,9 @@ class FlyItems(_OnTrajectory):
         latest, target = flight.vehicle.history.latest, flight.target
         assert latest is not None and target is not None, "the flight is in the air"
         is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
-        if not (is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s):
-            self._steady_since_us = None
-        elif self._steady_since_us is None:
-            self._steady_since_us = now_us
-        return self._steady_since_us is not None and now_us - self._steady_since_us >= item.steady.for_s * 1e6
+        is_steady = is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s
+        self._steady.update(is_steady, latest.time_boot_us)
+        return self._steady.lasts_us >= item.steady.for_s * 1e6
 
     def _has_turned(self, now_us: int) -> bool:
         """To a fixed heading; one that follows the way is never late."""
