@@ -1,7 +1,7 @@
 """State mission: one step after the other; holding: a pause after a recovery; returning: home. All watch for hits."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from companion.flight import expectations
 from companion.flight.context import TURNING_RAD_S, FlightContext, Inputs, StepTally, Target, Transition
@@ -21,7 +21,7 @@ from companion.mission.item_trajectory import (
 )
 from companion.mission.trajectory import Motion, Trajectory
 from companion.motion.settling import Lasting
-from companion.motion.vector import ZERO, plus
+from companion.motion.vector import ZERO, minus, plus
 
 # A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
 BRAKES_S = 1.0
@@ -79,7 +79,7 @@ class FlyItems(_OnTrajectory):
         self._action = step.action
         self._trajectory_began_us = flight.trajectory_us
         self._over_since_us: int | None = None
-        self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
+        self._heading = Heading(step.action, flight.yaw_rad, now_us)
         self._steady = Lasting()
         self._trajectory: Trajectory = stay(start)
         self._motion: items.Motion | None = None
@@ -231,41 +231,26 @@ class HoldAfterRecovery:
         return Transition(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
 
 
-# Slower, or nearer, than this there is no direction that noise in the last digits could not have made.
-_LEAST_SPEED_M_S = 0.05
-_LEAST_DISTANCE_M = 0.05
+# Slower than this in m/s, or nearer in m, there is no direction that noise in the last digits could not have made.
+_LEAST_LENGTH = 0.05
 
 
-@dataclass(slots=True)
 class Heading:
-    """A heading that turns to another. Radians clockwise from north; None: the vehicle chooses."""
+    """A heading that turns to the item's. Radians clockwise from north; None: the vehicle chooses."""
 
-    yaw_rad: float | None
-    at_us: int
-    rate_rad_s: float
-    fixed_rad: float | None
-    centre_m: Vector3 | None = None
-    along: bool = False
-
-    @classmethod
-    def of_step(cls, step: items.Step, yaw_rad: float | None, now_us: int) -> "Heading":
-        """The heading that the step asks for, beginning with the present one."""
-        action = step.action
-        rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else TURNING_RAD_S
+    def __init__(self, action: items.Action, yaw_rad: float | None, now_us: int) -> None:
+        """`yaw_rad`: the present one."""
         asked = getattr(action, "yaw_deg", None)
-        fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad
-        centre = action.centre_ned_m if isinstance(action, items.OrbitItem) and asked == "centre" else None
-        along = isinstance(action, items.PathItem | items.OrbitItem) and asked == "along"
-        return cls(yaw_rad, now_us, rate_rad_s, fixed_rad, centre, along)
-
-    @property
-    def is_fixed(self) -> bool:
-        return self.centre_m is None and not self.along
+        self.yaw_rad, self._at_us = yaw_rad, now_us
+        self.rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else TURNING_RAD_S
+        self.fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad
+        self.is_fixed = not isinstance(asked, str)
+        self._centre_m = action.centre_ned_m if isinstance(action, items.OrbitItem) and asked == "centre" else None
 
     def turn(self, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
         """Turn on until now, in the shorter direction."""
         wanted = self._wanted(position_m, velocity_m_s)
-        elapsed_s, self.at_us = (now_us - self.at_us) * 1e-6, now_us
+        elapsed_s, self._at_us = (now_us - self._at_us) * 1e-6, now_us
         if wanted is None or self.yaw_rad is None:
             self.yaw_rad = wanted
             return wanted
@@ -275,13 +260,10 @@ class Heading:
         return self.yaw_rad
 
     def _wanted(self, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
-        if self.centre_m is not None:
-            north, east = self.centre_m[0] - position_m[0], self.centre_m[1] - position_m[1]
-            return math.atan2(east, north) if math.hypot(north, east) > _LEAST_DISTANCE_M else self.yaw_rad
-        if self.along:
-            north, east, _ = velocity_m_s
-            return math.atan2(east, north) if math.hypot(north, east) > _LEAST_SPEED_M_S else self.yaw_rad
-        return self.fixed_rad
+        if self.is_fixed:
+            return self.fixed_rad
+        north, east, _ = velocity_m_s if self._centre_m is None else minus(self._centre_m, position_m)
+        return math.atan2(east, north) if math.hypot(north, east) > _LEAST_LENGTH else self.yaw_rad
 
 
 class FlyHome(_OnTrajectory):
