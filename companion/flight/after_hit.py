@@ -57,7 +57,7 @@ def lands_anyway(flight: FlightContext) -> bool:
 
 # What goes on after a hit that was none.
 _GOES_ON = {
-    State.TAKEOFF: Trigger.RECOVERED_TO_CONTINUE,
+    State.TAKEOFF: Trigger.RECOVERED_TO_RETRY,
     State.MISSION: Trigger.RECOVERED_TO_RETRY,
     State.HOLDING: Trigger.RECOVERED_TO_HOLD,
     State.RETURNING: Trigger.RECOVERED_TO_RETURN,
@@ -81,7 +81,7 @@ def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     text = "not a hit: one message showed it, and nothing else did; going on"
     flight.report(now_us, "unconfirmed", text, count=flight.unconfirmed)
     flight.tally = before.tally
-    flight.step_index = max(before.step_index, 1) if before.state is State.TAKEOFF else before.step_index
+    flight.step_index = before.step_index
     flight.after_recovery = before.after_recovery
     flight.target = Target(latest.position_ned_m, flight.yaw_rad)
     return Transition(_GOES_ON[before.state])

@@ -102,13 +102,16 @@ def test_one_forged_packet_costs_a_twitch(force_m_s2):
     fly_on(forge)
 
 
-def test_what_is_flown_for_a_time_or_round_goes_on_where_it_was():
+def test_a_climb_and_what_is_flown_for_a_time_or_round_go_on_where_they_were():
     around = {"orbit": {"centre_ned_m": [3, 2, -1.5], "radius_m": 2, "turns": 0.5, "yaw_deg": None}}
     ahead = {"velocity": {"velocity_ned_m_s": [1, 0, 0], "duration_s": 4}}
     air = simulated([ITEMS[0], {"hold": {"duration_s": 4}}, ahead, around, {"land": {}}])
+    air.run_until(lambda: "armed" in air.kinds() and motion(air)[2] < -0.9)
+    air.step(imu(air, -100.0))
     air.run_to("mission")
     for number in (1, 2, 3):
-        air.run_until(lambda told=2 * number - 1: air.kinds().count("item") == told, 2.5)
+        air.run_until(lambda told=2 * number: air.kinds().count("item") == told, 2.5)
+        assert motion(air)[2] == pytest.approx(-1.5, abs=0.2)
         air.run_for(2.5)
         air.step(imu(air, -100.0))
         air.run_until(lambda: air.state == "mission", 1.0)
