@@ -70,11 +70,6 @@ class Survey:
     ask_due_us: int = 0
 
     @property
-    def asked(self) -> tuple[str, ...]:
-        """The parameters to be read."""
-        return self.vehicle.autopilot.asked(self.line)
-
-    @property
     def setup(self) -> Setup:
         identity, fused = self.vehicle.identity, self.config.fused
         imu_hz = self.streams.rates_hz().get("HIGHRES_IMU", 0.0)
@@ -134,7 +129,7 @@ def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> 
             else:
                 survey.vehicle.identity, survey.heard_since_us = identity, now_us
                 survey.vehicle.autopilot = identity.autopilot
-        case messages.Parameter(name, value) if name in survey.asked:
+        case messages.Parameter(name, value) if name in survey.vehicle.autopilot.asked(survey.line):
             survey.parameters[name] = value
         case messages.EstimatorStatus():
             survey.estimator.append(sample)
@@ -157,9 +152,10 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
     if survey.now_us < survey.ask_due_us:
         return
     survey.ask_due_us = survey.now_us + ASK_AGAIN_US
-    outgoing += [messages.ReadParameter(name) for name in survey.asked if name not in survey.parameters]
     commands: list[messages.VehicleCommand] = []
     autopilot = survey.vehicle.autopilot
+    asked = autopilot.asked(survey.line)
+    outgoing += [messages.ReadParameter(name) for name in asked if name not in survey.parameters]
     if survey.vehicle.version is None:
         commands.append(messages.request_message(MessageId.AUTOPILOT_VERSION))
     if survey.listening_since_us is None:

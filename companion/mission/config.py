@@ -1,6 +1,5 @@
 """The mission's `companion:` part: every key optional, every default with its reason."""
 
-import math
 from typing import Annotated
 
 from pydantic import Field
@@ -56,11 +55,6 @@ class LinkConfig(StrictModel):
     than anyone notices a vehicle flying on its own."""
     position_silence_s: Annotated[Positive, Field(ge=0.1)] = 1.0
     """A position this old is 2 m wrong at 2 m/s: nothing flown on it is safe."""
-
-    @property
-    def patience_s(self) -> float:
-        """How long a vehicle on the ground may stay silent."""
-        return math.inf if self.wait else self.heartbeat_wait_s
 
 
 class FlightConfig(StrictModel):

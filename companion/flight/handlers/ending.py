@@ -88,8 +88,8 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition
     if flight.vehicle.identity is None:
         return None
     if state in ON_THE_GROUND:
-        silent_s = flight.silent_s(now_us)
-        if silent_s > flight.mission.companion.link.patience_s:
+        silent_s, link = flight.silent_s(now_us), flight.mission.companion.link
+        if silent_s > link.heartbeat_wait_s and not link.wait:
             return Transition(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
         flight.was_silent |= flight.is_silent(now_us)
         if flight.is_silent(now_us) or not flight.was_silent:
@@ -196,8 +196,8 @@ class HandOver:
         self.finished = False
         self._target = None if flight.target is None else flight.target.at_rest()
         self._previous_mode = flight.expected_mode
-        self._autopilot = flight.vehicle.autopilot
-        self._mode = self._autopilot.land if flight.mission.on_interrupt == "land" else self._autopilot.hold
+        autopilot = flight.vehicle.autopilot
+        self._mode = autopilot.land if flight.mission.on_interrupt == "land" else autopilot.hold
         # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
         self._disarming = flight.arming_requested and flight.armed_at_us is None
         flight.command_client.cancel()
@@ -228,10 +228,10 @@ class HandOver:
         if outcome is None:
             return False
         if outcome.succeeded:
-            flight.report(now_us, "mode", f"handed over to {self._autopilot.mode_name(self._mode)}")
-        elif outcome.refused and self._mode == self._autopilot.hold:
+            flight.report(now_us, "mode", f"handed over to {flight.vehicle.autopilot.mode_name(self._mode)}")
+        elif outcome.refused and self._mode == flight.vehicle.autopilot.hold:
             # PX4 holds only with a global position; without one (motion capture alone) it still lands.
-            self._mode = self._autopilot.land
+            self._mode = flight.vehicle.autopilot.land
             flight.report(now_us, "mode", "the vehicle does not hold: asking it to land")
             flight.ask_for_mode(self._mode)
             return False
@@ -244,5 +244,7 @@ class HandOver:
         holder = who_decided(report, self._previous_mode, self._mode)
         if holder is Holder.COMPANION:
             return False
-        flight.report(now_us, "mode", f"{holder.value} took over in {self._autopilot.mode_name(report.custom_mode)}")
+        flight.report(
+            now_us, "mode", f"{holder.value} took over in {flight.vehicle.mode_name}"
+        )
         return True
