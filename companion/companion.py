@@ -148,7 +148,7 @@ class Companion(Stepped[FlightCore]):
 
     def obstacles(self) -> tuple[Patch, ...]:
         """What is known of the surroundings by now: from before, and from this flight's hits. Mission coordinates."""
-        return all_known(self.core.flight)
+        return all_known(self.core.flight).patches
 
     def report(self) -> FlightReport:
         """The flight so far, or the whole of it once `finished`."""
@@ -164,7 +164,7 @@ class Companion(Stepped[FlightCore]):
             ended_at_us=core.now_us if flight.ended_at_us is None else flight.ended_at_us,
             armed_at_us=flight.armed_at_us,
             expectations=tuple([wish.report for wish in flight.expectations]),
-            obstacles=all_known(flight),
+            obstacles=all_known(flight).patches,
             unreachable=tuple(flight.unreachable),
             refused_messages=dict(flight.refusals.counts),
             unconfirmed=flight.unconfirmed,

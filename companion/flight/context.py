@@ -13,7 +13,7 @@ from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, ModeReport, Vehicle
-from companion.memory.patch import Patch
+from companion.memory.surroundings import ObstacleMap
 from companion.messages import (
     AttitudeSetpoint,
     CommandAck,
@@ -163,7 +163,7 @@ class FlightContext:
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)
     told_by_position: bool = False  # that recoveries are not flown by attitude
-    patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
+    known: ObstacleMap = field(init=False)  # of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
     crashed: str = ""  # how, once it has
@@ -187,7 +187,7 @@ class FlightContext:
         self.streams = StreamMonitor(config.streams, tuple(self.reflex.monitor.detector.losses))
         self.speeds = SpeedLimits.of(config.flight, self.mission.limits.max_speed_m_s)
         self.steps = steps_to_fly(self.mission)
-        self.patches = self.mission.obstacles.patches()
+        self.known = self.mission.known(self.mission.obstacles.patches())
 
     @property
     def step(self) -> Step:

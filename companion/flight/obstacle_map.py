@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
 from companion.flight.envelope import KnownSurface, touched
-from companion.memory.patch import Patch, is_same, remembered, touch_of
+from companion.memory.patch import Patch, is_same, touch_of
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
@@ -16,17 +16,15 @@ from companion.reflex.surface import Normal, Surface
 
 def remember(flight: FlightContext, hits: int, now_us: int) -> None:
     """Add the first `hits` hits, by their newest estimates; report new patches."""
-    before = flight.patches
-    flight.patches, flight.hits_remembered = _with_hits(flight, hits), hits
-    for patch in flight.patches:
+    before, flight.known, flight.hits_remembered = flight.known.patches, _with_hits(flight, hits), hits
+    for patch in flight.known.patches:
         if patch not in before:
             flight.report(now_us, "obstacle", f"remembered: {describe(patch)}", **as_data(patch))
 
 
-def all_known(flight: FlightContext) -> tuple[Patch, ...]:
+def all_known(flight: FlightContext) -> ObstacleMap:
     """With the hit of the present recovery: the map to keep if the program ends now."""
-    new = flight.collisions[flight.hits_remembered :]
-    return remembered(flight.patches, _touches(flight, new), _clearance_m(flight)) if new else flight.patches
+    return flight.known.joined(_touches(flight, flight.collisions[flight.hits_remembered :]))
 
 
 def surroundings(flight: FlightContext) -> ObstacleMap:
@@ -34,9 +32,7 @@ def surroundings(flight: FlightContext) -> ObstacleMap:
 
     An item that is tried again shall meet what stopped it: that hit is left out, and nothing else.
     """
-    patches = _with_hits(flight, len(flight.collisions) - flight.tally.hits) if flight.is_retry else flight.patches
-    mission = flight.mission
-    return ObstacleMap(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+    return _with_hits(flight, len(flight.collisions) - flight.tally.hits) if flight.is_retry else flight.known
 
 
 class FlightRoom:
@@ -50,16 +46,15 @@ class FlightRoom:
 
         Of each patch what counts is where the vehicle's centre would touch it, and that the margin is kept.
         """
-        flight = self._flight
-        if not flight.patches:
+        flight, known = self._flight, self._flight.known
+        if not known.patches:
             return []
-        place, clearance_m = flight.mission_ned_m(contact.position_ned_m), _clearance_m(flight)
-        reach_m = flight.mission.companion.estimate.reach_m
+        place, clearance_m = flight.mission_ned_m(contact.position_ned_m), known.clearance_m
         normal = Normal(contact.normal_ned, contact.normal_error_rad)
-        touch = touch_of(place, contact.velocity_ned_m_s, normal, reach_m, 0)
+        touch = touch_of(place, contact.velocity_ned_m_s, normal, known.reach_m, 0)
         return [
-            Surface(_touching_ned_m(flight, patch), patch.normal_ned, flight.mission.obstacles.margin_m)
-            for patch in flight.patches
+            Surface(_touching_ned_m(flight, patch), patch.normal_ned, known.margin_m)
+            for patch in known.patches
             if patch.faces(place, clearance_m) and not (touch is not None and is_same(patch, touch, clearance_m))
         ]
 
@@ -85,34 +80,27 @@ def known_surfaces(flight: FlightContext) -> list[KnownSurface]:
         # A surface that the recovery setpoint lies behind does not count: the vehicle has slid past it.
         if surface.off_m(record.setpoint_ned_m) > 0.0:
             known.append(KnownSurface(surface))
-    if flight.patches and flight.origin_ned_m is not None:
-        reach_m = flight.mission.companion.estimate.reach_m
+    if flight.known.patches and flight.origin_ned_m is not None:
         for patch in surroundings(flight).patches:
             surface = touched(_touching_ned_m(flight, patch), patch.normal_ned)
-            known.append(KnownSurface(surface, patch, flight.origin_ned_m, reach_m))
+            known.append(KnownSurface(surface, patch, flight.origin_ned_m, flight.known.reach_m))
     return known
 
 
 def _touching_ned_m(flight: FlightContext, patch: Patch) -> Vector3:
     """Where the vehicle's centre is when it touches the middle of a patch; local NED."""
-    reach_m = flight.mission.companion.estimate.reach_m
-    return flight.local_ned_m(plus(patch.centre_ned_m, reach_m, patch.normal_ned))
+    return flight.local_ned_m(plus(patch.centre_ned_m, flight.known.reach_m, patch.normal_ned))
 
 
-def _with_hits(flight: FlightContext, hits: int) -> tuple[Patch, ...]:
-    touches = _touches(flight, flight.collisions[:hits])
-    return remembered(flight.mission.obstacles.patches(), touches, _clearance_m(flight))
+def _with_hits(flight: FlightContext, hits: int) -> ObstacleMap:
+    mission = flight.mission
+    return mission.known(mission.obstacles.patches()).joined(_touches(flight, flight.collisions[:hits]))
 
 
 def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Patch]:
-    reach_m = flight.mission.companion.estimate.reach_m
     touches = []
     for record in records:
         centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
-        touch = touch_of(centre, velocity, record.normal, reach_m, record.detected_at_us)
+        touch = touch_of(centre, velocity, record.normal, flight.known.reach_m, record.detected_at_us)
         touches += [] if touch is None else [touch]
     return touches
-
-
-def _clearance_m(flight: FlightContext) -> float:
-    return flight.mission.companion.estimate.reach_m + flight.mission.obstacles.margin_m

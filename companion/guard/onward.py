@@ -8,7 +8,6 @@ from companion.flight.obstacle_map import all_known
 from companion.guard.context import GuardContext
 from companion.guard.watching import OTHERS_STOPPED_US
 from companion.memory.patch import LEAST_SPEED_M_S
-from companion.memory.surroundings import ObstacleMap
 from companion.messages import Asked, Vector3
 from companion.motion.rotation import yaw_rad
 from companion.motion.vector import ZERO, along, plus
@@ -66,8 +65,7 @@ def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> boo
     ahead_s = math.hypot(*velocity) / (2.0 * BRAKES_M_S2) + GOES_ON_S
     here = guard.mission_ned_m(latest.position_ned_m)
     place = here if asked.place_ned_m is None else guard.mission_ned_m(asked.place_ned_m)
-    mission = guard.mission
-    known = ObstacleMap(all_known(guard), mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+    known = all_known(guard)
     goal = plus(place, ahead_s, velocity)
     # A surface may be longer than it is known to be: who is in front of it stays there.
     leads_behind = any(

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import shapely
 from shapely import LineString, MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.fence import Fence
-from companion.memory.patch import Patch
+from companion.memory.patch import Patch, remembered
 from companion.messages import Vector3
 
 Place = tuple[float, float]
@@ -66,6 +66,10 @@ class ObstacleMap:
     @property
     def clearance_m(self) -> float:
         return self.reach_m + self.margin_m
+
+    def joined(self, touches: Sequence[Patch]) -> "ObstacleMap":
+        """With what the touches, in their order, add to it."""
+        return replace(self, patches=remembered(self.patches, touches, self.clearance_m))
 
     def walls(self, from_m: float, to_m: float, start_ned_m: Vector3) -> Walls:
         """Between two heights, for a vehicle that starts there."""

@@ -53,6 +53,10 @@ class Mission(StrictModel):
     sim: dict[str, object] | None = None
     """The simulated world (see `sim_vehicle.scene.Scene`)."""
 
+    def known(self, patches: tuple[Patch, ...]) -> ObstacleMap:
+        """The map of these."""
+        return ObstacleMap(patches, self.fence, self.companion.estimate.reach_m, self.obstacles.margin_m)
+
     @model_validator(mode="after")
     def _takeoff_first_land_last(self) -> Self:
         names = [item.name for item in self.items]
@@ -146,7 +150,7 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
 
 def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
-    known = ObstacleMap(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+    known = mission.known(patches)
     flight = mission.companion.flight
     speeds = SpeedLimits.of(flight, mission.limits.max_speed_m_s)
     for step in items.program(mission.items):

@@ -244,7 +244,5 @@ class HandOver:
         holder = who_decided(report, self._previous_mode, self._mode)
         if holder is Holder.COMPANION:
             return False
-        flight.report(
-            now_us, "mode", f"{holder.value} took over in {flight.vehicle.mode_name}"
-        )
+        flight.report(now_us, "mode", f"{holder.value} took over in {flight.vehicle.mode_name}")
         return True
