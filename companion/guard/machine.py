@@ -7,7 +7,7 @@ from typing import TypeAlias
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs, Transition
 from companion.flight.handlers.crash import Crashed, crashed
-from companion.flight.handlers.ending import LINK_RESTORED, Holder, Released, silent_link, silent_position, who_decided
+from companion.flight.handlers.ending import LINK_RESTORED, Released, silent_link, silent_position, who_decided
 from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.machine import StateMachine
 from companion.flight.states import State as FlightState
@@ -162,16 +162,16 @@ class GuardMachine(StateMachine):
         if isinstance(self.handler, GiveBack):
             requested = self.handler.wish
         holder = who_decided(report, expected, requested)
-        if holder is Holder.COMPANION:
+        if holder is None:
             guard.foreign_mode_since_us = None
             return None
         is_late = offboard in (expected, requested) and report.intended_custom_mode in (None, offboard)
-        if holder is Holder.FAILSAFE and is_late:
+        if holder == "failsafe" and is_late:
             if guard.foreign_mode_since_us is None:
                 guard.foreign_mode_since_us = guard.trajectory_us
             if guard.trajectory_us - guard.foreign_mode_since_us < RETURNS_US:
                 return None
-        who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot or a program"
+        who = "a failsafe of the vehicle" if holder == "failsafe" else "the pilot or a program"
         return f"{who} took over in {guard.vehicle.mode_name}"
 
     def _link_restored(self, now_us: int) -> Transition | None:

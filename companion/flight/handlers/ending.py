@@ -1,7 +1,7 @@
 """What ends a flight from outside, in every state, and how the vehicle is handed over."""
 
 import math
-from enum import Enum
+from typing import Literal
 
 from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition
 from companion.flight.states import ON_THE_WAY, State, Trigger
@@ -57,15 +57,13 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
     if flight.expected_mode is None or vehicle.mode is None:
         return None
-    holder = Holder.COMPANION
-    if vehicle.mode.custom_mode != flight.expected_mode:
-        holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
-    if holder is Holder.COMPANION:
+    holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
+    if holder is None:
         flight.foreign_mode_since_us = None
         return None
     if state is State.LANDING and _may_be_down(flight, now_us):
         return None
-    who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot"
+    who = "a failsafe of the vehicle" if holder == "failsafe" else "the pilot"
     return Transition(Trigger.CONTROL_LOST, f"{who} took over in {vehicle.mode_name}; setpoints stopped")
 
 
@@ -148,14 +146,10 @@ def battery_complaint(flight: FlightContext) -> str | None:
     return f"battery at {percent} %, below abort_when.battery_below_percent = {least:g}"
 
 
-class Holder(Enum):
-    COMPANION = "companion"
-    FAILSAFE = "failsafe"
-    PILOT = "pilot"
-
-
-def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | None) -> Holder:
-    """Tell the three apart from one report of the mode.
+def who_decided(
+    report: ModeReport, expected_mode: int, requested_mode: int | None
+) -> Literal["failsafe", "pilot"] | None:
+    """Who has the vehicle by one report of the mode; None: the companion.
 
     `expected_mode` is the one the companion has been seen to hold; `requested_mode` one it has asked for and not
     yet seen. In a failsafe PX4 keeps the user's intended mode (CURRENT_MODE) and reports MAV_STATE_CRITICAL
@@ -163,9 +157,9 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
     """
     own_modes, intended_mode = (expected_mode, requested_mode), report.intended_custom_mode
     if report.custom_mode in own_modes:
-        return Holder.COMPANION
+        return None
     still_intended = intended_mode is not None and intended_mode in own_modes
-    return Holder.FAILSAFE if report.failsafe or still_intended else Holder.PILOT
+    return "failsafe" if report.failsafe or still_intended else "pilot"
 
 
 # As long as two modes take that are refused: a hand-over that does not end keeps nobody in OFFBOARD.
@@ -242,7 +236,7 @@ class HandOver:
         if report is None or self._previous_mode is None:
             return False
         holder = who_decided(report, self._previous_mode, self._mode)
-        if holder is Holder.COMPANION:
+        if holder is None:
             return False
-        flight.report(now_us, "mode", f"{holder.value} took over in {flight.vehicle.mode_name}")
+        flight.report(now_us, "mode", f"{holder} took over in {flight.vehicle.mode_name}")
         return True
