@@ -11,7 +11,7 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig
-from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
+from companion.mission.trajectory import LEAST_GAP_M, Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
 from companion.motion.vector import minus
 
 # Least acceleration against a strong wind: 4 m/s after ten seconds.
@@ -175,12 +175,12 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
 
 
 def _turn_by_turn(item: items.OrbitItem, start_m: Vector3, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
-    """At rest after each turn. Turns that begin at the same place are planned once: no setpoint is sent meanwhile."""
+    """At rest after each turn. Turns from one place are planned once: while one is planned, no setpoint is sent."""
     planned, left_out, place = dict[tuple[float, ...], Planned](), 0, start_m
     flown: list[Trajectory] = []
     for number in range(math.ceil(item.turns)):
         turn = item.model_copy(update={"turns": min(1.0, item.turns - number)})
-        key = (turn.turns, *[round(axis_m, 3) for axis_m in place])
+        key = (turn.turns, *[round(axis_m / LEAST_GAP_M) for axis_m in place])
         if key not in planned:
             planned[key] = trajectory_around(turn, place, speeds, known)
         left_out += planned[key].left_out
