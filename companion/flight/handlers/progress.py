@@ -25,7 +25,7 @@ from companion.motion.vector import ZERO, minus, plus
 
 # A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
 BRAKES_S = 1.0
-# Of a time-out, and of a goal out of reach; "continue" is no move.
+# Of a time-out, a goal out of reach, damage, and of the last item; "continue" is no move.
 _TRIGGERS = {
     "abort": Trigger.INTERRUPTED,
     "return": Trigger.RETURN_DUE,
@@ -137,12 +137,10 @@ class FlyItems(_OnTrajectory):
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         damage, wanted = flight.motors.damage, flight.mission.on_damage
         if damage is not None and wanted != "tell":
-            return Transition(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)
+            return Transition(_TRIGGERS[wanted], damage.text)
         while True:
-            if isinstance(self._action, items.ReturnItem):
-                return Transition(Trigger.RETURN_DUE)
-            if isinstance(self._action, items.LandItem):
-                return Transition(Trigger.LAND_DUE)
+            if isinstance(self._action, items.ReturnItem | items.LandItem):
+                return Transition(_TRIGGERS[flight.step.name])
             if self._out_of_reach:
                 trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
                 if trigger is not None:
