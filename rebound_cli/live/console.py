@@ -26,50 +26,19 @@ Fields = Sequence[tuple[str, str]]
 _ANEW, _RED, _AS_BEFORE = "\r\x1b[K", "\x1b[1;31m", "\x1b[0m"
 
 
-class _Lines:
-    """Lines, on a terminal above the state now, which is written anew; on the writer's thread, and may raise."""
-
-    def __init__(self, stream: TextIO, is_terminal: bool) -> None:
-        self._stream, self._is_terminal = stream, is_terminal
-        # The state is no line of a service's journal: the service manager shows the present one.
-        self._is_journal = "NOTIFY_SOCKET" in os.environ
-
-    def print(self, text: str) -> None:
-        self.ask(f"{text}\n")
-
-    def event(self, time_s: float, kind: str, text: str, stands_out: bool) -> None:
-        line = f"{time_s:9.3f} s  {kind:<10}  {text}"
-        self.print(f"{_RED}{line}{_AS_BEFORE}" if stands_out and self._is_terminal else line)
-
-    def state(self, fields: Fields) -> None:
-        (_, time_text), *others = fields
-        line = "  ".join([f"{time_text:>11}", *(f"{name} {text}" for name, text in others)])
-        if self._is_terminal:
-            # One that wraps could not be cleared.
-            self.ask(line[: shutil.get_terminal_size().columns - 1])
-        elif not self._is_journal:
-            self.print(line)
-
-    def ask(self, question: str) -> None:
-        self._stream.write(f"{_ANEW}{question}" if self._is_terminal else question)
-        self._stream.flush()
-
-    def close(self) -> None:
-        """Take the state away."""
-        self.ask("")
-
-
 class Console:
     """Text for a person, on stdout or, when stdout belongs to a program, on stderr.
 
-    With a `writer` nothing waits for the terminal, or for the reader of a pipe, before the `with` ends.
+    On a terminal lines stand above the state now, which is written anew. With a `writer` nothing waits for the
+    terminal, or for the reader of a pipe, before the `with` ends.
     """
 
     def __init__(self, stream: TextIO, writer: Background | None = None) -> None:
-        self.writer = writer
+        self._stream, self.writer = stream, writer
         self._do = at_once if writer is None else writer.give
         self.is_terminal = stream.isatty()
-        self._display = _Lines(stream, self.is_terminal)
+        # The state is no line of a service's journal: the service manager shows the present one.
+        self._is_journal = "NOTIFY_SOCKET" in os.environ
         self._live_due_s = 0.0
         self.live_is_held = False  # while a question waits for its answer
 
@@ -79,33 +48,48 @@ class Console:
         if now_s < self._live_due_s or self.live_is_held:
             return
         self._live_due_s = now_s + (LIVE_INTERVAL_S if self.is_terminal else PLAIN_INTERVAL_S)
-        self._do(self._display.state, state_fields(status(), flight_time_s, link))
+        (_, time_text), *others = state_fields(status(), flight_time_s, link)
+        line = "  ".join([f"{time_text:>11}", *(f"{name} {text}" for name, text in others)])
+        if self.is_terminal:
+            # One that wraps could not be cleared.
+            self._put(line[: shutil.get_terminal_size().columns - 1])
+        elif not self._is_journal:
+            self.print(line)
 
     def events(self, events: "Sequence[Event]", started_at_us: int) -> None:
         for event in events:
             self.event((event.time_us - started_at_us) / 1e6, event.kind, event.text)
 
     def event(self, time_s: float, kind: str, text: str) -> None:
-        self._do(self._display.event, time_s, kind, text, kind in STANDING_OUT)
+        line = f"{time_s:9.3f} s  {kind:<10}  {text}"
+        self.print(f"{_RED}{line}{_AS_BEFORE}" if kind in STANDING_OUT and self.is_terminal else line)
 
     def print(self, text: str = "") -> None:
-        self._do(self._display.print, text)
+        self._put(f"{text}\n")
 
     def ask(self, question: str) -> None:
         """Print a question whose answer is read elsewhere; the state waits until it has come."""
-        self._do(self._display.ask, f"\n{question}")
+        self._put(f"\n{question}")
         self.live_is_held = True
 
     def still(self) -> None:
         """Take the state away: nothing changes any more."""
-        self._do(self._display.close)
+        self._put("")
+
+    def _put(self, text: str) -> None:
+        """In the place of the state."""
+        self._do(self._write, f"{_ANEW}{text}" if self.is_terminal else text)
+
+    def _write(self, text: str) -> None:
+        self._stream.write(text)
+        self._stream.flush()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Return when all is shown that could be. Raises what kept the rest from it, unless more went wrong."""
-        self._do(self._display.close)
+        self.still()
         if self.writer is None:
             return
         # Whoever presses Ctrl-C twice does not wait for a terminal that has been stopped.
