@@ -10,7 +10,7 @@ from rebound_cli.inputs import documents
 from rebound_cli.inputs.documents import Document, DocumentError, DocumentPath, load_document, validated
 from rebound_cli.inputs.shipped import shipped_missions
 from rebound_cli.results import run_folder
-from rebound_cli.results.run_folder import HIT_KINDS, RESOLVED_NAME, read_records, read_text, whole_lines
+from rebound_cli.results.run_folder import HIT_KINDS, RESOLVED_NAME, read_records, read_text, reading, whole_lines
 from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.faults.spec import check_motor
@@ -177,7 +177,7 @@ def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
         raise ResumeError(f"{run} was flown to its end: there is nothing to resume.")
     if armed is None or item is None:
         raise ResumeError(f"{run} ended before its first item: fly it from the start.")
-    try:
+    with reading(run / run_folder.EVENTS_NAME):
         at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
         return {
             "at_step": max(1, at_step),
@@ -186,9 +186,6 @@ def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
             "armed_boot_us": armed["data"]["time_boot_us"],
             "hits": sum(HIT_KINDS.get(each["kind"], 0) for each in events) + (flown.resume.hits if flown.resume else 0),
         }
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        text = "not the events of a flight; the file is damaged"
-        raise ResumeError(f"{run / run_folder.EVENTS_NAME}: {text}.") from error
 
 
 def resume(document: Document, run: Path, mission: "Mission", knows_more: bool) -> None:

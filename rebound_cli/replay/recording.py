@@ -96,10 +96,8 @@ def read_recording(folder: Path) -> Recording:
             raise LogError(f"{folder}: cut off before a whole step of the flight was written.")
         told = zip(lines, run_folder.read_records(folder / run_folder.EVENTS_NAME, events), strict=True)
         lines = [line for line, event in told if event["time_us"] < end_us]
-    try:
+    with run_folder.reading(folder / run_folder.VERSIONS_NAME):
         versions = dict(json.loads(run_folder.read_text(folder / run_folder.VERSIONS_NAME)))
-    except (ValueError, TypeError) as error:
-        raise LogError(f"{folder / run_folder.VERSIONS_NAME}: damaged: {error}.") from error
     return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
 
 
@@ -186,7 +184,8 @@ def reproduce(recording: Recording) -> Reproduction:
             what = "another packet was sent" if were == are else f"{were} packets were sent then and {are} now"
             differences.append(f"at {step.time_us} us {what}")
         for record in step.told:
-            _tell(stepped, record)
+            with run_folder.reading(run_folder.INPUTS_NAME):
+                _tell(stepped, record)
     differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
     followed.close()
     extent = {
@@ -220,8 +219,5 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
         case {"kind": "interval", "message_id": int() | None as message_id, "interval_us": int(interval_us)}, Guard():
             stepped.hear_interval(message_id, interval_us)
         case {"kind": "computer"}, _:
-            try:
-                status = ComputerStatus(**record["status"] | {"cpu_percent": tuple(record["status"]["cpu_percent"])})
-            except (TypeError, KeyError) as error:
-                raise LogError(f"{run_folder.INPUTS_NAME}: a status of the computer is damaged.") from error
+            status = ComputerStatus(**record["status"] | {"cpu_percent": tuple(record["status"]["cpu_percent"])})
             stepped.tell_computer(status)

@@ -4,8 +4,10 @@ import math
 from typing import Any
 
 from companion.memory.patch import Patch
+from companion.memory.stored import KnownPatch
 from companion.memory.surroundings import assumed_area
-from rebound_cli.report.shown_flight import ShownFlight, patch_of
+from rebound_cli.report.shown_flight import ShownFlight
+from rebound_cli.results.run_folder import EVENTS_NAME, reading
 from sim_vehicle.world import Motion, Obstacle, Pole
 
 # From ahead to the right, as PX4 counts the motors of a quad-x.
@@ -61,11 +63,12 @@ def _motion(flight: ShownFlight, motion: Motion | None) -> dict[str, Any] | None
 
 def surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
     """What was believed of each surface from when until when: from each touch of it to the next."""
-    told = [
-        (rounded_s(flight, event["time_us"]), patch_of(event["data"]))
-        for event in flight.events
-        if event["kind"] == "obstacle"
-    ]
+    with reading(EVENTS_NAME):
+        told = [
+            (rounded_s(flight, event["time_us"]), KnownPatch.model_validate(event["data"]).patch())
+            for event in flight.events
+            if event["kind"] == "obstacle"
+        ]
     known = [(0.0, patch) for patch in flight.patches if patch.found_at_us < flight.started_at_us]
     shown = []
     for number, (since_s, patch) in enumerate([*known, *told]):

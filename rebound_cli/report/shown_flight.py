@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
 from companion.memory.patch import Patch
 from companion.memory.stored import KnownPatch
@@ -60,8 +59,9 @@ class ShownFlight:
     def origin_ned_m(self) -> tuple[float, float, float]:
         """Where it was armed: the zero of the mission, and of what is remembered."""
         armed = next((event for event in self.events if event["kind"] == "armed"), None)
-        place = (armed or {}).get("data", {}).get("origin_ned_m") or (0.0, 0.0, 0.0)
-        return (float(place[0]), float(place[1]), float(place[2]))
+        with run_folder.reading(run_folder.EVENTS_NAME):
+            north, east, down = (armed or {}).get("data", {}).get("origin_ned_m") or (0.0, 0.0, 0.0)
+            return (float(north), float(east), float(down))
 
     @property
     def hits(self) -> Sequence[Finding]:
@@ -167,23 +167,14 @@ def _world(folder: Path) -> dict[str, Any]:
         return {}
     document, flown = load_document(settings_file(folder)), load_document(airframe).data
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
-    places = [tuple(rotor["place_frd_m"]) for rotor in flown.get("rotors") or ()]
-    return {"scene": scene, "rotors_frd_m": places, "stop_s": flown["arms"]["stop"]["contact_time_s"]}
+    with run_folder.reading(airframe):
+        places = [tuple(rotor["place_frd_m"]) for rotor in flown.get("rotors") or ()]
+        return {"scene": scene, "rotors_frd_m": places, "stop_s": flown["arms"]["stop"]["contact_time_s"]}
 
 
 def _patches(path: Path) -> Sequence[Patch]:
     """What was remembered at the end; nothing where nothing was."""
     if not path.exists():
         return ()
-    try:
-        return [patch_of(data) for data in json.loads(path.read_text())["patches"]]
-    except (ValueError, KeyError, TypeError) as error:
-        raise ReboundError(f"{path}: not a file of obstacles; it is damaged.") from error
-
-
-def patch_of(data: Any) -> Patch:
-    """As a file or an event has it. Raises ReboundError."""
-    try:
-        return KnownPatch.model_validate(data).patch()
-    except ValueError as error:
-        raise ReboundError("What the flight says of an obstacle is damaged.") from error
+    with run_folder.reading(path):
+        return [KnownPatch.model_validate(data).patch() for data in json.loads(path.read_text())["patches"]]

@@ -11,6 +11,7 @@ from rebound_cli.replay.report import speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import ending_text
+from rebound_cli.results.run_folder import SUMMARY_NAME, reading
 
 # A sample later than so many usual intervals after the one before: one between them was lost.
 LOST_FROM = 1.5
@@ -54,7 +55,8 @@ def lines(flight: ShownFlight) -> Sequence[str]:
     summary = flight.summary
     if summary is None or "mission" not in summary:
         return []
-    return [line for line in ending_text(summary).splitlines() if line]
+    with reading(SUMMARY_NAME):
+        return [line for line in ending_text(summary).splitlines() if line]
 
 
 def link_rows(flight: ShownFlight) -> Sequence[tuple[str, str]]:
@@ -68,7 +70,8 @@ def link_rows(flight: ShownFlight) -> Sequence[tuple[str, str]]:
     share = findings.watched_share
     if share is not None:
         rows.append(("Watched", f"{100.0 * share:.1f} % of the time in the air"))
-    rows += _summary_rows(flight.summary or {})
+    with reading(SUMMARY_NAME):
+        rows += _summary_rows(flight.summary or {})
     return rows if flight.difference is None else [*rows, ("Decided again", f"not the same: {flight.difference}")]
 
 

@@ -5,7 +5,7 @@ import json
 import os
 import platform
 import re
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -179,12 +179,21 @@ def event_line(event: "Event") -> str:
 def read_records(path: Path, text: str) -> "Iterator[dict[str, Any]]":
     """Each line of `events.jsonl` or `inputs.jsonl` with its time and kind. Raises RunFolderError for a damaged one."""
     for number, line in enumerate(text.splitlines(), start=1):
-        try:
+        with reading(f"{path}:{number}"):
             record = json.loads(line)
             record["time_us"], record["kind"] = int(record["time_us"]), str(record["kind"])
-        except (ValueError, KeyError, TypeError) as error:
-            raise RunFolderError(f"{path}:{number}: not a record of a flight; the file is damaged.") from error
         yield record
+
+
+@contextmanager
+def reading(place: object) -> "Iterator[None]":
+    """A damaged file makes its reader raise whatever the bytes led to: that is one sentence. Raises RunFolderError."""
+    try:
+        yield
+    except (OSError, ReboundError):
+        raise
+    except Exception as error:
+        raise RunFolderError(f"{place}: not what a flight leaves there; the file is damaged.") from error
 
 
 def whole_lines(text: str) -> str:
@@ -203,7 +212,7 @@ def read_text(path: Path) -> str:
 
 def read_summary(folder: Path) -> dict[str, Any] | None:
     """None of a flight that is not over, or was cut off."""
-    with suppress(OSError, ValueError, TypeError):
+    with suppress(OSError, ValueError, TypeError, RecursionError):
         return dict(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8")))
     return None
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.reflex.recovery.collision import CollisionReport
+from rebound_cli.results.run_folder import reading
 
 if TYPE_CHECKING:  # a flight with a real vehicle must not wait for the simulator's compiled kernels
     from sim_vehicle.truth import FaultSpan, Hit
@@ -59,12 +60,13 @@ class FlightTruth:
 
 
 def read_truth(path: Path) -> FlightTruth | None:
-    """None where a simulator has left none: of a real vehicle, or of a PX4 that never flew."""
+    """None where a simulator has left none: of a real vehicle, or of a PX4 that never flew. Raises RunFolderError."""
     if not path.exists():
         return None
     from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
 
-    return FlightTruth(*load_truth(path), load_faults(path), load_stalls(path))
+    with reading(path):
+        return FlightTruth(*load_truth(path), load_faults(path), load_stalls(path))
 
 
 @dataclass(frozen=True, slots=True)

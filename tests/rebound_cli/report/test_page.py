@@ -305,6 +305,23 @@ def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
     assert data["obstacles"] == [] and "truth" not in data["tables"]
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("truth.npz", b""),
+        ("truth.npz", b"PK"),
+        ("summary.json", b'{"mission": "wall"}'),
+        ("obstacles.json", b"["),
+        ("airframe.yaml", b"name: foldable"),
+    ],
+)
+def test_of_a_folder_with_a_damaged_file_there_is_a_sentence(wall_folder, tmp_path, capsys, name, content):
+    folder = shutil.copytree(wall_folder, tmp_path / "damaged")
+    (folder / name).write_bytes(content)
+    assert main(["report", str(folder)]) == 1
+    assert re.fullmatch(rf"rebound: .*{name}: .+ the file is damaged\.\n", capsys.readouterr().err)
+
+
 def test_a_flight_that_was_cut_off_has_one_and_one_in_which_nothing_was_heard_has_none(wall_folder, tmp_path, capsys):
     folder = shutil.copytree(wall_folder, tmp_path / "cut")
     (folder / "summary.json").unlink()
