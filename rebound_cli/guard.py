@@ -15,7 +15,7 @@ from companion.shell.connections.clients import SharedConnection, carried_bytes_
 from companion.shell.connections.connection import Connection, Selectable
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
-from rebound_cli.flights.kept import folder_with_room
+from rebound_cli.flights.kept import folder_with_room, hits_text
 from rebound_cli.inputs.documents import Document, apply_overrides, load_document, validated
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
@@ -99,7 +99,7 @@ def _recorded(
         }
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
     left_alone = f", {flight.left_alone} left to the program that flies" if flight.left_alone else ""
-    console.print(f"{summary['outcome']}; {len(hits)} hits{left_alone}; log in {folder}")
+    console.print(f"{summary['outcome']}; {hits_text(len(hits))}{left_alone}; log in {folder}")
     if outcome:
         offer_page(folder, console)
     return outcome

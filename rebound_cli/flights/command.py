@@ -2,9 +2,9 @@
 
 from argparse import Namespace
 
-from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder, simulated_text
+from rebound_cli.flights.kept import flight_named, hits_in, hits_text, kept_flights, runs_folder, simulated_text
 from rebound_cli.live.console import console_for
-from rebound_cli.results.run_folder import EVENTS_NAME, RunFolderError, read_records, read_summary
+from rebound_cli.results.run_folder import EVENTS_NAME, RunFolderError, read_records
 
 
 def run_list(options: Namespace) -> int:
@@ -18,9 +18,8 @@ def run_list(options: Namespace) -> int:
             # Of one whose events are damaged there is nothing but its size.
             lines, ends = [], []
         lasted_s = (ends[-1]["time_us"] - ends[0]["time_us"]) / 1e6 if ends else 0.0
-        hits = hits_in(lines)
-        told = "no hit" if hits == 0 else f"{hits} hit{'s' if hits > 1 else ''}"
-        print(f"{flight.name:36} {lasted_s:8.1f} s {flight.size_bytes / 1e6:8.1f} MB  {told:8}  {_end(flight)}")
+        told = f"{flight.name:36} {lasted_s:8.1f} s {flight.size_bytes / 1e6:8.1f} MB"
+        print(f"{told}  {hits_text(hits_in(lines)):8}  {flight.end()}")
     total_mb = sum(flight.size_bytes for flight in flights) / 1e6
     many = "" if len(flights) == 1 else "s"
     print(f"{len(flights)} flight{many}, {total_mb:.1f} MB in {runs}.{simulated_text(runs)}")
@@ -33,14 +32,7 @@ def run_show(options: Namespace) -> int:
     lines = flight.event_lines()
     events = list(read_records(flight.folder / EVENTS_NAME, "".join(lines)))
     console = console_for(False)
-    console.print(f"{flight.name}: {_end(flight)}; {hits_in(lines)} hits, {flight.size_bytes / 1e6:.1f} MB")
+    console.print(f"{flight.name}: {flight.end()}; {hits_text(hits_in(lines))}, {flight.size_bytes / 1e6:.1f} MB")
     for event in events:
         console.event((event["time_us"] - events[0]["time_us"]) / 1e6, event["kind"], str(event.get("text", "")))
     return 0
-
-
-def _end(flight: KeptFlight) -> str:
-    if flight.is_being_flown():
-        return "being flown"
-    summary = read_summary(flight.folder)
-    return "cut off" if summary is None else str(summary.get("reason") or summary.get("outcome"))

@@ -67,6 +67,13 @@ class KeptFlight:
             return isinstance(error, BlockingIOError)
         return False
 
+    def end(self) -> str:
+        """How it ended, for a person."""
+        if self.is_being_flown():
+            return "being flown"
+        summary = run_folder.read_summary(self.folder)
+        return "cut off" if summary is None else str(summary.get("reason") or summary.get("outcome"))
+
     def event_lines(self) -> Sequence[str]:
         """Of `events.jsonl`, as far as they were written. Raises RunFolderError."""
         return whole_lines(read_text(self.folder / EVENTS_NAME)).splitlines(keepends=True)
@@ -94,6 +101,10 @@ class KeptFlight:
 def hits_in(lines: Sequence[str]) -> int:
     """Of lines as `event_line` writes them, which need not be parsed for it."""
     return sum(adds * line.count(f'"kind": "{kind}"') for kind, adds in run_folder.HIT_KINDS.items() for line in lines)
+
+
+def hits_text(hits: int) -> str:
+    return f"{hits or 'no'} hit{'s' if hits > 1 else ''}"
 
 
 def size_of(folder: Path) -> int:

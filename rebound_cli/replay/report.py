@@ -162,7 +162,7 @@ def _facts(replay: Replay) -> Iterator[str]:
     for word, spans in (("blind", replay.findings.blind), ("off", replay.findings.off)):
         total_s = sum(span.duration_s for span in spans)
         shown = [f"{replay.log.seconds(s.start_us):.2f} s for {s.duration_s:.2f} s ({s.reason})" for s in spans[:4]]
-        more = f" and {len(spans) - 4} times more" if len(spans) > 4 else ""
+        more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
         yield f"{word}: {total_s:.2f} s in all: {', '.join(shown)}{more}" if spans else f"{word}: never"
     for loss in replay.losses:
         yield f"note: {loss}"

@@ -3,12 +3,15 @@
 A browser may be slow or vanish: each has a thread here, and none in the program that flies.
 """
 
+import sys
 import threading
 from argparse import Namespace
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
+from companion.errors import ReboundError
 from rebound_cli.live.status import ask
 from rebound_cli.report.page import live_page
 from rebound_cli.report.shown_flight import unseen_flight
@@ -30,17 +33,25 @@ class WatchServer(ThreadingHTTPServer):
 
     def __init__(self, folder: Path, host: str, port: int) -> None:
         """Raises OSError, ReboundError."""
-        super().__init__((host, port), _Handler)
         # Everything so far: it only grows, and each browser has its own place in it.
         self.told, self.is_over = list[bytes](), threading.Event()
+        try:
+            super().__init__((host, port), _Handler)
+        except (OSError, UnicodeError) as error:
+            raise ReboundError(f"{host}:{port}: nothing can be served there: {error}.") from error
         self.page = live_page(unseen_flight(folder)).encode()
         self.names = _LOOPBACK if host in _LOOPBACK else ()
         self._tail = Tail(folder)
-        threading.Thread(target=self._read, name="rebound watch", daemon=True).start()
+        self.reader = threading.Thread(target=self._read, name="rebound watch", daemon=True)
+        self.reader.start()
 
     def _read(self) -> None:
         while not self.is_over.is_set():
-            chunk = self._tail.read()
+            try:
+                chunk = self._tail.read()
+            except ReboundError as error:
+                print(f"rebound: {error}", file=sys.stderr)
+                return
             if chunk is not None:
                 self.told.append(as_line(chunk))
             else:
@@ -100,12 +111,7 @@ def run_watch(options: Namespace) -> int:
     folder = options.flight or Path(str(ask(None)["folder"]))
     if not (folder / run_folder.TLOG_NAME).exists():
         raise RunFolderError(f"{folder}: no flight is there; give a run's folder.")
-    server = WatchServer(folder, options.host, options.port)
-    print(f"{folder}: http://{options.host}:{server.server_port}/ (Ctrl-C ends it)", flush=True)
-    try:
+    with WatchServer(folder, options.host, options.port) as server, suppress(KeyboardInterrupt):
+        print(f"{folder}: http://{options.host}:{server.server_port}/ (Ctrl-C ends it)", flush=True)
         server.serve_forever()
-    except KeyboardInterrupt:
-        return 0
-    finally:
-        server.server_close()
     return 0

@@ -4,6 +4,7 @@ import http.client
 import io
 import json
 import random
+import shutil
 import socket
 import threading
 from contextlib import closing, contextmanager
@@ -15,6 +16,7 @@ from urllib.request import urlopen
 import numpy as np
 import pytest
 
+from companion.errors import ReboundError
 from companion.messages import Attitude, LocalPosition
 from companion.mission.config import CompanionConfig
 from rebound_cli.live.console import Console
@@ -140,6 +142,17 @@ def test_what_is_none_of_the_pages_business_is_refused(wall_folder):
         assert asked(server, "/../summary.json").status == 404
         assert asked(server, "/", method="POST").status == 501
         assert asked(server, "/", host=f"localhost:{server.server_port}").status == 200
+
+
+def test_an_address_that_cannot_be_had_and_damaged_events_are_a_sentence(wall_folder, tmp_path, capsys):
+    folder = shutil.copytree(wall_folder, tmp_path / "damaged")
+    (folder / "events.jsonl").write_text("{}\n")
+    with served(folder) as server:
+        for host in ("127.0.0.1", "a..b"):
+            with pytest.raises(ReboundError, match="nothing can be served there"):
+                WatchServer(folder, host, server.server_port)
+        server.reader.join(5)
+    assert capsys.readouterr().err.endswith("events.jsonl:1: not what a flight leaves there; the file is damaged.\n")
 
 
 def test_browsers_that_do_not_read_or_have_gone_disturb_nobody(wall_folder):
