@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.companion import Companion
-from companion.errors import ConfigurationError, ReboundError
+from companion.errors import ConfigurationError
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connections.connection import Connection, udp_in
@@ -225,8 +225,8 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
         console.print(f"\n{writer.loss} ({writer.lost} steps)")
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
-        if world is not None:
-            _show(flight)
+        if flight.followed is not None:
+            show_flight(flight.folder, flight.followed, console)
         else:
             offer_page(flight.folder, console)
         console.print(f"\nEverything is in {flight.folder}/")
@@ -236,14 +236,3 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     if flown.fault is not None:
         raise flown.fault
     return 0 if summary["outcome"] == "completed" else 1
-
-
-def _show(flight: Flight) -> None:
-    """The page of the flight; Ctrl-C leaves it out."""
-    try:
-        show_flight(flight.folder, flight.followed)
-    except KeyboardInterrupt:
-        offer_page(flight.folder, flight.console)
-    except ReboundError as error:
-        # Of a flight in which nothing was heard there is nothing to show.
-        flight.console.print(f"\nNo {run_folder.REPORT_NAME}: {error}")

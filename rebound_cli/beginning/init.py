@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from companion.errors import ConfigurationError
-from rebound_cli.inputs.documents import suggestion, write_text
+from rebound_cli.inputs.documents import suggestion
 from rebound_cli.inputs.shipped import shipped_examples, shipped_missions
 
 
@@ -54,4 +54,4 @@ def _write(file: Path, text: str) -> None:
     if file.exists():
         raise ConfigurationError(f"{file} is there already: nothing was written.")
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_text(file, text)
+    file.write_text(text, encoding="utf-8")

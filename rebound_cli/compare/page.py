@@ -10,7 +10,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from rebound_cli.compare.rows import Row, lines_of, notes
-from rebound_cli.inputs.documents import write_text
 
 CHARTS = {
     "at_rest_after_s": "at rest after the hit [s]",
@@ -32,7 +31,8 @@ def write_page(path: Path, title: str, rows: Sequence[Row]) -> None:
     cells = ("".join(f"<td>{html.escape(cell)}</td>" for cell in line) for line in lines_of(rows))
     table = "".join(f"<tr>{line}</tr>" for line in cells)
     note = " ".join(notes(rows))
-    write_text(path, _PAGE.format(title=html.escape(title), charts=_charts(rows), table=table, note=note))
+    page = _PAGE.format(title=html.escape(title), charts=_charts(rows), table=table, note=note)
+    path.write_text(page, encoding="utf-8")
 
 
 def _charts(rows: Sequence[Row]) -> str:

@@ -14,10 +14,17 @@ def run_export(options: Namespace) -> int:
     """Raises FlightError, RunFolderError, LogError."""
     flight, kind = flight_named(runs_folder(options.runs), options.flight), options.format
     out = options.out or Path(f"{flight.name}.{'tar.gz' if kind == 'archive' else kind}")
-    if kind == "mcap":
-        write_whole(out, _mcap(flight.folder))
-    else:
+    if kind == "archive":
         _write_archive(out, flight)
+    else:
+        # A drone has no mcap, and need not have.
+        from rebound_cli.export.foxglove import write_mcap
+        from rebound_cli.logs.reader import read_telemetry
+        from rebound_cli.report.shown_flight import recorded_flight
+
+        content = io.BytesIO()
+        write_mcap(recorded_flight(flight.folder), read_telemetry(flight.folder / TLOG_NAME), content)
+        write_whole(out, content.getvalue())
     print(f"{flight.name} is in {out}")
     return 0
 
@@ -32,14 +39,3 @@ def _write_archive(path: Path, flight: KeptFlight) -> None:
         unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)
-
-
-def _mcap(folder: Path) -> bytes:
-    """A run's folder as .mcap. A drone has no mcap, and need not have."""
-    from rebound_cli.export.foxglove import write_mcap
-    from rebound_cli.logs.reader import read_telemetry
-    from rebound_cli.report.shown_flight import recorded_flight
-
-    content = io.BytesIO()
-    write_mcap(recorded_flight(folder), read_telemetry(folder / TLOG_NAME), content)
-    return content.getvalue()

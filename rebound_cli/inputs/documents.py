@@ -138,14 +138,6 @@ def parse_document(text: str, name: str) -> Document:
     return Document(name, data, lines)
 
 
-def write_text(path: Path, text: str) -> None:
-    """What a command has made, where the person wants it. Raises DocumentError."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise DocumentError(f"{path}: cannot be written: {error.strerror}.") from error
-
-
 def refuse_existing(out: Path | None) -> None:
     """Before long work whose file would take another's place. Raises DocumentError."""
     if out is not None and out.exists():

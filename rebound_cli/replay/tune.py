@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from companion.mission.config import CompanionConfig
-from rebound_cli.inputs.documents import parse_document, refuse_existing, validated, write_text
+from rebound_cli.inputs.documents import parse_document, refuse_existing, validated
 from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.logs.log import Log, LogError, clipped
 from rebound_cli.logs.reader import read_log
@@ -76,7 +76,7 @@ def run_tune(options: Namespace) -> int:
         print(f"With these settings still {left} false alarms: this vehicle is not made quiet by thresholds.\n")
     print(text, end="")
     if out is not None:
-        write_text(out, text)
+        out.write_text(text, encoding="utf-8")
         print(f"\nWritten to {out}. Fly with it: rebound fly MISSION --companion {out} ...")
     return 0
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
 
+from companion.errors import ReboundError
 from rebound_cli.live.console import Console
 from rebound_cli.results.run_folder import REPORT_NAME, TLOG_NAME
 
@@ -17,16 +18,20 @@ if TYPE_CHECKING:
     from rebound_cli.replay.recording import Followed
 
 
-def show_flight(folder: Path, followed: "Followed | None") -> None:
-    """Write its page. One that was followed is not decided again. Raises ReboundError, OSError."""
-    # A drone that only offers the page never loads what makes it.
-    from rebound_cli.report.page import write_page
-    from rebound_cli.report.shown_flight import followed_flight, recorded_flight
+def show_flight(folder: Path, followed: "Followed", console: Console) -> None:
+    """Write its page, which decides nothing again; Ctrl-C leaves it out. Raises OSError."""
+    try:
+        # A drone that only offers the page never loads what makes it.
+        from rebound_cli.report.page import write_page
+        from rebound_cli.report.shown_flight import followed_flight, recorded_flight
 
-    # Where nothing was heard, that is what reading it says.
-    is_followed = followed is not None and followed.started_at_us
-    flight = followed_flight(folder, followed) if followed is not None and is_followed else recorded_flight(folder)
-    write_page(flight, folder / REPORT_NAME)
+        # Where nothing was heard, that is what reading it says.
+        flight = followed_flight(folder, followed) if followed.started_at_us else recorded_flight(folder)
+        write_page(flight, folder / REPORT_NAME)
+    except KeyboardInterrupt:
+        offer_page(folder, console)
+    except ReboundError as error:
+        console.print(f"\nNo {REPORT_NAME}: {error}")
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, MessageId, PositionTarget, Sample
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.log import Log, position_target
+from rebound_cli.logs.log import position_target
 
 Floats = npt.NDArray[np.float64]
 
@@ -92,11 +92,6 @@ def _texts(stamped: Iterable[tuple[int, bytes]]) -> list[tuple[int, str]]:
             at_us = texts.pop()[0]
         texts.append((at_us, number, text))
     return [(at_us, text.decode("utf-8", "replace")) for at_us, _, text in texts]
-
-
-def flight_log_of_log(log: Log) -> FlightLog:
-    """The same of any log that a replay reads."""
-    return flight_log_of((heard.at_us, heard.sample) for heard in log.heard)
 
 
 def flight_log_of(
