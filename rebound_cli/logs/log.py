@@ -26,7 +26,7 @@ WANTED = {
 _STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5
 QUADROTOR = 2
 # No battery lasts so long: a time stamp further from the middle of the log is damage.
-_LONGEST_US = 24 * 3600 * 1_000_000
+LONGEST_US = 24 * 3600 * 1_000_000
 # Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
 _SLOW_HZ = 15.0
 # PX4's limit of the accelerometer it was made for: +-16 g. A sample this near to it holds clipped readings.
@@ -104,7 +104,7 @@ def position_target(position_ned_m: Sequence[float], velocity_down_m_s: float) -
 
 def in_order(heard: Iterable[LoggedSample], middle_us: float) -> tuple[LoggedSample, ...]:
     """By time, without stamps that are damage; `middle_us` is that of the log."""
-    return tuple(sorted((h for h in heard if abs(h.at_us - middle_us) < _LONGEST_US), key=lambda h: h.at_us))
+    return tuple(sorted((h for h in heard if abs(h.at_us - middle_us) < LONGEST_US), key=lambda h: h.at_us))
 
 
 def heartbeat(vehicle_type: int, armed: bool, custom_mode: int = 0, is_failing: bool = False) -> Heartbeat:

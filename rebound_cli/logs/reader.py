@@ -1,6 +1,7 @@
 """Any log by its path. Telemetry logs (.tlog) of any program are read here, with any number of systems on them."""
 
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from companion.link.vehicle import Identity, identify, is_autopilot
@@ -9,7 +10,7 @@ from companion.mavlink.packet import message_id_of, source_of
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.log import WANTED, Log, LogError, LoggedSample
+from rebound_cli.logs.log import LONGEST_US, WANTED, Log, LogError, LoggedSample
 
 _ULOG_MAGIC, _DATAFLASH_MAGIC = b"ULog", b"\xa3\x95"
 Packets = list[tuple[int, bytes]]
@@ -37,7 +38,7 @@ def read_log(path: Path) -> Log:
 
 def read_telemetry(path: Path) -> Log:
     """Raises LogError."""
-    packets = list(read_tlog(path))
+    packets = list(_going_on(read_tlog(path)))
     if not packets:
         raise LogError(f"{path}: not a telemetry log: no MAVLink packet with a time stamp in it.")
     vehicle, others = _vehicle(path, packets)
@@ -60,6 +61,15 @@ def read_telemetry(path: Path) -> Log:
         losses.append(f"more than one vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
     name = f"{vehicle.autopilot.name} {vehicle.vehicle_type}, system {vehicle.system_id}"
     return Log(path, name, packets[0][0], tuple(heard), tuple(losses))
+
+
+def _going_on(packets: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes]]:
+    """With times that never go back: whoever wrote the log may have set a clock, and a stamp may be damaged."""
+    now_us = stamped_us = 0
+    for at_us, packet in packets:
+        passed_us, stamped_us = at_us - stamped_us, at_us
+        now_us = at_us if now_us == 0 else now_us + (passed_us if 0 <= passed_us < LONGEST_US else 0)
+        yield now_us, packet
 
 
 def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:

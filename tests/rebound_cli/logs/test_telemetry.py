@@ -105,12 +105,15 @@ def test_bytes_that_are_no_log_are_one_sentence(log, tmp_path):
             log.read(tmp_path)
 
 
-def test_a_clock_that_is_set_back_loses_nothing(log, tmp_path):
+def test_a_clock_that_is_set_back_and_a_damaged_stamp_lose_nothing_and_no_time_goes_back(log, tmp_path):
     log.heartbeat()
     log.imu()
-    for _ in range(5):
-        log.imu(at_us=EPOCH_US - 3_600_000_000)
-    assert len(log.read(tmp_path).imu()) == 6
+    for number in range(5):
+        log.imu(at_us=EPOCH_US - 3_600_000_000 + 4000 * number)
+    log.imu(at_us=EPOCH_US + 2 * 24 * 3_600_000_000)
+    read = log.read(tmp_path)
+    assert [(at_us - EPOCH_US) // 4000 for at_us, _ in read.imu()] == [1, 1, 2, 3, 4, 5, 5]
+    assert read.duration_s == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(
