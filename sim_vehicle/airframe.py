@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from sim_vehicle.airframes.aiding import Estimator, Sensors
 from sim_vehicle.errors import AirframeError
@@ -33,6 +33,8 @@ LEAST_DAMPING = 0.2
 BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
 
 Fraction = Annotated[float, Field(gt=0, lt=1)]
+# It is a comment in files that a shell reads: what came after a line's end would be a command.
+OneLine = Annotated[str, AfterValidator(lambda text: " ".join(text.split()))]
 
 
 class Geometry(Part):
@@ -229,9 +231,9 @@ class Control(Part):
 class Airframe(Part):
     """One vehicle. Frames: body forward-right-down; arms in PX4's motor order."""
 
-    name: str
+    name: OneLine
     """Names the airframe in summaries."""
-    description: str
+    description: OneLine
     """A line for people."""
     mass_kg: Positive
     """Of the whole vehicle."""

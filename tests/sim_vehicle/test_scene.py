@@ -138,6 +138,11 @@ def test_px4_gets_each_rotor_in_the_order_of_the_file() -> None:
     assert "# @type Octorotor x" in as_airframe_file(airframe)
 
 
+def test_no_name_ends_the_comment_that_it_is_in_a_shells_file() -> None:
+    hostile = with_base({"based_on": "foldable", "name": "a\nreboot", "description": "b\n\nreboot\n"})
+    assert "\n# @name a reboot: b reboot\n" in as_airframe_file(Airframe.model_validate(hostile))
+
+
 @pytest.mark.parametrize(("name", "kind"), [("hexa", "hexarotor"), ("octo", "octorotor"), ("racer", "quadrotor")])
 def test_each_meets_a_wall_recovers_and_lands(name: str, kind: str) -> None:
     flight = simulated("wall", f"sim.airframe={name}")
