@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from companion.mission.model import Leg, Mission, itinerary
 from rebound_cli.inputs.inputs import SimulatedWorld
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.quantities import Vector3
+from sim_vehicle.quantities import Floats, Vector3
 from sim_vehicle.scene import Scene
 from sim_vehicle.world import Obstacle
-
-Floats = npt.NDArray[np.float64]
 
 # Points this far apart show every bend, and miss no wall.
 _STEP_M = 0.05

@@ -9,7 +9,7 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from pymavlink.quaternion import QuaternionBase
 
 from companion import messages
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL
+from companion.messages import Sample, Vector3
 from rebound_cli.logs.log import (
     QUADROTOR,
     Log,
@@ -115,8 +116,8 @@ def read_dataflash(path: Path) -> Log:
         raise LogError(f"{path}: no IMU samples with times in it; Copter logs them by default (LOG_BITMASK).")
     estimate = _of_primary(topics["XKF1"], topics["XKF4"])
     heard = [
-        *_imu_samples(imu),
-        *_local_position(estimate),
+        *_pairs(messages.ImuSample, imu, "AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ"),
+        *_pairs(messages.LocalPosition, estimate, "PN", "PE", "PD", "VN", "VE", "VD"),
         *_attitude(topics["ATT"] or estimate),
         *_attitude_targets(topics["CTUN"], topics["ATT"]),
         *_vibration(topics["VIBE"]),
@@ -208,14 +209,10 @@ def _losses(topics: _Topics, estimate: Topic, window_us: float | None) -> Iterat
             yield f"the {what} is invalid by the estimator's own word for {share:.0f} % of the log: so is v_c"
 
 
-def _imu_samples(imu: Topic) -> Iterator[LoggedSample]:
-    for _, time_us, row in imu.rows(imu.vector("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")):
-        yield LoggedSample(time_us, messages.ImuSample(time_us, vector(row), vector(row[3:])))
-
-
-def _local_position(topic: Topic) -> Iterator[LoggedSample]:
-    for _, time_us, row in topic.rows(topic.vector("PN", "PE", "PD", "VN", "VE", "VD")):
-        yield LoggedSample(time_us, messages.LocalPosition(time_us, vector(row), vector(row[3:])))
+def _pairs(kind: Callable[[int, Vector3, Vector3], Sample], topic: Topic, *names: str) -> Iterator[LoggedSample]:
+    """Samples of two vectors, by the names of their parts."""
+    for _, time_us, row in topic.rows(topic.vector(*names)):
+        yield LoggedSample(time_us, kind(time_us, vector(row), vector(row[3:])))
 
 
 def _attitude(topic: Topic) -> Iterator[LoggedSample]:

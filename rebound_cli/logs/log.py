@@ -76,11 +76,11 @@ class Log:
         return [(heard.at_us, heard.sample) for heard in self.heard if isinstance(heard.sample, ImuSample)]
 
     @property
-    def imu_interval_us(self) -> float:
-        """Between two IMU samples, by the vehicle's clock; gaps count for nothing."""
+    def imu_rate_hz(self) -> float:
+        """IMU samples a second, by the vehicle's clock; gaps count for nothing."""
         intervals_us = np.diff([sample.time_boot_us for _, sample in self.imu()])
         intervals_us = intervals_us[intervals_us > 0]
-        return float(np.median(intervals_us)) if len(intervals_us) else 1e6
+        return 1e6 / float(np.median(intervals_us)) if len(intervals_us) else 1.0
 
     @property
     def duration_s(self) -> float:

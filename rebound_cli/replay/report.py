@@ -26,15 +26,6 @@ class Replay:
     losses: tuple[str, ...]
     reproduction: Reproduction | None
 
-    @property
-    def imu_rate_hz(self) -> float:
-        return 1e6 / self.log.imu_interval_us
-
-    @property
-    def peak_m_s2(self) -> float:
-        """The largest specific force in one sample."""
-        return max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in self.log.imu())
-
 
 def replay_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = None) -> Replay:
     """What a guard's detector makes of the log.
@@ -68,7 +59,7 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
 def report_text(replay: Replay) -> str:
     """The whole report; times in seconds since the log's start."""
     log = replay.log
-    headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {replay.imu_rate_hz:.0f} Hz"
+    headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {log.imu_rate_hz:.0f} Hz"
     told: list[tuple[int, list[str]]] = [(at_us, [text]) for at_us, text in replay.findings.happenings]
     if replay.reproduction is None:
         # Each interval in which a guard would have left a hit to whoever flies.
@@ -158,7 +149,8 @@ def bearing(normal_ned: Vector3) -> str:
 def _facts(replay: Replay) -> Iterator[str]:
     count, how = clipped(replay.log)
     samples = f"{count or 'no'} sample{'' if count == 1 else 's'} ({how})"
-    yield f"clipping: {samples}; largest sample {replay.peak_m_s2:.1f} m/s^2"
+    peak_m_s2 = max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in replay.log.imu())
+    yield f"clipping: {samples}; largest sample {peak_m_s2:.1f} m/s^2"
     for word, spans in (("blind", replay.findings.blind), ("off", replay.findings.off)):
         total_s = sum(span.duration_s for span in spans)
         shown = [f"{replay.log.seconds(s.start_us):.2f} s for {s.duration_s:.2f} s ({s.reason})" for s in spans[:4]]

@@ -101,7 +101,7 @@ def read_healthy(path: Path, config: CompanionConfig) -> Replay:
 
 def _flight_rows(flight: Replay) -> Iterator[str]:
     log, found = flight.log, flight.findings
-    yield f"{log.path}: {log.vehicle}, {found.flown_us * 1e-6:.0f} s in the air, IMU at {flight.imu_rate_hz:.0f} Hz"
+    yield f"{log.path}: {log.vehicle}, {found.flown_us * 1e-6:.0f} s in the air, IMU at {log.imu_rate_hz:.0f} Hz"
     count, how = clipped(log)
     alarms, blind_s = len(found.collisions), sum(span.duration_s for span in found.blind)
     blind = f"blind for {blind_s:.2f} s, first: {found.blind[0].reason}" if found.blind else "never blind"

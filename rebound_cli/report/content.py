@@ -38,8 +38,7 @@ from rebound_cli.report.series import (
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
-
-Floats = npt.NDArray[np.float64]
+from rebound_cli.results.flight_log import Floats
 
 # All rows of half a minute at 250 Hz, and ten a second more of what is longer: below 2 MB for minutes, 5 MB for half an
 # hour.

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from companion.messages import Vector3
 from companion.motion.config import SHOWN_US
@@ -20,12 +19,11 @@ from rebound_cli.replay.report import bearing, impact_facts, kind_text, speed_te
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import impact_text
+from rebound_cli.results.flight_log import Floats
 from rebound_cli.results.truth_match import index_of_hit
 
 if TYPE_CHECKING:
     from sim_vehicle.truth import Hit
-
-Floats = npt.NDArray[np.float64]
 
 # A page of more is read by nobody, and 40 of them at PX4's fastest stream are still half a megabyte.
 MOST_MOMENTS = 40

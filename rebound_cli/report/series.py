@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from rebound_cli.results.flight_log import FlightLog
+from rebound_cli.results.flight_log import FlightLog, Floats
 
-Floats = npt.NDArray[np.float64]
 # Values and their resolution, by the column's name.
 Columns: TypeAlias = dict[str, tuple[Floats, float]]
 

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from companion.shell.tlog import packets_in
 from rebound_cli.report.series import NED, TURN, VELOCITY, series
 from rebound_cli.results import run_folder
-from rebound_cli.results.flight_log import FlightLog, flight_log_of_packets
+from rebound_cli.results.flight_log import FlightLog, Floats, flight_log_of_packets
 
 # Columns of each table of the page, in the order of a row.
 COLUMNS = {
@@ -86,7 +85,7 @@ class Tail:
         }
         return {**rows, "force": self._thinned("force", np.column_stack([columns["imu"]["t"][0], side]), peaks=True)}
 
-    def _thinned(self, name: str, table: npt.NDArray[np.float64], peaks: bool = False) -> list[list[float | None]]:
+    def _thinned(self, name: str, table: Floats, peaks: bool = False) -> list[list[float | None]]:
         """A row each tenth of a second; of `peaks` the largest since the row before."""
         rows: list[list[float | None]] = []
         since = 0

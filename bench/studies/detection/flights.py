@@ -101,7 +101,7 @@ def row_of(name: str, replay: Replay, labels: Mapping[float, str]) -> Json:
         "vehicle": replay.log.vehicle,
         "flown_h": findings.flown_us / 3.6e9,
         "watched_h": findings.watched_us / 3.6e9,
-        "imu_hz": replay.imu_rate_hz,
+        "imu_hz": replay.log.imu_rate_hz,
         "collisions": told["collision"],
         "touchdowns": told["touchdown"],
         "crashes": told["crash"],
