@@ -127,7 +127,7 @@ def _flown(flight: FaultedFlight) -> JudgedFlight:
         replace(event, time_us=round(EPOCH_US + at_s * 1e6))
         for event, at_s in zip(flight.recorder.events, flight.recorder.told_s, strict=True)
     ]
-    known = FlightTruth(truth.hits, truth.series(), EPOCH_US, truth.faults)
+    known = FlightTruth(truth.hits, truth.series(), EPOCH_US)
     return JudgedFlight(flight.mission, flight.companion.report(), events, known, flight.scene, flight.airframe)
 
 

@@ -161,10 +161,6 @@ class DiskLimits:
     max_use: int
     keep_free: int
 
-    def to_go(self, used_bytes: int, free_bytes: int) -> int:
-        """How much is to be removed, of what all flights take and what is free."""
-        return max(used_bytes - self.max_use, self.keep_free - free_bytes, 0)
-
 
 def limits_of(config: DiskConfig, file_system_bytes: int) -> DiskLimits:
     tenth = file_system_bytes // 10
@@ -202,7 +198,8 @@ class Ring:
         limits = limits_of(self._config, disk.total)
         others = [flight for flight in kept_flights(self._runs) if flight.folder != self._present]
         present_bytes = size_of(self._present) if self._present.exists() else 0
-        to_go = limits.to_go(sum(flight.size_bytes for flight in others) + present_bytes, disk.free)
+        used_bytes = sum(flight.size_bytes for flight in others) + present_bytes
+        to_go = max(used_bytes - limits.max_use, limits.keep_free - disk.free)
         # From the oldest on: those without a hit, then those with one.
         for flight in sorted(others, key=KeptFlight.has_hit) if to_go > 0 else ():
             if to_go > 0 and flight.remove():

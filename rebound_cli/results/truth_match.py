@@ -12,7 +12,7 @@ from companion.reflex.recovery.collision import CollisionReport
 from rebound_cli.results.run_folder import reading
 
 if TYPE_CHECKING:  # a flight with a real vehicle must not wait for the simulator's compiled kernels
-    from sim_vehicle.truth import FaultSpan, Hit
+    from sim_vehicle.truth import Hit
 
 # A contact that falls between the IMU samples shows in the velocities after it: two intervals of ODOMETRY's 30 Hz, and
 # the estimate's delay of 20 to 40 ms.
@@ -34,7 +34,6 @@ class FlightTruth:
     hits: "Sequence[Hit]"
     series: Series
     epoch_at_boot_us: float
-    faults: "Sequence[FaultSpan]" = ()
     stalls: Sequence[tuple[int, int]] = ()
 
     def at_us(self, boot_us: Time) -> Time:
@@ -63,10 +62,10 @@ def read_truth(path: Path) -> FlightTruth | None:
     """None where a simulator has left none: of a real vehicle, or of a PX4 that never flew. Raises RunFolderError."""
     if not path.exists():
         return None
-    from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
+    from sim_vehicle.shell.truth_file import load_stalls, load_truth
 
     with reading(path):
-        return FlightTruth(*load_truth(path), load_faults(path), load_stalls(path))
+        return FlightTruth(*load_truth(path), load_stalls(path))
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,7 +72,7 @@ def fly_mission_lockstep(
     if not is_finished:
         reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
         report = replace(report, outcome="failed", reason=reason)
-    return Flown(report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US, truth.faults)), truth
+    return Flown(report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US)), truth
 
 
 def run_lockstep(

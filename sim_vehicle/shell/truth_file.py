@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from sim_vehicle.quantities import Floats
-from sim_vehicle.truth import FaultSpan, Hit, TruthRecorder
+from sim_vehicle.truth import Hit, TruthRecorder
 
 # What else is in the file.
 _NO_SERIES = ("hits", "faults", "epoch_at_boot_us", "stalls")
@@ -36,12 +36,6 @@ def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
     with np.load(path) as stored:
         series = {name: stored[name] for name in stored.files if name not in _NO_SERIES}
         return _HITS.validate_json(str(stored["hits"])), series, int(stored["epoch_at_boot_us"])
-
-
-def load_faults(path: Path) -> list[FaultSpan]:
-    """The faults that acted, in the order in which they began."""
-    with np.load(path) as stored:
-        return [FaultSpan(**fields) for fields in json.loads(str(stored["faults"]))] if "faults" in stored else []
 
 
 def load_stalls(path: Path) -> list[tuple[int, int]]:
