@@ -87,9 +87,7 @@ def run(options: argparse.Namespace, program: str) -> int:
         # A file or folder that cannot be had, or a disk that takes no more; any other error is a fault of ours.
         if error.filename is None and error.errno not in _DISK_ERRORS:
             raise
-        # Where a file was to take another's place, that other one is what the person has named.
-        name = error.filename2 or error.filename
-        said = f"{'' if name is None else f'{name}: '}{error.strerror}."
+        said = f"{'' if error.filename is None else f'{error.filename}: '}{error.strerror}."
     print(f"{program}: {said}", file=sys.stderr)
     return code
 

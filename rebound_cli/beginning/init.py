@@ -51,7 +51,9 @@ def _copy_mission(file: Path, model: str, mission: Path) -> None:
 
 
 def _write(file: Path, text: str) -> None:
-    if file.exists():
-        raise ConfigurationError(f"{file} is there already: nothing was written.")
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text, encoding="utf-8")
+    try:
+        with file.open("x", encoding="utf-8") as new:
+            new.write(text)
+    except FileExistsError:
+        raise ConfigurationError(f"{file} is there already: nothing was written.") from None

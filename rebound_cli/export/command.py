@@ -7,6 +7,7 @@ from pathlib import Path
 
 from companion.shell.files import write_whole
 from rebound_cli.flights.kept import KeptFlight, flight_named, runs_folder
+from rebound_cli.inputs.documents import refuse_special
 from rebound_cli.results.run_folder import TLOG_NAME
 
 
@@ -14,6 +15,7 @@ def run_export(options: Namespace) -> int:
     """Raises FlightError, RunFolderError, LogError."""
     flight, kind = flight_named(runs_folder(options.runs), options.flight), options.format
     out = options.out or Path(f"{flight.name}.{'tar.gz' if kind == 'archive' else kind}")
+    refuse_special(out)
     if kind == "archive":
         _write_archive(out, flight)
     else:

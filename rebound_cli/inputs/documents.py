@@ -144,6 +144,12 @@ def refuse_existing(out: Path | None) -> None:
         raise DocumentError(f"{out} exists already: give --out another name.")
 
 
+def refuse_special(out: Path) -> None:
+    """A file that is written whole takes the place of what is there, be it a device. Raises DocumentError."""
+    if out.is_symlink() or (out.exists() and not out.is_file()):
+        raise DocumentError(f"{out} is no ordinary file: give --out another name.")
+
+
 def _line(node: yaml.Node) -> int:
     return int(node.start_mark.line) + 1
 

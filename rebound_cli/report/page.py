@@ -15,6 +15,7 @@ from typing import Any
 
 from companion.shell.files import write_whole
 from rebound_cli.flights.kept import flight_named, runs_folder
+from rebound_cli.inputs.documents import refuse_special
 from rebound_cli.report.content import as_text, content, live_content
 from rebound_cli.report.shown_flight import ShownFlight, recorded_flight
 from rebound_cli.results.run_folder import REPORT_NAME
@@ -65,8 +66,9 @@ def file_text(name: str) -> str:
 def run_report(options: Namespace) -> int:
     """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
     folder = flight_named(runs_folder(options.runs), str(options.flight)).folder
-    path = write_page(recorded_flight(folder), options.out or folder / REPORT_NAME, options.no_position)
-    print(f"The report is in {path}")
+    out = options.out or folder / REPORT_NAME
+    refuse_special(out)
+    print(f"The report is in {write_page(recorded_flight(folder), out, options.no_position)}")
     return 0
 
 

@@ -61,7 +61,8 @@ def check_place(out: Path | None) -> None:
         place = place.parent
     if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
         raise RunFolderError(f"The run folder {wanted} cannot be made: nothing can be written to {place.absolute()}.")
-    if out is not None and (out / TLOG_NAME).exists():
+    # Through a folder that is made only now, as new/../flight, it leads to one that is there.
+    if out is not None and (out.resolve() / TLOG_NAME).exists():
         raise RunFolderError(f"{out} already holds a flight: give --out another folder.")
 
 

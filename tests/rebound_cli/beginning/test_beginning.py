@@ -56,6 +56,7 @@ def test_nothing_is_written_over_and_a_model_that_is_not_is_named(tmp_path, caps
     assert not file.exists()
     file.write_text("mine")
     assert main(["init", str(file)]) == 1
+    assert main(["init", str(tmp_path / "new" / ".." / file.name)]) == 1
     assert file.read_text() == "mine" and str(file) in capsys.readouterr().err
 
 

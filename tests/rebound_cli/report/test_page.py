@@ -305,6 +305,16 @@ def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
     assert data["obstacles"] == [] and "truth" not in data["tables"]
 
 
+@pytest.mark.parametrize("command", [("report",), ("logs", "export"), ("logs", "export", "--format", "mcap")])
+def test_what_is_no_ordinary_file_is_left_as_it_is(wall_folder, tmp_path, capsys, command):
+    link = tmp_path / "link"
+    link.symlink_to("/dev/null")
+    for out in (link, tmp_path):
+        assert main([*command, str(wall_folder), "--out", str(out)]) == 1
+        assert capsys.readouterr().err == f"rebound: {out} is no ordinary file: give --out another name.\n"
+    assert link.is_symlink() and list(tmp_path.iterdir()) == [link]
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [

@@ -34,8 +34,9 @@ def test_a_folder_below_a_file_or_with_a_flight_is_refused_at_once(command, tmp_
     (tmp_path / TLOG_NAME).write_bytes(b"")
     assert main([*command, "--out", str(tmp_path / TLOG_NAME / "run")]) == 1
     assert f"run cannot be made: nothing can be written to {tmp_path / TLOG_NAME}." in capsys.readouterr().err
-    assert main([*command, "--out", str(tmp_path)]) == 1
-    assert "already holds a flight" in capsys.readouterr().err
+    for folder in (tmp_path, tmp_path / "new" / ".."):
+        assert main([*command, "--out", str(folder)]) == 1
+        assert "already holds a flight" in capsys.readouterr().err
 
 
 def test_a_folder_that_nobody_may_write_to_is_refused(tmp_path, monkeypatch):
