@@ -120,8 +120,11 @@ def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> F
 
 
 def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: inputs.SimulatedWorld | None) -> None:
-    if mission_file.resolve() != (folder / run_folder.MISSION_NAME).resolve():
-        write_whole(folder / run_folder.MISSION_NAME, mission_file.read_bytes())
+    copy = folder / run_folder.MISSION_NAME
+    if mission_file.resolve() != copy.resolve():
+        if copy.exists():
+            raise ConfigurationError(f"{copy} is another mission: give --out another folder.")
+        write_whole(copy, mission_file.read_bytes())
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, inputs.resolved(mission, world))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     if world is not None:

@@ -62,8 +62,9 @@ def check_place(out: Path | None) -> None:
     if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
         raise RunFolderError(f"The run folder {wanted} cannot be made: nothing can be written to {place.absolute()}.")
     # Through a folder that is made only now, as new/../flight, it leads to one that is there.
-    if out is not None and (out.resolve() / TLOG_NAME).exists():
-        raise RunFolderError(f"{out} already holds a flight: give --out another folder.")
+    for name, what in ((TLOG_NAME, "a flight"), (GUARD_NAME, GUARD_NAME), (AIRFRAME_NAME, AIRFRAME_NAME)):
+        if out is not None and (out.resolve() / name).exists():
+            raise RunFolderError(f"{out} already holds {what}: give --out another folder.")
 
 
 def create_run_folder(out: Path | None, mission_name: str) -> Path:

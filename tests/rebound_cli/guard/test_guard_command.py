@@ -47,7 +47,7 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     assert status["command"] == "guard" and status["pid"] == guard.pid and status["folder"] == str(tmp_path)
     assert status["age_s"] < 5.0 and status["hits"] == 0
     assert not (tmp_path / "run" / "status.sock").exists()
-    assert "standing_by" in guard.said and "stopped by a terminate signal; 0 hits" in guard.said
+    assert "standing_by" in guard.said and "stopped by a terminate signal; no hit;" in guard.said
     assert [event["kind"] for event in events_of(tmp_path)][-1] == "stopped"
     assert (tmp_path / "flight.tlog").stat().st_size > 10_000
     assert_comes_again(tmp_path)

@@ -318,7 +318,6 @@ def test_what_is_no_ordinary_file_is_left_as_it_is(wall_folder, tmp_path, capsys
 @pytest.mark.parametrize(
     ("name", "content"),
     [
-        ("truth.npz", b""),
         ("truth.npz", b"PK"),
         ("summary.json", b'{"mission": "wall"}'),
         ("obstacles.json", b"["),

@@ -37,6 +37,18 @@ def test_a_folder_below_a_file_or_with_a_flight_is_refused_at_once(command, tmp_
     for folder in (tmp_path, tmp_path / "new" / ".."):
         assert main([*command, "--out", str(folder)]) == 1
         assert "already holds a flight" in capsys.readouterr().err
+    # Nor does a flight take the place of what a person may have written
+    for name in ("airframe.yaml", "guard.yaml"):
+        (tmp_path / name / name).mkdir(parents=True)
+        assert main([*command, "--out", str(tmp_path / name)]) == 1
+        assert f"{name} already holds {name}: give" in capsys.readouterr().err
+
+
+def test_a_flight_takes_no_other_missions_place(tmp_path, capsys):
+    (tmp_path / "mission.yaml").write_text("mine")
+    assert main(["fly", str(WALL), "--lockstep", "--out", str(tmp_path)]) == 78
+    assert "mission.yaml is another mission: give --out another folder." in capsys.readouterr().err
+    assert (tmp_path / "mission.yaml").read_text() == "mine"
 
 
 def test_a_folder_that_nobody_may_write_to_is_refused(tmp_path, monkeypatch):
