@@ -80,11 +80,11 @@ def _workers(scheduler: str | None) -> Iterator[Executor]:
             yield pool
         return
     from distributed import Client
-    from distributed.comm import get_address_host_port
+    from distributed.comm import resolve_address
 
     try:
         # Of one that is none Dask leaves a client behind that complains when it goes.
-        get_address_host_port(scheduler)
+        resolve_address(scheduler)
         client = Client(scheduler, timeout="3 s", set_as_default=False)
     except (OSError, ValueError) as error:
         raise ConfigurationError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error}).") from None
