@@ -60,6 +60,7 @@ class Reflex:
     settled: SettledConfig
     monitor: CollisionMonitor
     hits: list[CollisionRecord] = field(default_factory=list)
+    earlier_hits: int = 0  # before the vehicle restarted
     recovery: Recovery | None = None  # of the newest
     loss_s: float | None = None  # for so long the vehicle flies its last setpoint on; infinite: it takes no thrust
     keeps_trim: bool = False  # see interface.Autopilot
@@ -73,6 +74,9 @@ class Reflex:
         hides_clipping, self.monitor = self.monitor.estimator.hides_clipping, start_monitor(self.config, now_us)
         self.monitor.estimator.hides_clipping = hides_clipping
         self.loss_s = None
+        self.earlier_hits = len(self.hits)
+        for record in self.hits[-1:]:
+            record.is_over = True
 
     def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
         """Take the samples received since the last step, in order; call it without any, too."""
@@ -180,10 +184,10 @@ class Reflex:
 
     def follow(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """Take the samples of the step for the motion after the newest hit, and for what shows a crash."""
-        if self.hits:
+        if (newest := self.newest) is not None:
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
-            self.hits[-1].follow(self.monitor.state, self.monitor.estimator, positions)
-            validity, estimator = self.monitor.estimator.validity, self.hits[-1].estimator
+            newest.follow(self.monitor.state, self.monitor.estimator, positions)
+            validity, estimator = self.monitor.estimator.validity, newest.estimator
             if validity.invalid_since_boot_us is not None:
                 is_newest = validity.invalid_since_boot_us == estimator.hit_boot_us
                 validity.left_m_s = estimator.left_m_s if is_newest else math.inf
@@ -194,29 +198,31 @@ class Reflex:
         """The errors that the newest hit has left in the vehicle's estimate and tilt, and what its integrators have
         forgotten while it was flown by attitude.
         """
-        share = self._left_share(time_boot_us)
-        if share <= 0.0 or not self.law.leans:
+        newest, share = self.newest, self._left_share(time_boot_us)
+        if newest is None or share <= 0.0 or not self.law.leans:
             return None
-        estimator = self.hits[-1].estimator
+        estimator = newest.estimator
         pushed = ZERO if self.keeps_trim else plus(estimator.wind_m_s2, 1.0, estimator.tilted_m_s2)
         return LeftWrong(share, estimator.position_error_m, estimator.velocity_error_m_s, pushed)
 
     def _left_share(self, time_boot_us: int) -> float:
         """They fade out, as PX4 puts all of it right by itself, but for what a receiver shows."""
-        if not self.hits or not self.hits[-1].estimator.has_converged:
+        newest = self.newest
+        if newest is None or not newest.estimator.has_converged:
             return 0.0
-        left_us = self.hits[-1].sample_time_boot_us + numbers.FADED_US - time_boot_us
+        left_us = newest.sample_time_boot_us + numbers.FADED_US - time_boot_us
         share = left_us / (numbers.FADED_US - numbers.FADES_FROM_US)
-        return 1.0 if share >= 1.0 or self.hits[-1].estimator.is_measured_apart else share
+        return 1.0 if share >= 1.0 or newest.estimator.is_measured_apart else share
 
     def place_ned_m(self, reported: LocalPosition) -> Vector3:
         """Where the vehicle is: by the belief in a recovery, then as reported without what is left wrong."""
-        if self.hits and not self.hits[-1].is_over:
-            return self.hits[-1].estimator.motion.position_ned_m
-        share = self._left_share(reported.time_boot_us)
-        if share <= 0.0:
+        newest = self.newest
+        if newest is None:
             return reported.position_ned_m
-        return plus(reported.position_ned_m, -share, self.hits[-1].estimator.position_error_m)
+        if not newest.is_over:
+            return newest.estimator.motion.position_ned_m
+        share = max(0.0, self._left_share(reported.time_boot_us))
+        return plus(reported.position_ned_m, -share, newest.estimator.position_error_m)
 
     # --- by which law
 
@@ -244,6 +250,11 @@ class Reflex:
     def in_one_recovery(self) -> list[CollisionRecord]:
         """The last hits, the newest first, without a recovery in between."""
         return list(takewhile(lambda record: not record.is_over, reversed(self.hits)))
+
+    @property
+    def newest(self) -> CollisionRecord | None:
+        """The newest hit since the vehicle started."""
+        return self.hits[-1] if len(self.hits) > self.earlier_hits else None
 
     @property
     def thrust(self) -> ThrustGain:

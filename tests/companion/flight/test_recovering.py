@@ -283,6 +283,10 @@ def test_what_is_left_wrong_of_a_hit_fades_but_while_a_receiver_shows_it(is_apar
     flight.collisions[0].estimator.has_converged = True
     wrong = flight.reflex.left_wrong(HIT_US + 13_000_000)
     assert wrong.share == 1.0 if is_apart else wrong is None
+    # Nor does anything of it hold of a vehicle that has restarted, whose clock begins anew
+    assert flight.reflex.left_wrong(1).share == 1.0
+    flight.reflex.restart(0)
+    assert flight.reflex.left_wrong(1) is None and flight.reflex.in_one_recovery() == []
 
 
 @pytest.mark.parametrize("is_over", [False, True])
