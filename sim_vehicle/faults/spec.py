@@ -1,6 +1,6 @@
 """The entries of `sim.faults`: what goes wrong, how much, and when by the vehicle's boot clock."""
 
-from itertools import pairwise
+from itertools import combinations
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -280,9 +280,16 @@ def check_motor(fault: Fault, rotors: int) -> None:
 
 def overlapping(faults: tuple[Fault, ...]) -> str | None:
     """What is wrong with two faults that would act at once and cannot; None if nothing is."""
-    # The body has one place for it.
-    windows = sorted(fault.window_s for fault in faults if isinstance(fault, Push))
-    for (_, end_s), (start_s, _) in pairwise(windows):
-        if start_s < end_s:
-            return f"two faults of kind push act at {start_s:g} s; let one end before the next begins"
+    for one, other in combinations(faults, 2):
+        start_s, end_s = max(one.window_s[0], other.window_s[0]), min(one.window_s[1], other.window_s[1])
+        if start_s < end_s and (remedy := _apart(one, other)):
+            return f"two faults of kind {one.kind} act at {start_s:g} s; {remedy}"
     return None
+
+
+def _apart(one: Fault, other: Fault) -> str | None:
+    """The body has one place for a push, and its rotors one speed: how two become possible that act at once."""
+    if isinstance(one, Vibration) and isinstance(other, Vibration) and one.motor_hz != other.motor_hz:
+        return "give them the same motor_hz"
+    are_pushes = isinstance(one, Push) and isinstance(other, Push)
+    return "let one end before the next begins" if are_pushes else None

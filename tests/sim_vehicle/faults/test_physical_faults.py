@@ -190,6 +190,16 @@ def test_faults_that_make_no_sense_are_refused(fault: dict[str, Any], words: str
         Scene.model_validate({"faults": [fault]})
 
 
+def test_the_body_takes_one_push_at_once_and_its_rotors_turn_at_one_speed() -> None:
+    push = {"kind": "push", "force_ned_n": [1, 0, 0]}
+    slow, fast = ({"kind": "vibration", "accelerometer_rms_m_s2": 1, "motor_hz": turns} for turns in (90, 180))
+    for one, other, words in ((push, push, "let one end"), (slow, fast, "the same motor_hz")):
+        Scene.model_validate({"faults": [one | {"between_s": [2, 3]}, other | {"between_s": [1, 2]}]})
+        with pytest.raises(ValidationError, match=words):
+            Scene.model_validate({"faults": [one | {"between_s": [2, 3]}, other | {"between_s": [1, 2.1]}]})
+    Scene.model_validate({"faults": [slow | {"at_s": 0, "motor": motor} for motor in (0, 1)]})
+
+
 STEP_US = 4000
 
 
