@@ -15,6 +15,7 @@ from sim_vehicle.autopilot.messages import EVERY_ID, Command, Result
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.services.service import Board, Channel, Service
 
+GET_MESSAGE_INTERVAL = 510
 SET_MESSAGE_INTERVAL = 511
 REQUEST_MESSAGE = 512
 REQUEST_AUTOPILOT_CAPABILITIES = 520
@@ -22,8 +23,11 @@ REQUEST_AUTOPILOT_CAPABILITIES = 520
 # The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, HOME_POSITION, FLIGHT_INFORMATION,
 # STORAGE_INFORMATION.
 REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, 410: 242, 528: 264, 525: 261}
+_MESSAGE_INTERVAL_ID = 244
 
 _GREATEST_INT32 = 2**31 - 1
+# The same as a float with its two neighbours, and the upper half of a NaN: places that were sent in the wrong message.
+_LEAST_MISTAKEN, _GREATEST_MISTAKEN, _NAN_AS_INT = 2**31 - 128, 2**31 + 256, 0x7FF80000
 
 
 class CommandService(Service):
@@ -34,8 +38,8 @@ class CommandService(Service):
         self._board = board
         self.handlers = {
             11: self._set_mode,
-            75: lambda packet: self._take(command_from_int(packet)),
-            76: lambda packet: self._take(command_from_long(packet)),
+            75: lambda packet: self._take(command_from_int(packet), packet.x == packet.y == _NAN_AS_INT),
+            76: lambda packet: self._take(command_from_long(packet), _is_mistaken(packet)),
         }
 
     def _set_mode(self, packet: dialect.MAVLink_set_mode_message) -> None:
@@ -44,10 +48,10 @@ class CommandService(Service):
         source, target = (packet.get_srcSystem(), packet.get_srcComponent()), (packet.target_system, EVERY_ID)
         self._board.autopilot.command(Command(*source, *target, commands.DO_SET_MODE, packet.base_mode, main, sub))
 
-    def _take(self, command: Command) -> None:
-        if not self._is_for_us(command):
+    def _take(self, command: Command, is_mistaken: bool) -> None:
+        if not is_mistaken and not self._is_for_us(command):
             return
-        result = self._received(command)
+        result = Result.DENIED if is_mistaken else self._received(command)
         if result is not None:
             self._link.send(encode.command_ack(commands.answer(command, result)))
         if result is None or command.command == commands.DO_SET_MODE:
@@ -68,17 +72,30 @@ class CommandService(Service):
             return Result.ACCEPTED
         if command.command == SET_MESSAGE_INTERVAL:
             return Result.ACCEPTED if self._set_interval(command) else Result.FAILED
+        if command.command == GET_MESSAGE_INTERVAL:
+            return self._tell_interval(command.param1)
         asked = commands.whole(command.param1) if command.command == REQUEST_MESSAGE else REQUESTS.get(command.command)
         if asked is None:
             return None
+        if asked == _MESSAGE_INTERVAL_ID:
+            return self._tell_interval(command.param2)
         return Result.ACCEPTED if self._link.streams.send_now(asked) else Result.DENIED
 
     def _set_interval(self, command: Command) -> bool:
         # Response target and the two reserved parameters: PX4 supports none of them.
         if any(commands.whole(value, unset=0) != 0 for value in (command.param3, command.param4, command.param7)):
             return False
-        is_given = math.isfinite(command.param2)
-        return is_given and self._link.streams.set_interval(commands.whole(command.param1), command.param2)
+        return self._link.streams.set_interval(commands.whole(command.param1), command.param2)
+
+    def _tell_interval(self, message: float) -> Result:
+        number = commands.whole(message)
+        told = dialect.MAVLink_message_interval_message(number & 0xFFFF, self._link.streams.interval_us(number))
+        self._link.send(told)
+        return Result.ACCEPTED
+
+
+def _is_mistaken(packet: dialect.MAVLink_command_long_message) -> bool:
+    return all(_LEAST_MISTAKEN <= value <= _GREATEST_MISTAKEN for value in (packet.param5, packet.param6))
 
 
 def command_from_long(packet: dialect.MAVLink_command_long_message) -> Command:

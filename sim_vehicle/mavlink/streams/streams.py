@@ -21,6 +21,8 @@ from sim_vehicle.mavlink.telemetry import Telemetry
 
 NOT_STREAMED_US = -1
 EVERY_TIME_US = 0
+# PX4 counts in whole numbers of 32 bits.
+_LONGEST_US = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,7 @@ def interval_from_request(interval_us: float) -> int:
     rate_hz = np.float32(1_000_000) / np.float32(interval_us)
     if not np.isfinite(rate_hz) or rate_hz <= 0.000001:
         return NOT_STREAMED_US
-    return max(int(np.float32(1_000_000) / rate_hz), 1)
+    return min(max(int(np.float32(1_000_000) / rate_hz), 1), _LONGEST_US)
 
 
 class Stream:
@@ -190,8 +192,13 @@ class Streams:
 
     # --- commands ----------------------------------------------------------------------------------------
 
+    def interval_us(self, message_id: int) -> int:
+        """MESSAGE_INTERVAL's: -1 where nothing is sent and, as in PX4, where all that is new is."""
+        stream = self._by_id.get(message_id)
+        return NOT_STREAMED_US if stream is None else stream.interval_us or NOT_STREAMED_US
+
     def set_interval(self, message_id: int, interval_us: float) -> bool:
-        """SET_MESSAGE_INTERVAL; the heartbeat's cannot be changed."""
+        """SET_MESSAGE_INTERVAL; the heartbeat's cannot be changed, and NaN means the rate at which a link begins."""
         stream = self._by_id.get(message_id)
         if stream is None or message_id == HEARTBEAT_ID:
             return False

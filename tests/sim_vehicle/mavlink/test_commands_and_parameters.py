@@ -46,7 +46,7 @@ def client() -> Client:
         # Another link's interval, or an answer to somebody else, cannot be asked for
         (SET_INTERVAL, (105, 4_000, 1), [FAILED]),
         (SET_INTERVAL, (105, 4_000, 0, 0, 0, 0, 1), [FAILED]),
-        (SET_INTERVAL, (105, NAN), [FAILED]),
+        (SET_INTERVAL, (105, NAN), [ACCEPTED]),
         (REQUEST_MESSAGE, (27,), [DENIED]),
         (REQUEST_MESSAGE, (360,), [DENIED]),
         (REQUEST_MESSAGE, (65,), [DENIED]),
@@ -55,6 +55,8 @@ def client() -> Client:
         (REBOOT, (1,), [DENIED]),
         (401, (1,), [ACCEPTED]),
         (12345, (), [UNSUPPORTED]),
+        # Places that were meant for COMMAND_INT
+        (192, (0, 0, 0, 0, 2**31 - 1, 2**31 - 1), [DENIED]),
         (203, (), []),
         (2510, (), []),
         (ARM_DISARM, (5,), []),

@@ -236,9 +236,30 @@ def test_asked_and_received(monkeypatch, kind, asked_hz, received_hz, gaps):
     assert {round(1e3 * (b - a)) for a, b in pairwise(times_s)} == gaps
 
 
+def told_interval_us(client: Client, message_id: int) -> int:
+    """By both commands that ask for it."""
+    client.forget()
+    for command, params in ((510, (message_id,)), (REQUEST_MESSAGE, (244, message_id))):
+        client.command(command, *params)
+        client.run(0.02)
+        assert client.results(command) == [ACCEPTED]
+    first, second = client.all("MESSAGE_INTERVAL")
+    assert first.message_id == second.message_id == message_id & 0xFFFF and first.interval_us == second.interval_us
+    return first.interval_us
+
+
+# GPS_RAW_INT comes whenever there is a fix, 9999 never; an interval longer than 32 bits hold is the longest
+@pytest.mark.parametrize(("message_id", "asked_us", "told_us"), [
+    (105, 0, 20_000), (31, 10_000, 10_000), (24, 0, -1), (9999, 0, -1), (30, 5e11, 2**31 - 1),
+])  # fmt: skip
+def test_the_interval_is_told(message_id, asked_us, told_us):
+    assert told_interval_us(asked(message_id, asked_us)[0], message_id) == told_us
+
+
 def test_minus_one_stops_and_zero_restores():
     client, _ = asked(105, -1)
     assert client.rate_hz("HIGHRES_IMU", 2.0) == 0
+    assert told_interval_us(client, 105) == -1
     client.command(SET_INTERVAL, 105, 0)
     assert client.rate_hz("HIGHRES_IMU", 5.0) == pytest.approx(50, rel=0.02)
     # What is not streamed by default is stopped by 0
