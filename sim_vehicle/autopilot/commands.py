@@ -31,8 +31,8 @@ INJECT_FAILURE = 420
 # Left by the commander to modules that this vehicle does not have: cameras, gimbals, grippers, the logger, tunes.
 # On a PX4 without them nobody answers either.
 UNANSWERED = (
-    *(203, 204, 205, 206, 214, 242, 243, 500, 530, 531, 532, 1000, 1001, 2003, 2510, 2511, 3000),
-    *(31_010, 31_011, 31_012),
+    *(203, 204, 205, 206, 211, 214, 220, 242, 243, 500, 521, 530, 531, 532, 1000, 1001, 2003, 2510, 2511, 3000),
+    *(31_010, 31_011, 31_012, 42_600),
 )
 
 # FAILURE_UNIT and FAILURE_TYPE, as far as this vehicle knows them.

@@ -55,6 +55,12 @@ def test_forward_with_the_nose_east_is_east_and_an_acceleration_turns_with_the_w
     assert (north, east, down) == pytest.approx((0.0, -math.sin(0.5), math.cos(0.5)))
 
 
+@pytest.mark.parametrize("name", ["velocity", "acceleration_m_s2"])
+def test_what_turning_makes_too_large_for_a_float_means_stop(name):
+    north_east = (math.cos(math.pi / 8), 0.0, 0.0, math.sin(math.pi / 8))
+    assert offboard.trajectory_setpoint(target(frame=8, **{name: (3.4e38, 3.4e38, 0.0)}), north_east) == offboard.STOP
+
+
 @pytest.mark.parametrize("incomplete", [(None, None, -2.0), (1.0, None, -2.0)])
 def test_a_setpoint_that_leaves_an_axis_open_means_stop(incomplete):
     flown = offboard.trajectory_setpoint(target(position=incomplete), NORTH)

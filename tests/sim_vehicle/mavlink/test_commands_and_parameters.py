@@ -57,8 +57,7 @@ def client() -> Client:
         (12345, (), [UNSUPPORTED]),
         # Places that were meant for COMMAND_INT
         (192, (0, 0, 0, 0, 2**31 - 1, 2**31 - 1), [DENIED]),
-        (203, (), []),
-        (2510, (), []),
+        *((number, (), []) for number in (203, 211, 220, 521, 2510, 42600)),
         (ARM_DISARM, (5,), []),
         (ARM_DISARM, (0,), [ACCEPTED]),
         (SET_MODE, (1, 4, 3), [ACCEPTED, ACCEPTED]),
