@@ -71,15 +71,14 @@ class SimulatedVehicle:
         self.state, self.constants = self._plant.state, self._plant.constants
         self.truth = self._plant.truth
         """What really happened, never sent."""
-        parameters = self.parameters
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
-        self._autopilot = Autopilot(airframe.hover_fraction, first, parameters)
+        self._autopilot = Autopilot(airframe.hover_fraction, first, self.parameters)
         self._positioning = self._autopilot.commander.positioning
         self._positioning.sees_ground = self._plant.onboard is not None
         # Taken once: looking a record's field up costs microseconds.
         self._body = self.state.body
-        identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
+        identity = Identity(int(self.parameters["MAV_SYS_ID"]), int(self.parameters["MAV_COMP_ID"]))
         self._telemetry = Telemetry(
             sample=first,
             published=first,
@@ -240,7 +239,7 @@ class SimulatedVehicle:
             self._autopilot.battery.supply_share = faults.motors.voltage_share
         if now_us < slow.due_us:
             return
-        slow.gps_is_blocked = positioning.gps_is_off or positioning.gps_is_jammed
+        slow.gps_is_blocked = positioning.is_without_gps
         slow.update(now_us, self._body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss

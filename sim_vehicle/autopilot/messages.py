@@ -119,8 +119,8 @@ class StickInput(NamedTuple):
     pitch: float
     throttle: float
     yaw: float
-    source: int
-    """1 and more: the first link and those after it."""
+    source: object
+    """The link over which they came."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -155,8 +155,6 @@ class ModeState:
         self.intended = Mode.LOITER
         self.flown = Mode.LOITER
         """What flies, and what HEARTBEAT shows: ``intended``, or what a failsafe made of it."""
-        self.requested = False
-        """Whether a request was accepted since somebody last asked; the failsafes do."""
         self._after_disarming = Mode.LOITER
 
     def apply(self, event: ModeEvent, conditions: Conditions, requested: Mode | None = None) -> bool:
@@ -166,7 +164,6 @@ class ModeState:
         row = find_transition(self.intended, event, conditions, requested)
         if row is None:
             return False
-        self.requested = self.requested or event is ModeEvent.REQUEST
         self.mean(self._after_disarming if row.target is None else row.target)
         return True
 

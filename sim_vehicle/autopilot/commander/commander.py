@@ -77,7 +77,7 @@ class Commander:
             if tells:
                 self.texts.say(Severity.CRITICAL, f"Switching to {NUMBERS[mode].title} is currently not available")
             return Result.TEMPORARILY_REJECTED
-        self._judge()
+        self._judge(mode_requested=True)
         if says_so is not None:
             self.texts.say(Severity.INFO, says_so)
         return Result.ACCEPTED
@@ -170,11 +170,10 @@ class Commander:
         if reason is not None:
             self._disarmed(reason)
 
-    def _judge(self) -> None:
+    def _judge(self, mode_requested: bool = False) -> None:
         """Let the failsafes say what flies."""
         self._judged_us = self._now_us
-        decision = self.failsafe.update(self._now_us, self._situation(), self.parameters)
-        self.modes.requested = False
+        decision = self.failsafe.update(self._now_us, self._situation(mode_requested), self.parameters)
         for text in decision.says:
             self.texts.say(Severity.CRITICAL, text)
         if decision.intended is not self.modes.intended:
@@ -183,17 +182,16 @@ class Commander:
             self.modes.flown = decision.flown
             self.navigator.enter(decision.flown)
 
-    def _situation(self) -> FailsafeSituation:
+    def _situation(self, mode_requested: bool) -> FailsafeSituation:
         back = self._flies_setpoints and (self.signal.is_back or not self.failsafe.acts)
         return FailsafeSituation(
             armed=self.arming.armed,
             intended=self.modes.intended,
-            mode_requested=self.modes.requested,
+            mode_requested=mode_requested,
             sticks_moved=self.failsafe.acts and self.sticks.moving and self._sticks_override,
             sticks_lost=self.sticks.sticks is None,
             sticks_lost_at_arming=self._were_sticks_lost_at_arming(),
             ground_station_lost=self.ground_station.lost,
-            offboard_lost=not back,
             fence_breached=self.navigator.fence.breached,
             cannot_run=cannot_run(self._available, back),
         )

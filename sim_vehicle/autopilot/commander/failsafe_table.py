@@ -66,13 +66,12 @@ class FailsafeSituation(NamedTuple):
     armed: bool
     intended: Mode
     mode_requested: bool = False
-    """A mode was accepted since the last cycle, be it the same."""
+    """A mode was accepted just now, be it the same."""
     sticks_moved: bool = False
     """The pilot moves his sticks while a failsafe flies."""
     sticks_lost: bool = True
     sticks_lost_at_arming: bool = True
     ground_station_lost: bool = True
-    offboard_lost: bool = True
     fence_breached: bool = False
     cannot_run: frozenset[Mode] = frozenset()
     """Modes whose needs are not met, sticks left aside."""
@@ -164,7 +163,7 @@ def responses_now(now: FailsafeSituation, parameters: Parameters) -> list[tuple[
 def mode_fallback(now: FailsafeSituation, parameters: Parameters, intended: Mode) -> Action:
     """What becomes of a mode that cannot run: offboard's own loss first, then sticks, then the return."""
     action, mode = Action.NONE, intended
-    if mode is Mode.OFFBOARD and now.offboard_lost:
+    if mode is Mode.OFFBOARD and mode in now.cannot_run:
         action, mode = OFFBOARD_LOSS.get(int(parameters["COM_OBL_RC_ACT"]), OFFBOARD_LOSS[0])
     if mode is Mode.POSCTL and mode in now.cannot_run:
         action, mode = Action.FALL_BACK_TO_ALTITUDE, Mode.ALTCTL

@@ -88,13 +88,7 @@ class ManualInput:
         """None while no input that counts arrives."""
         self.moving = False
         self._heard_us = 0
-        self._links = 0
         self._speed = [0.0] * 4
-
-    def new_link_source(self) -> int:
-        """A number for one more link's sticks."""
-        self._links += 1
-        return self._links
 
     def heard(self, sticks: StickInput, now_us: int) -> None:
         """MANUAL_CONTROL."""

@@ -77,10 +77,8 @@ class Takeoff:
         return (now_us - self._since_us) / 1e6
 
 
-def wants_takeoff(demand: TrajectorySetpoint | None, down_m: float) -> bool:
+def wants_takeoff(demand: TrajectorySetpoint, down_m: float) -> bool:
     """Whether the demand lies above: by its height, or else by its velocity, or its acceleration."""
-    if demand is None:
-        return False
     height, velocity = demand.position_ned_m[2], demand.velocity_ned_m_s[2]
     acceleration = demand.acceleration_ned_m_s2[2]
     return (

@@ -35,7 +35,7 @@ def attitude_target(packet: dialect.MAVLink_set_attitude_target_message) -> Atti
     return AttitudeTarget(None if mask & _NO_ATTITUDE else (w, x, y, z), rates, thrust)
 
 
-def stick_input(packet: dialect.MAVLink_manual_control_message, source: int) -> StickInput:
+def stick_input(packet: dialect.MAVLink_manual_control_message, source: object) -> StickInput:
     """Values out of range count as centred; the throttle goes from 0 to 1000."""
     throttle = packet.z / (_FULL_STICK / 2) - 1.0 if 0 <= packet.z <= _FULL_STICK else 0.0
     return StickInput(_stick(packet.y), _stick(packet.x), throttle, _stick(packet.r), source)
@@ -64,9 +64,8 @@ class SetpointService(Service):
 
     def __init__(self, link: Channel, board: Board) -> None:
         receive = board.autopilot.receive
-        source = board.autopilot.commander.sticks.new_link_source()
         self.handlers = {
-            69: lambda packet: receive(stick_input(packet, source)),
+            69: lambda packet: receive(stick_input(packet, link)),
             82: lambda packet: receive(attitude_target(packet)),
             84: lambda packet: receive(position_target(packet)),
             # One without a height is none.
