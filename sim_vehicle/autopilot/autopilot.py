@@ -4,7 +4,7 @@ from enum import IntEnum
 
 from sim_vehicle.autopilot import commands, flight_commands
 from sim_vehicle.autopilot.commander.commander import Commander
-from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, ManualFlight
+from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, TAKEOFF_STICK, ManualFlight
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
 from sim_vehicle.autopilot.land_detector import LandDetector
@@ -211,7 +211,7 @@ class Autopilot:
         if mode is Mode.OFFBOARD:
             return isinstance(self._demand, TrajectorySetpoint) and wants_takeoff(self._demand, down_m)
         if mode in BY_STICKS:
-            return sticks is not None and self._manual.wants_takeoff(sticks)
+            return sticks is not None and sticks.throttle > TAKEOFF_STICK
         return self.navigator.wants_takeoff
 
     def _detect_landing(self) -> None:

@@ -50,7 +50,8 @@ def _repositioned(command: Command, commander: Commander) -> NavigatorTarget:
     place, yaw_rad, down_m = _place(command, commander), _given(command.param4), _down_m(command, commander)
     if place is None:
         stays = yaw_rad is not None or down_m is not None
-        place = navigator.held_place_ned_m if stays else navigator.stop_place_ned_m()
+        held_ned_m = navigator.shown_target_ned_m or navigator.view.position_ned_m
+        place = held_ned_m if stays else navigator.stop_place_ned_m()
     speed_m_s = _given(command.param1)
     there = place[0], place[1], navigator.view.position_ned_m[2] if down_m is None else down_m
     return NavigatorTarget(Kind.HOLD, there, yaw_rad, speed_m_s if speed_m_s and speed_m_s > 0.0 else None)

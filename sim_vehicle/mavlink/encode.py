@@ -92,7 +92,7 @@ def heartbeat(state: Telemetry) -> Message:
     autopilot = state.autopilot
     mode = autopilot.modes.flown
     return dialect.MAVLink_heartbeat_message(
-        int(state.parameter("MAV_TYPE")),
+        int(state.autopilot.parameters["MAV_TYPE"]),
         dialect.MAV_AUTOPILOT_PX4,
         base_mode(mode, autopilot.arming.armed, autopilot.signal.ever_arrived),
         NUMBERS[mode].custom_mode,

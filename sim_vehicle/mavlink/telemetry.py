@@ -8,9 +8,8 @@ import numpy as np
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.quantities import Floats, Quaternion, Vector3, quaternion_from_matrix
+from sim_vehicle.quantities import Floats, Vector3
 
 _KEPT = 0.99
 _ADDED = 1.0 - _KEPT
@@ -64,21 +63,3 @@ class Telemetry:
     """Unix time at the vehicle's boot."""
     system: int = 1
     """MAV_SYS_ID."""
-
-    @property
-    def origin(self) -> Origin:
-        """Where the local frame lies on the Earth."""
-        return self.autopilot.origin
-
-    @property
-    def home_ned_m(self) -> Vector3:
-        """HOME_POSITION."""
-        return self.autopilot.navigator.view.home_ned_m
-
-    def parameter(self, name: str) -> float:
-        """The value of a parameter that counts now."""
-        return self.autopilot.parameters[name]
-
-    def attitude_setpoint_wxyz(self) -> Quaternion:
-        """The attitude control's setpoint."""
-        return quaternion_from_matrix(self.attitude_setpoint.tolist())

@@ -163,8 +163,8 @@ class Commander:
         return Need.STICKS not in NEEDS[mode] and bool(mask & _OVERRIDES_AUTO)
 
     def _disarm_by_itself(self) -> None:
-        landed = self._detector.landed
-        if landed and self.arming.taken_off and self.navigator.mission_is_in_progress:
+        landed, is_in_mission = self._detector.landed, self.modes.flown is Mode.MISSION
+        if landed and self.arming.taken_off and is_in_mission and not self.navigator.missions.progress.finished:
             return
         reason = self.arming.disarm_by_itself(self._now_us, landed)
         if reason is not None:

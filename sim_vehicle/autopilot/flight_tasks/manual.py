@@ -56,10 +56,6 @@ class ManualFlight:
         """The throttle's upper limit grows once the motors are up to speed, whatever the mode."""
         self._armed_s = self._armed_s + step_s if armed else 0.0
 
-    def wants_takeoff(self, sticks: StickInput) -> bool:
-        """Whether a vehicle on the ground should leave it."""
-        return sticks.throttle > TAKEOFF_STICK
-
     def demand(self, mode: Mode, sticks: StickInput, view: View, step_s: float) -> Setpoint:
         """The next setpoint of a stick mode."""
         yaw_rate = self._expo(sticks.yaw) * math.radians(self._parameters["MPC_MAN_Y_MAX"])

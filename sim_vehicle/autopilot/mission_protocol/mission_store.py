@@ -60,14 +60,14 @@ class MissionStore:
         """The list of that type; an empty one for a type that does not exist."""
         return self.plans.get(kind, ())
 
-    def replace(self, kind: MissionType, plan: Plan, current: int | None = None) -> None:
+    def replace(self, kind: int, plan: Plan, current: int | None = None) -> None:
         """Store a list in whole. ``current``: the item that its sender marked; None keeps the present one."""
         self.plans[kind] = plan
-        if kind is MissionType.MISSION:
+        if kind == MissionType.MISSION:
             last = max(len(plan) - 1, 0)
             self.current = min(max(self.current if current is None else current, 0), last)
             self.mission_changes += 1
-        elif kind is MissionType.FENCE:
+        elif kind == MissionType.FENCE:
             self.fence_changes += 1
 
     def choose(self, number: int) -> None:

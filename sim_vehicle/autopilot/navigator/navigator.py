@@ -78,11 +78,6 @@ class Navigator:
             self._take_reposition()
         return True
 
-    @property
-    def held_place_ned_m(self) -> Vector3:
-        """The present target's place, or where the vehicle is."""
-        return self.shown_target_ned_m or self.view.position_ned_m
-
     def stop_place_ned_m(self) -> Vector3:
         """Where the vehicle would stand if it braked now."""
         return stop_point(self.view.position_ned_m, self.view.velocity_ned_m_s, self._parameters)
@@ -273,11 +268,6 @@ class Navigator:
         target = self._target_of(self._mode)
         is_none = self._mode not in _BY_TARGET or target.kind is Kind.IDLE
         return None if is_none else target.position_ned_m
-
-    @property
-    def mission_is_in_progress(self) -> bool:
-        """While it is, landing does not disarm."""
-        return self._mode is Mode.MISSION and not self.missions.progress.finished
 
     @property
     def orbit_status(self) -> tuple[float, Vector3] | None:

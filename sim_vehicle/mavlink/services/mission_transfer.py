@@ -118,12 +118,10 @@ class MissionTransfer:
             return
         self._peer, self._type = _peer(message), message.mission_type
         self._store.progress.reached = -1
-        if message.mission_type not in MOST_ITEMS:
-            self._acknowledge(MissionResult.NO_SPACE if message.count else MissionResult.ACCEPTED)
-        elif message.count > MOST_ITEMS[MissionType(message.mission_type)]:
+        if message.count > MOST_ITEMS.get(message.mission_type, 0):
             self._acknowledge(MissionResult.NO_SPACE)
         elif message.count == 0:
-            self._store.replace(MissionType(message.mission_type), ())
+            self._store.replace(message.mission_type, ())
             self._acknowledge(MissionResult.ACCEPTED)
         else:
             self.state, self._store.uploading = TransferState.RECEIVING, True
@@ -174,7 +172,7 @@ class MissionTransfer:
     def _store_list(self) -> None:
         # The same list once more changes nothing; compared as text, because a heading of NaN is the same then, too.
         if repr(tuple(self._items)) != repr(self._store.plan(self._type)):
-            self._store.replace(MissionType(self._type), tuple(self._items), self._marked)
+            self._store.replace(self._type, tuple(self._items), self._marked)
         self.end(MissionResult.ACCEPTED)
 
     def _acknowledge_again(self, message: Packet) -> None:
@@ -200,8 +198,7 @@ class MissionTransfer:
         self._type = message.mission_type
         kinds = MOST_ITEMS if message.mission_type == MissionType.ALL else [message.mission_type]
         for kind in kinds:
-            if kind in MOST_ITEMS:
-                self._store.replace(MissionType(kind), (), 0)
+            self._store.replace(kind, (), 0)
         self._acknowledge(MissionResult.ACCEPTED, _peer(message))
 
     def _set_current(self, message: Packet) -> None:

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Message, boot_ms
 from sim_vehicle.mavlink.telemetry import Telemetry
+from sim_vehicle.quantities import quaternion_from_matrix
 
 # Between v1.16 and v1.17, the PX4 whose behaviour was measured: version 1.17.0, type alpha (64).
 FLIGHT_VERSION = 1 << 24 | 17 << 16 | 0 << 8 | 64
@@ -43,7 +44,7 @@ OUTPUTS = 16
 def sys_status(state: Telemetry) -> Message:
     """Health as PX4's checks see it; the processor's load is a SITL's."""
     autopilot, battery = state.autopilot, state.autopilot.battery
-    enabled = _PRESENT if state.parameter("COM_RC_IN_MODE") == _NO_STICKS else _PRESENT | _RC_RECEIVER
+    enabled = _PRESENT if state.autopilot.parameters["COM_RC_IN_MODE"] == _NO_STICKS else _PRESENT | _RC_RECEIVER
     health = _WELL | (_PREARM_CHECK if autopilot.commander.checks_pass else 0)
     if state.gps is None:
         health &= ~_GPS
@@ -128,14 +129,15 @@ def flight_information(state: Telemetry) -> Message:
     armed_us = arming.armed_at_us if arming.armed else 0
     taken_off_us = arming.taken_off_at_us if arming.armed and arming.taken_off else 0
     return dialect.MAVLink_flight_information_message(
-        boot_ms(state.sample), armed_us, taken_off_us, int(state.parameter("COM_FLIGHT_UUID"))
+        boot_ms(state.sample), armed_us, taken_off_us, int(state.autopilot.parameters["COM_FLIGHT_UUID"])
     )
 
 
 def attitude_target(state: Telemetry) -> Message:
     """The attitude control's setpoint; it has none for the rates."""
+    attitude_wxyz = quaternion_from_matrix(state.attitude_setpoint.tolist())
     return framing.ATTITUDE_TARGET, framing.ATTITUDE_TARGET.pack(
-        boot_ms(state.sample), *state.attitude_setpoint_wxyz(), 0.0, 0.0, 0.0, state.sample.thrust_fraction, 0
+        boot_ms(state.sample), *attitude_wxyz, 0.0, 0.0, 0.0, state.sample.thrust_fraction, 0
     )
 
 

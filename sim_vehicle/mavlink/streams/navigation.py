@@ -27,8 +27,8 @@ def global_position_int(state: Telemetry) -> Message:
     v_north, v_east, v_down = estimate.velocity_ned_m_s
     return framing.GLOBAL_POSITION_INT, framing.GLOBAL_POSITION_INT.pack(
         boot_ms(estimate),
-        *units_of(state.origin.place_at(estimate.position_ned_m)),
-        round(1e3 * (state.home_ned_m[2] - estimate.position_ned_m[2])),
+        *units_of(state.autopilot.origin.place_at(estimate.position_ned_m)),
+        round(1e3 * (state.autopilot.navigator.view.home_ned_m[2] - estimate.position_ned_m[2])),
         _int16(100 * v_north),
         _int16(100 * v_east),
         _int16(100 * v_down),
@@ -38,8 +38,8 @@ def global_position_int(state: Telemetry) -> Message:
 
 def gps_raw_int(state: Telemetry) -> Message:
     fix = state.gps
-    if fix is None or state.parameter("SIM_GPS_USED") < 4:
-        satellites = int(state.parameter("SIM_GPS_USED")) if fix is not None else 0
+    if fix is None or state.autopilot.parameters["SIM_GPS_USED"] < 4:
+        satellites = int(state.autopilot.parameters["SIM_GPS_USED"]) if fix is not None else 0
         unknown = (_UNKNOWN_16,) * 4
         return dialect.MAVLink_gps_raw_int_message(state.sample.time_boot_us, 0, 0, 0, 0, *unknown, satellites)
     v_north, v_east, _ = fix.velocity_ned_m_s
@@ -52,7 +52,7 @@ def gps_raw_int(state: Telemetry) -> Message:
         _VDOP_CENTI,
         min(round(100 * math.hypot(v_north, v_east)), _UNKNOWN_16 - 1),
         _heading_centidegrees(math.atan2(v_east, v_north)),
-        int(state.parameter("SIM_GPS_USED")),
+        int(state.autopilot.parameters["SIM_GPS_USED"]),
         place[2],
         accuracy_mm,
         accuracy_mm,
@@ -61,14 +61,14 @@ def gps_raw_int(state: Telemetry) -> Message:
 
 
 def gps_global_origin(state: Telemetry) -> Message:
-    return dialect.MAVLink_gps_global_origin_message(*units_of(state.origin.place), 0)
+    return dialect.MAVLink_gps_global_origin_message(*units_of(state.autopilot.origin.place), 0)
 
 
 def home_position(state: Telemetry) -> Message:
     navigator = state.autopilot.navigator
-    home, yaw = state.home_ned_m, navigator.view.home_yaw_rad
+    home, yaw = navigator.view.home_ned_m, navigator.view.home_yaw_rad
     return dialect.MAVLink_home_position_message(
-        *units_of(state.origin.place_at(home)),
+        *units_of(state.autopilot.origin.place_at(home)),
         *home,
         (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)),
         0.0,
@@ -81,14 +81,14 @@ def home_position(state: Telemetry) -> Message:
 def altitude(state: Telemetry) -> Message:
     """Without a range finder nothing is known of the terrain."""
     height_m = -state.published.position_ned_m[2]
-    origin_m = state.origin.place.altitude_m
+    origin_m = state.autopilot.origin.place.altitude_m
     seen = state.range.distance_m if state.range is not None else None
     return dialect.MAVLink_altitude_message(
         state.published.time_boot_us,
         state.air.altitude_m if state.air is not None else NAN,
         origin_m + height_m,
         height_m,
-        height_m + state.home_ned_m[2],
+        height_m + state.autopilot.navigator.view.home_ned_m[2],
         NAN if seen is None else height_m - seen,
         NAN if seen is None else seen,
     )
@@ -103,7 +103,7 @@ def vfr_hud(state: Telemetry) -> Message:
         math.hypot(v_north, v_east),
         int(_heading_centidegrees(yaw_of(estimate.attitude_wxyz)) / 100),
         int(100 * estimate.thrust_fraction) if state.autopilot.arming.armed else 0,
-        state.origin.place.altitude_m - estimate.position_ned_m[2],
+        state.autopilot.origin.place.altitude_m - estimate.position_ned_m[2],
         -v_down,
     )
 
@@ -126,7 +126,7 @@ def position_target_global_int(state: Telemetry) -> Message | None:
     if target is None or autopilot.detector.landed:
         return None
     flown = applied if isinstance(applied, TrajectorySetpoint) else None
-    place = state.origin.place_at(target)
+    place = state.autopilot.origin.place_at(target)
     velocity = flown.velocity_ned_m_s if flown is not None else (None, None, None)
     return dialect.MAVLink_position_target_global_int_message(
         boot_ms(state.published),
@@ -149,7 +149,7 @@ def orbit_execution_status(state: Telemetry) -> Message | None:
     if orbit is None:
         return None
     radius_m, centre_ned_m = orbit
-    place = state.origin.place_at(centre_ned_m)
+    place = state.autopilot.origin.place_at(centre_ned_m)
     return dialect.MAVLink_orbit_execution_status_message(
         state.published.time_boot_us, radius_m, dialect.MAV_FRAME_GLOBAL, *units_of(place)[:2], place.altitude_m
     )

@@ -156,8 +156,8 @@ class Streams:
     def __init__(self, state: Telemetry, topics: Topics, encoder: Encoder, link: LinkKind, seed: int) -> None:
         self._state = state
         self._encoder = encoder
-        self._now_us = state.sample.time_boot_us
-        self._streams = [Stream(kind, self._now_us, interval_from_rate(kind.rates.on(link))) for kind in KINDS]
+        now_us = state.sample.time_boot_us
+        self._streams = [Stream(kind, now_us, interval_from_rate(kind.rates.on(link))) for kind in KINDS]
         self._by_id = {stream.kind.message_id: stream for stream in self._streams}
         self._versions = topics.versions
         self._loops = LateLoops(seed)
@@ -169,7 +169,7 @@ class Streams:
 
     def update(self) -> None:
         """Send what is due at the newest sample."""
-        self._now_us = now_us = self._state.sample.time_boot_us
+        now_us = self._state.sample.time_boot_us
         if self._loops.misses_this_one():
             return
         versions = self._versions
@@ -211,7 +211,7 @@ class Streams:
         if stream.interval_us >= 0 and wanted_us >= 0:
             stream.set_interval(wanted_us)
         else:
-            stream.restart(wanted_us, self._now_us)
+            stream.restart(wanted_us, self._state.sample.time_boot_us)
         self._run()
         return True
 
