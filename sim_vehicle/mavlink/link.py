@@ -105,9 +105,8 @@ class Link:
             self._encoder.sign(self._signing.key, self._number, self._signing.next_stamp)
         for text in texts:
             self._texts.add(text, now_us)
-        if self._texts.heard_us is not None:
-            for message in self._texts.due(now_us):
-                self.send(message)
+        for message in self._texts.due(now_us):
+            self.send(message)
         for service in self._services:
             service.update(now_us)
         self.streams.update()

@@ -175,8 +175,7 @@ class Navigator:
             self._return.update(view)
         elif self._mode is Mode.TAKEOFF:
             accepts = takeoff_acceptance(self._target, view, self._parameters)
-            over = self._arrival.is_reached(self._target, accepts, view, self._parameters)
-            self.takeoff_is_over = self.takeoff_is_over or over
+            self.takeoff_is_over = self._arrival.is_reached(self._target, accepts, view, self._parameters)
 
     def _hold_after_breach(self) -> None:
         """GF_ACTION 2 holds where the fence was found breached."""
