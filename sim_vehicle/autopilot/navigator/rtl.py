@@ -19,7 +19,7 @@ class ReturnLeg(Enum):
     CLIMB = auto()
     GO = auto()
     LAND = auto()
-    DONE = auto()
+    """Or nothing, on the ground."""
 
 
 class Return:
@@ -29,7 +29,7 @@ class Return:
         self._parameters = parameters
         self._origin = origin
         self._arrival = Arrival()
-        self._leg = ReturnLeg.DONE
+        self._leg = ReturnLeg.LAND
         self._down_m = 0.0
         self.target = NavigatorTarget(Kind.IDLE, (0.0, 0.0, 0.0))
         self._texts = texts
@@ -38,18 +38,18 @@ class Return:
         """Choose how high, and start."""
         return_height_m = return_height_over(view.height_m, view.distance_m(view.home_ned_m), self._parameters)
         self._down_m = view.home_ned_m[2] - return_height_m
-        if view.landed:
-            self._leg = ReturnLeg.DONE
-        else:
-            self._leg = ReturnLeg.CLIMB if view.height_m < return_height_m else ReturnLeg.GO
         altitude_m = self._origin.place.altitude_m - self._down_m
         heights = f"{math.ceil(altitude_m)} m ({math.ceil(return_height_m)} m above destination)"
         self._texts.say(Severity.INFO, f"RTL: start return at {heights}")
+        if view.landed:
+            self._leg, self.target = ReturnLeg.LAND, NavigatorTarget(Kind.IDLE, view.position_ned_m)
+            return
+        self._leg = ReturnLeg.CLIMB if view.height_m < return_height_m else ReturnLeg.GO
         self._enter(view)
 
     def update(self, view: View) -> None:
         """Go on to the next leg where this one is over."""
-        if self._leg in (ReturnLeg.DONE, ReturnLeg.LAND):
+        if self._leg is ReturnLeg.LAND:
             return
         if self._arrival.is_reached(self.target, self._acceptance(), view, self._parameters):
             self._leg = ReturnLeg.GO if self._leg is ReturnLeg.CLIMB else ReturnLeg.LAND
@@ -65,11 +65,9 @@ class Return:
             is_near = view.distance_m(home) < self._parameters["RTL_MIN_DIST"]
             yaw_rad = view.home_yaw_rad if is_near else None
             self.target = NavigatorTarget(Kind.POSITION, (north, east, self._down_m), yaw_rad)
-        elif self._leg is ReturnLeg.LAND:
+        else:
             self.target = NavigatorTarget(Kind.LAND, home, view.home_yaw_rad)
             self._texts.say(Severity.INFO, "RTL: land at destination")
-        else:
-            self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
 
     def _acceptance(self) -> Acceptance:
         yaw_rad = None if self._leg is ReturnLeg.CLIMB else self.target.yaw_rad
