@@ -53,19 +53,12 @@ def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
 
 
-@pytest.fixture
-def air() -> Air:
-    """Around a companion that flies a mission, and a vehicle with a pilot."""
+def test_what_the_companion_sends_once_it_has_heard_of_the_pilot_counts() -> None:
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, links_may_fail=True)
-    companion = flying_in("mission").companion
-    air = Air(vehicle, companion, Interrupts(), Injector(), random.Random(1), 60.0)
-    air.add_pilot()
-    return air
-
-
-def test_what_the_companion_sends_once_it_has_heard_of_the_pilot_counts(air: Air) -> None:
+    air = Air(vehicle, flying_in("mission").companion, Interrupts(), Injector(), random.Random(1), 60.0)
     setpoint = made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT)
     # Given a pilot who has taken over, of which the companion has not heard
+    air.add_pilot()
     air.take_over()
     air.send(setpoint)
     assert air.after_told == 0

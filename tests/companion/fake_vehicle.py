@@ -136,9 +136,8 @@ class FakeVehicle:
         elif kind == "PARAM_REQUEST_READ" and message.param_id == "COM_OF_LOSS_T":
             self.lost_answers -= 1
             if self.lost_answers < 0:
-                self.send(
-                    mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", self.loss_s, mav.MAV_PARAM_TYPE_REAL32, 1, 0)
-                )
+                kind_of_number = mav.MAV_PARAM_TYPE_REAL32
+                self.send(mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", self.loss_s, kind_of_number, 1, 0))
         elif kind == "COMMAND_LONG":
             self.obey_command(message)
 
@@ -155,36 +154,14 @@ class FakeVehicle:
         elif command == 400:
             self.armed = message.param1 == 1.0
         elif command == 512 and message.param1 == 148:
-            self.send(
-                mav.MAVLink_autopilot_version_message(
-                    0, 1 << 24 | 15 << 16, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
-                )
-            )
+            self.send(mav.MAVLink_autopilot_version_message(0, 1 << 24 | 15 << 16, 0, 0, 0, *[[0] * 8] * 3, 0, 0, 0))
 
     def stream(self) -> None:
         n, boot_ms = self.ticks, self.time_us // 1000
         if n % self.imu_every == 0 and not self.no_imu:
-            f = self.specific_force
-            push, self.push_m_s2 = self.push_m_s2, (0.0, 0.0)
-            self.send(
-                mav.MAVLink_highres_imu_message(
-                    self.time_us,
-                    f[0] + push[0],
-                    f[1] + push[1],
-                    f[2],
-                    0,
-                    0,
-                    self.yaw_rate_rad_s,
-                    0,
-                    0,
-                    0,
-                    0,
-                    0,
-                    0,
-                    0,
-                    0x3F,
-                )
-            )
+            (x, y, z), push, self.push_m_s2 = self.specific_force, self.push_m_s2, (0.0, 0.0)
+            measured = (x + push[0], y + push[1], z, 0.0, 0.0, self.yaw_rate_rad_s)
+            self.send(mav.MAVLink_highres_imu_message(self.time_us, *measured, *[0] * 7, 0x3F))
         if n % 5 == 0 and not self.no_positions:
             self.send(mav.MAVLink_local_position_ned_message(boot_ms, *self.position, *self.velocity))
         if n % 5 == 1:

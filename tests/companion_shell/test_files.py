@@ -9,7 +9,7 @@ from bench.fly.packets import GROUND_STATION, made
 from companion.mavlink.decode import Decoder
 from companion.mavlink.signing import MINUTE, UNIX_AT_2015_US, stamp_at
 from companion.shell.signing_files import SigningFileError, StampFile, read_key, write_new
-from companion.shell.tlog import FLUSH_INTERVAL_US, TlogWriter, may_be_logged, read_tlog
+from companion.shell.tlog import TlogWriter, may_be_logged, read_tlog
 
 KEY = bytes(range(32))
 NOW_US = UNIX_AT_2015_US + 10**14
@@ -87,17 +87,12 @@ def heartbeats(count):
     ]
 
 
-def written(path, packets):
-    """A log that is still open."""
-    writer = TlogWriter(path)
-    for number, packet in enumerate(packets):
-        writer.write(EPOCH_US + 4000 * number, [packet])
-    return writer
-
-
 def test_pymavlinks_reader_finds_every_packet_and_its_time(tmp_path):
     # Given a log written by us
-    written(tmp_path / "flight.tlog", heartbeats(5)).close()
+    writer = TlogWriter(tmp_path / "flight.tlog")
+    for number, packet in enumerate(heartbeats(5)):
+        writer.write(EPOCH_US + 4000 * number, [packet])
+    writer.close()
     # When the usual tools' reader opens it
     log = mavutil.mavlink_connection(str(tmp_path / "flight.tlog"))
     messages = [log.recv_match(blocking=False) for _ in range(5)]
@@ -119,17 +114,6 @@ def test_foreign_bytes_and_a_cut_end_lose_no_whole_packet(tmp_path):
     path.write_bytes(path.read_bytes()[:-4])
     # When it is read, then the whole packets are there
     assert [packet for _, packet in read_tlog(path)] == [first, second]
-
-
-def test_a_killed_writer_leaves_all_but_the_last_moment(tmp_path):
-    # Given a writer that is never closed
-    path = tmp_path / "flight.tlog"
-    writer = written(path, heartbeats(1000))
-    # When the file is read as a kill would leave it
-    last_us = list(read_tlog(path))[-1][0]
-    # Then at most the flush interval is missing
-    assert EPOCH_US + 4000 * 999 - last_us <= FLUSH_INTERVAL_US
-    writer.close()
 
 
 def test_a_packet_is_what_its_header_and_its_checksum_say():

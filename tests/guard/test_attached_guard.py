@@ -72,8 +72,9 @@ def test_the_guards_own_setpoints_carry_the_vehicle_meanwhile_from_the_hit_on(ai
 def test_in_the_programs_own_offboard_nothing_is_streamed_beforehand_and_nothing_needs_confirming(air):
     taken_s = air.event_s("take_over")
     assert air.setpoints("guard", taken_s - 1.0, taken_s) == []
-    # but that PX4 changes its controllers
-    assert {message.command for message in air.sent_by("guard", "LONG", taken_s - 0.1, taken_s + 0.1)} == {RUN_CHECKS}
+    # but that PX4 changes its controllers, with the hit to attitudes and with the hand-over to places
+    for at_s in (taken_s, air.event_s("hand_over")):
+        assert [message.command for message in air.sent_by("guard", "LONG", at_s - 0.1, at_s + 0.1)] == [RUN_CHECKS]
     assert air.event("confirmed").data["after_ms"] == 0.0
 
 

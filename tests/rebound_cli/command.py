@@ -112,10 +112,6 @@ def processes_naming(text):
     return found
 
 
-def wait_until_gone(text):
-    wait_until_there(text, False)
-
-
 def wait_until_there(text, is_there=True):
     """A process that has just been started has no command line for a moment."""
     end_s = time.monotonic() + 5.0

@@ -21,12 +21,8 @@ from tests.bench.random_missions.made_up import DONE_S, collision, event, events
 SEEDS = range(1, 61)
 
 
-@pytest.fixture(scope="module")
-def drawn():
-    return {kind: [drawn_vehicle(seed, kind) for seed in SEEDS] for kind in AIRFRAMES}
-
-
-def test_a_vehicle_is_an_airframe_file_that_reads_back_the_same(drawn):
+def test_a_vehicle_is_an_airframe_file_that_reads_back_the_same():
+    drawn = {kind: [drawn_vehicle(seed, kind) for seed in SEEDS] for kind in AIRFRAMES}
     for data in (*drawn["foldable"], *drawn["rigid"]):
         assert yaml.safe_load(yaml.safe_dump(data)) == data
         Airframe.model_validate(with_base(data))

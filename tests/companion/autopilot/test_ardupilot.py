@@ -316,18 +316,14 @@ def without_highres_imu(command, count):
 
 
 @pytest.mark.parametrize("asked", [(27, 1_000_000), (None, 0)])
-def test_a_client_that_slows_down_what_stands_in_for_highres_imu_is_noticed(asked):
-    guard = guarded(FakeCopter(ack=without_highres_imu), lambda guard: guard.status().state == "standing by")
+def test_a_board_without_highres_imu_is_asked_for_its_raw_one_and_a_client_that_slows_it_down_is_noticed(asked):
+    vehicle = FakeCopter(ack=without_highres_imu)
+    guard = guarded(vehicle, lambda guard: guard.status().state == "standing by")
+    intervals_us = [(int(sent.param1), sent.param2) for _, sent in vehicle.commands if sent.command == 511]
+    assert intervals_us[:2] == [(105, intervals_us[0][1]), (27, intervals_us[0][1])]
     guard.hear_interval(*asked)
     again = [sent.command.parameters[0] for sent in guard.core.flight.outbox if isinstance(sent, SendCommand)]
     assert again == [27] if asked[0] else {27, 65} <= {*again}
-
-
-def test_a_board_without_highres_imu_is_flown_by_its_raw_one():
-    f = flight(FakeCopter(ack=without_highres_imu), items=[TAKEOFF, LANDING])
-    f.run_to("takeoff")
-    first, second = ((int(message.param1), message.param2) for _, message in commanded(f, 511)[:2])
-    assert (first, second) == ((105, first[1]), (27, first[1]))
 
 
 def test_a_raw_imu_has_milli_units_and_counts_until_the_finer_one_comes():

@@ -5,7 +5,6 @@ import pytest
 from companion.flight.obstacle_map import surroundings
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
-from companion.motion.motors import Damage
 from companion.reflex.config import EstimateConfig
 from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import INTO_WALL, LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, strike
@@ -74,13 +73,6 @@ def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
     f.run_to("landing")
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.6)
     assert f.run_to_end().outcome == "completed"
-
-
-def test_a_motor_that_is_found_hurt_on_the_way_home_ends_it_there_where_the_mission_says_so():
-    f = fake_vehicle.flying_in("returning", on_damage="land")
-    assert f.state == "returning", "a whole vehicle flies on"
-    f.companion.core.flight.motors.damage = Damage(3, 0.16, 0.995, False)
-    f.run_to("landing", 0.1)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from companion.motion.config import GRAVITY_M_S2
 from companion.motion.motors import Damage, MotorWatch
 from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
 from companion.reflex.detection.crash import CrashWatch
-from tests.companion.fake_vehicle import FakeVehicle, flight, flying_in, mission
+from tests.companion.fake_vehicle import flying_in, mission
 from tests.flying import Flight
 from tests.simulated import flown, wall
 
@@ -238,11 +238,17 @@ def test_what_loads_a_motor_while_it_may_hang_on_the_wall_is_no_damage():
         assert (context.motors.damage is None) == (settled_after_s is None)
 
 
-@pytest.mark.parametrize(("policy", "state"), [("tell", "mission"), ("land", "landing"), ("return", "returning")])
-def test_a_mission_says_what_follows(policy, state):
-    f = flight(FakeVehicle(), on_damage=policy)
-    f.run_to("mission")
-    f.run_for(1.0)
+@pytest.mark.parametrize(
+    ("policy", "found_in", "state"),
+    [
+        ("tell", "mission", "mission"),
+        ("land", "mission", "landing"),
+        ("return", "mission", "returning"),
+        ("land", "returning", "landing"),
+    ],
+)
+def test_a_mission_says_what_follows(policy, found_in, state):
+    f = flying_in(found_in, on_damage=policy)
     f.companion.core.flight.motors.damage = Damage(3, 0.16, 0.995, False)
     f.step()
     assert f.state == state

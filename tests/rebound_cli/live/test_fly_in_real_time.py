@@ -14,7 +14,7 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.json.parameters import as_parameter_file
 from tests.rebound_cli import command
-from tests.rebound_cli.command import SQUARE, WALL, assert_comes_again, run_here, start, wait_for_event, wait_until_gone
+from tests.rebound_cli.command import SQUARE, WALL, assert_comes_again, run_here, start, wait_for_event
 from tests.sim_vehicle.hil.test_hil_tcp import Px4Client
 
 pytestmark = pytest.mark.realtime
@@ -35,7 +35,7 @@ def test_a_short_flight_beside_the_simulated_vehicle(tmp_path):
         assert 0.9 < summary["realtime_factor"] < 1.1
         assert (folder / "report.html").read_text(encoding="utf-8").rstrip().endswith("</html>")
         assert (folder / "truth.npz").exists()
-        wait_until_gone(folder)
+        command.wait_until_there(folder, False)
         # And each can be decided again
         assert_comes_again(folder)
 
@@ -56,7 +56,7 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path):
     # Then the program ends at once, and says what that means
     assert process.returncode == 130
     assert len(stderr.strip().splitlines()) == 1 and "ended at once" in stderr
-    wait_until_gone(folder)
+    command.wait_until_there(folder, False)
 
 
 def test_version():
@@ -126,7 +126,7 @@ def test_ctrl_c_while_waiting_for_px4_ends_everything(tmp_path):
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
     assert process.returncode == 1
-    wait_until_gone(folder)
+    command.wait_until_there(folder, False)
 
 
 @pytest.mark.parametrize(
