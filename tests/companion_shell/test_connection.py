@@ -65,7 +65,7 @@ def test_a_vehicle_that_moved_is_heard_and_answered_within_a_second():
         # Then it is answered there within the second, and told once
         assert heard_us is not None and heard_us <= 1_000_000
         assert (peer.answered, peer.moves) == (moved, 1)
-        assert f"{moved[0]}:{moved[1]}" in peer.news()
+        assert f"now sends from {moved[0]}:{moved[1]}" in peer.news()
 
 
 def test_who_fills_a_gap_of_the_vehicles_loses_its_place_to_it():

@@ -83,16 +83,6 @@ def test_the_programs_own_heartbeats_and_time_questions_have_none_of_the_guards_
     assert "COMMAND_LONG" in sent and not sent & {"HEARTBEAT", "TIMESYNC"}
 
 
-def test_a_program_that_commands_a_mode_while_the_guard_holds_has_its_way():
-    air = holding()
-    air.run_for(0.2)
-    # So has one that flies another vehicle by the same MAVSDK
-    assert air.guard.lets_pass(setpoint(system_id=2)) and not air.guard.lets_pass(setpoint())
-    air.set_mode(HOLD)
-    air.run_to(State.STOOD_DOWN, 1.0)
-    assert air.mode == AUTO_LOITER
-
-
 def test_the_guard_makes_way_for_a_programs_setpoints_before_its_offboard_and_after_they_end():
     """Both streams together would have the vehicle stop and go; the guard's alone would keep it in the OFFBOARD of a
     program that has died."""
@@ -112,11 +102,17 @@ def test_the_guard_makes_way_for_a_programs_setpoints_before_its_offboard_and_af
 # --- the gate
 
 
-def test_the_gate_knows_its_own_by_content_and_each_but_once():
+def test_the_gate_keeps_out_a_programs_setpoints_for_this_vehicle_and_nothing_else():
     air = holding()
+    # Its own it knows by their content, each but once
     own = [packet for sender, packet in air.outgoing if sender == "guard" and message_id_of(packet) in SETPOINT_IDS]
     assert own and not air.guard.lets_pass(setpoint())
     assert [air.guard.lets_pass(own[0]) for _ in range(2)] == [True, False]
+    # One that flies another vehicle by the same MAVSDK, and one that commands a mode, has its way
+    assert air.guard.lets_pass(setpoint(system_id=2))
+    air.set_mode(HOLD)
+    air.run_to(State.STOOD_DOWN, 1.0)
+    assert air.mode == AUTO_LOITER
 
 
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():

@@ -286,10 +286,6 @@ def test_a_guard_meets_a_copter_and_hears_its_sticks_as_pulses():
     assert [message.param2 for _, message in vehicle.commands if message.command == AUX_FUNCTION] == [0.0]
 
 
-def test_a_guard_refuses_a_copter_that_is_too_old():
-    assert guarded(FakeCopter(flight_version=OLD), lambda _: False).core.machine.outcome == TOO_OLD
-
-
 def test_a_switch_that_is_not_answered_is_set_again():
     vehicle = FakeCopter(ack=lambda command, count: [] if command == AUX_FUNCTION and count < 3 else [0])
     guarded(vehicle, lambda guard: guard.status().state == "standing by" and vehicle.time_us > 4_000_000)

@@ -165,13 +165,6 @@ def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
         assert "no way round what is known" in report.reason and f.vehicle.mode == LOITER
 
 
-def test_a_wall_known_beforehand_is_not_touched():
-    known = [{"touches_ned_m": [[3.2, -1.9, -1.5], [3.2, 1.9, -1.5]], "normal_ned": [-1, 0, 0]}]
-    f = in_room(INTO_WALL, on_collision=ROUND, obstacles={"known": known})
-    report = f.run_to_end(60)
-    assert report.collisions == () and report.unreachable == ("2",)
-
-
 def test_a_way_home_that_is_cut_off_ends_where_it_is():
     known = [{"touches_ned_m": [[1.0, -1.9, -1.5], [1.0, 1.9, -1.5]], "normal_ned": [1, 0, 0]}]
     beside = {"go_to": {"position_ned_m": [2, 0, -1.5], "speed_m_s": 2.0}}

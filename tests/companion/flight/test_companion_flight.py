@@ -17,7 +17,6 @@ from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 from companion.guard import states as guard_states
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
-from companion.reflex import reflex
 from companion.report import Event
 from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight, flying_in, hovering, strike
@@ -240,15 +239,6 @@ def test_whatever_breaks_in_the_air_hands_the_vehicle_over_by_setpoints_that_are
     for _, sent in f.setpoints_since(broken_at_us):
         assert math.isfinite(sent.x) and math.isnan(sent.vx) and math.isnan(sent.afx)
         assert math.dist((sent.x, sent.y, sent.z), (safe.x, safe.y, safe.z)) < 0.1, "where the last good one was"
-
-
-def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
-    f = flight(confirmed=False)
-    f.run_until(f.companion.plan_is_ready)
-    commands = len(f.vehicle.commands)
-    monkeypatch.setattr(reflex, "advance", breaks)
-    assert f.run_to_end(1.0).outcome == "failed"
-    assert len(f.vehicle.commands) == commands and f.vehicle.setpoints == []
 
 
 def test_when_even_the_hand_over_breaks_silence_leaves_the_vehicle_to_its_failsafe(monkeypatch):

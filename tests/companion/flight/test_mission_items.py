@@ -83,16 +83,6 @@ def test_turning_on_the_spot():
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.01)
 
 
-def test_waiting_for_a_file():
-    f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LANDING])
-    f.run_to("mission")
-    f.run_for(5.0)
-    assert f.companion.file_awaited == "go" and f.state == "mission"
-    f.companion.file_is_there()
-    assert f.companion.file_awaited is None
-    f.run_to("landing", 0.1)
-
-
 def test_whoever_is_pushed_is_not_steady():
     f = flight(items=[TAKEOFF, {"wait_for": {"steady": {"for_s": 1.0}}}, LANDING])
     f.run_until(lambda: f.state == "mission" and abs(f.vehicle.velocity[2]) < 0.05)

@@ -205,12 +205,6 @@ def test_a_log_of_anybodys_has_a_page_too():
     assert data["tables"]["imu"]["rows"] > 2000 and data["modes"][0][1] == "OFFBOARD"
 
 
-def test_a_healthy_flight_is_told_by_its_closest_call():
-    shown = of_a_log(flight(hit_us=None))
-    (moment,) = moments_of(shown)
-    assert moment.kind == "closest" and content(shown)["sentence"].startswith("No hit; ")
-
-
 def test_a_hit_between_the_samples_is_told_by_the_velocity_that_shows_it():
     # Given a vehicle that a contact between two samples has slowed from 1 to 0.4 m/s
     log, level, chance, heard = flight(hit_us=None), (1.0, 0.0, 0.0, 0.0), random.Random(1), []

@@ -55,17 +55,6 @@ def test_a_run_folder_can_be_flown_again_to_the_byte(wall_flight, tmp_path):
     assert (tmp_path / "again" / "flight.tlog").read_bytes() == (folder / "flight.tlog").read_bytes()
 
 
-def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
-    result = run_here("fly", WALL, "--lockstep", "--airframe", "rigid", "--seed", "2", "--out", tmp_path / "run")
-    assert result.stderr == ""
-    assert "detection" in result.stdout and "Hit a wall at 1.9" in result.stdout and "landed safely" in result.stdout
-    assert "rigid airframe, seed 2" in result.stdout and str(tmp_path / "run") in result.stdout
-    resolved = yaml.safe_load((tmp_path / "run/resolved.yaml").read_text())
-    assert resolved["companion"]["estimate"]["guards"]["centre_m"] == 0.145 and resolved["sim"]["seed"] == 2
-    # And nobody says what the rigid frame bears
-    assert "not known" not in result.stdout and "broken" not in result.stdout
-
-
 def test_a_mission_is_flown_over_a_line_that_loses_every_seventh_packet(tmp_path):
     lossy = ("--set", "sim.faults=[{kind: wire, at_s: 0, loss: 0.15}]")
     flown = run_here("fly", SQUARE, "--lockstep", *HOP, *lossy, "--json", "--out", tmp_path / "run")
