@@ -36,7 +36,8 @@ def test_a_dask_scheduler_s_workers_fly_as_this_machine_s_cores_do(tmp_path):
         done = run_here(*words, cluster.scheduler_address)
     assert done.returncode == 0, done.stderr
     # Then each flight is as this process flies it
-    assert run_here("fly", "wall", "--lockstep", "--seed", "2", "--out", tmp_path / "here").returncode == 0
+    flown = run_here("fly", "wall", "--lockstep", "--seed", "2", "--out", tmp_path / "here")
+    assert flown.returncode == 0 and "foldable airframe, seed 2" in flown.stdout
     there, here = (tmp_path / run / "flight.tlog" for run in ("there/as-written-seed-2", "here"))
     assert there.read_bytes() == here.read_bytes()
 
