@@ -236,10 +236,7 @@ def watch_all(
                 found.append(Found(step.time_boot_us, estimate, estimate))
             else:
                 touches.append(estimate)
-        for final in seen.finished:
-            for entry in found:
-                if entry.first.impact is final.impact:
-                    entry.final = final
-    if found and monitor.estimator.estimate is not None and monitor.estimator.estimate.impact is found[-1].first.impact:
-        found[-1].final = monitor.estimator.estimate
+        latest = monitor.estimator.estimate
+        if found and latest is not None and latest.impact is found[-1].first.impact:
+            found[-1].final = latest
     return found, touches

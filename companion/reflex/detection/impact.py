@@ -172,12 +172,11 @@ class ImpactEstimator:
         )
         return estimate
 
-    def follow(self, estimate: ImpactEstimate, sample: ImuSample, state: DetectorState) -> ImpactEstimate | None:
-        """Take each IMU sample while the latest estimate is not final, and the detector's state after it.
-
-        Returns the final estimate, once: when the contact is over.
-        """
-        contact, is_over = self.contact, state.phase is not Phase.CONTACT
+    def follow(self, sample: ImuSample, state: DetectorState) -> None:
+        """Take an IMU sample and the detector's state after it; the estimate is final when the contact is over."""
+        estimate, contact, is_over = self.estimate, self.contact, state.phase is not Phase.CONTACT
+        if estimate is None or estimate.is_final:
+            return
         if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
             contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
             estimate = self._refined(estimate, contact)
@@ -189,7 +188,6 @@ class ImpactEstimator:
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)
-        return self.estimate if is_over else None
 
     def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
         begun_us, error_us = estimate.time_boot_us, estimate.time_error_us

@@ -93,14 +93,13 @@ class CollisionMonitor:
 
 
 class MonitorResult(NamedTuple):
-    """Result of one step: impacts at their first sample, final estimates of contacts that have ended, notices."""
+    """Result of one step: impacts at their first sample, and notices. The estimator refines the latest impact."""
 
     impacts: Sequence[ImpactEstimate]
-    finished: Sequence[ImpactEstimate]
     notices: Sequence[Notice]
 
 
-NOTHING_SEEN = MonitorResult((), (), ())
+NOTHING_SEEN = MonitorResult((), ())
 
 
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
@@ -115,7 +114,6 @@ def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonit
 def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Situation, now_us: int) -> MonitorResult:
     """Take the samples received since the last call, in order. Call it without samples, too: that shows a silence."""
     impacts: list[ImpactEstimate] = []
-    finished: list[ImpactEstimate] = []
     imu_samples, is_on, sight, estimator = 0, situation.off_reason is None, monitor.config.sight, monitor.estimator
     if is_on and monitor.state.threshold_m_s2 > sight.max_threshold_m_s2:
         situation = situation._replace(off_reason=_vibration(monitor.state))
@@ -145,15 +143,13 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         monitor.state, impact = monitor.detector.step(monitor.state, sample, situation, estimator)
         if impact is not None:
             impacts.append(estimator.begin(impact))
-        elif type(sample) is ImuSample and estimator.estimate is not None and not estimator.estimate.is_final:
-            final = estimator.follow(estimator.estimate, sample, monitor.state)
-            if final is not None:
-                finished.append(final)
+        elif type(sample) is ImuSample:
+            estimator.follow(sample, monitor.state)
     monitor.stream_health.imu(imu_samples, sight, now_us)
     if now_us - monitor.promised_us >= 1e6:
         _promise(monitor, now_us)
     notices = _notices(monitor, is_on, now_us)
-    return MonitorResult(impacts, finished, notices) if impacts or finished or notices else NOTHING_SEEN
+    return MonitorResult(impacts, notices) if impacts or notices else NOTHING_SEEN
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:

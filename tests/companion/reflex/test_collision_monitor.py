@@ -33,11 +33,10 @@ INTERVAL_US = 4_000
 
 @dataclass
 class Watch:
-    """`impacts`, `finished` and `notices`: of all that has been heard, the last with its time."""
+    """`impacts` and `told`: of all that has been heard, notices with their times."""
 
     config: CompanionConfig = field(default_factory=CompanionConfig)
     impacts: list = field(default_factory=list)
-    finished: list = field(default_factory=list)
     told: list[tuple[int, str, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -71,7 +70,6 @@ class Watch:
                 samples += [] if wxyz is None else [Attitude(t, wxyz, rates(t))]
             seen = advance(self.monitor, samples, situation, t)
             self.impacts += seen.impacts
-            self.finished += seen.finished
             self.told += [(t, notice.kind, notice.text) for notice in seen.notices]
             look(t)
         return self
@@ -155,7 +153,8 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():
         velocity=lambda t: (1.5 - 30e-6 * pushed_us(t), 0.0, 0.0),
         place=lambda t: (1.5e-6 * t, 0.0, -3.0),
     )
-    (final,) = watch.finished
+    final = watch.monitor.estimator.estimate
+    assert len(watch.impacts) == 1 and final.is_final
     assert final.impact.kind is ImpactKind.WALL
     assert abs(final.time_boot_us - hit_us) < 2_000
     assert final.velocity_ned_m_s == pytest.approx((1.5, 0.0, 0.0), abs=0.03)
