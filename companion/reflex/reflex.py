@@ -153,6 +153,7 @@ class Reflex:
             contact=contact,
             peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
             estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second, fits_models),
+            source=self.monitor.estimator,
         )
         if before is None and self._is_attitude_heard:
             reported_wxyz = self.monitor.estimator.strapdown.attitude_wxyz
@@ -164,8 +165,7 @@ class Reflex:
             for each in earlier
             if each.contact.time_boot_us < contact.time_boot_us
         ]
-        places = self.monitor.estimator.history
-        self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, places, self.keeps_trim)
+        self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, self.keeps_trim)
         self.hits.append(record)
         return record
 
@@ -186,7 +186,7 @@ class Reflex:
         """Take the samples of the step for the motion after the newest hit, and for what shows a crash."""
         if (newest := self.newest) is not None:
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
-            newest.follow(self.monitor.state, self.monitor.estimator, positions)
+            newest.follow(self.monitor.state, positions)
             validity, estimator = self.monitor.estimator.validity, newest.estimator
             if validity.invalid_since_boot_us is not None:
                 is_newest = validity.invalid_since_boot_us == estimator.hit_boot_us

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
-from companion.motion.history import MotionHistory
-from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, minus, split, unit
 from companion.reflex.config import DECIDED_US, FADED_US
 from companion.reflex.detection.confirmation import Hypothesis
@@ -55,8 +53,8 @@ class CollisionRecord:
     contact: Contact
     peak_specific_force_m_s2: float
     estimator: MotionEstimator
+    source: ImpactEstimator
     setpoint_ned_m: Vector3 = ZERO  # where to rest, as its recovery has it now
-    fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
     settled_after_s: float | None = None  # from its first sample to the beginning of its rest
     is_over: bool = False  # settled, or given up on
@@ -72,9 +70,9 @@ class CollisionRecord:
             normal = with_change(normal, before_m_s, after_m_s, estimator.after_error_m_s)
         return level(normal)
 
-    def follow(self, state: DetectorState, source: ImpactEstimator, positions: Sequence[LocalPosition]) -> None:
+    def follow(self, state: DetectorState, positions: Sequence[LocalPosition]) -> None:
         """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
-        strapdown, estimate, self.fixes = source.strapdown, source.estimate, source.strapdown.fixes
+        strapdown, estimate = self.source.strapdown, self.source.estimate
         # In these phases the state still describes the contact.
         is_in_contact = state.phase in (Phase.CONTACT, Phase.ARMED)
         # A velocity that shows it may have come before the sample of the same time.
@@ -89,18 +87,18 @@ class CollisionRecord:
                 estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal, estimate.impulse_m_s
             )
         self.estimator.imu(strapdown)
-        self.estimator.measure(source.doppler)
+        self.estimator.measure(self.source.doppler)
         is_left = strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US or self.estimator.is_measured_apart
         if self.is_over and is_left:
             for sample in positions:
                 self.estimator.update(sample)
 
-    def is_rejected(self, now_boot_us: int, places: MotionHistory) -> bool:
+    def is_rejected(self, now_boot_us: int) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
         if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
-        hypothesis, self.hypothesis = self.hypothesis, None
-        return hypothesis.is_rejected(self.fixes, places, self.estimator.config.position_noise_m)
+        hypothesis, source, self.hypothesis = self.hypothesis, self.source, None
+        return hypothesis.is_rejected(source.strapdown.fixes, source.history, source.config.position_noise_m)
 
     def is_rebound(self, time_boot_us: int) -> bool:
         """Whether a velocity, which may be late, shows the rebound. Later the vehicle's own controller makes it."""

@@ -10,7 +10,6 @@ from typing import NamedTuple, Protocol
 
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import SettledConfig
-from companion.motion.history import MotionHistory
 from companion.motion.settling import Lasting, SettlingMonitor
 from companion.motion.vector import along, minus, plus, split
 from companion.reflex import config as reflex
@@ -47,7 +46,7 @@ class Progress(NamedTuple):
 
 
 class Recovery:
-    """Changed only by `take`. `earlier`: the surfaces hit before in the same recovery; `places`: the vehicle's own."""
+    """Changed only by `take`. `earlier`: the surfaces hit before in the same recovery."""
 
     def __init__(
         self,
@@ -57,12 +56,10 @@ class Recovery:
         settled: SettledConfig,
         room: Room,
         earlier: Sequence[Surface],
-        places: MotionHistory,
         keeps_trim: bool = False,
     ) -> None:
         self.record, self.law, self.leans = record, law, law.leans
-        self._config, self._settled, self._room = config, settled, room
-        self._earlier, self._places = earlier, places
+        self._config, self._settled, self._room, self._earlier = config, settled, room, earlier
         # Where a tilt that still brakes would be kept, none is left by then.
         self.rests_s = settled.duration_s if keeps_trim else reflex.RESTS_S
         self._contact = record.contact  # as known now, at the vehicle's place while the obstacle goes along
@@ -82,7 +79,7 @@ class Recovery:
     def take(self, sample: LocalPosition) -> Progress:
         """One position that the vehicle reports."""
         record = self.record
-        is_rejected = record.is_rejected(sample.time_boot_us, self._places)
+        is_rejected = record.is_rejected(sample.time_boot_us)
         record.estimator.update(sample)
         self._touch(sample)
         rested_s = rebound_m_s = None

@@ -41,7 +41,8 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         contact = Contact(HIT_US, AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
-    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator))
+    source = reflex.monitor.estimator
+    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator, source))
     return flight
 
 
@@ -55,9 +56,9 @@ def test_what_is_left_of_one_hit_says_nothing_of_what_came_after_it():
 
 
 def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
-    reflex, mission, places = flight.reflex, flight.mission, flight.vehicle.history
+    reflex, mission = flight.reflex, flight.mission
     how = reflex.law, mission.recovery, mission.companion.settled
-    reflex.recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, places, reflex.keeps_trim)
+    reflex.recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, reflex.keeps_trim)
     return Recover(flight, reflex.recovery)
 
 
