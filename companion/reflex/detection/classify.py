@@ -26,14 +26,24 @@ def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
 class Touch:
     """What is known of a contact when it is noticed. Local NED, SI.
 
-    `upward` is the sine of the force's elevation; `sinking_m_s` is by the reported heights.
+    `sinking_m_s` is by the reported heights. The force's direction counts; its size has no influence.
     """
 
-    upward: float
+    force_ned: Vector3
     velocity_ned_m_s: Vector3 | None
     attitude_wxyz: Quaternion
     situation: Situation
     sinking_m_s: float | None = None
+
+    @property
+    def kind(self) -> ImpactKind:
+        return next(row.kind for row in TABLE if row.applies(self))
+
+    @property
+    def upward(self) -> float:
+        """Sine of the force's elevation."""
+        size = math.hypot(*self.force_ned)
+        return -self.force_ned[2] / size if size > 0.0 else 0.0
 
     @property
     def near_ground(self) -> bool:
@@ -130,20 +140,6 @@ TABLE = (
 )
 
 
-def kind_of(
-    force_ned: Vector3,
-    velocity_ned_m_s: Vector3 | None,
-    attitude_wxyz: Quaternion,
-    situation: Situation,
-    sinking_m_s: float | None = None,
-) -> ImpactKind:
-    """The kind by direction, motion and situation; the size of the force has no influence."""
-    size = math.hypot(*force_ned)
-    upward = -force_ned[2] / size if size > 0.0 else 0.0
-    touch = Touch(upward, velocity_ned_m_s, attitude_wxyz, situation, sinking_m_s)
-    return next(row.kind for row in TABLE if row.applies(touch))
-
-
 def classified(impact: Impact, velocity_ned_m_s: Vector3 | None, situation: Situation, motion: Motion) -> Impact:
     """The impact with its kind where that is unknown. `velocity_ned_m_s` is the newest."""
     if impact.kind is not ImpactKind.UNKNOWN:
@@ -155,8 +151,8 @@ def classified(impact: Impact, velocity_ned_m_s: Vector3 | None, situation: Situ
     if before is not None:
         velocity, until_us = before.velocity_ned_m_s, before.time_boot_us
     force_ned = body_to_ned(attitude, impact.specific_force_frd_m_s2)
-    kind = kind_of(force_ned, velocity, attitude, situation, _sinking_m_s(motion.history, until_us))
-    return replace(impact, kind=kind)
+    touch = Touch(force_ned, velocity, attitude, situation, _sinking_m_s(motion.history, until_us))
+    return replace(impact, kind=touch.kind)
 
 
 def _sinking_m_s(history: MotionHistory, time_boot_us: int) -> float | None:

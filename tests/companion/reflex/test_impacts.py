@@ -7,7 +7,7 @@ import pytest
 from companion.messages import ImuSample, LocalPosition, Odometry
 from companion.motion.strapdown import LEVEL, VelocityFix
 from companion.reflex.config import CHANGE_RAD, GROUND_M, IMPULSE_RAD, EstimateConfig
-from companion.reflex.detection.classify import FASTEST_LANDING_M_S, classified, kind_of
+from companion.reflex.detection.classify import FASTEST_LANDING_M_S, Touch, classified
 from companion.reflex.detection.detector import Impact, ImpactKind, Situation
 from companion.reflex.detection.impact import ContactForce, ImpactEstimator
 from companion.reflex.surface import Normal, normal_of, with_change
@@ -156,7 +156,7 @@ def kind(
 ):
     situation = Situation(may_crash=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
     tilted = (math.cos(math.radians(tilt_deg / 2.0)), math.sin(math.radians(tilt_deg / 2.0)), 0.0, 0.0)
-    return kind_of(force, velocity, tilted, situation._replace(has_climbed=has_climbed), sinking_m_s)
+    return Touch(force, velocity, tilted, situation._replace(has_climbed=has_climbed), sinking_m_s).kind
 
 
 def sinking(speed_m_s):
