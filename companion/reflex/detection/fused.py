@@ -87,7 +87,6 @@ class FusedState(DetectorState):
     last_frd_m_s2: Vector3 = ZERO
     before_frd_m_s2: Vector3 = ZERO
     """Of the sample before the last."""
-    before_boot_us: int = 0
     before_threshold_m_s2: float = 0.0
     """Before the last sample was learnt: it may be a hit's first."""
 
@@ -153,10 +152,8 @@ class FusedDetector:
         self, state: FusedState, sample: Sample, situation: Situation, motion: Motion
     ) -> tuple[FusedState, Impact | None]:
         if type(sample) is ImuSample:
-            before_us = state.last_sample_boot_us
             impact = self._imu(state, sample, situation, motion)
-            state.before_boot_us, state.before_frd_m_s2 = before_us, state.last_frd_m_s2
-            state.last_frd_m_s2 = sample.specific_force_frd_m_s2
+            state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, sample.specific_force_frd_m_s2
             return state, impact
         if isinstance(sample, (LocalPosition, Odometry)):
             return state, self._velocity(state, sample, situation, motion)
@@ -172,11 +169,11 @@ class FusedDetector:
         if off is None and situation.landed_state is LandedState.ON_GROUND:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
-        s.last_sample_boot_us = now_us
+        earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
         s.turn.imu(before_us, now_us, w, config)
         side, thresholds, is_of_two = s.side_force(config, f)
         if is_of_two:
-            free_until_us = s.before_boot_us
+            free_until_us = earlier_us
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
         s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
         s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
@@ -191,7 +188,7 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            return self._turned(s, now_us, situation, motion) if s.turn.value > s.turn.limit else None
+            return self._turned(s, earlier_us, situation, motion) if s.turn.value > s.turn.limit else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         x, y, z = s.floor.mean_frd_m_s2
         force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
@@ -207,9 +204,9 @@ class FusedDetector:
             return None if is_learnt else self._unwatched(s, situation, motion, impact)
         return self._loud(s, situation, motion, impact, s.jumps(f))
 
-    def _turned(self, s: FusedState, now_us: int, situation: Situation, motion: Motion) -> Impact | None:
+    def _turned(self, s: FusedState, free_until_us: int, situation: Situation, motion: Motion) -> Impact | None:
         """What turned a vehicle that flew somewhere pushed it back: where to, only its velocity before says."""
-        free_until_us = s.before_boot_us
+        now_us = s.last_sample_boot_us
         before = motion.history.before(free_until_us + 1) if motion.validity.is_known else None
         is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
         if s.phase is not Phase.ARMED or is_again or before is None:
