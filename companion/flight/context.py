@@ -37,7 +37,7 @@ from companion.motion.vector import ZERO, minus, plus
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
 from companion.reflex.recovery.collision import CollisionRecord
-from companion.reflex.reflex import Reflex, start_reflex
+from companion.reflex.reflex import Reflex
 from companion.report import Event, ExpectationReport, JsonValue, Outcome
 
 # As the autopilot's own modes turn: the vehicle can follow.
@@ -183,7 +183,7 @@ class FlightContext:
 
     def __post_init__(self) -> None:
         config = self.mission.companion
-        self.reflex = start_reflex(config, self.mission.recovery, config.settled, 0)
+        self.reflex = Reflex(config, self.mission.recovery, config.settled)
         self.streams = StreamMonitor(config.streams, tuple(self.reflex.monitor.detector.losses))
         self.speeds = SpeedLimits.of(config.flight, self.mission.limits.max_speed_m_s)
         self.steps = steps_to_fly(self.mission)

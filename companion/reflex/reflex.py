@@ -23,7 +23,7 @@ from companion.reflex.detection.free_flight import ThrustGain
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.detection.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
 from companion.reflex.detection.sustained_force import SustainedForceMonitor
-from companion.reflex.recovery.attitude_law import Lean
+from companion.reflex.recovery.attitude_law import Lean, wanted
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact, Law
 from companion.reflex.recovery.motion_estimator import MotionEstimator
@@ -58,7 +58,7 @@ class Reflex:
     config: CollisionMonitorConfig
     law_config: RecoveryConfig
     settled: SettledConfig
-    monitor: CollisionMonitor
+    monitor: CollisionMonitor = field(init=False)
     hits: list[CollisionRecord] = field(default_factory=list)
     earlier_hits: int = 0  # before the vehicle restarted
     recovery: Recovery | None = None  # of the newest
@@ -66,6 +66,9 @@ class Reflex:
     keeps_trim: bool = False  # see interface.Autopilot
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     crash: CrashWatch = field(default_factory=CrashWatch)
+
+    def __post_init__(self) -> None:
+        self.monitor = start_monitor(self.config, 0)
 
     # --- what was touched
 
@@ -179,8 +182,11 @@ class Reflex:
 
         What PX4 holds goes on while it turns its thrust.
         """
-        assert self.recovery is not None and self.loss_s is not None, "only a known one lets it lean"
-        return self.recovery.lean(self.thrust.full_m_s2, self.loss_s + numbers.NOTICED_S + numbers.LEAD_S)
+        recovery = self.recovery
+        assert recovery is not None and self.loss_s is not None, "only a known one lets it lean"
+        belief, held_s = recovery.record.estimator.belief, self.loss_s + numbers.NOTICED_S + numbers.LEAD_S
+        acceleration = wanted(belief, recovery.surfaces, recovery.record.setpoint_ned_m[2])
+        return acceleration, Lean(belief, recovery.surfaces, self.thrust.full_m_s2, held_s)
 
     def follow(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """Take the samples of the step for the motion after the newest hit, and for what shows a crash."""
@@ -269,13 +275,6 @@ class Reflex:
     @property
     def _is_attitude_heard(self) -> bool:
         return self.monitor.gate.latest is not None
-
-
-def start_reflex(
-    config: CollisionMonitorConfig, law_config: RecoveryConfig, settled: SettledConfig, now_us: int
-) -> Reflex:
-    """A reflex before its first sample; `now_us` is on the clock of `step`."""
-    return Reflex(config, law_config, settled, start_monitor(config, now_us))
 
 
 def _held_notice(held: ImpactEstimate) -> Notice:

@@ -14,7 +14,7 @@ from companion.motion.settling import Lasting, SettlingMonitor
 from companion.motion.vector import along, minus, plus, split
 from companion.reflex import config as reflex
 from companion.reflex.config import RecoveryConfig
-from companion.reflex.recovery.attitude_law import Lean, brakable_m_s, wanted
+from companion.reflex.recovery.attitude_law import brakable_m_s
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import Contact, Law, MotionState
 from companion.reflex.surface import Surface, projected
@@ -63,18 +63,12 @@ class Recovery:
         # Where a tilt that still brakes would be kept, none is left by then.
         self.rests_s = settled.duration_s if keeps_trim else reflex.RESTS_S
         self._contact = record.contact  # as known now, at the vehicle's place while the obstacle goes along
-        self._surfaces = self._around(self._contact)
+        self.surfaces = self._around(self._contact)
         record.setpoint_ned_m = self._told_ned_m = self._goal(record.estimator.start)
         self._has_left = self._has_passed = False
         self._slow = Lasting()
         self._held_since_us = record.sample_time_boot_us  # by a position
         self._monitor = SettlingMonitor(settled)
-
-    def lean(self, full_m_s2: float, held_s: float) -> tuple[Vector3, Lean]:
-        """The acceleration wanted now, local NED, and what makes attitude and thrust of it."""
-        belief = self.record.estimator.belief
-        acceleration = wanted(belief, self._surfaces, self.record.setpoint_ned_m[2])
-        return acceleration, Lean(belief, self._surfaces, full_m_s2, held_s)
 
     def take(self, sample: LocalPosition) -> Progress:
         """One position that the vehicle reports."""
@@ -93,7 +87,7 @@ class Recovery:
     @property
     def is_pressed(self) -> bool:
         """Whether the vehicle has not left what it hit, by the belief: a report may be off by more than a metre."""
-        off_m = self._surfaces[0].off_m(self.record.estimator.motion.position_ned_m)
+        off_m = self.surfaces[0].off_m(self.record.estimator.motion.position_ned_m)
         return not self._has_left and off_m < self._settled.distance_m
 
     @property
@@ -129,7 +123,7 @@ class Recovery:
     def _follow(self, sample: LocalPosition) -> tuple[float | None, float | None]:
         """Set the goal again by contact and motion; hand over to it once the vehicle rests."""
         record, state, rested_s = self.record, self._state(), None
-        self._surfaces = self._around(self._contact)
+        self.surfaces = self._around(self._contact)
         record.setpoint_ned_m = place = self._goal(state)
         if self.leans and self._rests(sample):
             self.leans, self._held_since_us, record.overshoot_m = False, sample.time_boot_us, 0.0
@@ -187,7 +181,7 @@ class Recovery:
         ceiling it says nothing.
         """
         goal, is_steep = self.law.goal_ned_m(self._config, self._contact, motion), self._contact.normal_ned[2] != 0.0
-        surfaces = self._surfaces if self.law.leans or is_steep else self._surfaces[1:]
+        surfaces = self.surfaces if self.law.leans or is_steep else self.surfaces[1:]
         goal = projected(goal, [(one.normal_ned, one.level_m) for one in surfaces])
         return self._room.inside(self._contact.position_ned_m, goal)
 

@@ -22,7 +22,7 @@ from companion.reflex.config import APPROACH_RAD, RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.detector import ImpactKind, Phase, Situation
 from companion.reflex.detection.monitor import advance, start_monitor
-from companion.reflex.reflex import start_reflex
+from companion.reflex.reflex import Reflex
 
 STILL = (0.0, 0.0, 0.0)
 IN_FLIGHT = Situation(may_crash=True, landed_state=LandedState.IN_AIR, height_m=3.0)
@@ -295,7 +295,7 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
     config, rejected = CompanionConfig(), []
     # Nothing else is known, and there is no fence
     room: Any = SimpleNamespace(surfaces=lambda contact: (), inside=lambda contact_ned_m, goal_ned_m: goal_ned_m)
-    reflex = start_reflex(config, RecoveryConfig(), config.settled, 0)
+    reflex = Reflex(config, RecoveryConfig(), config.settled)
     for us in range(INTERVAL_US, 3_600_000, INTERVAL_US):
         samples: list[Sample] = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
         if us % (5 * INTERVAL_US) == 0:
