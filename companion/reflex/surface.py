@@ -12,16 +12,7 @@ from dataclasses import dataclass
 from companion.messages import Vector3
 from companion.motion.config import SAME_M_S
 from companion.motion.vector import ZERO, along, minus, plus, unit
-from companion.reflex.config import (
-    APPROACH_M_S,
-    APPROACH_RAD,
-    CHANGE_RAD,
-    FROM_BEHIND,
-    IMPULSE_RAD,
-    ROUNDS,
-    STEEP,
-    UNKNOWN_RAD,
-)
+from companion.reflex import config as reflex
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +20,7 @@ class Normal:
     """Unit vector out of the obstacle, NED, and its standard deviation, rad; zero and `UNKNOWN_RAD` if unknown."""
 
     direction_ned: Vector3 = ZERO
-    error_rad: float = UNKNOWN_RAD
+    error_rad: float = reflex.UNKNOWN_RAD
 
     def with_direction(self, vector_ned: Vector3, error_rad: float) -> "Normal":
         """The normal after another vector of that direction; a zero vector changes nothing."""
@@ -44,12 +35,12 @@ class Normal:
 def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, is_hidden: bool = False) -> Normal:
     """The normal by the contact's impulse or force; where that shows none, or may be clipped unseen, by the velocity
     before it."""
-    normal, (n, e, d) = Normal().with_direction(impulse_ned, IMPULSE_RAD), velocity_ned_m_s
+    normal, (n, e, d) = Normal().with_direction(impulse_ned, reflex.IMPULSE_RAD), velocity_ned_m_s
     is_unclear = is_hidden or normal.direction_ned == ZERO
-    if not is_unclear or math.hypot(n, e, d) <= APPROACH_M_S:
+    if not is_unclear or math.hypot(n, e, d) <= reflex.APPROACH_M_S:
         return normal
-    back = Normal().with_direction((-n, -e, -d), APPROACH_RAD)
-    is_behind = along(normal.direction_ned, back.direction_ned) < FROM_BEHIND
+    back = Normal().with_direction((-n, -e, -d), reflex.APPROACH_RAD)
+    is_behind = along(normal.direction_ned, back.direction_ned) < reflex.FROM_BEHIND
     return normal if is_behind else back
 
 
@@ -58,13 +49,13 @@ def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3,
     change_m_s = minus(after_ned_m_s, before_ned_m_s)
     size_m_s = math.hypot(*change_m_s)
     error_rad = math.hypot(SAME_M_S, error_m_s) / max(size_m_s, 1e-6)
-    return normal.with_direction(change_m_s, math.hypot(CHANGE_RAD, error_rad))
+    return normal.with_direction(change_m_s, math.hypot(reflex.CHANGE_RAD, error_rad))
 
 
 def away_from(normal_ned: Vector3) -> Vector3:
     """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
     n, e, d = normal_ned
-    return unit((n, e, d if abs(d) > STEEP * math.hypot(n, e, d) else 0.0))
+    return unit((n, e, d if abs(d) > reflex.STEEP * math.hypot(n, e, d) else 0.0))
 
 
 def level(normal: Normal) -> Normal:
@@ -95,7 +86,7 @@ def projected(vector: Vector3, sides: Sequence[tuple[Vector3, float]]) -> Vector
 
     Of places, velocities and accelerations alike. It converges in a few rounds, or between facing surfaces never.
     """
-    for _ in range(ROUNDS):
+    for _ in range(reflex.ROUNDS):
         before = vector
         for normal, least in sides:
             short = least - along(vector, normal)

@@ -9,18 +9,7 @@ from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import tilt_rad
 from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, towards
-from companion.reflex.config import (
-    CARRIED_SHARE,
-    LIES_US,
-    LOW_M,
-    LOW_US,
-    LYING_SHARE,
-    RESTS_M_S,
-    STILL_M_S2,
-    STILL_RAD_S,
-    TIPPED_RAD,
-    TIPPED_US,
-)
+from companion.reflex import config as reflex
 
 
 @dataclass(slots=True)
@@ -36,33 +25,34 @@ class CrashWatch:
 
     @property
     def is_tipped(self) -> bool:
-        return self.tipped.lasts_us >= TIPPED_US
+        return self.tipped.lasts_us >= reflex.TIPPED_US
 
     @property
     def is_low(self) -> bool:
-        return self.low.lasts_us >= LOW_US
+        return self.low.lasts_us >= reflex.LOW_US
 
     @property
     def lies(self) -> bool:
-        return self.lying.lasts_us >= LIES_US
+        return self.lying.lasts_us >= reflex.LIES_US
 
     def update(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """`height_m`: above the arming position, None where it is not known."""
+        share = reflex.LYING_SHARE
         for sample in samples:
             match sample:
                 case ImuSample():
-                    self.force_frd_m_s2 = towards(self.force_frd_m_s2, sample.specific_force_frd_m_s2, LYING_SHARE)
-                    self.rates_frd_rad_s = towards(self.rates_frd_rad_s, sample.angular_velocity_frd_rad_s, LYING_SHARE)
+                    self.force_frd_m_s2 = towards(self.force_frd_m_s2, sample.specific_force_frd_m_s2, share)
+                    self.rates_frd_rad_s = towards(self.rates_frd_rad_s, sample.angular_velocity_frd_rad_s, share)
                 case Attitude():
-                    self.tipped.update(tilt_rad(sample.attitude_wxyz) > TIPPED_RAD, sample.time_boot_us)
+                    self.tipped.update(tilt_rad(sample.attitude_wxyz) > reflex.TIPPED_RAD, sample.time_boot_us)
                 case LocalPosition():
-                    self._rest(sample, height_m is not None and height_m < LOW_M, landed)
+                    self._rest(sample, height_m is not None and height_m < reflex.LOW_M, landed)
 
     def _rest(self, sample: LocalPosition, is_low: bool, landed: LandedState) -> None:
-        is_still = is_low and math.hypot(*sample.velocity_ned_m_s) < RESTS_M_S
+        is_still = is_low and math.hypot(*sample.velocity_ned_m_s) < reflex.RESTS_M_S
         self.low.update(is_still, sample.time_boot_us)
-        is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < STILL_M_S2
-        self.is_carried = is_weight and -self.force_frd_m_s2[2] < CARRIED_SHARE * GRAVITY_M_S2
-        turns = math.hypot(*self.rates_frd_rad_s) > STILL_RAD_S
+        is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < reflex.STILL_M_S2
+        self.is_carried = is_weight and -self.force_frd_m_s2[2] < reflex.CARRIED_SHARE * GRAVITY_M_S2
+        turns = math.hypot(*self.rates_frd_rad_s) > reflex.STILL_RAD_S
         lies = self.is_carried or landed is LandedState.ON_GROUND
         self.lying.update(is_still and lies and not turns, sample.time_boot_us)

@@ -6,15 +6,7 @@ from dataclasses import dataclass
 from companion.messages import Vector3
 from companion.motion.config import CURRENT_US
 from companion.motion.vector import ZERO
-from companion.reflex.config import (
-    EXCESS,
-    GAIN_MEMORY_S,
-    LEAST_FRACTION,
-    MARGIN,
-    MEAN_MEMORY_S,
-    SPREAD_MEMORY_S,
-    STRONGEST_M_S2,
-)
+from companion.reflex import config as reflex
 
 
 @dataclass(slots=True)
@@ -31,15 +23,15 @@ class ForceNoise:
         """Take one sample, ``step_s`` after the last; the first ones count as a plain mean."""
         if self.known_s <= 0.0:
             self.mean_frd_m_s2 = force_frd_m_s2
-        known_s = self.known_s = min(self.known_s + step_s, SPREAD_MEMORY_S)
-        mean_share, share = step_s / min(known_s, MEAN_MEMORY_S), step_s / known_s
+        known_s = self.known_s = min(self.known_s + step_s, reflex.SPREAD_MEMORY_S)
+        mean_share, share = step_s / min(known_s, reflex.MEAN_MEMORY_S), step_s / known_s
         (f_x, f_y, f_z), (m_x, m_y, m_z), (v_x, v_y, v_z) = force_frd_m_s2, self.mean_frd_m_s2, self.variance_m2_s4
         x, y, z = f_x - m_x, f_y - m_y, f_z - m_z
         v_x, v_y, v_z = v_x + share * (x * x - v_x), v_y + share * (y * y - v_y), v_z + share * (z * z - v_z)
         self.mean_frd_m_s2 = (m_x + mean_share * x, m_y + mean_share * y, m_z + mean_share * z)
         self.variance_m2_s4 = (v_x, v_y, v_z)
-        self.side_m_s2 = EXCESS * math.sqrt(max(v_x, v_y))
-        self.vertical_m_s2 = EXCESS * math.sqrt(v_z)
+        self.side_m_s2 = reflex.EXCESS * math.sqrt(max(v_x, v_y))
+        self.vertical_m_s2 = reflex.EXCESS * math.sqrt(v_z)
 
 
 @dataclass(slots=True)
@@ -53,7 +45,7 @@ class ThrustGain:
     fraction_boot_us: int = -CURRENT_US
     full_m_s2: float = 0.0
     known_s: float = 0.0
-    most_m_s2: float = STRONGEST_M_S2
+    most_m_s2: float = reflex.STRONGEST_M_S2
     """Largest upward specific force that thrust can explain."""
 
     def set_fraction(self, time_us: int, fraction: float) -> None:
@@ -61,11 +53,11 @@ class ThrustGain:
 
     def is_commanded(self, time_us: int) -> bool:
         """Whether the commanded thrust is valid, and large enough for a quotient."""
-        return self.fraction >= LEAST_FRACTION and time_us - self.fraction_boot_us <= CURRENT_US
+        return self.fraction >= reflex.LEAST_FRACTION and time_us - self.fraction_boot_us <= CURRENT_US
 
     @property
     def is_known(self) -> bool:
-        return self.known_s >= GAIN_MEMORY_S
+        return self.known_s >= reflex.GAIN_MEMORY_S
 
     def learn(self, time_us: int, thrust_m_s2: float, elapsed_s: float) -> None:
         """Take the specific force by thrust of one sample of a vehicle in free air.
@@ -73,10 +65,10 @@ class ThrustGain:
         Propellers push nothing down: a vehicle whose specific force points down lies on its back.
         """
         if self.is_commanded(time_us) and thrust_m_s2 > 0.0 and elapsed_s > 0.0:
-            self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
+            self.known_s = min(self.known_s + elapsed_s, reflex.GAIN_MEMORY_S)
             self.full_m_s2 += (thrust_m_s2 / self.fraction - self.full_m_s2) * elapsed_s / self.known_s
-            if self.known_s >= GAIN_MEMORY_S:
-                self.most_m_s2 = MARGIN * self.full_m_s2
+            if self.known_s >= reflex.GAIN_MEMORY_S:
+                self.most_m_s2 = reflex.MARGIN * self.full_m_s2
 
     def expected_m_s2(self, time_us: int, mean_m_s2: float) -> float:
         """Expected f_z in free air: from the commanded thrust, else its recent mean."""

@@ -33,16 +33,8 @@ from companion.messages import (
 from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
 from companion.motion.vector import ZERO, limited, minus, plus
-from companion.reflex.config import (
-    APPROACH_M_S,
-    CLEAR,
-    JUMP,
-    LEARNT_S,
-    MEAN_MEMORY_S,
-    SETTLED_US,
-    SHAKING,
-    FusedConfig,
-)
+from companion.reflex import config as reflex
+from companion.reflex.config import FusedConfig
 from companion.reflex.detection.classify import classified, hovers
 from companion.reflex.detection.detector import (
     ON_THE_GROUND,
@@ -95,7 +87,7 @@ class FusedState(DetectorState):
         speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
         p, q, r = rates_frd_rad_s
         turning_rad_s = abs(p) + abs(q) + abs(r)
-        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, MEAN_MEMORY_S * turning_rad_s)
+        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, reflex.MEAN_MEMORY_S * turning_rad_s)
 
     def side_force(self, config: FusedConfig, force_frd_m_s2: Vector3) -> tuple[float, float, bool]:
         """Horizontal force, m/s^2; how many thresholds are a hit; whether it is that of two samples together.
@@ -104,10 +96,10 @@ class FusedState(DetectorState):
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
         alone = math.dist(force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2])
-        if self.phase is not Phase.ARMED or self.threshold_m_s2 <= SHAKING * config.side_threshold_m_s2:
+        if self.phase is not Phase.ARMED or self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
             return alone, 1.0, False
         together, of_two = self._together_m_s2(force_frd_m_s2), self.before_threshold_m_s2 / self.threshold_m_s2
-        return (together, of_two, True) if together / of_two > alone / CLEAR else (alone, CLEAR, False)
+        return (together, of_two, True) if together / of_two > alone / reflex.CLEAR else (alone, reflex.CLEAR, False)
 
     def _together_m_s2(self, force_frd_m_s2: Vector3) -> float:
         """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
@@ -121,12 +113,12 @@ class FusedState(DetectorState):
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""
-        is_slow = math.hypot(*self.velocity_ned_m_s or ZERO) < APPROACH_M_S
+        is_slow = math.hypot(*self.velocity_ned_m_s or ZERO) < reflex.APPROACH_M_S
         return is_slow and self.hovered_boot_us is not None and time_us - self.hovered_boot_us < CURRENT_US
 
     def jumps(self, force_frd_m_s2: Vector3) -> bool:
         """Whether the force changed over one sample, or over two, by more than a hand's does."""
-        least_m_s2 = JUMP * self.threshold_m_s2
+        least_m_s2 = reflex.JUMP * self.threshold_m_s2
         return any(math.dist(force_frd_m_s2, f) >= least_m_s2 for f in (self.last_frd_m_s2, self.before_frd_m_s2))
 
 
@@ -181,11 +173,12 @@ class FusedDetector:
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
-            s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
+            s.phase = Phase.QUIET
+            s.last_loud_boot_us = now_us + (reflex.SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
         if ratio < 1.0:
             s.observed = None
             self._learn(s, f, before_us)
-            is_quiet = s.floor.known_s >= LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
+            is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
             return self._turned(s, earlier_us, situation, motion) if s.turn.value > s.turn.limit else None
@@ -211,7 +204,7 @@ class FusedDetector:
         is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
         if s.phase is not Phase.ARMED or is_again or before is None:
             return None
-        if math.hypot(*before.velocity_ned_m_s) < APPROACH_M_S:
+        if math.hypot(*before.velocity_ned_m_s) < reflex.APPROACH_M_S:
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
         force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.value / s.turn.limit)

@@ -15,16 +15,7 @@ from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.vector import ZERO, minus, plus, split, towards, unit
-from companion.reflex.config import (
-    FOLLOWED_S,
-    FREE_M_S,
-    HELD_M_S2,
-    IMPULSE_RAD,
-    LEAD_S,
-    PLACE_SPREAD_M,
-    SMOOTHING_S,
-    STEADY_M_S,
-)
+from companion.reflex import config as reflex
 from companion.reflex.detection.detector import Impact, ImpactKind
 from companion.reflex.detection.free_flight import ThrustGain
 from companion.reflex.detection.impact import ImpactEstimate
@@ -66,7 +57,7 @@ class SustainedForceMonitor:
         """
         is_first, now_us, elapsed_s = self.time_us == 0, sample.time_boot_us, self._smooth(sample, attitude_wxyz)
         short = ZERO if goal_ned_m is None else minus(goal_ned_m, sample.position_ned_m)
-        is_there = math.hypot(*short) < PLACE_SPREAD_M
+        is_there = math.hypot(*short) < reflex.PLACE_SPREAD_M
         if goal_ned_m is None:
             self.gain.known_s = 0.0
         elif is_there or not self.gain.is_known:
@@ -79,13 +70,13 @@ class SustainedForceMonitor:
         along_m_s, across = split(self.velocity_m_s, towards)
         is_free = _is_free(along_m_s, math.hypot(*across))
         if is_there or is_free:
-            share = 1.0 if abs(along_m_s) > FREE_M_S else elapsed_s / (FOLLOWED_S + elapsed_s)
+            share = 1.0 if abs(along_m_s) > reflex.FREE_M_S else elapsed_s / (reflex.FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
-        if is_free or force_m_s2 < 0.5 * HELD_M_S2 or split(short, towards)[0] <= 0.0:
+        if is_free or force_m_s2 < 0.5 * reflex.HELD_M_S2 or split(short, towards)[0] <= 0.0:
             self.pushed_since_us = now_us
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
         since_us = self.pushed_since_us
-        if force_m_s2 < HELD_M_S2 or now_us - since_us < 2.0 * 1e6 * LEAD_S:
+        if force_m_s2 < reflex.HELD_M_S2 or now_us - since_us < 2.0 * 1e6 * reflex.LEAD_S:
             return None
         self.pushed_since_us = now_us
         normal = away_from(plus(ZERO, -1.0, grown))
@@ -97,7 +88,7 @@ class SustainedForceMonitor:
             position_ned_m=sample.position_ned_m,
             velocity_ned_m_s=sample.velocity_ned_m_s,
             velocity_error_m_s=0.0,
-            normal=Normal(normal, IMPULSE_RAD),
+            normal=Normal(normal, reflex.IMPULSE_RAD),
             peak_specific_force_m_s2=force_m_s2,
             impulse_m_s=0.5e-6 * force_m_s2 * (now_us - since_us),
             is_fully_measured=True,
@@ -113,11 +104,11 @@ class SustainedForceMonitor:
         if self.time_us == 0:
             self.velocity_m_s, self.thrust_ned_m_s2, self.time_us = velocity, thrust, now_us
         elapsed_s, self.time_us, self.imu_count = (now_us - self.time_us) * 1e-6, now_us, 0
-        weight = elapsed_s / (SMOOTHING_S + elapsed_s)
+        weight = elapsed_s / (reflex.SMOOTHING_S + elapsed_s)
         self.velocity_m_s = towards(self.velocity_m_s, velocity, weight)
         self.thrust_ned_m_s2 = towards(self.thrust_ned_m_s2, thrust, weight)
         changes = minus(velocity, self.velocity_m_s)
-        self.missing_m_s2 = plus(self.thrust_ned_m_s2, -1.0 / SMOOTHING_S, changes)
+        self.missing_m_s2 = plus(self.thrust_ned_m_s2, -1.0 / reflex.SMOOTHING_S, changes)
         return elapsed_s
 
 
@@ -126,6 +117,6 @@ def _is_free(along_m_s: float, across_m_s: float) -> bool:
 
     One that slides moves along the force, too: friction and wind turn the force by up to 60 degrees.
     """
-    most_back_m_s = max(STEADY_M_S, min(across_m_s, 2.0 * STEADY_M_S))
-    most_on_m_s = max(STEADY_M_S, min(2.0 * across_m_s, FREE_M_S))
+    most_back_m_s = max(reflex.STEADY_M_S, min(across_m_s, 2.0 * reflex.STEADY_M_S))
+    most_on_m_s = max(reflex.STEADY_M_S, min(2.0 * across_m_s, reflex.FREE_M_S))
     return along_m_s >= most_on_m_s or along_m_s <= -most_back_m_s

@@ -13,15 +13,8 @@ from companion.messages import Vector3
 from companion.motion.delay import Delay
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, plus
-from companion.reflex.config import (
-    COMPARED,
-    LONGEST_STEP_US,
-    MEMORY,
-    RISE,
-    SHAKEN_S,
-    STAMP_S,
-    FusedConfig,
-)
+from companion.reflex import config as reflex
+from companion.reflex.config import FusedConfig
 
 
 @dataclass(slots=True)
@@ -39,15 +32,15 @@ class VelocityJump:
 
     def step_m_s(self, fixes: Sequence[VelocityFix]) -> Vector3 | None:
         """Difference of the newest velocity from the recent ones and the accelerometer, m/s; None if not comparable."""
-        if len(fixes) < COMPARED + 2:
+        if len(fixes) < reflex.COMPARED + 2:
             return None
-        recent = [fixes[place] for place in range(-COMPARED - 2, 0)]
+        recent = [fixes[place] for place in range(-reflex.COMPARED - 2, 0)]
         times = [fix.time_boot_us for fix in recent]
         if recent[-1].velocity_ned_m_s == recent[-2].velocity_ned_m_s:
             # Equal to the last digit: the estimator is not running, and restarts after this.
             self.since_us = times[-1]
         apart_us = [b - a for a, b in pairwise(times)]
-        if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_STEP_US:
+        if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > reflex.LONGEST_STEP_US:
             return None
         step = _newest_less_mean(fix.less_sum_m_s for fix in recent[1:])
         # Mean accelerations between velocities, without vibration.
@@ -59,7 +52,7 @@ class VelocityJump:
 
     def compared(self, fixes: Sequence[VelocityFix]) -> Sequence[VelocityFix]:
         """The velocities that make the newest step, the newest last."""
-        return [fixes[place] for place in range(-COMPARED - 1, 0)]
+        return [fixes[place] for place in range(-reflex.COMPARED - 1, 0)]
 
     def learn(self, step: Vector3) -> None:
         """Learn delay and standard deviation from the newest step, limited to what is no hit.
@@ -69,9 +62,9 @@ class VelocityJump:
         """
         self.delay.learn(*self.newest)
         square = along(step, step) / 3.0
-        self.known = min(self.known + 1, MEMORY)
+        self.known = min(self.known + 1, reflex.MEMORY)
         change = square - self.variance_m2_s2
-        self.variance_m2_s2 += change / (min(self.known, RISE) if change > 0.0 else self.known)
+        self.variance_m2_s2 += change / (min(self.known, reflex.RISE) if change > 0.0 else self.known)
 
     def least_m_s(self, config: FusedConfig, caution: float, shaking_m_s2: float, apart_us: int) -> float:
         """The step, m/s, that is a hit; infinite before the first step.
@@ -87,7 +80,7 @@ class VelocityJump:
         spreads = config.noise_factor
         noise_m_s = spreads * math.sqrt(self.variance_m2_s2) * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
         unseen_share = max(0.0, 1.0 - self.averaging_us / max(apart_us, 1))
-        unseen_m_s = shaking_m_s2 * (SHAKEN_S * unseen_share + STAMP_S)
+        unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
         return caution * max(config.velocity_step_m_s, noise_m_s) + unseen_m_s
 
 
@@ -97,5 +90,5 @@ def _rate(a: Vector3, b: Vector3, seconds: float) -> Vector3:
 
 def _newest_less_mean(vectors: Iterable[Vector3]) -> Vector3:
     """The last vector less the mean of those before it."""
-    x, y, z = (newest - sum(before) / COMPARED for *before, newest in zip(*vectors, strict=True))
+    x, y, z = (newest - sum(before) / reflex.COMPARED for *before, newest in zip(*vectors, strict=True))
     return (x, y, z)
