@@ -34,12 +34,9 @@ from companion.reflex.surface import Surface, level
 class Reaction(NamedTuple):
     """What the samples of one step have shown. `collisions` are to be recovered from."""
 
-    collisions: Sequence[ImpactEstimate] = ()
-    has_touched_down: bool = False
-    notices: Sequence[Notice] = ()
-
-
-NO_REACTION = Reaction()
+    collisions: Sequence[ImpactEstimate]
+    has_touched_down: bool
+    notices: Sequence[Notice]
 
 
 class LeftWrong(NamedTuple):
@@ -97,7 +94,7 @@ class Reflex:
         if held is not None:
             found = [held]
             notices.append(_held_notice(held))
-        return Reaction(found, has_touched_down, notices) if result.impacts or notices or found else NO_REACTION
+        return Reaction(found, has_touched_down, notices)
 
     def _contact_notice(self, estimate: ImpactEstimate) -> Notice | None:
         """What is no collision, and a crash; a collision is told with its recovery."""
@@ -175,7 +172,7 @@ class Reflex:
     def take_back(self) -> None:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
         self.hits.pop()
-        self.monitor.reject()
+        self.monitor.estimator.validity.assess(True, self.sample_boot_us)
 
     def lean(self) -> tuple[Vector3, Lean]:
         """The acceleration wanted by the present recovery, local NED, and what makes attitude and thrust of it.

@@ -79,10 +79,6 @@ class CollisionMonitor:
     promised_us: int = 0
     heard: set[MessageId] = field(default_factory=set)
 
-    def reject(self) -> None:
-        """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
-        self.estimator.validity.assess(True, self.estimator.strapdown.time_boot_us)
-
     def describe(self) -> str:
         """For the live line."""
         if self.no_data_reason is not None:
@@ -97,9 +93,6 @@ class MonitorResult(NamedTuple):
 
     impacts: Sequence[ImpactEstimate]
     notices: Sequence[Notice]
-
-
-NOTHING_SEEN = MonitorResult((), ())
 
 
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
@@ -148,8 +141,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     monitor.stream_health.imu(imu_samples, sight, now_us)
     if now_us - monitor.promised_us >= 1e6:
         _promise(monitor, now_us)
-    notices = _notices(monitor, is_on, now_us)
-    return MonitorResult(impacts, notices) if impacts or notices else NOTHING_SEEN
+    return MonitorResult(impacts, _notices(monitor, is_on, now_us))
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:
