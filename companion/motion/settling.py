@@ -1,7 +1,7 @@
 """Has the vehicle come to rest at a place?"""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from companion.messages import Vector3
 from companion.motion.config import SettledConfig
@@ -20,6 +20,7 @@ class Lasting:
         self.lasts_us = 0 if self.since_us is None else time_boot_us - self.since_us
 
 
+@dataclass(slots=True)
 class SettlingMonitor:
     """Within a distance of the place and below a low-pass filtered speed, without a break, for a duration.
 
@@ -27,18 +28,16 @@ class SettlingMonitor:
     much again: one of which nothing is known is no rest.
     """
 
-    __slots__ = ("_config", "_still", "_time_us", "_velocity")
-
-    def __init__(self, config: SettledConfig) -> None:
-        self._config = config
-        self._velocity, self._time_us = ZERO, 0
-        self._still = Lasting()
+    config: SettledConfig
+    _velocity: Vector3 = ZERO
+    _time_us: int = 0
+    _still: Lasting = field(default_factory=Lasting)
 
     def settled_since(
         self, time_boot_us: int, distance_m: float, velocity_m_s: Vector3, spread_m_s: float
     ) -> int | None:
         """Take the present motion; the start (boot time) of an interval that is by now long enough, or None."""
-        config, elapsed_s = self._config, max(1e-6, 1e-6 * (time_boot_us - self._time_us))
+        config, elapsed_s = self.config, max(1e-6, 1e-6 * (time_boot_us - self._time_us))
         share, self._time_us = elapsed_s / (config.smoothing_s + elapsed_s), time_boot_us
         self._velocity = towards(self._velocity, velocity_m_s, share)
         most_m_s = config.speed_m_s + min(spread_m_s, config.speed_m_s)

@@ -117,26 +117,10 @@ TABLE = (
         "sent down, near the ground or pushed from below; flown down by hand; as low as the feet",
         lambda touch: touch.has_landed,
     ),
-    Row(
-        ImpactKind.STRUCK,
-        "hovering, away from the ground",
-        lambda touch: touch.is_struck,
-    ),
-    Row(
-        ImpactKind.FLOOR,
-        "pushed from below",
-        lambda touch: touch.is_pushed_up,
-    ),
-    Row(
-        ImpactKind.CEILING,
-        "pushed from above",
-        lambda touch: touch.upward < -STEEP,
-    ),
-    Row(
-        ImpactKind.WALL,
-        "pushed from the side",
-        lambda touch: True,
-    ),
+    Row(ImpactKind.STRUCK, "hovering, away from the ground", lambda touch: touch.is_struck),
+    Row(ImpactKind.FLOOR, "pushed from below", lambda touch: touch.is_pushed_up),
+    Row(ImpactKind.CEILING, "pushed from above", lambda touch: touch.upward < -STEEP),
+    Row(ImpactKind.WALL, "pushed from the side", lambda touch: True),
 )
 
 
