@@ -25,7 +25,7 @@ class ContactForce:
     averaging_us: int
     range_m_s2: float
     came_ned_m_s: Vector3 = ZERO
-    """v_c; zero where it is not known."""
+    """v_c; zero where it is not known, as in a hit that follows another that clipping hid a part of."""
     is_over: bool = False
     impulse_ned_m_s: Vector3 = ZERO
     forces_ned_m_s2: list[Vector3] = field(default_factory=list)
@@ -118,8 +118,6 @@ class ImpactEstimator:
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
     contact: ContactForce | None = None
-    came_ned_m_s: Vector3 = ZERO
-    """v_c, where the vehicle's estimate is valid: zero in a hit that follows another that clipping hid a part of."""
 
     def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
@@ -145,14 +143,13 @@ class ImpactEstimator:
         place, velocity, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
-        self.contact, self.came_ned_m_s = None, velocity if self.validity.is_valid else ZERO
+        self.contact, came = None, velocity if self.validity.is_valid else ZERO
         # A velocity that alone shows a contact has no force of its own.
         if self.imu is not None and impact.evidence is Evidence.FORCE:
             free = minus(self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
             averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
             range_m_s2 = self.config.accelerometer_range_m_s2
-            came, hides = self.came_ned_m_s, self.hides_clipping
-            self.contact = ContactForce(free, averaging_us, range_m_s2, came, is_clipped=hides)
+            self.contact = ContactForce(free, averaging_us, range_m_s2, came, is_clipped=self.hides_clipping)
             self.contact.add(self.imu, self.imu.time_boot_us - free_until_us, self.strapdown.valid_wxyz)
         self.validity.invalidate(sample_us, math.hypot(*velocity))
         self.estimate = estimate = ImpactEstimate(
@@ -162,7 +159,7 @@ class ImpactEstimator:
             position_ned_m=place,
             velocity_ned_m_s=velocity,
             velocity_error_m_s=error_m_s,
-            normal=self._normal(force_ned, impact.evidence is Evidence.RATE_JUMP),
+            normal=normal_of(force_ned, came, self.hides_clipping or impact.evidence is Evidence.RATE_JUMP),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_fully_measured=False,
@@ -197,13 +194,10 @@ class ImpactEstimator:
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
-            normal=self._normal(contact.impulse_ned_m_s),
+            normal=normal_of(contact.impulse_ned_m_s, contact.came_ned_m_s, self.hides_clipping),
             peak_specific_force_m_s2=contact.peak_m_s2,
             impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
         )
-
-    def _normal(self, impulse_ned: Vector3, is_guessed: bool = False) -> Normal:
-        return normal_of(impulse_ned, self.came_ned_m_s, self.hides_clipping or is_guessed)
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
         """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.
