@@ -4,7 +4,6 @@ from companion.flight.after_hit import take_back
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
 from companion.reflex.detection.impact import ImpactEstimate
-from companion.reflex.recovery.collision import CollisionReport
 from companion.reflex.recovery.recovery import Progress, Recovery
 
 
@@ -14,10 +13,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     if reason is not None and not flight.told_by_position:
         flight.told_by_position = True
         flight.report(now_us, "by_position", f"recovery by position, as law paper has it: {reason}", reason=reason)
-    _report_detection(flight, record.report())
-
-
-def _report_detection(flight: FlightContext, hit: CollisionReport) -> None:
+    hit = record.report()
     force_m_s2, v_c, speed_m_s = hit.peak_specific_force_m_s2, hit.impact_velocity_ned_m_s, hit.impact_speed_m_s
     place, setpoint = (
         as_text(flight.mission_ned_m(each)) for each in (hit.position_ned_m, hit.recovery_setpoint_ned_m)
