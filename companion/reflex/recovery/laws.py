@@ -17,17 +17,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.vector import ZERO, plus, split
+from companion.motion.vector import plus, split
 from companion.reflex.config import WAY_S, RecoveryConfig
 
 
 @dataclass(frozen=True, slots=True)
 class MotionState:
-    """Position, velocity and acceleration, local NED. The acceleration is that of the vehicle's own thrust alone."""
+    """Position and velocity, local NED."""
 
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
-    acceleration_ned_m_s2: Vector3 = ZERO
 
 
 @dataclass(frozen=True, slots=True)

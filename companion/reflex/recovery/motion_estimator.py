@@ -69,6 +69,7 @@ class MotionEstimator:
     after_error_m_s: float = math.inf  # its standard deviation
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
+    _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
     _at_boot_us: int = 0  # the bank's time
     _moved_m_s: Vector3 = ZERO  # the integral up to that time
@@ -120,9 +121,9 @@ class MotionEstimator:
         pushed = strapdown.acceleration_ned_m_s2
         pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else pushed
         was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
-        mean = towards(was.acceleration_ned_m_s2, pushed, weight)
+        self._smoothed_m_s2 = towards(self._smoothed_m_s2, pushed, weight)
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
-        self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
+        self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed))
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
         self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
         self.heading_error_rad = strapdown.heading_error_rad
@@ -222,7 +223,7 @@ class MotionEstimator:
             self._measured.predict(self._time_boot_us, self._summed_m_s)
             n, e, _ = self._measured.velocity_ned_m_s
             velocity, self.spread_m_s = (n, e, velocity[2]), self._measured.spread_m_s
-        self.motion = MotionState(motion.position_ned_m, velocity, self.motion.acceleration_ned_m_s2)
+        self.motion = MotionState(motion.position_ned_m, velocity)
         self._look_back()
 
     def _look_back(self) -> None:
@@ -268,7 +269,7 @@ class MotionEstimator:
         g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
         # The report as of now.
         place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)
-        velocity = plus(sample.velocity_ned_m_s, behind_s, self.motion.acceleration_ned_m_s2)
+        velocity = plus(sample.velocity_ned_m_s, behind_s, self._smoothed_m_s2)
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * STAMP_RESOLUTION_US))
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
@@ -336,7 +337,7 @@ class MotionEstimator:
         place, velocity = towards(was.position_ned_m, measured.position_ned_m, share), was.velocity_ned_m_s
         if not self.is_measured_apart:
             velocity, self.spread_m_s = towards(velocity, measured.velocity_ned_m_s, share), 0.0
-        self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
+        self.motion = MotionState(place, velocity)
         self._look_back()
 
     @property
