@@ -60,7 +60,7 @@ class Baseline(ABC):
     def initial(self) -> Any:
         return self.state(threshold_m_s2=self._least_m_s2)
 
-    def step(self, state: Any, sample: Sample, situation: Situation, motion: Motion) -> tuple[Any, Impact | None]:
+    def step(self, state: Any, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if isinstance(sample, Attitude):
             state.attitude_wxyz = sample.attitude_wxyz
         elif isinstance(sample, AttitudeTarget):
@@ -69,8 +69,8 @@ class Baseline(ABC):
             reading = self.look(state, sample, situation)
             if reading is not None:
                 impact = judge(state, sample.time_boot_us, reading, situation.off_reason)
-                return state, None if impact is None else _on_ground(impact, situation, motion)
-        return state, None
+                return None if impact is None else _on_ground(impact, situation, motion)
+        return None
 
     @abstractmethod
     def look(self, s: Any, sample: Any, situation: Situation) -> Reading | None:

@@ -64,9 +64,7 @@ class MomentumDetector(Baseline):
         MessageId.ATTITUDE_TARGET: "thrust is taken for the accelerometer's mean, so that manoeuvres look like pushes"
     }
 
-    def step(
-        self, state: MomentumState, sample: Sample, situation: Situation, motion: Motion
-    ) -> tuple[MomentumState, Impact | None]:
+    def step(self, state: MomentumState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if isinstance(sample, ImuSample):
             elapsed_s = min(max(sample.time_boot_us - state.imu_boot_us, 0), 50_000) * 1e-6
             state.imu_boot_us = sample.time_boot_us

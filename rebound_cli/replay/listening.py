@@ -107,11 +107,9 @@ class _ListenedTo:
         state: DetectorState = self._detector.initial()
         return state
 
-    def step(
-        self, state: DetectorState, sample: Sample, situation: Situation, motion: Motion
-    ) -> tuple[DetectorState, Impact | None]:
+    def step(self, state: DetectorState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         phase = _NUMBERS[state.phase]
-        state, impact = self._detector.step(state, sample, situation, motion)
+        impact: Impact | None = self._detector.step(state, sample, situation, motion)
         if isinstance(sample, ImuSample):
             self._listener.forces.numbers.extend((sample.time_boot_us, phase, *_forces(state)))
         elif isinstance(sample, LocalPosition | Odometry) and isinstance(state, FusedState):
@@ -120,7 +118,7 @@ class _ListenedTo:
                 self._listener.velocities.numbers.extend((sample.time_boot_us, phase, jump.value, jump.limit))
         if impact is not None:
             self._listener.shown[impact.sample_time_boot_us] = self._shown(state, impact)
-        return state, impact
+        return impact
 
     def _shown(self, state: DetectorState, impact: Impact) -> Shown:
         if impact.evidence is Evidence.VELOCITY_JUMP:

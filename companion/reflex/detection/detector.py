@@ -153,7 +153,7 @@ StateT = TypeVar("StateT", bound=DetectorState)
 
 
 class Detector(Protocol[StateT]):
-    """A detector holds its parameters; all that changes is in the state passed through `step`.
+    """A detector holds its parameters; all that changes is in the state that `step` is given.
 
     `losses` are the streams it makes use of besides HIGHRES_IMU, with what is lost where one does not arrive.
     """
@@ -163,9 +163,6 @@ class Detector(Protocol[StateT]):
 
     def initial(self) -> StateT: ...
 
-    def step(self, state: StateT, sample: Sample, situation: Situation, motion: Motion) -> tuple[StateT, Impact | None]:
-        """Take one sample of any kind, in the order heard; IMU samples come in the order of their stamps.
-
-        The state given may be changed and returned; whoever wants to keep an old one copies it.
-        """
+    def step(self, state: StateT, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
+        """Take one sample of any kind, in the order heard; IMU samples come in the order of their stamps."""
         ...

@@ -140,18 +140,16 @@ class FusedDetector:
         jump, turn = VelocityJump(self._averaging_us), RateJump(limit=self._config.rate_step_rad_s)
         return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, turn=turn, jump=jump)
 
-    def step(
-        self, state: FusedState, sample: Sample, situation: Situation, motion: Motion
-    ) -> tuple[FusedState, Impact | None]:
+    def step(self, state: FusedState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if type(sample) is ImuSample:
             impact = self._imu(state, sample, situation, motion)
             state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, sample.specific_force_frd_m_s2
-            return state, impact
+            return impact
         if isinstance(sample, (LocalPosition, Odometry)):
-            return state, self._velocity(state, sample, situation, motion)
+            return self._velocity(state, sample, situation, motion)
         if isinstance(sample, AttitudeTarget):
             state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-        return state, None
+        return None
 
     # --- force ------------------------------------------------------------------------------------------------
 

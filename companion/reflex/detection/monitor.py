@@ -133,7 +133,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         monitor.is_attitude_old = attitude is not None and newest_us - attitude.time_boot_us > sight.silence_s * 1e6
         if monitor.is_attitude_old:
             estimator.strapdown.fixes.clear()
-        monitor.state, impact = monitor.detector.step(monitor.state, sample, situation, estimator)
+        impact = monitor.detector.step(monitor.state, sample, situation, estimator)
         if impact is not None:
             impacts.append(estimator.begin(impact))
         elif type(sample) is ImuSample:

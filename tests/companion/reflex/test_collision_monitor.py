@@ -133,11 +133,11 @@ def test_a_touch_that_tips_the_vehicle_over_is_a_crash_as_soon_as_it_lies_there(
     monitor.estimator.strapdown.valid_wxyz = (0.5, math.sqrt(0.75), 0.0, 0.0)
     tilted = down._replace(off_reason="below 0.5 m")
     sample = ImuSample(2_220_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
-    _, impact = monitor.detector.step(monitor.state, sample, tilted, monitor.estimator)
+    impact = monitor.detector.step(monitor.state, sample, tilted, monitor.estimator)
     assert impact is not None and impact.kind is ImpactKind.CRASH
     # Then it is one crash
     again = ImuSample(2_240_000, (-60.0, 0.0, -9.81), (0.0, 0.0, 0.0))
-    assert monitor.detector.step(monitor.state, again, tilted, monitor.estimator)[1] is None
+    assert monitor.detector.step(monitor.state, again, tilted, monitor.estimator) is None
 
 
 def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():

@@ -87,7 +87,7 @@ class Flight:
             if not isinstance(sample, ImuSample) and not isinstance(sample, self.heard):
                 continue
             motion.update(sample)
-            self.state, impact = detector.step(self.state, sample, self.situation(t), motion)
+            impact = detector.step(self.state, sample, self.situation(t), motion)
             if impact is not None:
                 impacts.append(impact)
         return impacts
