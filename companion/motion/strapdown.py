@@ -55,8 +55,7 @@ class Strapdown:
     """Velocities without a restart of the integral or a reset of the estimator between them, the newest last."""
     has_new_fix: bool = False
     """Whether the newest velocity is one of them; while ODOMETRY comes, only its velocities are."""
-    _odometry_boot_us: int | None = None
-    _reset_counter: int = 0
+    _odometry: Odometry | None = None
 
     def attitude(self, time_us: int, attitude_wxyz: Quaternion, most_wrong_rad: float = 0.0) -> None:
         """Take one reported attitude, whose tilt may be wrong by so much; one that is further off has its reason."""
@@ -93,13 +92,13 @@ class Strapdown:
 
     def velocity(self, sample: LocalPosition | Odometry) -> None:
         """Take one velocity."""
-        time_us, told_us = sample.time_boot_us, self._odometry_boot_us
+        time_us, told = sample.time_boot_us, self._odometry
         self.has_new_fix, ahead_us = False, time_us - self.time_boot_us
         if isinstance(sample, Odometry):
-            if told_us is None or sample.reset_counter != self._reset_counter:
+            if told is None or sample.reset_counter != told.reset_counter:
                 self.fixes.clear()
-            self._odometry_boot_us, self._reset_counter = time_us, sample.reset_counter
-        elif told_us is not None and time_us - told_us <= CURRENT_US:
+            self._odometry = sample
+        elif told is not None and time_us - told.time_boot_us <= CURRENT_US:
             return
         if not -LONGEST_GAP_US < ahead_us < LONGEST_GAP_US:
             return
