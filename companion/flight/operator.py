@@ -102,10 +102,9 @@ def values(
         NamedValue(time_us, "rb_hits", float(hits)),
     ]
     if latest is not None:
-        report = latest.report()
-        sent.append(NamedValue(time_us, "rb_peak", report.peak_specific_force_m_s2))
-        sent.append(DebugVector(time_us, "rb_v_c", report.impact_velocity_ned_m_s))
-        sent.append(DebugVector(time_us, "rb_normal", report.normal_ned))
+        sent.append(NamedValue(time_us, "rb_peak", latest.peak_specific_force_m_s2))
+        sent.append(DebugVector(time_us, "rb_v_c", latest.contact.velocity_ned_m_s))
+        sent.append(DebugVector(time_us, "rb_normal", latest.normal.direction_ned))
     return sent
 
 
