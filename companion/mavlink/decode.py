@@ -111,10 +111,14 @@ class Decoder:
 
 def checksum_holds(data: bytes, start: int, length: int) -> bool:
     """Whether the packet's own checksum holds; for messages that are not in the dialect, always."""
-    packet = data[start : start + length]
-    crc_extra = _CRC_EXTRA.get(message_id_of(packet))
+    if data[start] == MAGIC_V2:
+        message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
+        end = start + HEADER_V2 + data[start + 1]
+    else:
+        message_id = data[start + 5]
+        end = start + HEADER_V1 + data[start + 1]
+    crc_extra = _CRC_EXTRA.get(message_id)
     if crc_extra is None:
         return start + length == len(data) or data[start + length] in (MAGIC_V1, MAGIC_V2)
-    end = (HEADER_V2 if packet[0] == MAGIC_V2 else HEADER_V1) + packet[1]
-    expected: int = mcrf4xx(packet[1:end] + crc_extra)
-    return expected == packet[end] | packet[end + 1] << 8
+    expected: int = mcrf4xx(data[start + 1 : end] + crc_extra)
+    return expected == data[end] | data[end + 1] << 8

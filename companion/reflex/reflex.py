@@ -57,7 +57,7 @@ class Reflex:
     settled: SettledConfig
     monitor: CollisionMonitor = field(init=False)
     hits: list[CollisionRecord] = field(default_factory=list)
-    earlier_hits: int = 0  # before the vehicle restarted
+    newest: CollisionRecord | None = None  # of them, since the vehicle started
     recovery: Recovery | None = None  # of the newest
     loss_s: float | None = None  # for so long the vehicle flies its last setpoint on; infinite: it takes no thrust
     keeps_trim: bool = False  # see interface.Autopilot
@@ -74,9 +74,8 @@ class Reflex:
         hides_clipping, self.monitor = self.monitor.estimator.hides_clipping, start_monitor(self.config, now_us)
         self.monitor.estimator.hides_clipping = hides_clipping
         self.loss_s = None
-        self.earlier_hits = len(self.hits)
-        for record in self.hits[-1:]:
-            record.is_over = True
+        if self.newest is not None:
+            self.newest.is_over, self.newest = True, None
 
     def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
         """Take the samples received since the last step, in order; call it without any, too."""
@@ -167,11 +166,13 @@ class Reflex:
         ]
         self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, self.keeps_trim)
         self.hits.append(record)
+        self.newest = record
         return record
 
     def take_back(self) -> None:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
         self.hits.pop()
+        self.newest = self.hits[-1] if self.hits else None
         self.monitor.estimator.validity.assess(True, self.sample_boot_us)
 
     def lean(self) -> tuple[Vector3, Lean]:
@@ -253,11 +254,6 @@ class Reflex:
     def in_one_recovery(self) -> list[CollisionRecord]:
         """The last hits, the newest first, without a recovery in between."""
         return list(takewhile(lambda record: not record.is_over, reversed(self.hits)))
-
-    @property
-    def newest(self) -> CollisionRecord | None:
-        """The newest hit since the vehicle started."""
-        return self.hits[-1] if len(self.hits) > self.earlier_hits else None
 
     @property
     def thrust(self) -> ThrustGain:

@@ -57,7 +57,9 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
     if flight.expected_mode is None or vehicle.mode is None:
         return None
-    holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
+    holder, mode, expected_mode = None, vehicle.mode, flight.expected_mode
+    if mode.custom_mode != expected_mode:
+        holder = who_decided(mode, expected_mode, flight.command_client.requested_mode)
     if holder is None:
         flight.foreign_mode_since_us = None
         return None

@@ -170,10 +170,9 @@ class ImpactEstimator:
         return estimate
 
     def follow(self, sample: ImuSample, state: DetectorState) -> None:
-        """Take an IMU sample and the detector's state after it; the estimate is final when the contact is over."""
+        """Take an IMU sample, and the detector's state after it, until the estimate is final: the contact is over."""
         estimate, contact, is_over = self.estimate, self.contact, state.phase is not Phase.CONTACT
-        if estimate is None or estimate.is_final:
-            return
+        assert estimate is not None, "an impact has begun"
         if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
             contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
             estimate = self._refined(estimate, contact)

@@ -136,7 +136,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         impact = monitor.detector.step(monitor.state, sample, situation, estimator)
         if impact is not None:
             impacts.append(estimator.begin(impact))
-        elif type(sample) is ImuSample:
+        elif type(sample) is ImuSample and estimator.estimate is not None and not estimator.estimate.is_final:
             estimator.follow(sample, monitor.state)
     monitor.stream_health.imu(imu_samples, sight, now_us)
     if now_us - monitor.promised_us >= 1e6:

@@ -42,7 +42,8 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
     source = reflex.monitor.estimator
-    flight.collisions.append(CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator, source))
+    reflex.newest = CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator, source)
+    flight.collisions.append(reflex.newest)
     return flight
 
 
