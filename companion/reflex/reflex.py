@@ -39,6 +39,9 @@ class Reaction(NamedTuple):
     notices: Sequence[Notice]
 
 
+NO_REACTION = Reaction((), False, ())
+
+
 class LeftWrong(NamedTuple):
     """What a vehicle's own estimate has wrong after a hit, and what pushes it; local NED. `share`: of them, by now."""
 
@@ -93,7 +96,7 @@ class Reflex:
         if held is not None:
             found = [held]
             notices.append(_held_notice(held))
-        return Reaction(found, has_touched_down, notices)
+        return Reaction(found, has_touched_down, notices) if result.impacts or notices or found else NO_REACTION
 
     def _contact_notice(self, estimate: ImpactEstimate) -> Notice | None:
         """What is no collision, and a crash; a collision is told with its recovery."""

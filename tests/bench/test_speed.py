@@ -17,7 +17,7 @@ MOST_MORE = 1.05
 HELD_TO = {"sim_vehicle": 116.82, "companion": 245.0, "rebound_cli": 6.14}
 HELD_RATIO = {
     "a quiet IMU sample": 2.77,
-    "a position": 3.63,
+    "a position": 3.74,
     "an attitude": 2.09,
     "a hit's first sample": 21.0,
     "a second of flight": 1.88,

@@ -95,6 +95,9 @@ class MonitorResult(NamedTuple):
     notices: Sequence[Notice]
 
 
+NOTHING_SEEN = MonitorResult((), ())
+
+
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
     """A monitor before its first sample; ``now_us`` is on the clock of `advance`."""
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
@@ -141,7 +144,8 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     monitor.stream_health.imu(imu_samples, sight, now_us)
     if now_us - monitor.promised_us >= 1e6:
         _promise(monitor, now_us)
-    return MonitorResult(impacts, _notices(monitor, is_on, now_us))
+    notices = _notices(monitor, is_on, now_us)
+    return MonitorResult(impacts, notices) if impacts or notices else NOTHING_SEEN
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:
