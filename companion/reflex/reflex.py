@@ -175,7 +175,7 @@ class Reflex:
     def take_back(self) -> None:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
         self.hits.pop()
-        self.newest = self.hits[-1] if self.hits else None
+        self.newest = next((each for each in self.hits[-1:] if each.source is self.monitor.estimator), None)
         self.monitor.estimator.validity.assess(True, self.sample_boot_us)
 
     def lean(self) -> tuple[Vector3, Lean]:

@@ -184,10 +184,11 @@ class CollisionGuard:
         if name not in SETPOINTS:
             return True
         with self._changed:
+            # Also of one that cannot be read
             passes = self._is_over or not self.holds
-            if not self._is_over:
+            if not self._is_over and (packet := packet_from(name, source, fields_json)):
                 with self._guarded():
-                    passes = self._guard.lets_pass(packet_from(name, source, fields_json))
+                    passes = self._guard.lets_pass(packet)
             return passes
 
     def _send(self, step: StepResult) -> None:

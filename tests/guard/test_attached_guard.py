@@ -239,6 +239,16 @@ def test_a_fault_in_the_gate_lets_no_setpoint_pass_while_the_guard_holds(monkeyp
     assert not joined.guard._turn() and joined.link.sent == ["the last"]
 
 
+def test_a_setpoint_that_cannot_be_read_passes_but_while_the_guard_holds_and_is_no_fault(monkeypatch):
+    joined = Joined(monkeypatch)
+    name, fields_json = "SET_POSITION_TARGET_LOCAL_NED", b'{"type_mask": null}'
+    assert packet_from(name, PROGRAM, fields_json) == b""
+    assert not joined.guard._outgoing(name, PROGRAM, fields_json)
+    assert joined.air.guard.core.stop_reason is None
+    joined.air.run_to(State.WATCHING, 10.0)
+    assert joined.guard._outgoing(name, PROGRAM, fields_json)
+
+
 def test_a_fault_that_stays_ends_the_guard_in_time(monkeypatch):
     monkeypatch.setattr(mavsdk_guard, "GIVING_BACK_US", 1_000_000)
     joined = Joined(monkeypatch)

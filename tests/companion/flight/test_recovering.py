@@ -288,7 +288,11 @@ def test_what_is_left_wrong_of_a_hit_fades_but_while_a_receiver_shows_it(is_apar
     # Nor does anything of it hold of a vehicle that has restarted, whose clock begins anew
     assert flight.reflex.left_wrong(1).share == 1.0
     flight.reflex.restart(0)
-    assert flight.reflex.left_wrong(1) is None and flight.reflex.in_one_recovery() == []
+    assert flight.reflex.newest is None and flight.reflex.in_one_recovery() == []
+    # Nor when a hit after it is taken back
+    flight.collisions.append(flight_with().collisions[0])
+    flight.reflex.take_back()
+    assert flight.reflex.newest is None
 
 
 @pytest.mark.parametrize("is_over", [False, True])
