@@ -23,10 +23,14 @@ from companion.motion.config import (
     FINEST_DOPPLER_M_S,
     LEVEL_DRIFT_M2_S5,
     LEVEL_SPREAD_M_S2,
+    RECEIVER_DELAY_S,
+    RECEIVER_LATEST_S,
+    RECEIVER_REPEATS,
+    RECEIVER_SPREAD_S,
 )
-from companion.motion.delay import RECEIVER, Delay
+from companion.motion.delay import Delay
 from companion.motion.strapdown import Strapdown
-from companion.motion.vector import ZERO, limited, minus, plus, towards
+from companion.motion.vector import ZERO, flat, limited, minus, plus, towards
 
 
 @dataclass(slots=True)
@@ -38,7 +42,9 @@ class Doppler:
     late_s: float = 0.0  # carried on by so much
     variance_m2_s2: float = DOPPLER_M_S**2
     known: int = 1
-    delay: Delay = field(default_factory=lambda: Delay(RECEIVER))
+    delay: Delay = field(
+        default_factory=lambda: Delay(RECEIVER_DELAY_S, RECEIVER_SPREAD_S, RECEIVER_LATEST_S, RECEIVER_REPEATS)
+    )
     place_ned_m: Vector3 | None = None  # horizontal, as of then; None until it is known beside the vehicle's own
     _first: GpsFix | None = None  # where its places are counted from
     _off_m: Vector3 | None = None  # the vehicle's own place less the receiver's
@@ -71,12 +77,12 @@ class Doppler:
         return (EARTH_M * north_rad, EARTH_M * east_rad * math.cos(math.radians(first.latitude_deg)), 0.0)
 
     def _learn(self, sample: GpsFix, strapdown: Strapdown) -> None:
-        faster = _faster_by(strapdown, RECEIVER.expected_s)
+        faster = _faster_by(strapdown, RECEIVER_DELAY_S)
         if faster is None:
             return
         (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, strapdown.sum_ned_m_s)
         behind: Vector3 = (n - own[0], e - own[1], 0.0)
-        change = plus(ZERO, 1.0 / RECEIVER.expected_s, faster)
+        change = plus(ZERO, 1.0 / RECEIVER_DELAY_S, faster)
         most_m_s = DOPPLER_GATE * math.sqrt(self.variance_m2_s2)
         # A receiver may show a hit before any sample does: neither its noise nor its delay.
         if math.hypot(*plus(behind, self.delay.delay_s(self.variance_m2_s2), change)) < most_m_s:
@@ -122,10 +128,10 @@ class MeasuredVelocity:
     def _measures(self, doppler: Doppler) -> tuple[Vector3, float, float, float]:
         """Innovation of a receiver's velocity, its variance, and its covariances with v and b."""
         late_s = doppler.late_s
-        n, e, _ = plus(minus(doppler.velocity_ned_m_s, self.velocity_ned_m_s), late_s, self.unseen_m_s2)
+        innovation = plus(minus(doppler.velocity_ned_m_s, self.velocity_ned_m_s), late_s, self.unseen_m_s2)
         with_v = self.variance_m2_s2 - late_s * self.both_m2_s3
         with_b = self.both_m2_s3 - late_s * self.unseen_variance_m2_s4
-        return (n, e, 0.0), with_v - late_s * with_b + doppler.trusted_variance_m2_s2, with_v, with_b
+        return flat(innovation), with_v - late_s * with_b + doppler.trusted_variance_m2_s2, with_v, with_b
 
     def deviation(self, doppler: Doppler) -> float:
         """How far a receiver's velocity is from this one, in standard deviations of the difference."""
@@ -155,6 +161,6 @@ def _faster_by(strapdown: Strapdown, since_s: float) -> Vector3 | None:
         if fix.time_boot_us <= at_us:
             share = (at_us - fix.time_boot_us) / max(later_us - fix.time_boot_us, 1)
             then_m_s = towards(fix.sum_ned_m_s, later_m_s, share)
-            return (sum_m_s[0] - then_m_s[0], sum_m_s[1] - then_m_s[1], 0.0)
+            return flat(minus(sum_m_s, then_m_s))
         later_us, later_m_s = fix.time_boot_us, fix.sum_ned_m_s
     return None

@@ -7,6 +7,11 @@ from companion.messages import Vector3
 ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 
+def flat(vector: Vector3) -> Vector3:
+    """Without its part down, of NED."""
+    return (vector[0], vector[1], 0.0)
+
+
 def along(vector: Vector3, normal: Vector3) -> float:
     """The component of a vector along a unit normal."""
     return vector[0] * normal[0] + vector[1] * normal[1] + vector[2] * normal[2]

@@ -19,7 +19,7 @@ from companion.messages import AttitudeSetpoint, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import LEVEL
-from companion.motion.vector import ZERO, along, limited, minus, plus
+from companion.motion.vector import ZERO, along, flat, limited, minus, plus
 from companion.reflex import config as reflex
 from companion.reflex.surface import Surface, projected
 
@@ -57,7 +57,10 @@ class Lean:
     def setpoint(self, time_us: int, acceleration_ned_m_s2: Vector3) -> AttitudeSetpoint:
         """As it is sent."""
         attitude_wxyz, thrust = attitude_and_thrust(acceleration_ned_m_s2, self)
-        return AttitudeSetpoint(time_us, attitude_wxyz, thrust, turn_kept(self.belief.yaw_rate_rad_s))
+        turns_rad_s = self.belief.yaw_rate_rad_s
+        # So that no more than BRAKED_RAD_S of the present turn is left to brake.
+        kept_rad_s = turns_rad_s - min(max(turns_rad_s, -reflex.BRAKED_RAD_S), reflex.BRAKED_RAD_S)
+        return AttitudeSetpoint(time_us, attitude_wxyz, thrust, kept_rad_s)
 
 
 def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector3:
@@ -94,8 +97,7 @@ def held_off(acceleration_ned_m_s2: Vector3, belief: Belief, surfaces: Sequence[
 
 def braked(belief: Belief, normal_ned: Vector3, within_s: float) -> Vector3:
     """The level acceleration that ends the speed within a time."""
-    n, e, _ = belief.velocity_ned_m_s
-    return plus(ZERO, -1.0 / within_s, _certain((n, e, 0.0), normal_ned, belief.spread_m_s))
+    return plus(ZERO, -1.0 / within_s, _certain(flat(belief.velocity_ned_m_s), normal_ned, belief.spread_m_s))
 
 
 def _certain(velocity_m_s: Vector3, normal: Vector3, spread_m_s: float, off_m_s: float = 0.0) -> Vector3:
@@ -114,15 +116,14 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     """Attitude in the vehicle's own frame, and the collective thrust as a share of the most."""
     belief, full_m_s2, turns_rad_s = lean.belief, lean.full_m_s2, abs(lean.belief.yaw_rate_rad_s)
     # To stay below the top of a fence may take more than gravity, which no upright vehicle has.
-    n, e, d = acceleration_ned_m_s2
-    d = min(max(d, -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2)
+    d = min(max(acceleration_ned_m_s2[2], -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2)
     lifts_m_s2 = GRAVITY_M_S2 - d
     margin = reflex.TURN_MARGIN if turns_rad_s > reflex.BRAKED_RAD_S else reflex.HOVER_MARGIN
     least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), margin * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
     # One that turns by more than a radian within its attitude's lag does not get the tilt that is asked for.
     most_m_s2 /= max(1.0, turns_rad_s * reflex.LEAD_S)
-    n, e, _ = limited((n, e, 0.0), most_m_s2)
+    n, e, _ = limited(flat(acceleration_ned_m_s2), most_m_s2)
     up, place = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0)), belief.position_ned_m
     leant_on = [surface for surface in lean.surfaces if along(up, surface.normal_ned) < 0.0]
     presses = any(surface.off_m(place) < surface.distance_m for surface in leant_on)
@@ -137,11 +138,6 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     c, s = math.cos(turned_rad), math.sin(turned_rad)
     # No heading is asked for but the vehicle's own: motors that turn it have no thrust left to lift it.
     return tilted((n * c - e * s, n * s + e * c, d), turn_rad(belief.attitude_wxyz) + turned_rad), thrust
-
-
-def turn_kept(yaw_rate_rad_s: float) -> float:
-    """The turn that is asked for, so that no more than BRAKED_RAD_S of the present one is left to brake."""
-    return yaw_rate_rad_s - min(max(yaw_rate_rad_s, -reflex.BRAKED_RAD_S), reflex.BRAKED_RAD_S)
 
 
 def turn_rad(attitude_wxyz: Quaternion) -> float:

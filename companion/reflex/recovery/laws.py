@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.vector import plus, split
+from companion.motion.vector import flat, plus, split
 from companion.reflex.config import WAY_S, RecoveryConfig
 
 
@@ -69,7 +69,7 @@ def _normal(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Ve
     gamma_s = config.gamma_per_axis[0]
     along_m_s, tangential = split(contact.velocity_ned_m_s, contact.normal_ned)
     goal = plus(contact.position_ned_m, gamma_s * abs(along_m_s), contact.normal_ned)
-    return plus(goal, gamma_s, (tangential[0], tangential[1], 0.0)) if config.tangential == "kept" else goal
+    return plus(goal, gamma_s, flat(tangential)) if config.tangential == "kept" else goal
 
 
 def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:

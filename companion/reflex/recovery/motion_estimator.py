@@ -31,7 +31,7 @@ from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.settling import Lasting
 from companion.motion.strapdown import LEVEL, Strapdown
-from companion.motion.vector import ZERO, along, limited, minus, plus, split, towards
+from companion.motion.vector import ZERO, along, flat, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
 from companion.reflex.config import EstimateConfig
 from companion.reflex.correction import error_response
@@ -133,9 +133,9 @@ class MotionEstimator:
         self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
         if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
-            n, e, _ = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
+            across = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
             share = elapsed_s / (reflex.SMOOTHING_S + elapsed_s)
-            self.external_m_s2 = towards(self.external_m_s2, (n, e, 0.0), share)
+            self.external_m_s2 = towards(self.external_m_s2, flat(across), share)
 
     @property
     def _bias_m_s2(self) -> Vector3:
@@ -187,8 +187,7 @@ class MotionEstimator:
         self._measured = known
         place = self.motion.position_ned_m
         if doppler.place_ned_m is not None:
-            n, e, _ = minus(doppler.place_ned_m, place)
-            off = limited((n, e, 0.0), DOPPLER_GATE * reflex.PLACE_SPREAD_M)
+            off = limited(flat(minus(doppler.place_ned_m, place)), DOPPLER_GATE * reflex.PLACE_SPREAD_M)
             place = plus(place, since_s / (reflex.FOLLOWED_S + since_s), off)
         self._believe(replace(self.motion, position_ned_m=place), self.spread_m_s)
 
@@ -296,8 +295,7 @@ class MotionEstimator:
         else:
             self._believe(estimate, spread_m_s)
         if self.has_converged and not (self._has_agreed or self.is_measured_apart):
-            n, e, _ = bank.mean_error(0, way_s)
-            self.position_error_m, self._hidden_error_m_s = (n, e, 0.0), error_m_s
+            self.position_error_m, self._hidden_error_m_s = flat(bank.mean_error(0, way_s)), error_m_s
 
     def _compare(
         self, reported_m_s: Vector3, climb_error_m_s: float, elapsed_s: float, is_known: bool, time_boot_us: int
@@ -307,17 +305,15 @@ class MotionEstimator:
         It is known once it hardly changes, and by all models nothing swings (`is_known`): a swing only passes through
         what was measured. Once the two have agreed for a while the receiver is needed no more.
         """
-        off = minus(reported_m_s, self.motion.velocity_ned_m_s)
-        share = elapsed_s / (reflex.COMPARED_S + elapsed_s)
-        n, e, _ = error = towards(self._hidden_error_m_s, off, share)
-        self._steady.update(is_known and _differs_m_s(off, error) <= SAME_M_S, time_boot_us)
+        off = flat(minus(reported_m_s, self.motion.velocity_ned_m_s))
+        error = flat(towards(self._hidden_error_m_s, off, elapsed_s / (reflex.COMPARED_S + elapsed_s)))
+        self._steady.update(is_known and math.dist(off, error) <= SAME_M_S, time_boot_us)
         # `spread_m_s` is the measured one's.
-        is_same = _differs_m_s(off, ZERO) <= math.hypot(SAME_M_S, self.spread_m_s)
-        self._same.update(is_same, time_boot_us)
+        self._same.update(math.hypot(*off) <= math.hypot(SAME_M_S, self.spread_m_s), time_boot_us)
         is_steady = self.fits_models and self._steady.lasts_us > SHOWN_US
         self._has_agreed = self._same.lasts_us > 1e6 * reflex.COMPARED_S
         self.has_converged = self.has_converged or is_steady or self._has_agreed
-        self._hidden_error_m_s = ZERO if self._has_agreed else (n, e, climb_error_m_s)
+        self._hidden_error_m_s = ZERO if self._has_agreed else (error[0], error[1], climb_error_m_s)
 
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter.
@@ -325,8 +321,7 @@ class MotionEstimator:
         A velocity that is measured apart stays, and so does the place that it leads to: the report's is compared.
         """
         if self.is_measured_apart:
-            n, e, _ = minus(sample.position_ned_m, self.motion.position_ned_m)
-            self.position_error_m = (n, e, 0.0)
+            self.position_error_m = flat(minus(sample.position_ned_m, self.motion.position_ned_m))
         measured = self.corrected(sample)
         was, share, before, self._newest = self.motion, 1.0, self._newest, measured
         if before is not None:
@@ -350,11 +345,6 @@ class MotionEstimator:
         place = minus(sample.position_ned_m, self.position_error_m)
         velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
         return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
-
-
-def _differs_m_s(velocity_m_s: Vector3, other_m_s: Vector3) -> float:
-    """Horizontally."""
-    return math.dist(velocity_m_s[:2], other_m_s[:2])
 
 
 def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:

@@ -7,8 +7,8 @@ import pytest
 
 from companion.mavlink.readers import _gps_raw
 from companion.messages import GpsFix, LocalPosition, Refused
-from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, SAME_M_S, SettledConfig
-from companion.motion.delay import RECEIVER, Delay
+from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, RECEIVER_DELAY_S, SAME_M_S, SettledConfig
+from companion.motion.delay import Delay
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, turned, yaw_rad
@@ -154,7 +154,7 @@ def test_a_steady_flight_teaches_no_delay_and_the_receivers_noise():
     air = Air(0.2, noise_m_s=0.4)
     for _ in range(7_500):
         air.step()
-    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(RECEIVER.expected_s, abs=0.02)
+    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(RECEIVER_DELAY_S, abs=0.02)
     assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.4, rel=0.25)
 
 
