@@ -148,10 +148,6 @@ class MeasuredVelocity:
         self.unseen_variance_m2_s4 -= with_b * with_b / size
         self.taken_boot_us = doppler.taken_boot_us
 
-    @property
-    def spread_m_s(self) -> float:
-        return math.sqrt(self.variance_m2_s2)
-
 
 def _faster_by(strapdown: Strapdown, since_s: float) -> Vector3 | None:
     """What the accelerometer has added to the horizontal velocity in so long; None where that is not kept."""

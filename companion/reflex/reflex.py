@@ -39,9 +39,6 @@ class Reaction(NamedTuple):
     notices: Sequence[Notice]
 
 
-NO_REACTION = Reaction((), False, ())
-
-
 class LeftWrong(NamedTuple):
     """What a vehicle's own estimate has wrong after a hit, and what pushes it; local NED. `share`: of them, by now."""
 
@@ -82,21 +79,15 @@ class Reflex:
 
     def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
         """Take the samples received since the last step, in order; call it without any, too."""
-        result = advance(self.monitor, samples, situation, now_us)
-        notices, has_touched_down = list(result.notices), False
-        found: list[ImpactEstimate] = []
-        for estimate in result.impacts:
-            notice = None if situation.is_wreck else self._contact_notice(estimate)
-            notices += [] if notice is None else [notice]
-            has_touched_down |= estimate.impact.is_ground
-            # A crash is told where no hit is looked for, too.
-            if estimate.impact.is_collision and not situation.off_reason:
-                found.append(estimate)
-        held = None if found else self._held(samples, situation)
-        if held is not None:
+        impacts, seen = advance(self.monitor, samples, situation, now_us)
+        # A crash is told where no hit is looked for, too.
+        found = [each for each in impacts if each.impact.is_collision and not situation.off_reason]
+        told = [] if situation.is_wreck else [self._contact_notice(each) for each in impacts]
+        if not found and (held := self._held(samples, situation)) is not None:
             found = [held]
-            notices.append(_held_notice(held))
-        return Reaction(found, has_touched_down, notices) if result.impacts or notices or found else NO_REACTION
+            told.append(_held_notice(held))
+        notices = [*seen, *(notice for notice in told if notice is not None)]
+        return Reaction(found, any(each.impact.is_ground for each in impacts), notices)
 
     def _contact_notice(self, estimate: ImpactEstimate) -> Notice | None:
         """What is no collision, and a crash; a collision is told with its recovery."""

@@ -57,13 +57,10 @@ class Touch:
         return down_m_s > math.hypot(north_m_s, east_m_s)
 
     @property
-    def is_let_down(self) -> bool:
-        return self.situation.flown_by_hand and self.situation.descent_commanded
-
-    @property
     def meets_ground(self) -> bool:
         """The place of arming may lie higher or lower than the ground here: what comes down meets it at any height."""
-        return self.near_ground or (self.comes_down and (self.is_pushed_up or self.is_let_down))
+        is_let_down = self.situation.flown_by_hand and self.situation.descent_commanded
+        return self.near_ground or (self.comes_down and (self.is_pushed_up or is_let_down))
 
     @property
     def is_pushed_up(self) -> bool:
@@ -90,10 +87,6 @@ class Touch:
         is_as_low_as_feet = height_m is not None and height_m < SCRAPING_M
         return is_as_low_as_feet or (self.situation.descent_commanded and (self.meets_ground or self.is_pushed_up))
 
-    @property
-    def is_struck(self) -> bool:
-        return hovers(self.velocity_ned_m_s) and not self.near_ground
-
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -117,7 +110,11 @@ TABLE = (
         "sent down, near the ground or pushed from below; flown down by hand; as low as the feet",
         lambda touch: touch.has_landed,
     ),
-    Row(ImpactKind.STRUCK, "hovering, away from the ground", lambda touch: touch.is_struck),
+    Row(
+        ImpactKind.STRUCK,
+        "hovering, away from the ground",
+        lambda touch: hovers(touch.velocity_ned_m_s) and not touch.near_ground,
+    ),
     Row(ImpactKind.FLOOR, "pushed from below", lambda touch: touch.is_pushed_up),
     Row(ImpactKind.CEILING, "pushed from above", lambda touch: touch.upward < -STEEP),
     Row(ImpactKind.WALL, "pushed from the side", lambda touch: True),

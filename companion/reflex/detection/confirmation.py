@@ -32,15 +32,14 @@ class Hypothesis:
     force_m_s2: float = 0.0  # the contact force per mass in the IMU sample
     earlier: ImuSample | None = None  # the one before; None where a velocity shows the hit
     later_boot_us: int | None = None  # time of the one after, once it has come
-    is_turned: bool = False  # whether that one shows a rate jump that no motor makes
 
-    def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> None:
-        """Take the newest IMU sample's time and rates (FRD). The first one after the hit may show a rate jump."""
-        if self.earlier is not None and self.later_boot_us is None and time_boot_us > self.time_boot_us:
-            self.later_boot_us = time_boot_us
-            elapsed_s = 1e-6 * (time_boot_us - self.earlier.time_boot_us)
-            turned = math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s)
-            self.is_turned = turned > MOTORS_RAD_S2 * elapsed_s
+    def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> bool:
+        """Take the newest IMU sample's time and rates (FRD); whether it is the first one after the hit and shows a rate
+        jump that no motor makes."""
+        if self.earlier is None or self.later_boot_us is not None or time_boot_us <= self.time_boot_us:
+            return False
+        self.later_boot_us, elapsed_s = time_boot_us, 1e-6 * (time_boot_us - self.earlier.time_boot_us)
+        return math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s) > MOTORS_RAD_S2 * elapsed_s
 
     def is_rejected(self, fixes: Sequence[VelocityFix], history: MotionHistory, position_noise_m: float) -> bool:
         """Whether velocities show no impulse of this size, or positions no jump of the velocity."""

@@ -143,11 +143,6 @@ class DetectorState:
     threshold_m_s2: float = 0.0
     thrust: ThrustGain = field(default_factory=ThrustGain)
 
-    def describe(self) -> str:
-        if self.phase is Phase.OFF:
-            return f"off ({self.off_reason})"
-        return f"{self.phase.value} at {self.threshold_m_s2:.1f} m/s^2"
-
 
 StateT = TypeVar("StateT", bound=DetectorState)
 

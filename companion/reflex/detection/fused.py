@@ -215,11 +215,8 @@ class FusedDetector:
         is_known = s.kind is ImpactKind.CRASH and since_us <= 1e6 * self._config.longest_contact_s
         if is_known or not situation.may_crash:
             return None
-        if (impact := classified(impact, s.velocity_ned_m_s, situation, motion)).kind is not ImpactKind.CRASH:
-            return None
-        s.contact_began_boot_us, s.peak_specific_force_m_s2 = impact.sample_time_boot_us, impact.size_m_s2
-        s.kind = impact.kind
-        return impact
+        impact = classified(impact, s.velocity_ned_m_s, situation, motion)
+        return None if impact.kind is not ImpactKind.CRASH else self._begun(s, impact)
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
         elapsed_us = s.last_sample_boot_us - before_us
@@ -239,11 +236,9 @@ class FusedDetector:
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
+                impact = classified(impact, s.velocity_ned_m_s, situation, motion)
                 # A touch that tips the vehicle over becomes a crash.
-                if (
-                    s.kind is not ImpactKind.CRASH
-                    and classified(impact, s.velocity_ned_m_s, situation, motion).kind is ImpactKind.CRASH
-                ):
+                if impact.kind is ImpactKind.CRASH and s.kind is not ImpactKind.CRASH:
                     return self._fire(s, situation, motion, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
@@ -256,12 +251,14 @@ class FusedDetector:
         return self._fire(s, situation, motion, impact)
 
     def _fire(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact:
+        """A hit that is looked for."""
+        s.phase, s.observed, s.last_loud_boot_us = Phase.CONTACT, None, impact.sample_time_boot_us
+        return self._begun(s, classified(impact, s.velocity_ned_m_s, situation, motion))
+
+    def _begun(self, s: FusedState, impact: Impact) -> Impact:
         """Begin the contact."""
-        impact = classified(impact, s.velocity_ned_m_s, situation, motion)
-        s.phase, s.off_reason = Phase.CONTACT, ""
-        s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
+        s.contact_began_boot_us, s.kind = impact.sample_time_boot_us, impact.kind
         s.peak_specific_force_m_s2 = impact.size_m_s2
-        s.observed, s.kind = None, impact.kind
         return impact
 
     # --- velocity ---------------------------------------------------------------------------------------------

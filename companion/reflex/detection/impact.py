@@ -94,13 +94,13 @@ class ImpactEstimate:
     time_error_us: int
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
-    velocity_error_m_s: float
     normal: Normal
     peak_specific_force_m_s2: float
     impulse_m_s: float
-    is_fully_measured: bool
-    is_lower_bound: bool
-    is_final: bool
+    velocity_error_m_s: float = 0.0
+    is_fully_measured: bool = False
+    is_lower_bound: bool = True
+    is_final: bool = False
     earlier: ImuSample | None = None
 
 
@@ -158,13 +158,10 @@ class ImpactEstimator:
             time_error_us=(sample_us - free_until_us) // 2,
             position_ned_m=place,
             velocity_ned_m_s=velocity,
-            velocity_error_m_s=error_m_s,
             normal=normal_of(force_ned, came, self.hides_clipping or impact.evidence is Evidence.RATE_JUMP),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
-            is_fully_measured=False,
-            is_lower_bound=True,
-            is_final=False,
+            velocity_error_m_s=error_m_s,
             earlier=self.earlier_imu,
         )
         return estimate

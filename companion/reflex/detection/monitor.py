@@ -79,13 +79,20 @@ class CollisionMonitor:
     promised_us: int = 0
     heard: set[MessageId] = field(default_factory=set)
 
+    @property
+    def seen_from(self) -> str:
+        """What a hit must be, in words."""
+        if self.promise is not None and self.state.phase is Phase.ARMED:
+            return self.promise.text()
+        return f"{self.state.threshold_m_s2:.1f} m/s^2"
+
     def describe(self) -> str:
         """For the live line."""
         if self.no_data_reason is not None:
             return f"blind ({self.no_data_reason})"
-        if self.promise is not None and self.state.phase is Phase.ARMED:
-            return f"{self.state.phase.value} at {self.promise.text()}"
-        return self.state.describe()
+        if self.state.phase is Phase.OFF:
+            return f"off ({self.state.off_reason})"
+        return f"{self.state.phase.value} at {self.seen_from}"
 
 
 class MonitorResult(NamedTuple):
@@ -93,9 +100,6 @@ class MonitorResult(NamedTuple):
 
     impacts: Sequence[ImpactEstimate]
     notices: Sequence[Notice]
-
-
-NOTHING_SEEN = MonitorResult((), ())
 
 
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
@@ -144,8 +148,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     monitor.stream_health.imu(imu_samples, sight, now_us)
     if now_us - monitor.promised_us >= 1e6:
         _promise(monitor, now_us)
-    notices = _notices(monitor, is_on, now_us)
-    return MonitorResult(impacts, notices) if impacts or notices else NOTHING_SEEN
+    return MonitorResult(impacts, _notices(monitor, is_on, now_us))
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:
@@ -187,10 +190,8 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
     has_waited = now_us - monitor.stream_health.started_us >= KEPT_US
     if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
         monitor.is_introduced = True
-        threshold_m_s2 = monitor.state.threshold_m_s2
-        means = f"{threshold_m_s2:.1f} m/s^2" if monitor.promise is None else monitor.promise.text()
-        text = f"detector '{monitor.detector.name}' armed: from {means}"
-        notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
+        text = f"detector '{monitor.detector.name}' armed: from {monitor.seen_from}"
+        notices.append(Notice("detector", text, {"threshold_m_s2": round(monitor.state.threshold_m_s2, 3)}))
         losses = monitor.detector.losses.items()
         notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]
     estimate = monitor.estimator.estimate

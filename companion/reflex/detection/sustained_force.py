@@ -87,7 +87,6 @@ class SustainedForceMonitor:
             time_error_us=now_us - since_us,
             position_ned_m=sample.position_ned_m,
             velocity_ned_m_s=sample.velocity_ned_m_s,
-            velocity_error_m_s=0.0,
             normal=Normal(normal, reflex.IMPULSE_RAD),
             peak_specific_force_m_s2=force_m_s2,
             impulse_m_s=0.5e-6 * force_m_s2 * (now_us - since_us),

@@ -79,8 +79,8 @@ class CollisionRecord:
         is_larger = state.peak_specific_force_m_s2 > self.peak_specific_force_m_s2
         is_seen_again = is_in_contact and (is_larger or state.last_loud_boot_us > self.sample_time_boot_us)
         if self.hypothesis is not None:
-            self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
-            self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis
+            is_turned = self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
+            self.hypothesis = None if is_turned or is_seen_again else self.hypothesis
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
             self.estimator.note_contact(
@@ -100,17 +100,14 @@ class CollisionRecord:
         hypothesis, source, self.hypothesis = self.hypothesis, self.source, None
         return hypothesis.is_rejected(source.strapdown.fixes, source.history, source.config.position_noise_m)
 
-    def is_rebound(self, time_boot_us: int) -> bool:
-        """Whether a velocity, which may be late, shows the rebound. Later the vehicle's own controller makes it."""
-        return time_boot_us - self.estimator.pushed_boot_us <= LATEST_S * 1e6
-
     def follow_recovery(self, sample: LocalPosition) -> None:
         """Update overshoot and rebound speed while the vehicle recovers."""
         normal = self.normal.direction_ned
         away = unit(minus(self.setpoint_ned_m, self.contact.position_ned_m))
         past_m = split(minus(sample.position_ned_m, self.setpoint_ned_m), normal if away == ZERO else away)[0]
         self.overshoot_m = max(self.overshoot_m, past_m)
-        if self.is_rebound(sample.time_boot_us):
+        # A velocity, which may be late, shows the rebound; later the vehicle's own controller makes it.
+        if sample.time_boot_us - self.estimator.pushed_boot_us <= LATEST_S * 1e6:
             self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, split(sample.velocity_ned_m_s, normal)[0])
 
     def report(self) -> CollisionReport:

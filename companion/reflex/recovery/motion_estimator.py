@@ -221,7 +221,7 @@ class MotionEstimator:
         if self._measured is not None and self.is_measured_apart:
             self._measured.predict(self._time_boot_us, self._summed_m_s)
             n, e, _ = self._measured.velocity_ned_m_s
-            velocity, self.spread_m_s = (n, e, velocity[2]), self._measured.spread_m_s
+            velocity, self.spread_m_s = (n, e, velocity[2]), math.sqrt(self._measured.variance_m2_s2)
         self.motion = MotionState(motion.position_ned_m, velocity)
         self._look_back()
 
@@ -287,14 +287,13 @@ class MotionEstimator:
         if not self.fits_models:
             # By then a receiver's velocity has come, where there is one.
             is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US
-        if self.is_measured_apart:
+        is_apart = self.is_measured_apart
+        self.has_converged = self.has_converged or (is_known and not is_apart)
+        if is_apart or not self.has_converged:
             self._believe(estimate, spread_m_s)
+        if is_apart:
             self._compare(velocity, error_m_s[2], elapsed_s, is_known, sample.time_boot_us)
-        elif self.has_converged or is_known:
-            self.has_converged = True
-        else:
-            self._believe(estimate, spread_m_s)
-        if self.has_converged and not (self._has_agreed or self.is_measured_apart):
+        elif self.has_converged:
             self.position_error_m, self._hidden_error_m_s = flat(bank.mean_error(0, way_s)), error_m_s
 
     def _compare(

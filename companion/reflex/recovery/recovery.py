@@ -79,10 +79,8 @@ class Recovery:
         rested_s = rebound_m_s = None
         if self.law.follows and (self.leans or not self.law.leans):
             rested_s, rebound_m_s = self._follow(sample)
-        settled_s = self._settled_after_s(sample)
-        if settled_s is not None:
-            record.settled_after_s = settled_s
-        return Progress(is_rejected, rested_s, rebound_m_s, settled_s)
+        record.settled_after_s = self._settled_after_s(sample)
+        return Progress(is_rejected, rested_s, rebound_m_s, record.settled_after_s)
 
     @property
     def is_pressed(self) -> bool:
