@@ -176,7 +176,8 @@ class Reflex:
         """
         recovery = self.recovery
         assert recovery is not None and self.loss_s is not None, "only a known one lets it lean"
-        belief, held_s = recovery.record.estimator.belief, self.loss_s + numbers.NOTICED_S + numbers.LEAD_S
+        belief = recovery.record.estimator.belief(self.monitor.estimator.strapdown)
+        held_s = self.loss_s + numbers.NOTICED_S + numbers.LEAD_S
         acceleration = wanted(belief, recovery.surfaces, recovery.record.setpoint_ned_m[2])
         return acceleration, Lean(belief, recovery.surfaces, self.thrust.full_m_s2, held_s)
 

@@ -14,7 +14,7 @@ innovations (Magill 1965). Before the first report v is the expected rebound, wi
 import math
 from dataclasses import dataclass, field, replace
 
-from companion.messages import LocalPosition, Quaternion, Vector3
+from companion.messages import LocalPosition, Vector3
 from companion.motion.config import (
     CURRENT_US,
     DELAY_S,
@@ -30,7 +30,7 @@ from companion.motion.config import (
 from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.settling import Lasting
-from companion.motion.strapdown import LEVEL, Strapdown
+from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, flat, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
 from companion.reflex.config import EstimateConfig
@@ -56,11 +56,7 @@ class MotionEstimator:
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
-    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
-    attitude_wxyz: Quaternion = LEVEL
-    yaw_rate_rad_s: float = 0.0
-    heading_error_rad: float = 0.0  # of the vehicle's own attitude
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, by gyroscopes, NED
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
@@ -116,6 +112,9 @@ class MotionEstimator:
         """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
         time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
         self._time_boot_us = time_us
+        if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
+            # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
+            self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
         if not 0.0 < elapsed_s < 1e-6 * LONGEST_GAP_US:
             return
         pushed = strapdown.acceleration_ned_m_s2
@@ -125,12 +124,6 @@ class MotionEstimator:
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed))
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
-        self.attitude_wxyz, self.yaw_rate_rad_s = strapdown.valid_wxyz, strapdown.rates_frd_rad_s[2]
-        self.heading_error_rad = strapdown.heading_error_rad
-        if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
-            # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
-            self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
-        self.tilt_m_s2 = tilt_ahead(strapdown, reflex.TILT_AHEAD_S)
         if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
             across = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
@@ -147,20 +140,19 @@ class MotionEstimator:
         """External force per mass across the thrust, horizontal: wind and drag."""
         return minus(self.external_m_s2, self._bias_m_s2)
 
-    @property
-    def belief(self) -> Belief:
+    def belief(self, strapdown: Strapdown) -> Belief:
         """What the attitude law goes by."""
         motion = self.motion
         return Belief(
             motion.position_ned_m,
             motion.velocity_ned_m_s,
             self.spread_m_s,
-            self.tilt_m_s2,
+            tilt_ahead(strapdown),
             self.wind_m_s2,
-            self.attitude_wxyz,
-            self.yaw_rate_rad_s,
+            strapdown.valid_wxyz,
+            strapdown.rates_frd_rad_s[2],
             self.tilted_m_s2,
-            self.heading_error_rad,
+            strapdown.heading_error_rad,
         )
 
     @property
@@ -357,9 +349,9 @@ def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition
     return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
 
 
-def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
-    """Horizontal acceleration, NED, of a thrust that carries the vehicle, at the tilt in `lead_s`."""
-    ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, lead_s)
+def tilt_ahead(strapdown: Strapdown) -> Vector3:
+    """Horizontal acceleration, NED, of a thrust that carries the vehicle, at the tilt of TILT_AHEAD_S later."""
+    ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, reflex.TILT_AHEAD_S)
     n, e, d = body_to_ned(ahead_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
     upright = max(-d / GRAVITY_M_S2, reflex.LEAST_UPRIGHT_COSINE)
     return (n / upright, e / upright, 0.0)

@@ -135,7 +135,7 @@ def test_a_heading_that_is_reported_while_a_hit_is_corrected_is_compared_with_th
     for time_us in (8_000, 12_000):
         strapdown.imu(time_us, (0.0, 0.0, -G), ZERO)
         found.imu(strapdown)
-    assert found.belief.heading_error_rad == strapdown.heading_error_rad
+    assert found.belief(strapdown).heading_error_rad == strapdown.heading_error_rad
 
 
 @pytest.mark.parametrize("late_s", [0.012, 0.06, 0.2])
@@ -310,7 +310,7 @@ def test_an_acceleration_that_the_accelerometer_does_not_show_is_found():
         go_on(air, found, 0.004)
     # Then the belief does not lag behind, and the law is told what to lean against
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.15)
-    assert found.belief.level_m_s2[0] == pytest.approx(0.5, abs=0.15)
+    assert found.belief(air.strapdown).level_m_s2[0] == pytest.approx(0.5, abs=0.15)
 
 
 def test_gyroscopes_that_drift_mislead_the_belief_by_no_more_than_the_receivers_noise():
