@@ -66,6 +66,8 @@ class VelocityValidity:
     """Whether a receiver's velocity shows that the vehicle's own is not right yet."""
     left_m_s: float = math.inf
     """What is left to correct, once that is known."""
+    _hit_boot_us: int = 0
+    """Of the latest hit."""
     _speed_m_s: float = 0.0
     """Of the latest hit, or of the hardest of those."""
 
@@ -99,13 +101,13 @@ class VelocityValidity:
 
     def invalidate(self, time_us: int, speed_m_s: float) -> None:
         """A new hit, at this speed: the velocity is not valid until the hit is known to be measured whole."""
-        self._is_again, self.invalid_since_boot_us = not self.is_valid, time_us
+        self._is_again, self.invalid_since_boot_us, self._hit_boot_us = not self.is_valid, time_us, time_us
         self._speed_m_s = max(speed_m_s, self._speed_m_s) if self._is_again else speed_m_s
 
-    def assess(self, is_fully_measured: bool, time_us: int) -> None:
+    def assess(self, is_fully_measured: bool) -> None:
         """Take whether the latest hit was measured whole, as known by now."""
         if not is_fully_measured:
-            self.invalid_since_boot_us = self.invalid_since_boot_us or time_us
+            self.invalid_since_boot_us = self._hit_boot_us
         elif not self._is_again:
             self.invalid_since_boot_us = None
 

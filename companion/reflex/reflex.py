@@ -167,7 +167,7 @@ class Reflex:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
         self.hits.pop()
         self.newest = next((each for each in self.hits[-1:] if each.source is self.monitor.estimator), None)
-        self.monitor.estimator.validity.assess(True, self.sample_boot_us)
+        self.monitor.estimator.validity.assess(True)
 
     def lean(self) -> tuple[Vector3, Lean]:
         """The acceleration wanted by the present recovery, local NED, and what makes attitude and thrust of it.

@@ -177,7 +177,7 @@ class ImpactEstimator:
             # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
             contact.is_over = is_over
             is_whole = contact.is_fully_measured
-            self.validity.assess(is_whole, sample.time_boot_us)
+            self.validity.assess(is_whole)
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)
