@@ -19,7 +19,7 @@ from typing import TypeAlias
 
 # Five SERVO_OUTPUT_RAW at the 10 Hz of PX4's onboard set. A turn begins and ends within this time.
 WINDOW_US = 500_000
-# A minute of windows after the hit is enough.
+# Half a minute of windows after the hit is enough.
 MOST_WINDOWS = 60
 # The usual level of significance.
 LEAST_CONFIDENCE = 0.99

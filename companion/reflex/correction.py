@@ -1,8 +1,7 @@
 """How a vehicle's estimator corrects a velocity of which a clipped accelerometer hid a part, and until when.
 
-A clipped accelerometer hides a part of the hit from PX4's velocity. PX4's estimator corrects this in a swing that looks
-like another hit. On a real PX4 the velocity was wrong by up to 7.8 m/s. It stayed so for 0.1 s, overshot by a fifth
-after 0.7 s, and the tilt was wrong for seconds.
+PX4's estimator corrects it in a swing that looks like another hit. On a real PX4 the velocity was wrong by up to
+7.8 m/s. It stayed so for 0.1 s, overshot by a fifth after 0.7 s, and the tilt was wrong for seconds.
 
 The detector uses the validity: it must not take that swing for a second hit. A second hit jumps further than the swing
 of the first one's speed. A recovery knows the normal and the expected rebound, too: it uses `motion_estimator`.

@@ -144,7 +144,7 @@ class Reflex:
             sample_time_boot_us=first_us,
             detector=self.config.detector,
             contact=contact,
-            peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
+            peak_specific_force_m_s2=impact.size_m_s2,
             estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second, fits_models),
             source=self.monitor.estimator,
         )
@@ -211,7 +211,7 @@ class Reflex:
             return 0.0
         left_us = newest.sample_time_boot_us + numbers.FADED_US - time_boot_us
         share = left_us / (numbers.FADED_US - numbers.FADES_FROM_US)
-        return 1.0 if share >= 1.0 or newest.estimator.is_measured_apart else share
+        return 1.0 if newest.estimator.is_measured_apart else min(max(share, 0.0), 1.0)
 
     def place_ned_m(self, reported: LocalPosition) -> Vector3:
         """Where the vehicle is: by the belief in a recovery, then as reported without what is left wrong."""
@@ -220,7 +220,7 @@ class Reflex:
             return reported.position_ned_m
         if not newest.is_over:
             return newest.estimator.motion.position_ned_m
-        share = max(0.0, self._left_share(reported.time_boot_us))
+        share = self._left_share(reported.time_boot_us)
         return plus(reported.position_ned_m, -share, newest.estimator.position_error_m)
 
     # --- by which law

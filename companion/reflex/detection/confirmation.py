@@ -15,7 +15,7 @@ from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import VelocityFix
-from companion.motion.vector import ZERO, minus, plus, split
+from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex.config import DECIDED_US, STRUCK_M_S, SURE
 from companion.reflex.detection.detector import Evidence
 from companion.reflex.detection.impact import ImpactEstimate
@@ -72,7 +72,7 @@ class Hypothesis:
         return is_unmoved and is_clear and math.hypot(*change) < STRUCK_M_S
 
     def _along(self, vectors: Sequence[Vector3]) -> list[float]:
-        return [split(each, self.away)[0] for each in vectors]
+        return [along(each, self.away) for each in vectors]
 
     def _stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
         """Whether the positions before and after show less than half of the jump, beyond their noise."""
@@ -89,7 +89,7 @@ class Hypothesis:
         if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
             return None
         over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
-        return split(minus(places[-1].position_ned_m, places[0].position_ned_m), self.away)[0] / over_s
+        return along(minus(places[-1].position_ned_m, places[0].position_ned_m), self.away) / over_s
 
 
 def _median(vectors: Sequence[Vector3]) -> Vector3:

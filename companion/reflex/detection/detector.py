@@ -70,15 +70,16 @@ class Situation(NamedTuple):
     is_wreck: bool = False
 
 
-class Motion(Protocol):
+@dataclass(slots=True)
+class Motion:
     """What the samples add up to. All have heard the newest already. A velocity that is not valid lacks a part of a hit
     that was clipped; samples behind a filter hide clipping.
     """
 
-    history: MotionHistory
-    strapdown: Strapdown
-    validity: VelocityValidity
-    hides_clipping: bool
+    history: MotionHistory = field(init=False, default_factory=MotionHistory)
+    strapdown: Strapdown = field(init=False, default_factory=Strapdown)
+    validity: VelocityValidity = field(init=False, default_factory=VelocityValidity)
+    hides_clipping: bool = field(init=False, default=False)
 
 
 @dataclass(frozen=True, slots=True)

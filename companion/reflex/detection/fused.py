@@ -276,10 +276,10 @@ class FusedDetector:
         # A filter makes a pulse of a contact, of which samples hold a part. A jump beside them is the estimator's own.
         if not strapdown.has_new_fix or motion.hides_clipping:
             return None
-        step = jump.step_m_s(strapdown.fixes)
         if time_us - s.last_loud_boot_us < SHOWN_US:
             jump.since_us = time_us
             return None
+        step = jump.step_m_s(strapdown.fixes)
         if step is None:
             return None
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor

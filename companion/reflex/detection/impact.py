@@ -6,13 +6,10 @@ from dataclasses import dataclass, field, replace
 from companion.messages import Attitude, GpsFix, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
 from companion.motion.config import SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.doppler import Doppler
-from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex.config import CLIPPED_SHARE, SHORT, EstimateConfig
-from companion.reflex.correction import VelocityValidity
-from companion.reflex.detection.detector import DetectorState, Evidence, Impact, Phase
+from companion.reflex.detection.detector import DetectorState, Evidence, Impact, Motion, Phase
 from companion.reflex.surface import Normal, normal_of
 
 
@@ -54,10 +51,6 @@ class ContactForce:
             first_m_s2, second_m_s2 = (math.hypot(*each) for each in self.forces_ned_m_s2)
             share = min(1.0, first_m_s2 / second_m_s2) if second_m_s2 > 0.0 else 1.0
             self.begun_boot_us = sample.time_boot_us - elapsed_us - round(share * self.averaging_us)
-
-    @property
-    def peak_m_s2(self) -> float:
-        return max(math.hypot(*force) for force in self.forces_ned_m_s2)
 
     @property
     def is_fully_measured(self) -> bool:
@@ -105,15 +98,11 @@ class ImpactEstimate:
 
 
 @dataclass(slots=True)
-class ImpactEstimator:
+class ImpactEstimator(Motion):
     """Takes all samples, and refines the estimate of the latest impact with each. Times: vehicle's boot clock."""
 
     config: EstimateConfig
-    history: MotionHistory = field(default_factory=MotionHistory)
-    strapdown: Strapdown = field(default_factory=Strapdown)
-    validity: VelocityValidity = field(default_factory=VelocityValidity)
     doppler: Doppler = field(default_factory=Doppler)
-    hides_clipping: bool = False  # filtered samples do not show it
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
@@ -191,7 +180,7 @@ class ImpactEstimator:
             time_boot_us=begun_us,
             time_error_us=error_us,
             normal=normal_of(contact.impulse_ned_m_s, contact.came_ned_m_s, self.hides_clipping),
-            peak_specific_force_m_s2=contact.peak_m_s2,
+            peak_specific_force_m_s2=max(math.hypot(*force) for force in contact.forces_ned_m_s2),
             impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
         )
 

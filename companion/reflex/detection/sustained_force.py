@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.vector import ZERO, minus, plus, split, towards, unit
+from companion.motion.vector import ZERO, along, minus, plus, split, towards, unit
 from companion.reflex import config as reflex
 from companion.reflex.detection.detector import Impact, ImpactKind
 from companion.reflex.detection.free_flight import ThrustGain
@@ -66,13 +66,13 @@ class SustainedForceMonitor:
             self.wind_m_s2 = self.missing_m_s2
         grown = minus(self.missing_m_s2, self.wind_m_s2)
         towards = unit(grown)
-        force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
+        force_m_s2 = min(along(grown, towards), along(self.missing_m_s2, towards))
         along_m_s, across = split(self.velocity_m_s, towards)
         is_free = _is_free(along_m_s, math.hypot(*across))
         if is_there or is_free:
             share = 1.0 if abs(along_m_s) > reflex.FREE_M_S else elapsed_s / (reflex.FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
-        if is_free or force_m_s2 < 0.5 * reflex.HELD_M_S2 or split(short, towards)[0] <= 0.0:
+        if is_free or force_m_s2 < 0.5 * reflex.HELD_M_S2 or along(short, towards) <= 0.0:
             self.pushed_since_us = now_us
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
         since_us = self.pushed_since_us

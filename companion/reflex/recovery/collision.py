@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S
-from companion.motion.vector import ZERO, minus, split, unit
+from companion.motion.vector import ZERO, along, minus, unit
 from companion.reflex.config import DECIDED_US, FADED_US
 from companion.reflex.detection.confirmation import Hypothesis
 from companion.reflex.detection.detector import DetectorState, Phase
@@ -104,11 +104,11 @@ class CollisionRecord:
         """Update overshoot and rebound speed while the vehicle recovers."""
         normal = self.normal.direction_ned
         away = unit(minus(self.setpoint_ned_m, self.contact.position_ned_m))
-        past_m = split(minus(sample.position_ned_m, self.setpoint_ned_m), normal if away == ZERO else away)[0]
+        past_m = along(minus(sample.position_ned_m, self.setpoint_ned_m), normal if away == ZERO else away)
         self.overshoot_m = max(self.overshoot_m, past_m)
         # A velocity, which may be late, shows the rebound; later the vehicle's own controller makes it.
         if sample.time_boot_us - self.estimator.pushed_boot_us <= LATEST_S * 1e6:
-            self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, split(sample.velocity_ned_m_s, normal)[0])
+            self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, along(sample.velocity_ned_m_s, normal))
 
     def report(self) -> CollisionReport:
         velocity = self.contact.velocity_ned_m_s

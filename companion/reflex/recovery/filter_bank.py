@@ -1,7 +1,5 @@
-"""A bank of Kalman filters of the motion after a hit, one for each model of how the vehicle's estimate corrects itself.
-
-At a time t after the hit the vehicle reports v(t) + e g(t) and x(t) + e G(t), where e is what the accelerometer did not
-show of the hit (see `correction`). Each model is weighted by the likelihood of its innovations (Magill 1965).
+"""A bank of Kalman filters of the motion after a hit, one for each model of how the vehicle's estimate corrects itself
+(see `motion_estimator` and `correction`).
 """
 
 import math
