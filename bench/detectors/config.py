@@ -18,7 +18,7 @@ class BaselineConfig(CompanionConfig):
 
     retired = frozenset[str]()
 
-    detectors: ClassVar[Mapping[str, Callable[[Any, int], Detector[Any]]]] = {
+    detectors: ClassVar[Mapping[str, Callable[[Any, int], Detector]]] = {
         **CompanionConfig.detectors,
         **{baseline.name: baseline for baseline in BASELINES},
     }

@@ -91,7 +91,7 @@ class Listener:
 
     def listen(self, monitor: CollisionMonitor) -> None:
         """To this watch, from now on."""
-        monitor.detector = cast(Detector[Any], _ListenedTo(monitor.detector, self))
+        monitor.detector = cast(Detector, _ListenedTo(monitor.detector, self))
 
 
 class _ListenedTo:
@@ -99,17 +99,16 @@ class _ListenedTo:
 
     losses: Mapping[MessageId, str]
 
-    def __init__(self, detector: Detector[Any], listener: Listener) -> None:
+    def __init__(self, detector: Detector, listener: Listener) -> None:
         self._detector, self._listener = detector, listener
         self.name, self.losses = detector.name, detector.losses
 
     def initial(self) -> DetectorState:
-        state: DetectorState = self._detector.initial()
-        return state
+        return self._detector.initial()
 
     def step(self, state: DetectorState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         phase = _NUMBERS[state.phase]
-        impact: Impact | None = self._detector.step(state, sample, situation, motion)
+        impact = self._detector.step(state, sample, situation, motion)
         if isinstance(sample, ImuSample):
             self._listener.forces.numbers.extend((sample.time_boot_us, phase, *_forces(state)))
         elif isinstance(sample, LocalPosition | Odometry) and isinstance(state, FusedState):

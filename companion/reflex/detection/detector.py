@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import ClassVar, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from companion.messages import LandedState, MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
@@ -145,10 +145,7 @@ class DetectorState:
     thrust: ThrustGain = field(default_factory=ThrustGain)
 
 
-StateT = TypeVar("StateT", bound=DetectorState)
-
-
-class Detector(Protocol[StateT]):
+class Detector(Protocol):
     """A detector holds its parameters; all that changes is in the state that `step` is given.
 
     `losses` are the streams it makes use of besides HIGHRES_IMU, with what is lost where one does not arrive.
@@ -157,8 +154,8 @@ class Detector(Protocol[StateT]):
     name: str
     losses: ClassVar[Mapping[MessageId, str]]
 
-    def initial(self) -> StateT: ...
+    def initial(self) -> DetectorState: ...
 
-    def step(self, state: StateT, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
+    def step(self, state: Any, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         """Take one sample of any kind, in the order heard; IMU samples come in the order of their stamps."""
         ...

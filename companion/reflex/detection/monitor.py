@@ -31,7 +31,7 @@ class CollisionMonitorConfig(StrictModel):
 
     retired = frozenset({"fuzzy", "hybrid", "lateral", "momentum", "threshold", "tracking"})
 
-    detectors: ClassVar[Mapping[str, Callable[[Any, int], Detector[Any]]]] = {FusedDetector.name: FusedDetector}
+    detectors: ClassVar[Mapping[str, Callable[[Any, int], Detector]]] = {FusedDetector.name: FusedDetector}
     """By the names allowed in `detector`, from their settings and the IMU's averaging interval in microseconds. A
     subclass adds others, with a key for the settings of each."""
 
@@ -64,7 +64,7 @@ class CollisionMonitor:
     """The monitor's state between two steps. It can be copied and pickled as a whole."""
 
     config: CollisionMonitorConfig
-    detector: Detector[Any]
+    detector: Detector
     state: DetectorState
     estimator: ImpactEstimator
     stream_health: StreamHealth
