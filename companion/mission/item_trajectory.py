@@ -132,8 +132,6 @@ LOOK_EVERY_M = 0.1
 MOST_LOOKS = 2_000
 # A circle that cannot be flown as one is flown by its points: 24 differ from it by less than 1 % of the radius.
 ROUND_BY_DEG = 15.0
-# Beside a point by less than this it has been passed: setpoints on a curve are up to 4 cm apart.
-PASSED_M = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +166,7 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
     limits = speeds.limits(item.speed_m_s, item.acceleration_m_s2)
     if not isinstance(item, items.GoToItem):
         curve = CurveProfile(places, *limits)
-        places_on_it = looks(curve, curve.duration_s)
+        places_on_it = looks(curve)
         if not known.block(places_on_it) and all(known.fence.complaint(place) is None for place in places_on_it):
             return Planned(curve, True, left_out)
     return Planned(lines(places, limits), True, left_out)
@@ -213,7 +211,7 @@ def lines(places_m: Sequence[Vector3], limits: SpeedAndAccelerations) -> Chain:
 
 
 def left_of(item: items.Motion, trajectory: Trajectory, elapsed_s: float) -> items.Motion:
-    """What is left of an interrupted item. Of a path: the points behind the last one that the trajectory passed."""
+    """What is left of an interrupted item. Of a path: its points that the trajectory still passes."""
     left_s = trajectory.duration_s - elapsed_s
     if left_s <= 0.0:
         return items.GoToItem(position_ned_m=trajectory.target_m)
@@ -222,21 +220,16 @@ def left_of(item: items.Motion, trajectory: Trajectory, elapsed_s: float) -> ite
             return item.model_copy(update={"duration_s": left_s})
         case items.OrbitItem(), Chain(parts=[_, CircleProfile(duration_s=round_s)]):
             return item.model_copy(update={"turns": item.turns * min(1.0, left_s / round_s)})
-        case items.PathItem(points_ned_m=points), _:
-            flown = looks(trajectory, elapsed_s)
-            near = [
-                number
-                for number, point in enumerate(points[:-1], start=1)
-                if min(math.dist(point, place) for place in flown) < PASSED_M
-            ]
-            return item.model_copy(update={"points_ned_m": points[max(near, default=0) :]})
+        case items.PathItem(points_ned_m=points), Chain() | CurveProfile():
+            ahead = [place for place in trajectory.ahead(elapsed_s) if place in points]
+            return item.model_copy(update={"points_ned_m": tuple(ahead) or points[-1:]})
     return item
 
 
-def looks(trajectory: Trajectory, until_s: float) -> list[Vector3]:
-    """Points of a trajectory, near to one another, from its start until a time."""
+def looks(trajectory: Trajectory) -> list[Vector3]:
+    """Points of a trajectory, near to one another."""
     count = max(1, min(MOST_LOOKS, math.ceil(trajectory.distance_m / LOOK_EVERY_M)))
-    return [trajectory.at(until_s * number / count)[0] for number in range(count + 1)]
+    return [trajectory.at(trajectory.duration_s * number / count)[0] for number in range(count + 1)]
 
 
 def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
@@ -248,7 +241,7 @@ def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
         return known.block((trajectory.start_m, trajectory.target_m))
     if isinstance(trajectory, CircleProfile):
         trajectory = replace(trajectory, angle_rad=max(-math.tau, min(math.tau, trajectory.angle_rad)))
-    return known.block(looks(trajectory, trajectory.duration_s))
+    return known.block(looks(trajectory))
 
 
 def _points_of(item: items.GoToItem | items.PathItem | items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import TypeAlias
 
 import numpy as np
@@ -166,6 +167,11 @@ class Chain:
             elapsed_s -= duration_s
         return self.parts[-1].at(elapsed_s)
 
+    def ahead(self, elapsed_s: float) -> list[Vector3]:
+        """The ends of its parts that are not reached by then."""
+        ends_s = accumulate(part.duration_s for part in self.parts)
+        return [part.target_m for part, end_s in zip(self.parts, ends_s, strict=True) if end_s > elapsed_s]
+
 
 Floats = npt.NDArray[np.float64]
 
@@ -199,6 +205,7 @@ class CurveProfile:
         self.target_m: Vector3 = points[-1]
         self.duration_s = self.distance_m = 0.0
         self._table: list[Motion] = []
+        self._points_m, self._passed_s = points, [0.0]
         if len(points) > 1:
             self._plan(np.array(points), speed_m_s, acceleration_m_s2, speeding_up_m_s2)
 
@@ -211,6 +218,10 @@ class CurveProfile:
         before, after = self._table[index : index + 2]
         place, velocity, acceleration = (towards(a, b, steps - index) for a, b in zip(before, after, strict=True))
         return place, velocity, acceleration
+
+    def ahead(self, elapsed_s: float) -> list[Vector3]:
+        """The points that are not passed by then."""
+        return [place for place, passed_s in zip(self._points_m, self._passed_s, strict=True) if passed_s > elapsed_s]
 
     def _plan(self, points: Floats, speed_m_s: float, acceleration_m_s2: float, speeding_up_m_s2: float) -> None:
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -229,6 +240,7 @@ class CurveProfile:
         speeds = _within_acceleration(top_m_s, pieces_m, min(braking_m_s2, speeding_up_m_s2), braking_m_s2)
         times_s = np.concatenate([[0.0], np.cumsum(2.0 * pieces_m / (speeds[1:] + speeds[:-1]))])
         self.distance_m, self.duration_s = float(along_m[-1]), float(times_s[-1])
+        self._passed_s = np.interp(knots, u, times_s).tolist()
         self._tabulate(spline, u, along_m, speeds, times_s)
 
     def _tabulate(self, spline: "_Spline", u: Floats, along_m: Floats, speeds: Floats, times_s: Floats) -> None:

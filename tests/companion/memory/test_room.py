@@ -217,14 +217,31 @@ def test_an_orbit_is_flown_round_what_stands_in_it(turns):
     assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
 
 
-@pytest.mark.parametrize("last", [(6.0, 0.0, -1.5), START])
-def test_what_has_been_flown_of_a_path_is_not_flown_again(last):
-    """Also of one that ends where it begins."""
-    path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), last))
-    trajectory = CurveProfile((START, *path.points_ned_m), 1.5, 2.0)
+TWICE = (4.0, 0.0, -1.5)
+LOOP = (TWICE, (6.0, 2.0, -1.5), (4.0, 4.0, -1.5), TWICE, (4.0, -2.0, -1.5))
+
+
+@pytest.mark.parametrize(
+    ("points", "half"),
+    [
+        (((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), (6.0, 0.0, -1.5)), 1),
+        (((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), START), 1),
+        (LOOP, 2),
+    ],
+)
+def test_what_has_been_flown_of_a_path_is_not_flown_again(points, half):
+    """Also of one that ends where it begins. And what is ahead is flown, of one that crosses itself, too."""
+    path = PathItem(points_ned_m=points)
+    trajectory = CurveProfile((START, *points), 1.5, 2.0)
     left = [left_of(path, trajectory, trajectory.duration_s * part) for part in (0.1, 0.5, 1.0)]
-    assert [item.points_ned_m for item in left[:2]] == [path.points_ned_m, path.points_ned_m[1:]]
-    assert left[2] == GoToItem(position_ned_m=last)
+    assert [item.points_ned_m for item in left[:2]] == [points, points[half:]]
+    assert left[2] == GoToItem(position_ned_m=points[-1])
+
+
+def test_of_a_path_round_a_wall_its_own_points_are_left():
+    path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5), (6.0, 0.0, -1.5), (6.0, 3.0, -1.5)))
+    round_it = trajectory_around(path, START, PACE, around(wall(0.0))).trajectory
+    assert left_of(path, round_it, 0.5 * round_it.duration_s).points_ned_m == path.points_ned_m[2:]
 
 
 # --- touch after touch
