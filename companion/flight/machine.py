@@ -2,6 +2,7 @@
 
 import traceback
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, TypeAlias
@@ -24,6 +25,7 @@ class StateMachine(ABC):
     """What a flight's and a guard's have in common. The same inputs always give the same moves."""
 
     program: ClassVar[str]
+    table: ClassVar[Mapping[Any, Mapping[Any, Any]]]
     giving_away: ClassVar[tuple[Enum, ...]]
     """States in which the vehicle is given away already."""
     flight: FlightContext
@@ -41,8 +43,8 @@ class StateMachine(ABC):
         return True
 
     @abstractmethod
-    def step(self, inputs: Inputs, now_us: int) -> bool:
-        """Take all moves that are due; whether there were any."""
+    def _begin(self, previous: Any, transition: Transition, now_us: int) -> Any:
+        """What is done in the present state, which was entered by that transition."""
 
     @abstractmethod
     def _give_away(self, text: str, now_us: int) -> None:
@@ -72,11 +74,29 @@ class StateMachine(ABC):
             self._release(text)
         return self.handler is not before
 
+    def _take(self, transition: Transition | None, now_us: int) -> bool:
+        """Whether it moves on. A trigger counts by its name: a guard takes a flight's, too."""
+        if transition is None:
+            return False
+        ways = {trigger.name: state for trigger, state in self.table[self.state].items()}
+        if transition.trigger.name not in ways:
+            return False
+        previous, self.state = self.state, ways[transition.trigger.name]
+        self.handler = self._begin(previous, transition, now_us)
+        return True
+
+    def _take_all(self, transition: Transition | None, now_us: int) -> None:
+        """That one and all that follow from it in this step."""
+        while self._take(transition, now_us):
+            # The answers and positions of this step belong to the state that asked for them.
+            transition = self.handler.step(self.flight, Inputs(), now_us)
+
 
 # What is done in a state; one object is made each time the state is entered. `step` does what is due and returns a
 # transition when the state is over; `target` is the setpoint for now, None while none must be sent.
-OnTheWay: TypeAlias = TakeOff | FlyItems | Recover | HoldAfterRecovery | FlyHome | Land
-Handler: TypeAlias = Connect | Ready | OnTheWay | Crashed | Released | HandOver
+Handler: TypeAlias = (
+    Connect | Ready | TakeOff | FlyItems | Recover | HoldAfterRecovery | FlyHome | Land | Crashed | Released | HandOver
+)
 
 
 @dataclass
@@ -84,6 +104,7 @@ class Machine(StateMachine):
     """The present state and what is being done in it."""
 
     program = "companion"
+    table = TABLE
     giving_away = FINAL_STATES
     flight: FlightContext
     handler: Handler
@@ -94,15 +115,12 @@ class Machine(StateMachine):
         return isinstance(self.handler, Released | HandOver) and self.handler.finished
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
+        """Take all moves that are due; whether there were any."""
         before = self.handler
         if self.state not in FINAL_STATES:
-            ended = early_end(self.flight, self.state, inputs, now_us)
-            if ended is not None:
-                self._take(ended, now_us)
+            self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
         if self.state in IN_THE_AIR:
-            how = crashed(self.flight, self.state is State.LANDING, now_us)
-            if how is not None:
-                self._take(Transition(Trigger.CRASHED, how), now_us)
+            self._take(crashed(self.flight, self.state is State.LANDING, now_us), now_us)
         for estimate in inputs.impacts:
             if self.state in IN_THE_AIR and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
@@ -111,11 +129,7 @@ class Machine(StateMachine):
                 record_collision(self.flight, estimate, now_us)
                 decide(self.flight, self.state, now_us)
                 self._take(Transition(Trigger.COLLISION), now_us)
-        transition = self.handler.step(self.flight, inputs, now_us)
-        while transition is not None:
-            self._take(transition, now_us)
-            # The answers and positions of this step belong to the state that asked for them.
-            transition = self.handler.step(self.flight, Inputs(), now_us)
+        self._take_all(self.handler.step(self.flight, inputs, now_us), now_us)
         # A hit may be taken back until its recovery is over.
         if self.flight.expectations and self.state is not State.RECOVERING:
             expectations.review(self.flight, now_us)
@@ -128,12 +142,6 @@ class Machine(StateMachine):
         self.handler = Released()
         if self.state not in FINAL_STATES or self.flight.outcome is None:
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
-
-    def _take(self, transition: Transition, now_us: int) -> None:
-        if transition.trigger not in TABLE[self.state]:
-            return
-        previous, self.state = self.state, TABLE[self.state][transition.trigger]
-        self.handler = self._begin(previous, transition, now_us)
 
     def _begin(self, previous: State, transition: Transition, now_us: int) -> Handler:
         flight = self.flight
@@ -148,7 +156,7 @@ class Machine(StateMachine):
                 flight.vehicle.attitude_parameters.clear()
                 return Connect()
             case State.READY:
-                return Ready()
+                return Ready(flight, now_us)
             case State.TAKEOFF:
                 first = flight.steps[0].action
                 assert isinstance(first, TakeoffItem), "the mission model sees to it"

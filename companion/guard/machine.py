@@ -53,6 +53,7 @@ class GuardMachine(StateMachine):
     """The present state and what is being done in it."""
 
     program = "guard"
+    table = TABLE
     giving_away = (State.GIVING_BACK,)
     flight: GuardContext
     handler: Handler
@@ -73,8 +74,7 @@ class GuardMachine(StateMachine):
         self._take(self._from_outside(inputs, now_us), now_us)
         if self.state in MAY_CRASH:
             meant = self.state not in HOLDING and goes_down(self.flight, now_us)
-            if crashed(self.flight, meant, now_us) is not None:
-                self._take(Transition(Trigger.CRASHED), now_us)
+            self._take(crashed(self.flight, meant, now_us), now_us)
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over
@@ -89,10 +89,7 @@ class GuardMachine(StateMachine):
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
                 self._take(Transition(Trigger.HIT), now_us)
-        transition = self._led_back() or self.handler.step(self.flight, inputs, now_us)
-        while self._take(transition, now_us):
-            # The answers and positions of this step belong to the state that asked for them.
-            transition = self.handler.step(self.flight, Inputs(), now_us)
+        self._take_all(self._led_back() or self.handler.step(self.flight, inputs, now_us), now_us)
         return self.handler is not before
 
     def _give_away(self, text: str, now_us: int) -> None:
@@ -148,24 +145,21 @@ class GuardMachine(StateMachine):
 
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight
-        report, expected = guard.vehicle.mode, guard.expected_mode
-        override = guard.vehicle.autopilot.stick_override
+        override, offboard = guard.vehicle.autopilot.stick_override, guard.vehicle.autopilot.setpoints
         if guard.sticks is not None and any(has_moved(guard.sticks, now, override) for now in inputs.sticks):
             return STICKS
-        if report is None or expected is None:
-            return None
-        offboard = guard.vehicle.autopilot.setpoints
-        if self.state is State.GIVING_BACK and report.custom_mode == offboard:
+        if self.state is State.GIVING_BACK and guard.vehicle.flies_setpoints:
             # Late: it was asked for, and given up.
-            guard.expected_mode = expected = offboard
+            guard.expected_mode = offboard
         requested = guard.command_client.requested_mode
         if isinstance(self.handler, GiveBack):
             requested = self.handler.wish
-        holder = who_decided(report, expected, requested)
-        if holder is None:
+        holder = who_decided(guard, requested)
+        report = guard.vehicle.mode
+        if holder is None or report is None:
             guard.foreign_mode_since_us = None
             return None
-        is_late = offboard in (expected, requested) and report.intended_custom_mode in (None, offboard)
+        is_late = offboard in (guard.expected_mode, requested) and report.intended_custom_mode in (None, offboard)
         if holder == "failsafe" and is_late:
             if guard.foreign_mode_since_us is None:
                 guard.foreign_mode_since_us = guard.trajectory_us
@@ -182,21 +176,12 @@ class GuardMachine(StateMachine):
             return None
         return Transition(Trigger.STREAMS_GONE, LINK_RESTORED)
 
-    def _take(self, transition: Transition | None, now_us: int) -> bool:
-        """Whether it moves the guard on. A trigger of a flight's counts by its name."""
-        if transition is None or (trigger := Trigger[transition.trigger.name]) not in TABLE[self.state]:
-            return False
-        self.state = TABLE[self.state][trigger]
-        guard = self.flight
+    def _begin(self, previous: State, transition: Transition, now_us: int) -> Handler:
+        guard, trigger = self.flight, Trigger[transition.trigger.name]
         if transition.text:
             guard.report(now_us, _KINDS.get(trigger, "guard"), transition.text)
         if trigger in _TO_HOLD:
             guard.then_hold = transition.text or trigger.value
-        self.handler = self._begin(transition, now_us)
-        return True
-
-    def _begin(self, transition: Transition, now_us: int) -> Handler:
-        guard = self.flight
         if self.state not in HOLDING:
             guard.command_client.cancel()
             guard.expected_mode = None
@@ -221,7 +206,7 @@ class GuardMachine(StateMachine):
                     guard.then_hold = f"recovery {hits} of at most {limit}"
                     if guard.config.then == "previous":
                         guard.report(now_us, "not_back", f"not given back: {guard.then_hold}")
-                return GiveBack(guard, transition.trigger is Trigger.CROSSED, now_us)
+                return GiveBack(guard, trigger is Trigger.CROSSED, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)
             case State.CRASHED:

@@ -101,8 +101,6 @@ class GuardConnect(Meet):
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
     """
 
-    refused = Trigger.REFUSED
-
     def __init__(self, is_first: bool = True) -> None:
         super().__init__()
         self.is_first = is_first
@@ -125,7 +123,7 @@ class GuardConnect(Meet):
         self._report_streams(flight, now_us)
         unattended = unattended_text(flight.vehicle.autopilot, flight.mission.limits.max_speed_m_s)
         flight.report(now_us, "unattended", unattended)
-        return Transition(Trigger.CONNECTED) if complaint is None else Transition(self.refused, complaint)
+        return Transition(Trigger.CONNECTED) if complaint is None else Transition(Trigger.REFUSED, complaint)
 
 
 class StandBy(FixedSetpoint):

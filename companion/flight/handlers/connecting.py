@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from enum import Enum
 from itertools import chain
 
 from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Transition
@@ -14,9 +13,6 @@ from companion.messages import LandedState, MessageId, VehicleCommand, request_m
 
 class Meet(FixedSetpoint, ABC):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
-
-    refused: Enum = Trigger.REFUSED
-    """The vehicle, or nobody, is there."""
 
     def __init__(self) -> None:
         self._started_us: int | None = None
@@ -43,7 +39,7 @@ class Meet(FixedSetpoint, ABC):
                 return None
             text = f"no HEARTBEAT from an autopilot within {wait_s:g} s"
             if not companion.link.wait:
-                return Transition(self.refused, f"{text}; is the address right?")
+                return Transition(Trigger.REFUSED, f"{text}; is the address right?")
             self._is_told = True
             flight.report(now_us, "link", f"{text}: waiting for it")
             return None
@@ -59,7 +55,7 @@ class Meet(FixedSetpoint, ABC):
         if now_us - self._measuring_since_us < companion.streams.window_s * 1e6 or flight.is_silent(now_us):
             return None
         too_old = flight.vehicle.version_complaint()
-        return self._judge(flight, now_us) if too_old is None else Transition(self.refused, too_old)
+        return self._judge(flight, now_us) if too_old is None else Transition(Trigger.REFUSED, too_old)
 
     def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
@@ -104,19 +100,16 @@ class Connect(Meet):
             return None
         self._report_streams(flight, now_us)
         complaint = too_slow or ground_check(flight)
-        return Transition(Trigger.VEHICLE_READY) if complaint is None else Transition(self.refused, complaint)
+        return Transition(Trigger.VEHICLE_READY) if complaint is None else Transition(Trigger.REFUSED, complaint)
 
 
 class Ready(FixedSetpoint):
     """Show the plan; nothing happens until it is confirmed."""
 
-    def __init__(self) -> None:
-        self._shown = False
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        flight.report(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        if not self._shown:
-            self._shown = True
-            flight.report(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
         if flight.is_silent(now_us) or not flight.plan_confirmed:
             return None
         complaint = ground_check(flight)

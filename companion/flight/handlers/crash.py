@@ -9,8 +9,8 @@ from companion.messages import DISARM, DISARM_BY_FORCE
 from companion.motion.rotation import tilt_rad
 
 
-def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
-    """How, told with what is known; None of a vehicle that flies, or stands."""
+def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition | None:
+    """Told with how, and what is known; None of a vehicle that flies, or stands."""
     watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest, flight.vehicle.attitude
     if latest is None or attitude is None or not flight.may_crash:
         return None
@@ -41,7 +41,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> str | None:
         speed_m_s=speed_m_s,
         motor=None if damage is None else damage.motor,
     )
-    return flight.crashed
+    return Transition(Trigger.CRASHED)
 
 
 def _is_pressed(flight: FlightContext, now_us: int) -> bool:

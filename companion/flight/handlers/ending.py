@@ -6,7 +6,6 @@ from typing import Literal
 from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition
 from companion.flight.states import ON_THE_WAY, State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
-from companion.link.vehicle import ModeReport
 from companion.messages import DISARM, LandedState, Vector3
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
@@ -55,11 +54,7 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
     vehicle = flight.vehicle
     if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
-    if flight.expected_mode is None or vehicle.mode is None:
-        return None
-    holder, mode, expected_mode = None, vehicle.mode, flight.expected_mode
-    if mode.custom_mode != expected_mode:
-        holder = who_decided(mode, expected_mode, flight.command_client.requested_mode)
+    holder = who_decided(flight, flight.command_client.requested_mode)
     if holder is None:
         flight.foreign_mode_since_us = None
         return None
@@ -148,19 +143,17 @@ def battery_complaint(flight: FlightContext) -> str | None:
     return f"battery at {percent} %, below abort_when.battery_below_percent = {least:g}"
 
 
-def who_decided(
-    report: ModeReport, expected_mode: int, requested_mode: int | None
-) -> Literal["failsafe", "pilot"] | None:
-    """Who has the vehicle by one report of the mode; None: the companion.
+def who_decided(flight: FlightContext, requested_mode: int | None) -> Literal["failsafe", "pilot"] | None:
+    """Who has the vehicle by its newest report of the mode; None: the companion, or nobody knows.
 
-    `expected_mode` is the one the companion has been seen to hold; `requested_mode` one it has asked for and not
-    yet seen. In a failsafe PX4 keeps the user's intended mode (CURRENT_MODE) and reports MAV_STATE_CRITICAL
-    (HEARTBEAT); a pilot's change moves the intended mode too.
+    `requested_mode`: one that the companion has asked for and not yet seen. In a failsafe PX4 keeps the user's intended
+    mode (CURRENT_MODE) and reports MAV_STATE_CRITICAL (HEARTBEAT); a pilot's change moves the intended mode too.
     """
-    own_modes, intended_mode = (expected_mode, requested_mode), report.intended_custom_mode
-    if report.custom_mode in own_modes:
+    report, expected_mode = flight.vehicle.mode, flight.expected_mode
+    if report is None or expected_mode is None or report.custom_mode in (expected_mode, requested_mode):
         return None
-    still_intended = intended_mode is not None and intended_mode in own_modes
+    intended_mode = report.intended_custom_mode
+    still_intended = intended_mode is not None and intended_mode in (expected_mode, requested_mode)
     return "failsafe" if report.failsafe or still_intended else "pilot"
 
 
@@ -191,11 +184,10 @@ class HandOver:
         self._is_asked = False
         self.finished = False
         self._target = None if flight.target is None else flight.target.at_rest()
-        self._previous_mode = flight.expected_mode
         autopilot = flight.vehicle.autopilot
         self._mode = autopilot.land if flight.mission.on_interrupt == "land" else autopilot.hold
         # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
-        self._disarming = flight.arming_requested and flight.armed_at_us is None
+        self._disarming = flight.armed_at_us is None and flight.expected_mode == autopilot.setpoints
         flight.command_client.cancel()
         if self._disarming:
             flight.command_client.begin(DISARM)
@@ -234,11 +226,7 @@ class HandOver:
         return True
 
     def _taken_by_another(self, flight: FlightContext, now_us: int) -> bool:
-        report = flight.vehicle.mode
-        if report is None or self._previous_mode is None:
-            return False
-        holder = who_decided(report, self._previous_mode, self._mode)
-        if holder is None:
-            return False
-        flight.report(now_us, "mode", f"{holder} took over in {flight.vehicle.mode_name}")
-        return True
+        holder = who_decided(flight, self._mode)
+        if holder is not None:
+            flight.report(now_us, "mode", f"{holder} took over in {flight.vehicle.mode_name}")
+        return holder is not None

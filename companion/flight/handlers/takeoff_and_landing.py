@@ -71,7 +71,6 @@ class TakeOff:
             return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
         flight.expected_mode = flight.vehicle.autopilot.setpoints
         self._now = self._arm
-        flight.arming_requested = True
         flight.command_client.begin(ARM)
         return self._arm(flight, Inputs(), now_us)
 
