@@ -31,7 +31,6 @@ from companion.mission.model import Mission, steps_to_fly
 from companion.mission.policy import OnCollision
 from companion.mission.trajectory import Motion
 from companion.motion.motors import MotorWatch
-from companion.motion.rotation import yaw_rad
 from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus, plus
 from companion.reflex.detection.impact import ImpactEstimate
@@ -239,10 +238,9 @@ class FlightContext:
         Motors that turn a vehicle as fast as they can have no thrust left to climb with. One that something holds they
         turn over it.
         """
-        attitude = self.vehicle.attitude
-        if wanted_rad is None or attitude is None:
+        heading_rad, lead_rad = self.vehicle.heading_rad, rate_rad_s / defaults.YAW_GAIN_PER_S
+        if wanted_rad is None or heading_rad is None:
             return wanted_rad
-        heading_rad, lead_rad = yaw_rad(attitude.attitude_wxyz), rate_rad_s / defaults.YAW_GAIN_PER_S
         short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
         return wanted_rad if abs(short_rad) <= lead_rad else heading_rad + math.copysign(lead_rad, short_rad)
 

@@ -166,10 +166,8 @@ class Machine(StateMachine):
                     flight.step_index = 1
                 return FlyItems(flight, now_us)
             case State.RECOVERING:
-                recovery = flight.reflex.recovery
-                assert recovery is not None, "a collision begins one"
                 flies = flight.own_modes == (flight.vehicle.autopilot.setpoints, None)
-                return Recover(flight, recovery) if flies else TakeBack(flight, recovery, now_us)
+                return Recover(flight) if flies else TakeBack(flight, now_us)
             case State.HOLDING:
                 return HoldAfterRecovery(flight, now_us)
             case State.RETURNING:

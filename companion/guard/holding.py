@@ -28,8 +28,9 @@ HAND_OVER_US = 500_000
 class TakeOver:
     """The recovery began with the first setpoint. The state lasts until the vehicle reports OFFBOARD."""
 
-    def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
-        self._recover, self.target = recover, recover.target
+    def __init__(self, guard: GuardContext, now_us: int) -> None:
+        self._recover = Recover(guard)
+        self.target = self._recover.target
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
         if guard.command_client.requested_mode != guard.vehicle.autopilot.setpoints:
             guard.count_asked_mode()
@@ -61,8 +62,9 @@ class TakeOver:
 class Recovering:
     """Until the vehicle rests clear of what it hit."""
 
-    def __init__(self, recover: Recover, now_us: int) -> None:
-        self._recover, self.target = recover, recover.target
+    def __init__(self, guard: GuardContext, now_us: int) -> None:
+        self._recover = Recover(guard)
+        self.target = self._recover.target
         self._since_us = now_us  # in OFFBOARD, with no step late and no silence
         self._late_us = 0
         self._foreign = 0

@@ -8,7 +8,7 @@ from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs, Transition
 from companion.flight.handlers.crash import Crashed, crashed
 from companion.flight.handlers.ending import LINK_RESTORED, Released, silent_link, silent_position, who_decided
-from companion.flight.handlers.recovering import Recover, record_collision
+from companion.flight.handlers.recovering import record_collision
 from companion.flight.machine import StateMachine
 from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext
@@ -17,7 +17,6 @@ from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
 from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down
 from companion.messages import Asked, Sticks
-from companion.motion.rotation import yaw_rad
 from companion.reflex.detection.detector import ImpactKind
 from companion.reflex.recovery.collision import recoveries_from
 
@@ -121,8 +120,7 @@ class GuardMachine(StateMachine):
         guard = self.flight
         guard.previous_mode = guard.expected_mode = guard.vehicle.custom_mode
         guard.then_hold, guard.target = "", None
-        attitude = guard.vehicle.attitude
-        guard.yaw_rad = None if attitude is None else yaw_rad(attitude.attitude_wxyz)
+        guard.yaw_rad = guard.vehicle.heading_rad
 
     def _from_outside(self, inputs: Inputs, now_us: int) -> Transition | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
@@ -197,9 +195,9 @@ class GuardMachine(StateMachine):
             case State.TAKING_OVER:
                 mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode_name(guard.previous_mode)
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
-                return TakeOver(guard, self._recover(), now_us)
+                return TakeOver(guard, now_us)
             case State.RECOVERING:
-                return Recovering(self._recover(), now_us)
+                return Recovering(guard, now_us)
             case State.GIVING_BACK:
                 limit, hits = guard.config.max_hits, recoveries_from(guard.hits)
                 if hits >= limit and not guard.then_hold:
@@ -215,11 +213,6 @@ class GuardMachine(StateMachine):
                 self.outcome = transition.text
                 return Released()
 
-    def _recover(self) -> Recover:
-        recovery = self.flight.reflex.recovery
-        assert recovery is not None, "a hit begins one"
-        return Recover(self.flight, recovery)
-
 
 def has_moved(before: Sticks, now: Sticks, override: float) -> bool:
     """Have the pilot's sticks been moved, as far as the autopilot itself takes for a takeover? By PX4's default that
@@ -228,8 +221,7 @@ def has_moved(before: Sticks, now: Sticks, override: float) -> bool:
     A stick pushed to a new place counts; one let go does not: a pilot startled by a hit opens the hand. The throttle's
     middle is PX4's too; one that has no spring lies anywhere, and only its way from there counts.
     """
-    for place, (was, deflection) in enumerate(zip(before.deflections, now.deflections, strict=True)):
-        is_pushed = place == THROTTLE or abs(deflection) > override
-        if is_pushed and abs(deflection - was) > override:
-            return True
-    return False
+    return any(
+        abs(deflection - was) > override and (place == THROTTLE or abs(deflection) > override)
+        for place, (was, deflection) in enumerate(zip(before.deflections, now.deflections, strict=True))
+    )

@@ -9,7 +9,6 @@ from companion.guard.context import GuardContext
 from companion.guard.watching import OTHERS_STOPPED_US
 from companion.memory.patch import LEAST_SPEED_M_S
 from companion.messages import Asked, Vector3
-from companion.motion.rotation import yaw_rad
 from companion.motion.vector import ZERO, along, plus
 
 # PX4 brakes by this where it is set up as docs/how-to/guard.md has it. With PX4's default it needs less room
@@ -44,11 +43,10 @@ def leads_into(guard: GuardContext, mode: int) -> str | None:
 
 def _sticks_ned(guard: GuardContext) -> Vector3:
     """Where the pilot's sticks push the vehicle by its present heading: 1 is full deflection, NED."""
-    attitude = guard.vehicle.attitude
-    if guard.sticks_now is None or attitude is None:
+    heading_rad = guard.vehicle.heading_rad
+    if guard.sticks_now is None or heading_rad is None:
         return ZERO
     forward, right, *_ = guard.sticks_now.deflections
-    heading_rad = yaw_rad(attitude.attitude_wxyz)
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
     return (forward * cosine - right * sine, forward * sine + right * cosine, 0.0)
 

@@ -6,6 +6,7 @@ from companion import messages
 from companion.autopilot.interface import Autopilot, Pilot
 from companion.autopilot.known import ASSUMED, AUTOPILOTS, NAMES, defaults
 from companion.motion.history import MotionHistory
+from companion.motion.rotation import yaw_rad
 
 # MAV_COMP_ID_AUTOPILOT1: gimbals, cameras and ground stations on the same link have other numbers.
 AUTOPILOT_COMPONENT_ID = 1
@@ -171,6 +172,11 @@ class Vehicle:
         """Whether it is on the ground, and has said so for a while: a land detector may be wrong in the air."""
         said_us = self.last_received_us - self.landed_us
         return self.landed is messages.LandedState.ON_GROUND and said_us >= STANDS_US
+
+    @property
+    def heading_rad(self) -> float | None:
+        """Clockwise from north; None before it has told its attitude."""
+        return None if self.attitude is None else yaw_rad(self.attitude.attitude_wxyz)
 
     @property
     def custom_mode(self) -> int | None:

@@ -6,7 +6,7 @@ Coordinates: NED, relative to the arming position.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -341,7 +341,7 @@ class MissionItem(StrictModel):
 
     @model_validator(mode="after")
     def _exactly_one_action(self) -> Self:
-        if len(self._actions_given()) != 1:
+        if len(self._given) != 1:
             raise ValueError(f"an item is a map with exactly one key of: {', '.join(ACTIONS)}")
         if self.on_timeout != "abort" and self.timeout_s is None:
             raise ValueError("on_timeout says what follows a time-out: give timeout_s too")
@@ -351,20 +351,21 @@ class MissionItem(StrictModel):
             raise ValueError(f"on_collision has no meaning beside {self.name}")
         return self
 
-    def _actions_given(self) -> list[str]:
-        given = [field.removesuffix("_") for field, value in self if value is not None]
-        return [name for name in given if name in ACTIONS]
+    @property
+    def _given(self) -> dict[str, Any]:
+        """Actions by their names."""
+        given = {field.removesuffix("_"): value for field, value in self if value is not None}
+        return {name: value for name, value in given.items() if name in ACTIONS}
 
     @property
     def name(self) -> str:
-        return self._actions_given()[0]
+        return next(iter(self._given))
 
     @property
     def action(self) -> Action:
         """What is done; a repeat is no action of its own but what stands in it (see `program`)."""
-        name = self.name
-        action: Action | None = getattr(self, "return_" if name == "return" else name)
-        assert action is not None and self.repeat is None, "the validator admits exactly one action"
+        assert self.repeat is None
+        action: Action = self._given[self.name]
         return action
 
 

@@ -4,7 +4,7 @@ from companion.flight.after_hit import take_back
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
 from companion.reflex.detection.impact import ImpactEstimate
-from companion.reflex.recovery.recovery import Progress, Recovery
+from companion.reflex.recovery.recovery import Progress
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
@@ -37,8 +37,9 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
 class Recover:
     """Fly to rest after the newest collision, and wait until the vehicle has settled."""
 
-    def __init__(self, flight: FlightContext, recovery: Recovery) -> None:
-        self._recovery = recovery
+    def __init__(self, flight: FlightContext) -> None:
+        assert flight.reflex.recovery is not None, "a collision begins one"
+        self._recovery = flight.reflex.recovery
         *_, first = flight.reflex.in_one_recovery()
         self._first_hit_us = first.detected_at_us
 

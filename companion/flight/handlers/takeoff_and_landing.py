@@ -10,8 +10,6 @@ from companion.messages import ARM, Vector3, take_off
 from companion.mission.item_trajectory import climb
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
-from companion.motion.rotation import yaw_rad
-from companion.reflex.recovery.recovery import Recovery
 
 # The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.
 ORIGIN_MEAN_US = 1_000_000
@@ -40,8 +38,7 @@ class TakeOff:
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
         self._climbed_until_us = flight.trajectory_us  # on the clock of ways
-        attitude = flight.vehicle.attitude
-        flight.yaw_rad = yaw_rad(attitude.attitude_wxyz) if attitude is not None else None
+        flight.yaw_rad = flight.vehicle.heading_rad
         self._ground_ned_m = mean_position(flight)
         flight.report(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
 
@@ -193,8 +190,8 @@ class TakeBack(Recover):
     A vehicle that does not take the mode goes on landing by itself, and is left to it.
     """
 
-    def __init__(self, flight: FlightContext, recovery: Recovery, now_us: int) -> None:
-        super().__init__(flight, recovery)
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        super().__init__(flight)
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.
         self._is_asked = flight.command_client.requested_mode == flight.vehicle.autopilot.setpoints

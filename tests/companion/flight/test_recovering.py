@@ -60,7 +60,7 @@ def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
     reflex, mission = flight.reflex, flight.mission
     how = reflex.law, mission.recovery, mission.companion.settled
     reflex.recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, reflex.keeps_trim)
-    return Recover(flight, reflex.recovery)
+    return Recover(flight)
 
 
 def hears(
