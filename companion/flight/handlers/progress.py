@@ -125,14 +125,13 @@ class FlyItems(_OnTrajectory):
             flight.report(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
 
     def interrupt(self, flight: FlightContext) -> None:
-        """A hit ends the present trajectory: note its heading, and what is left of the item."""
-        flight.yaw_rad = self._heading.yaw_rad
+        """A hit ends the present trajectory: note what is left of the item."""
         if self._motion is not None:
             flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight))
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
-        wanted_rad = self._heading.turn(motion[0], motion[1], now_us)
-        return flight.heading_towards(wanted_rad, self._heading.rate_rad_s)
+        flight.yaw_rad = self._heading.turned(flight.yaw_rad, motion[0], motion[1], now_us)
+        return flight.heading_towards(flight.yaw_rad, self._heading.rate_rad_s)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         damage, wanted = flight.motors.damage, flight.mission.on_damage
@@ -152,7 +151,6 @@ class FlyItems(_OnTrajectory):
     def _leave(self, flight: FlightContext, now_us: int) -> None:
         """On to the next step, from the setpoint of this moment."""
         flight.target = self.target(flight, now_us)
-        flight.yaw_rad = self._heading.yaw_rad
         flight.step_index += 1
         self._begin(flight, now_us)
 
@@ -167,9 +165,9 @@ class FlyItems(_OnTrajectory):
             case items.WaitForItem():
                 return self._has_come(self._action, flight, now_us)
             case items.VelocityItem() | items.SetYawItem():
-                return elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
+                return elapsed_s >= self._trajectory.duration_s and self._has_turned(flight, now_us)
             case _:
-                if elapsed_s < self._trajectory.duration_s or not self._has_turned(now_us):
+                if elapsed_s < self._trajectory.duration_s or not self._has_turned(flight, now_us):
                     return False
                 if self._over_since_us is None:
                     self._over_since_us = now_us
@@ -191,10 +189,12 @@ class FlyItems(_OnTrajectory):
         self._steady.update(is_steady, latest.time_boot_us)
         return self._steady.lasts_us >= item.steady.for_s * 1e6
 
-    def _has_turned(self, now_us: int) -> bool:
+    def _has_turned(self, flight: FlightContext, now_us: int) -> bool:
         """To a fixed heading; one that follows the way is never late."""
         heading = self._heading
-        return not heading.is_fixed or heading.turn(self._trajectory.target_m, ZERO, now_us) == heading.fixed_rad
+        if heading.is_fixed:
+            flight.yaw_rad = heading.turned(flight.yaw_rad, self._trajectory.target_m, ZERO, now_us)
+        return not heading.is_fixed or flight.yaw_rad == heading.fixed_rad
 
     def _overdue(self, flight: FlightContext, now_us: int) -> Transition | None:
         item, began_us = flight.step.item, flight.tally.began_us
@@ -238,30 +238,26 @@ class Heading:
 
     def __init__(self, action: items.Action, yaw_rad: float | None, now_us: int) -> None:
         """`yaw_rad`: the present one."""
-        asked = getattr(action, "yaw_deg", None)
-        self.yaw_rad, self._at_us = yaw_rad, now_us
+        asked, self._at_us = getattr(action, "yaw_deg", None), now_us
         self.rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else TURNING_RAD_S
         self.fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad
         self.is_fixed = not isinstance(asked, str)
         self._centre_m = action.centre_ned_m if isinstance(action, items.OrbitItem) and asked == "centre" else None
 
-    def turn(self, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
-        """Turn on until now, in the shorter direction."""
-        wanted = self._wanted(position_m, velocity_m_s)
-        elapsed_s, self._at_us = (now_us - self._at_us) * 1e-6, now_us
-        if wanted is None or self.yaw_rad is None:
-            self.yaw_rad = wanted
+    def turned(self, yaw_rad: float | None, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
+        """The heading turned on until now, in the shorter direction."""
+        wanted = self._wanted(yaw_rad, position_m, velocity_m_s)
+        step, self._at_us = self.rate_rad_s * ((now_us - self._at_us) * 1e-6), now_us
+        if wanted is None or yaw_rad is None:
             return wanted
-        turn = math.remainder(wanted - self.yaw_rad, math.tau)
-        step = self.rate_rad_s * elapsed_s
-        self.yaw_rad = wanted if abs(turn) <= step else self.yaw_rad + math.copysign(step, turn)
-        return self.yaw_rad
+        turn = math.remainder(wanted - yaw_rad, math.tau)
+        return wanted if abs(turn) <= step else yaw_rad + math.copysign(step, turn)
 
-    def _wanted(self, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
+    def _wanted(self, yaw_rad: float | None, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
         if self.is_fixed:
             return self.fixed_rad
         north, east, _ = velocity_m_s if self._centre_m is None else minus(self._centre_m, position_m)
-        return math.atan2(east, north) if math.hypot(north, east) > _LEAST_LENGTH else self.yaw_rad
+        return math.atan2(east, north) if math.hypot(north, east) > _LEAST_LENGTH else yaw_rad
 
 
 class FlyHome(_OnTrajectory):

@@ -96,13 +96,21 @@ def test_whoever_is_pushed_is_not_steady():
 
 @pytest.mark.parametrize(
     ("on_timeout", "mode", "outcome", "north_m"),
-    [("abort", LOITER, "aborted", 0.0), ("land", None, "completed", 0.0), ("continue", None, "completed", 1.0)],
+    [
+        ("abort", LOITER, "aborted", 1.0),
+        ("land", None, "completed", 1.0),
+        ("return", None, "completed", 0.0),
+        ("continue", None, "completed", 2.0),
+    ],
 )
 def test_an_item_that_takes_too_long(on_timeout, mode, outcome, north_m):
-    wait = {"wait_for": {"file": "never"}, "timeout_s": 2.0, "on_timeout": on_timeout}
-    f = flown(wait, {"go_to": {"position_ned_m": [1, 0, -1.5]}})
+    """The heading stays where it is by then."""
+    turn = {"set_yaw": {"yaw_deg": 90, "rate_deg_s": 30}, "timeout_s": 2.0, "on_timeout": on_timeout}
+    there, further = ({"go_to": {"position_ned_m": [north_m, 0, -1.5]}} for north_m in (1, 2))
+    f = flown(there, turn, further)
+    assert f.vehicle.setpoints[-1][1].yaw == pytest.approx(math.radians(60), abs=0.05)
     assert f.report.outcome == outcome and "not done within 2 s" in f.event("timeout").text
-    assert (f.event("timeout").time_us - f.event("item").time_us) / 1e6 == pytest.approx(2.0, abs=0.02)
+    assert (f.event("timeout").time_us - f.event("item", 1).time_us) / 1e6 == pytest.approx(2.0, abs=0.02)
     assert f.vehicle.position[0] == pytest.approx(north_m, abs=0.2)
     assert mode is None or f.vehicle.mode == mode
 
