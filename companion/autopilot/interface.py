@@ -49,7 +49,7 @@ class LastWords:
     """The place that is said then, off the obstacle. None: it brakes by itself then, and is braked until then."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Autopilot:
     """Tables and functions of one autopilot; nothing else of the companion names its modes and parameters."""
 
@@ -69,29 +69,29 @@ class Autopilot:
     """Of a mode that is not listed the one with these bits alone counts, where it is."""
     mode_parameters: Callable[[int], tuple[int, int]]
     """The second and the third of the command that asks for it."""
-    casts_whole_numbers: bool
+    casts_whole_numbers: bool = False
     """A parameter that is a whole number travels as a float of its value, and not as the bytes of the number."""
     attitude_mask: int
     """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
     least_version: tuple[int, int, int]
     """Older ones are refused."""
-    streams: tuple[VehicleCommand, ...]
+    streams: tuple[VehicleCommand, ...] = ()
     """Asked for beside those that all autopilots have."""
-    filters_imu: bool
+    filters_imu: bool = False
     """Its inertial samples are filtered: none shows that the raw ones were clipped."""
-    lesser_imu: MessageId | None
+    lesser_imu: MessageId | None = None
     """Of boards that do not have HIGHRES_IMU."""
     estimator_message: MessageId
     """In which it tells how good its estimate is."""
     sticks_message: MessageId
     """In which it tells where the pilot's sticks are."""
-    is_told_to_take_off: bool
+    is_told_to_take_off: bool = False
     """Its setpoints do not lift it off the ground: a command does."""
     wants_setpoints_first: bool
     """It takes the mode that flies them only while they come."""
     changed_law: Callable[[bool | None], VehicleCommand | None]
     """What it is told when it is flown by attitude from now on (True), by position (False), or no more (None)."""
-    keeps_trim: bool
+    keeps_trim: bool = False
     """Its position control begins with the tilt that was asked for last, as what wind and a wrong tilt take."""
     attitude_parameters: tuple[str, ...]
     """Read before it is flown by attitude."""

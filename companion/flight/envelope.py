@@ -13,7 +13,6 @@ from companion.autopilot.interface import Autopilot
 from companion.fence import Fence
 from companion.flight.context import Target
 from companion.memory.patch import Patch
-from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
@@ -63,11 +62,6 @@ def longer_loss_text(autopilot: Autopilot, loss_s: float) -> str:
 
 def _flown_on(autopilot: Autopilot) -> str:
     return f"if the companion dies, {autopilot.name} flies its last setpoint on"
-
-
-def touched(place_ned_m: Vector3, normal_ned: Vector3) -> Surface:
-    """The surface that a vehicle with its centre there touched, and the clearance of a held setpoint."""
-    return Surface(place_ned_m, normal_ned, LEAST_FREE_M)
 
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.

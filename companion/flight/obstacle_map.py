@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
-from companion.flight.envelope import KnownSurface, touched
+from companion.flight.envelope import KnownSurface
 from companion.memory.patch import Patch, is_same, touch_of
 from companion.memory.stored import as_data, describe
-from companion.memory.surroundings import ObstacleMap
+from companion.memory.surroundings import LEAST_FREE_M, ObstacleMap
 from companion.messages import Vector3
 from companion.motion.vector import minus, plus
 from companion.reflex.recovery.collision import CollisionRecord
@@ -76,13 +76,13 @@ def known_surfaces(flight: FlightContext) -> list[KnownSurface]:
     """Surfaces that a setpoint must not lead into: those hit in this recovery, and the obstacle map."""
     known = []
     for record in flight.reflex.in_one_recovery():
-        surface = touched(record.contact.position_ned_m, record.contact.normal_ned)
+        surface = Surface(record.contact.position_ned_m, record.contact.normal_ned, LEAST_FREE_M)
         # A surface that the recovery setpoint lies behind does not count: the vehicle has slid past it.
         if surface.off_m(record.setpoint_ned_m) > 0.0:
             known.append(KnownSurface(surface))
     if flight.known.patches and flight.origin_ned_m is not None:
         for patch in surroundings(flight).patches:
-            surface = touched(_touching_ned_m(flight, patch), patch.normal_ned)
+            surface = Surface(_touching_ned_m(flight, patch), patch.normal_ned, LEAST_FREE_M)
             known.append(KnownSurface(surface, patch, flight.origin_ned_m, flight.known.reach_m))
     return known
 

@@ -51,11 +51,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         echoes = [sample for sample in samples if isinstance(sample, PositionTarget)]
         inputs = inputs._replace(echoes=echoes, sticks=sticks, is_enabled=self.is_enabled)
         self.is_enabled = False
-        moved = self.machine.step(inputs, now_us)
-        if moved and self.machine.state is State.CONNECTING:
-            guard.reflex.restart(now_us)
-            guard.vehicle.attitude_parameters.clear()
-        return moved
+        return self.machine.step(inputs, now_us)
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         if target.lean is None:

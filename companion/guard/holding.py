@@ -114,10 +114,6 @@ class GiveBack(FixedSetpoint):
     The first is asked for straight after a report of the present one: a person's own request that shows there is not
     overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
 
-    What flew before has it back where it does not lead into what was hit (see onward.leads_into). For a program's next
-    setpoint, and for sticks that are released, the guard waits, holding; in any other case the vehicle is given back to
-    hold.
-
     A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on another link
     nothing is streamed. When no mode is taken the setpoints stop, and PX4's action for lost setpoints follows.
     """
@@ -134,7 +130,9 @@ class GiveBack(FixedSetpoint):
         self._is_doubted = self.wish == previous  # whether it would hit again
 
     def _waits(self, guard: GuardContext, inputs: Inputs, now_us: int) -> bool:
-        """Whether a program's next setpoints are waited for, or a pilot. A mode that would hit again is given up."""
+        """Whether a program's next setpoints are waited for, or a pilot's sticks to be released. Any other mode that
+        would hit again is given up.
+        """
         reason = leads_into(guard, self.wish) if self._is_doubted else None
         if reason is None:
             self._is_doubted = False

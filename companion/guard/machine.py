@@ -187,6 +187,8 @@ class GuardMachine(StateMachine):
                 guard.collisions[-1].is_over = True
         match self.state:
             case State.CONNECTING:
+                guard.reflex.restart(now_us)
+                guard.vehicle.attitude_parameters.clear()
                 return GuardConnect(isinstance(self.handler, GuardConnect) and self.handler.is_first)
             case State.STANDING_BY:
                 return StandBy()

@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from typing import Any, Self
 
 from companion.companion import StepResult
@@ -227,8 +228,11 @@ class CollisionGuard:
             told, self._untold = self._untold, []
             self.events.extend(told)
             listeners = list(self._listeners)
-        for event in told:
-            self._tell(event, listeners)
+        for event, listener in product(told, listeners):
+            try:
+                listener(event)
+            except Exception:
+                _LOG.exception("a listener of the guard's events failed")
         return goes_on
 
     def _end_after_a_fault(self) -> None:
@@ -237,10 +241,3 @@ class CollisionGuard:
             # From here on the program's own setpoints pass.
             self._is_over = True
             self._changed.notify_all()
-
-    def _tell(self, event: Event, listeners: list[Callable[[Event], None]]) -> None:
-        for listener in listeners:
-            try:
-                listener(event)
-            except Exception:
-                _LOG.exception("a listener of the guard's events failed")

@@ -18,9 +18,10 @@ from companion.autopilot.px4.firmware import PX4
 from companion.core import Limiter
 from companion.fence import Fence
 from companion.flight.context import Target
-from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded, touched, unattended_text
+from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded, unattended_text
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.plan import mission_lines
+from companion.memory.surroundings import LEAST_FREE_M
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.model import Mission
 from companion.mission.policy import SetpointLimits
@@ -28,6 +29,7 @@ from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.config import HELD_S, MOST_HELD_S, NOTICED_S
 from companion.reflex.recovery.attitude_law import Belief, Lean
 from companion.reflex.recovery.laws import MotionState
+from companion.reflex.surface import Surface
 from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, flight, flying_in, hovering
 from tests.companion.hostile import HEARD, STATES, Attacker, attacked
@@ -229,7 +231,7 @@ ROOM, DEFAULTS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), SetpointL
 HERE = (0.0, 0.0, -1.5)
 HELD_BY_ATTITUDE_S = MOST_HELD_S + NOTICED_S
 # A wall that is touched with the centre 0.5 m north of here.
-WALL = touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0))
+WALL = Surface((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0), LEAST_FREE_M)
 
 
 def surroundings(known=(), vehicle=HERE) -> Surroundings:
