@@ -323,4 +323,4 @@ class FixedSetpoint:
 
 def as_text(vector: Vector3) -> str:
     """For people, two decimals and no negative zero."""
-    return "[" + ", ".join(f"{round(value, 2) + 0.0:.2f}" for value in vector) + "]"
+    return "[" + ", ".join(f"{value:z.2f}" for value in vector) + "]"

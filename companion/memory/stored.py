@@ -99,10 +99,10 @@ def describe(patch: Patch) -> str:
     """For people: what, where, how much of it."""
     n, e, d = patch.centre_ned_m
     hits = "touched once" if patch.hits == 1 else f"touched {patch.hits} times"
-    place = f"[{n:.2f}, {e:.2f}, {d:.2f}]"
+    place = f"[{n:z.2f}, {e:z.2f}, {d:z.2f}]"
     north, east, down = patch.normal_ned
     if patch.is_steep:
         return f"surface {'above' if down > 0.0 else 'below'} at {place}, {hits}"
-    facing_deg = math.degrees(math.atan2(east, north)) % 360.0
+    facing_deg = round(math.degrees(math.atan2(east, north))) % 360
     low_m, high_m = patch.assumed_along_m()
-    return f"surface facing {facing_deg:.0f} deg at {place}, {hits}, assumed {high_m - low_m:.1f} m wide"
+    return f"surface facing {facing_deg} deg at {place}, {hits}, assumed {high_m - low_m:.1f} m wide"
