@@ -58,7 +58,6 @@ class Survey:
     vehicle: Vehicle = field(default_factory=Vehicle)
     refusal: str | None = None
     heard_since_us: int | None = None
-    listening_since_us: int | None = None
     parameters: dict[str, int | float] = field(default_factory=dict)
     imu: list[messages.ImuSample] = field(default_factory=list)
     positions: list[messages.LocalPosition] = field(default_factory=list)
@@ -91,7 +90,7 @@ class Survey:
 
     @property
     def finished(self) -> bool:
-        since_us = self.listening_since_us
+        since_us = self.streams.started_us
         return self.refusal is not None or (since_us is not None and self.now_us >= since_us + LISTENING_US)
 
 
@@ -111,14 +110,13 @@ def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[mess
             survey.refusal = f"no {NAMES} was heard within {wait_s:g} s; check the address, the cable and the baud rate"
         return outgoing
     _ask(survey, outgoing)
-    if survey.listening_since_us is None and now_us - survey.heard_since_us >= SETTLING_US:
-        survey.listening_since_us = now_us
+    if survey.streams.started_us is None and now_us - survey.heard_since_us >= SETTLING_US:
         survey.streams.start(now_us)
     return outgoing
 
 
 def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> None:
-    now_us, listens = survey.now_us, survey.listening_since_us is not None
+    now_us, listens = survey.now_us, survey.streams.started_us is not None
     survey.vehicle.update(sample, now_us)
     survey.streams.count(type(sample), now_us)
     match sample:
@@ -158,7 +156,7 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
     outgoing += [messages.ReadParameter(name) for name in asked if name not in survey.parameters]
     if survey.vehicle.version is None:
         commands.append(messages.request_message(MessageId.AUTOPILOT_VERSION))
-    if survey.listening_since_us is None:
+    if survey.streams.started_us is None:
         commands += [stream.request() for stream in survey.streams.streams]
         commands += autopilot.streams
         commands.append(messages.set_message_interval(autopilot.estimator_message, 1_000_000))
@@ -303,7 +301,7 @@ class Preflight:
         frames = self._decoder.feed(received)
         samples = [sample for _, sample in frames if sample is not None]
         known = survey.vehicle.identity
-        if known is not None and survey.listening_since_us is not None:
+        if known is not None and survey.streams.started_us is not None:
             for frame, _ in frames:
                 survey.delivery.take(frame, (known.system_id, known.component_id))
         outgoing = advance(survey, samples, now_us)

@@ -48,30 +48,30 @@ def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -
 class StreamMonitor:
     """Counts received messages. Rates are means over the companion's time, so lost packets lower them."""
 
-    __slots__ = ("_counts", "_started_us", "_until_us", "asked", "streams")
+    __slots__ = ("_counts", "_until_us", "asked", "started_us", "streams")
 
     def __init__(self, config: StreamsConfig, for_detector: Collection[MessageId] = ()) -> None:
         self.streams = wanted_streams(config, for_detector)
         self.asked: dict[float, messages.VehicleCommand] = {}  # by message, and what stands in for one, too
         self._counts: dict[type, int] = {stream.sample_type: 0 for stream in self.streams}
-        self._started_us: int | None = None
+        self.started_us: int | None = None  # unset: nothing is counted yet
         self._until_us = 0
 
     def count(self, sample_type: type, now_us: int) -> None:
-        if self._started_us is not None and sample_type in self._counts:
+        if self.started_us is not None and sample_type in self._counts:
             self._counts[sample_type] += 1
             self._until_us = now_us
 
     def start(self, now_us: int) -> None:
         """Begin to measure, from nothing."""
         self._counts = dict.fromkeys(self._counts, 0)
-        self._started_us = self._until_us = now_us
+        self.started_us = self._until_us = now_us
 
     def rates_hz(self) -> dict[str, float]:
         """Mean rates since the start, until something last arrived."""
-        if self._started_us is None or self._until_us <= self._started_us:
+        if self.started_us is None or self._until_us <= self.started_us:
             return {}
-        seconds = (self._until_us - self._started_us) * 1e-6
+        seconds = (self._until_us - self.started_us) * 1e-6
         return {s.message_id.name: round(self._counts[s.sample_type] / seconds, 2) for s in self.streams}
 
     def too_slow(self, autopilot: Autopilot) -> str | None:
