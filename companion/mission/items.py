@@ -6,7 +6,7 @@ Coordinates: NED, relative to the arming position.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -15,6 +15,20 @@ from companion.mission.policy import OnCollision, OnTimeout
 from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel
 
 Count = Annotated[int, Field(strict=True, ge=0)]
+
+
+class SomeKeys(StrictModel):
+    """At least one key is given, of a choice exactly one."""
+
+    is_choice: ClassVar[bool] = False
+
+    @model_validator(mode="after")
+    def _enough(self) -> Self:
+        given = len(self.model_dump(exclude_none=True))
+        if given == 0 or (self.is_choice and given > 1):
+            number = "exactly" if self.is_choice else "at least"
+            raise ValueError(f"give {number} one key: {', '.join(type(self).model_fields)}")
+        return self
 
 
 class ExpectHit(StrictModel):
@@ -35,7 +49,7 @@ class ExpectNoHit(StrictModel):
     """Without it until the end of the flight."""
 
 
-class ExpectHits(StrictModel):
+class ExpectHits(SomeKeys):
     """How many hits there have been until here."""
 
     exactly: Count | None = None
@@ -44,12 +58,6 @@ class ExpectHits(StrictModel):
     """The least number."""
     at_most: Count | None = None
     """The largest number."""
-
-    @model_validator(mode="after")
-    def _something(self) -> Self:
-        if self.model_dump(exclude_none=True) == {}:
-            raise ValueError("give exactly, at_least or at_most")
-        return self
 
 
 class ExpectRecovered(StrictModel):
@@ -70,19 +78,13 @@ class ExpectPosition(StrictModel):
     """Distance to it at most."""
 
 
-class ExpectHeight(StrictModel):
+class ExpectHeight(SomeKeys):
     """The vehicle's height above the arming position now."""
 
     min_m: NotNegative | None = None
     """At least."""
     max_m: Positive | None = None
     """At most."""
-
-    @model_validator(mode="after")
-    def _something(self) -> Self:
-        if self.min_m is None and self.max_m is None:
-            raise ValueError("give min_m, max_m or both")
-        return self
 
 
 class ExpectFlightTime(StrictModel):
@@ -97,11 +99,12 @@ Check: TypeAlias = (
 )
 
 
-class ExpectItem(StrictModel):
+class ExpectItem(SomeKeys):
     """A map with exactly one key. One that is not met makes the flight's outcome `failed`; the flight goes on."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
     bare = frozenset({"no_collision", "recovered"})
+    is_choice = True
 
     collision: ExpectHit | None = None
     no_collision: ExpectNoHit | None = None
@@ -110,12 +113,6 @@ class ExpectItem(StrictModel):
     position: ExpectPosition | None = None
     height: ExpectHeight | None = None
     flight_time: ExpectFlightTime | None = None
-
-    @model_validator(mode="after")
-    def _exactly_one_key(self) -> Self:
-        if len(self.model_dump(exclude_none=True)) != 1:
-            raise ValueError(f"an expectation has exactly one key: {', '.join(ExpectItem.model_fields)}")
-        return self
 
     @property
     def check(self) -> Check:
@@ -223,10 +220,11 @@ class SteadyCondition(StrictModel):
     """How long both must hold."""
 
 
-class WaitForItem(StrictModel):
+class WaitForItem(SomeKeys):
     """Hold until a condition is met; give exactly one. `timeout_s` beside the item limits the wait."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+    is_choice = True
 
     flight_time_s: Positive | None = None
     """Time since arming."""
@@ -236,12 +234,6 @@ class WaitForItem(StrictModel):
     """The vehicle rests at its setpoint."""
     file: Annotated[str, Field(min_length=1)] | None = None
     """A file exists on the companion's computer: another program, or a person, gives the sign."""
-
-    @model_validator(mode="after")
-    def _exactly_one(self) -> Self:
-        if len(self.model_dump(exclude_none=True)) != 1:
-            raise ValueError(f"give exactly one condition: {', '.join(WaitForItem.model_fields)}")
-        return self
 
 
 class SetSpeedItem(StrictModel):
