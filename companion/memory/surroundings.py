@@ -73,8 +73,7 @@ class ObstacleMap:
 
     def walls(self, from_m: float, to_m: float, start_ned_m: Vector3) -> Walls:
         """Between two heights, for a vehicle that starts there."""
-        low_m, high_m = min(from_m, to_m), max(from_m, to_m)
-        here = [patch for patch in self.patches if self._meets(patch, low_m, high_m)]
+        here = [patch for patch in self.patches if self._meets(patch, from_m, to_m)]
         there = [patch for patch in here if not _is_within(patch, start_ned_m)]
         return Walls([*map(assumed_area, there)], [*map(core, there)], self.reach_m, self.clearance_m)
 
@@ -83,10 +82,10 @@ class ObstacleMap:
         walls = self.walls(-place_ned_m[2], -place_ned_m[2], start_ned_m)
         return walls.keeps_off(Point(place_ned_m[:2]), ())
 
-    def _meets(self, patch: Patch, low_m: float, high_m: float) -> bool:
+    def _meets(self, patch: Patch, from_m: float, to_m: float) -> bool:
         bottom_m, top_m = patch.assumed_heights_m()
         off_m = self.clearance_m - LEVEL_SLACK_M
-        return low_m < top_m + off_m and high_m > bottom_m - off_m
+        return min(from_m, to_m) < top_m + off_m and max(from_m, to_m) > bottom_m - off_m
 
     def levels_m(self) -> list[float]:
         """Heights just above walls and floors and just below ceilings, inside the fence."""
@@ -99,8 +98,7 @@ class ObstacleMap:
 
     def is_capped(self, start: Place, from_m: float, to_m: float) -> bool:
         """Whether a ceiling, or a floor, is between the vehicle and another height."""
-        low_m, high_m = min(from_m, to_m), max(from_m, to_m)
-        steep = [patch for patch in self.patches if patch.is_steep and self._meets(patch, low_m, high_m)]
+        steep = [patch for patch in self.patches if patch.is_steep and self._meets(patch, from_m, to_m)]
         return any(core(patch).distance(Point(start)) < self.reach_m for patch in steep)
 
     def block(self, points_ned_m: Sequence[Vector3]) -> bool:

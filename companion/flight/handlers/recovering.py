@@ -40,8 +40,7 @@ class Recover:
     def __init__(self, flight: FlightContext) -> None:
         assert flight.reflex.recovery is not None, "a collision begins one"
         self._recovery = flight.reflex.recovery
-        *_, first = flight.reflex.in_one_recovery()
-        self._first_hit_us = first.detected_at_us
+        self._first_hit = flight.reflex.in_one_recovery()[-1]
 
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
         """Attitude and thrust until it rests; then its place."""
@@ -62,7 +61,7 @@ class Recover:
             if shown.settled_s is not None:
                 return self._leave(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
-        if now_us - self._first_hit_us > timeout_s * 1e6:
+        if now_us - self._first_hit.detected_at_us > timeout_s * 1e6:
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.report(now_us, "recovered", text, settled_after_s=None)
             return self._leave(flight)
