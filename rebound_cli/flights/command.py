@@ -4,7 +4,7 @@ from argparse import Namespace
 
 from rebound_cli.flights.kept import flight_named, hits_in, hits_text, kept_flights, runs_folder, simulated_text
 from rebound_cli.live.console import console_for
-from rebound_cli.results.run_folder import EVENTS_NAME, RunFolderError, read_records
+from rebound_cli.results.run_folder import RunFolderError
 
 
 def run_list(options: Namespace) -> int:
@@ -13,11 +13,11 @@ def run_list(options: Namespace) -> int:
     for flight in flights:
         try:
             lines = flight.event_lines()
-            ends = list(read_records(flight.folder / EVENTS_NAME, "".join([*lines[:1], *lines[-1:]])))
+            ends = flight.timed_events([*lines[:1], *lines[-1:]])
         except RunFolderError:
             # Of one whose events are damaged there is nothing but its size.
             lines, ends = [], []
-        lasted_s = (ends[-1]["time_us"] - ends[0]["time_us"]) / 1e6 if ends else 0.0
+        lasted_s = ends[-1][0] if ends else 0.0
         told = f"{flight.name:36} {lasted_s:8.1f} s {flight.size_bytes / 1e6:8.1f} MB"
         print(f"{told}  {hits_text(hits_in(lines)):8}  {flight.end()}")
     total_mb = sum(flight.size_bytes for flight in flights) / 1e6
@@ -30,9 +30,9 @@ def run_show(options: Namespace) -> int:
     """Raises FlightError, RunFolderError."""
     flight = flight_named(runs_folder(options.runs), options.flight)
     lines = flight.event_lines()
-    events = list(read_records(flight.folder / EVENTS_NAME, "".join(lines)))
+    events = flight.timed_events(lines)
     console = console_for(False)
     console.print(f"{flight.name}: {flight.end()}; {hits_text(hits_in(lines))}, {flight.size_bytes / 1e6:.1f} MB")
-    for event in events:
-        console.event((event["time_us"] - events[0]["time_us"]) / 1e6, event["kind"], str(event.get("text", "")))
+    for at_s, event in events:
+        console.event(at_s, event["kind"], str(event.get("text", "")))
     return 0

@@ -12,15 +12,19 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from companion.errors import ReboundError
 from companion.mission.config import DiskConfig
+from companion.shell.tlog import packets_in
 from rebound_cli.inputs.documents import nearest
 from rebound_cli.results import run_folder
-from rebound_cli.results.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_text, whole_lines
+from rebound_cli.results.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_records, read_text, whole_lines
 
 # As `create_run_folder` names them. A folder that a person has named is that person's.
 _NAMED_BY_US = re.compile(r"(\d{8}T\d{6}Z)-.+")
+# Some packets, however long they are.
+_FIRST_BYTES = 1000
 # The unit of stat's st_blocks, whatever the file system's own is.
 _BLOCK_BYTES = 512
 # Where a service flies: below systemd's StateDirectory=rebound.
@@ -77,6 +81,17 @@ class KeptFlight:
     def event_lines(self) -> Sequence[str]:
         """Of `events.jsonl`, as far as they were written. Raises RunFolderError."""
         return whole_lines(read_text(self.folder / EVENTS_NAME)).splitlines(keepends=True)
+
+    def timed_events(self, lines: Sequence[str]) -> list[tuple[float, dict[str, Any]]]:
+        """Of such lines from the first on: each event, and when, in seconds since the flight's first step.
+
+        A flight begins with a packet, a heartbeat; without room for packets by its first event. Raises RunFolderError.
+        """
+        events = list(read_records(self.folder / EVENTS_NAME, "".join(lines)))
+        with (self.folder / TLOG_NAME).open("rb") as tlog:
+            stamps_us = [stamp_us for stamp_us, _, _ in packets_in(tlog.read(_FIRST_BYTES))]
+        stamps_us += [event["time_us"] for event in events]
+        return [((event["time_us"] - stamps_us[0]) / 1e6, event) for event in events]
 
     def has_hit(self) -> bool:
         """Where that cannot be read it might have."""

@@ -32,9 +32,16 @@ def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int, stalls: 
 
 
 def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
-    """Hits, path and the wall clock (microseconds) at the vehicle's boot time 0."""
+    """Hits, path and the wall clock (microseconds) at the vehicle's boot time 0.
+
+    Raises whatever a file leads to that holds anything else; ValueError for a path without all of its columns.
+    """
     with np.load(path) as stored:
-        series = {name: stored[name] for name in stored.files if name not in _NO_SERIES}
+        series = {name: np.asarray(stored[name], float) for name in stored.files if name not in _NO_SERIES}
+        rows, arms = series["arm_fold_m"].shape
+        for name, like in TruthRecorder(rotors=arms).series().items():
+            if series[name].shape != (rows, *like.shape[1:]):
+                raise ValueError(f"{path}: {name} has the shape {series[name].shape}.")
         return _HITS.validate_json(str(stored["hits"])), series, int(stored["epoch_at_boot_us"])
 
 

@@ -97,6 +97,8 @@ def test_show_is_of_the_last_flight_and_has_its_events_in_order(runs, capsys):
     told = capsys.readouterr().out
     assert told.startswith(f"{LAST}: cut off; no hit,")
     assert told.index("connected") < told.index("a step came late")
+    # Times are those that whoever flew it has read: the first packet came a quarter of a second before.
+    assert "    0.250 s  connected " in told
     assert logs("show", "20260102T000000Z-guard", "--runs", runs) == 0
     told = capsys.readouterr().out
     assert told.startswith("20260102T000000Z-guard: cut off; 2 hits") and told.count("detection") == 3

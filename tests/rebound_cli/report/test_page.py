@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import io
 import json
 import re
 import shutil
@@ -21,6 +22,7 @@ from rebound_cli.report.page import SCRIPTS, file_text, page
 from rebound_cli.report.shown_flight import recorded_flight
 from rebound_cli.results.flight_log import read_flight_log
 from sim_vehicle.obstacles import WallSpec
+from sim_vehicle.truth import TruthRecorder
 
 
 def unpacked(column):
@@ -315,10 +317,18 @@ def test_what_is_no_ordinary_file_is_left_as_it_is(wall_folder, tmp_path, capsys
     assert link.is_symlink() and list(tmp_path.iterdir()) == [link]
 
 
+def truth_of(**series):
+    file = io.BytesIO()
+    np.savez(file, hits="[]", epoch_at_boot_us=0, **series)
+    return file.getvalue()
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [
         ("truth.npz", b"PK"),
+        ("truth.npz", truth_of(time_boot_us=np.zeros(9))),
+        ("truth.npz", truth_of(**TruthRecorder().series() | {"attitude_wxyz": np.zeros((1, 4))})),
         ("summary.json", b'{"mission": "wall"}'),
         ("obstacles.json", b"["),
         ("airframe.yaml", b"name: foldable"),
