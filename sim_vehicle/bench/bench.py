@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.bench.faults import FaultRequest, opposite
-from sim_vehicle.bench.strike import DURATION_S, strike
+from sim_vehicle.bench.strike import DURATION_S, THICKNESS_M, strike
 from sim_vehicle.bench.truth import Timeline, TimelineEntry, Truth, truth_of
 from sim_vehicle.errors import ConditionNotMet, FaultError, ParameterError, SceneError
 from sim_vehicle.faults.spec import Fault
@@ -45,6 +45,9 @@ class Setup:
 
     def scene(self) -> Scene:
         """The world as a mission file would state it. Raises SceneError."""
+        for spec in self.obstacles:
+            if not isinstance(spec, ObstacleSpec):
+                raise SceneError(f"obstacles are Wall, Pole or Box of sim_vehicle.testing, not {spec!r}.")
         try:
             return Scene.model_validate(
                 {
@@ -146,10 +149,14 @@ class Bench:
 
         The speed is against the vehicle as it moves now. Raises SceneError for what is no speed or angle.
         """
-        if not (speed_m_s > 0.0 and math.isfinite(speed_m_s + bearing_deg + elevation_deg)):
-            raise SceneError(f"a hit needs a speed of more than 0 m/s and angles, not {speed_m_s:g} m/s.")
+        vehicle = self.vehicle
+        # A faster plate would be through itself between two looks at what is near.
+        fastest_m_s = 1e6 * THICKNESS_M / vehicle.constants.raw_interval_us
+        if not (0.0 < speed_m_s <= fastest_m_s and math.isfinite(bearing_deg + elevation_deg)):
+            told = f"{speed_m_s:g} m/s from {bearing_deg:g} and {elevation_deg:g} deg"
+            raise SceneError(f"a hit needs angles and a speed above 0 up to {fastest_m_s:g} m/s, not {told}.")
         self._strikes += 1
-        name, vehicle = f"strike {self._strikes}", self.vehicle
+        name = f"strike {self._strikes}"
         plate = strike(vehicle.state, vehicle.constants, speed_m_s, bearing_deg, elevation_deg, name)
         vehicle.put((plate,))
         above = f", {elevation_deg:g} deg up" if elevation_deg else ""

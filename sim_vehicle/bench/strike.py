@@ -17,7 +17,7 @@ LEAD_S = 0.02
 FOLLOW_S = 0.11
 RETREAT_M_S, RETREAT_S = 5.0, 0.3
 # Covers the guards of the built-in airframes with room for a miss of 7 cm.
-_SIZE_M, _THICKNESS_M = 0.6, 0.1
+_SIZE_M, THICKNESS_M = 0.6, 0.1
 
 DURATION_S = LEAD_S + FOLLOW_S + RETREAT_S
 
@@ -42,7 +42,7 @@ def strike(
     motion = Motion(
         (now_s, now_s + LEAD_S + FOLLOW_S, now_s + DURATION_S), ((0.0, 0.0, 0.0), vector(swing), vector(retreat))
     )
-    return plate(name, vector(start), vector(-out), (_SIZE_M, _SIZE_M), _THICKNESS_M, motion)
+    return plate(name, vector(start), vector(-out), (_SIZE_M, _SIZE_M), THICKNESS_M, motion)
 
 
 def _extent_m(state: PlantState, constants: Constants, direction_ned: Floats) -> float:

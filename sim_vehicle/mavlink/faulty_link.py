@@ -21,6 +21,8 @@ _INBOUND_SEED = 0x1B
 _STAMPS_US = {"time_boot_ms": 1000, "time_usec": 1}
 # The narrow ones wrap as the vehicle's own counters would; SERVO_OUTPUT_RAW counts microseconds in 32 bits.
 _MASKS = {"uint32_t": 0xFFFFFFFF, "uint64_t": 0xFFFFFFFFFFFFFFFF}
+# Of TIMESYNC's nanoseconds, 64 bits with a sign.
+_SIGN = 1 << 63
 
 
 class FaultyLink(Link):
@@ -120,7 +122,7 @@ def _move(message: Any, offset_us: int) -> bool:
     if name == "TIMESYNC":
         # An answer has the vehicle's time in tc1, a request of its own in ts1.
         field = "tc1" if message.tc1 else "ts1"
-        setattr(message, field, getattr(message, field) + 1000 * offset_us)
+        setattr(message, field, (getattr(message, field) + 1000 * offset_us + _SIGN) % (2 * _SIGN) - _SIGN)
         changed = True
     return changed
 

@@ -243,3 +243,7 @@ def test_bad_setups_are_one_sentence() -> None:
         LockstepVehicle(parameters={"MPC_XY_CRUSE": 3})
     with pytest.raises(SceneError, match=r"faults\.0\.motor_failure"):
         LockstepVehicle(faults=[{"kind": "motor_failure", "at_s": 1, "motor": 9}])
+    with pytest.raises(SceneError, match="obstacles are Wall, Pole or Box"):
+        LockstepVehicle(obstacles=[{"point_ned_m": (2, 0, 0), "normal_ned": (-1, 0, 0)}])
+    with pytest.raises(SceneError, match="up to 800 m/s, not 1000 m/s"):
+        LockstepVehicle().hit(1000.0)

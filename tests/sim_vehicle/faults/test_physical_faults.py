@@ -266,6 +266,9 @@ def test_a_clock_that_jumps_shows_in_every_stamp_and_wraps_where_it_is_narrow() 
     # One second after the jump the milliseconds are at their end and begin anew.
     assert narrow.max() > 2**32 - 30 and narrow[-1] < 1100
     assert wide[-1] > 2**32 * 1000
+    # Nanoseconds with a sign are as wide as they are: 2**63 of them begin at -2**63.
+    moved = restamped(dialect.MAVLink_timesync_message(2**63 - 1000, 5).pack(dialect.MAVLink(None, 1, 1)), 1)
+    assert dialect.MAVLink(None).decode(bytearray(moved)).tc1 == -(2**63)
 
 
 def test_a_battery_that_sags_shows_its_voltage() -> None:
