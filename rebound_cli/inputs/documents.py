@@ -28,6 +28,15 @@ _WITH_COMMA = re.compile(r"[-+]?\d+,\d+")
 _OF_THE_MODEL = re.compile(r"a valid (tuple|list|dictionary( or instance of \w+)?)")
 
 
+class _Loader(yaml.SafeLoader):
+    """Takes 1e-3 for a number, as editors and YAML 1.2 do; YAML 1.1 wants 1.0e-3."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
+)
+
+
 class DocumentError(ConfigurationError):
     """A file, or a value given with --set, that cannot be used."""
 
@@ -111,7 +120,7 @@ def parse_document(text: str, name: str) -> Document:
     if len(text) > MOST_CHARACTERS:
         raise DocumentError(f"{name}: longer than {MOST_CHARACTERS // 1_000_000} MB; no file that a person writes is.")
     try:
-        loader = yaml.SafeLoader(text)
+        loader = _Loader(text)
         node = loader.get_single_node()
         if node is None:
             raise DocumentError(f"{name}: the file is empty.")
@@ -178,7 +187,7 @@ def parse_override(text: str) -> Override:
     if not separator or not all(parts):
         raise DocumentError(f"--set {text}: give PATH=VALUE, such as items.1.go_to.speed_m_s=2.5.")
     try:
-        value = yaml.safe_load(value_text)
+        value = yaml.load(value_text, _Loader)
     except (yaml.YAMLError, ValueError, RecursionError):
         raise DocumentError(f"--set {text}: the value {value_text!r} is not valid YAML.") from None
     return Override(f"--set {text}", tuple(int(part) if part.isdecimal() else part for part in parts), value)

@@ -63,6 +63,10 @@ def run_tune(options: Namespace) -> int:
     refuse_existing(out)
     config = companion_settings(options.companion)
     flights = [read_healthy(path, config) for path in options.logs]
+    # What follows takes longer than such a flight.
+    for flight in flights:
+        rows = (textwrap.fill(row, _WIDTH, subsequent_indent="    ") for row in _flight_rows(flight))
+        print(*rows, sep="\n", end="\n\n", flush=True)
     logs = [flight.log for flight in flights]
     found = margins(logs, config)
     advice = advise(logs, config, found)
@@ -70,8 +74,6 @@ def run_tune(options: Namespace) -> int:
     # Read as `rebound fly` will read it before anybody has it.
     document = parse_document(text, str(out or "the settings"))
     validated(CompanionConfig, document, document.data["companion"], ("companion",))
-    for flight in flights:
-        print("\n".join(textwrap.fill(row, _WIDTH, subsequent_indent="    ") for row in _flight_rows(flight)) + "\n")
     if left := advice.false_alarms_left:
         print(f"With these settings still {left} false alarms: this vehicle is not made quiet by thresholds.\n")
     print(text, end="")

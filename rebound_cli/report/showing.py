@@ -7,6 +7,7 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 from threading import Thread
 from typing import TYPE_CHECKING
 
@@ -38,7 +39,7 @@ def show_flight(folder: Path, followed: "Followed", console: Console) -> None:
 def watched_page(folder: Path, console: Console, is_to_open: bool) -> Iterator[None]:
     """Until the flight is over a process of its own serves its page, if that is to be opened; says where it is."""
     if not is_to_open:
-        console.print(f"Run folder {folder}/; to watch the flight in a browser: rebound watch {folder}")
+        console.print(f"Run folder {folder}/; to watch the flight in a browser: rebound watch {quote(str(folder))}")
         yield
         return
     command = [sys.executable, "-m", "rebound_cli", "watch", str(folder)]
@@ -60,4 +61,4 @@ def watched_page(folder: Path, console: Console, is_to_open: bool) -> Iterator[N
 def offer_page(folder: Path, console: Console) -> None:
     """How to make it; of a flight in which nothing was heard there is none."""
     if (folder / TLOG_NAME).stat().st_size > 0:
-        console.print(f"A page to look at: rebound report {folder}")
+        console.print(f"A page to look at: rebound report {quote(str(folder))}")

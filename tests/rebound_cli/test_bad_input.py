@@ -215,6 +215,12 @@ def test_what_is_wrong_names_file_line_and_path(old, new, said):
     assert complaint(mission_from, document(old, new)).startswith(f"demo.yaml:{said}")
 
 
+def test_a_number_may_be_written_as_editors_take_it():
+    told = [parse_document(f"a: {text}\n", "demo.yaml").data["a"] for text in ("1e-3", "-1.5e3", ".5E2", "0x1e5", "e5")]
+    assert told == [0.001, -1500.0, 50.0, 0x1E5, "e5"]
+    assert mission_from(document(sets=["items.1.go_to.speed_m_s=5e-1"])).items[1].action.speed_m_s == 0.5
+
+
 def test_an_unknown_key_suggests_the_close_one_and_lists_all():
     text = complaint(mission_from, document("speed_m_s", "sped_m_s"))
     assert "demo.yaml:6: items.1.go_to.sped_m_s: unknown key 'sped_m_s'; did you mean 'speed_m_s'?" in text
