@@ -209,8 +209,9 @@ def _fly_stepped(flight: Flight, vehicle: "SteppedVehicle") -> Flown:
     flown, truth = fly_mission_lockstep(
         flight.mission, vehicle, flight.recorder, flight.interrupts, flight.console, flight.followed
     )
-    save_truth(flight.folder / run_folder.TRUTH_NAME, truth, EPOCH_US)
-    return flown
+    path = flight.folder / run_folder.TRUTH_NAME
+    save_truth(path, truth, EPOCH_US)
+    return replace(flown, truth=read_truth(path))
 
 
 def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:

@@ -66,7 +66,7 @@ def fly(flight: StudyFlight) -> Json:
     truth = flown.truth
     assert truth is not None, "a lockstep flight has its truth"
     report, settled_s = flown.report, mission.companion.settled.duration_s
-    matches = match_contacts(report.collisions, truth.hits, settled_s)
+    matches = match_contacts(report.collisions, truth, settled_s)
     row = {
         "study": flight.study,
         **flight.names,

@@ -146,7 +146,7 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
         true, boot_us, folds_m = truth.series, truth.series["time_boot_us"], truth.series["arm_fold_m"]
         columns["truth"] = (
             times(truth.at_us(boot_us), flight.started_at_us)
-            | {"boot": ((boot_us - first_us) * 1e-6, TIME_S)}
+            | {"boot": ((truth.told_us(boot_us) - first_us) * 1e-6, TIME_S)}
             | vector(NED, true["position_ned_m"], PLACE_M)
             | vector(VELOCITY, true["velocity_ned_m_s"], SPEED_M_S)
             | vector(TURN, true["attitude_wxyz"], UNIT)

@@ -20,7 +20,6 @@ from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import impact_text
 from rebound_cli.results.flight_log import Floats
-from rebound_cli.results.truth_match import index_of_hit
 
 if TYPE_CHECKING:
     from sim_vehicle.truth import Hit
@@ -61,7 +60,7 @@ def moments_of(flight: ShownFlight) -> list[Moment]:
 def _impact(flight: ShownFlight, finding: Finding) -> Moment:
     first = finding.first
     boot_us = first.impact.sample_time_boot_us
-    touch = flight.contact_at(boot_us)
+    touch, touched_us = flight.contact_at(boot_us), None
     normal = _normal(flight, finding)
     kind, what = "hit" if finding.is_collision else "contact", kind_text(finding)
     facts = impact_facts(finding, normal, flight.seconds)
@@ -69,6 +68,7 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
         # As `detection_latency_ms` of the summary and the end of the flight in words have it.
         began_us = flight.truth.at_us(touch.contact_at_boot_us)
         late_ms = (finding.at_us - began_us) / 1e3
+        touched_us = flight.truth.told_us(touch.contact_at_boot_us)
         hit = impact_text(touch.kind, touch.impact_velocity_ned_m_s)
         facts.append(("Simulator", f"{hit}, from {flight.seconds(began_us):.4f} s on, seen after {late_ms:.1f} ms"))
         facts.append(("Simulator's normal", bearing(touch.normal_ned)))
@@ -85,7 +85,7 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
         position_ned_m=first.position_ned_m,
         normal_ned=normal.direction_ned,
         normal_error_deg=math.degrees(normal.error_rad),
-        touched_boot_us=None if touch is None else touch.contact_at_boot_us,
+        touched_boot_us=touched_us,
     )
 
 
@@ -161,14 +161,14 @@ def _missed(flight: ShownFlight) -> list[Moment]:
     if flight.truth is None:
         return []
     seen = [finding.first.impact.sample_time_boot_us for finding in flight.findings.impacts]
-    told = {index_of_hit(boot_us, flight.truth.hits) for boot_us in seen}
+    told = {flight.truth.index_of_hit(boot_us) for boot_us in seen}
     missed = [hit for index, hit in enumerate(flight.truth.hits) if index not in told]
     return [
         Moment(
             kind="missed",
             title=f"Not seen: {impact_text(hit.kind, hit.impact_velocity_ned_m_s)}",
             at_us=flight.truth.at_us(hit.contact_at_boot_us),
-            boot_us=hit.contact_at_boot_us,
+            boot_us=flight.truth.told_us(hit.contact_at_boot_us),
             facts=[
                 ("Contact began", f"{flight.seconds(flight.truth.at_us(hit.contact_at_boot_us)):.3f} s"),
                 ("Lasted", f"{1e3 * hit.contact_duration_s:.0f} ms"),
@@ -177,7 +177,7 @@ def _missed(flight: ShownFlight) -> list[Moment]:
             reasons=list(_why_missed(flight, hit)),
             normal_ned=hit.normal_ned,
             position_ned_m=hit.contact_position_ned_m,
-            touched_boot_us=hit.contact_at_boot_us,
+            touched_boot_us=flight.truth.told_us(hit.contact_at_boot_us),
         )
         for hit in missed
     ]
@@ -185,22 +185,22 @@ def _missed(flight: ShownFlight) -> list[Moment]:
 
 def _why_missed(flight: ShownFlight, hit: "Hit") -> Iterator[str]:
     assert flight.truth is not None, "a simulated flight has one"
-    at_us = flight.truth.at_us(hit.contact_at_boot_us)
+    at_us, told_us = (clock(hit.contact_at_boot_us) for clock in (flight.truth.at_us, flight.truth.told_us))
     for word, spans in (("off", flight.findings.off), ("blind", flight.findings.blind)):
         for span in spans:
             if span.start_us <= at_us <= span.end_us:
                 yield f"The detector was {word}: {span.reason}."
-    until_us = hit.ended_at_boot_us + flight.config.estimate.imu_averaging_interval_s * 1e6
+    until_us = flight.truth.told_us(hit.ended_at_boot_us) + flight.config.estimate.imu_averaging_interval_s * 1e6
     forces, jumps = flight.findings.listener.forces, flight.findings.listener.velocities
     tested, velocities = forces.all(), jumps.all()
-    rows = np.flatnonzero((hit.contact_at_boot_us <= tested.time_boot_us) & (tested.time_boot_us <= until_us))
+    rows = np.flatnonzero((told_us <= tested.time_boot_us) & (tested.time_boot_us <= until_us))
     if not len(rows):
         yield "No IMU sample came while it lasted."
     elif np.any(np.take(tested.phase, rows) == PHASES.index(Phase.CONTACT)):
         yield "It belonged to the contact before: one contact is told once."
     else:
         yield from _signs(forces.one(rows[_loudest(np.take(tested.ratio, rows))]))
-    rows = np.flatnonzero(np.abs(velocities.time_boot_us - hit.contact_at_boot_us - 0.5 * SHOWN_US) <= 0.5 * SHOWN_US)
+    rows = np.flatnonzero(np.abs(velocities.time_boot_us - told_us - 0.5 * SHOWN_US) <= 0.5 * SHOWN_US)
     if len(rows):
         yield from _signs(jumps.one(rows[_loudest(np.take(velocities.ratio, rows))]))
 

@@ -26,7 +26,7 @@ from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
 from rebound_cli.results import run_folder
 from rebound_cli.results.flight_log import FlightLog, flight_log_of, read_flight_log
-from rebound_cli.results.truth_match import FlightTruth, Time, index_of_hit, read_truth
+from rebound_cli.results.truth_match import FlightTruth, Time, read_truth
 from sim_vehicle.scene import Scene
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class ShownFlight:
 
     def contact_at(self, boot_us: int) -> "Hit | None":
         """The simulator's contact that an IMU sample belongs to."""
-        index = None if self.truth is None else index_of_hit(boot_us, self.truth.hits)
+        index = None if self.truth is None else self.truth.index_of_hit(boot_us)
         return None if self.truth is None or index is None else self.truth.hits[index]
 
     def seconds(self, at_us: Time) -> Time:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from companion.link.vehicle import OLD_NEWS_US
 from companion.reflex.detection.detector import ImpactKind
 from rebound_cli.replay.report import speed_text
 from rebound_cli.replay.watching import Finding
@@ -79,10 +80,14 @@ def _imu_rows(flight: ShownFlight) -> Sequence[tuple[str, str]]:
     boot_us, at_us = flight.log.imu_time_boot_us, flight.log.imu_at_us
     if len(boot_us) < 2:
         return [("IMU samples", str(len(boot_us)))]
-    intervals_us = np.diff(boot_us)
+    intervals_us, heard_us = np.diff(boot_us), np.diff(at_us)
     usual_us = float(np.median(intervals_us))
-    lost = int(sum(round(gap_us / usual_us) - 1 for gap_us in intervals_us if gap_us > LOST_FROM * usual_us))
-    delays_ms = (at_us - boot_us - (at_us - boot_us).min()) / 1e3
+    # Times that run back, or on without any that was heard, are another clock's: of one that was reset or has jumped.
+    is_anew = (intervals_us < 0.0) | (intervals_us > heard_us + OLD_NEWS_US)
+    gaps_us = intervals_us[~is_anew]
+    lost = int(sum(round(gap_us / usual_us) - 1 for gap_us in gaps_us if gap_us > LOST_FROM * usual_us))
+    pieces_us = np.split(at_us - boot_us, np.flatnonzero(is_anew) + 1)
+    delays_ms = np.concatenate([piece_us - piece_us.min() for piece_us in pieces_us]) / 1e3
     p50, p99, most = np.percentile(delays_ms, 50), np.percentile(delays_ms, 99), delays_ms.max()
     averaging_ms = flight.config.estimate.imu_averaging_interval_s * 1e3
     return [

@@ -52,7 +52,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
     """The content of summary.json. Without truth everything that needs it is null."""
     report, truth = flown.report, flown.truth
     duration_s = (report.ended_at_us - report.started_at_us) / 1e6
-    matches = match_contacts(report.collisions, truth.hits, facts.settled_duration_s) if truth else None
+    matches = match_contacts(report.collisions, truth, facts.settled_duration_s) if truth else None
     hits = matches.hit_of_collision if matches else (None,) * len(report.collisions)
     return {
         "schema": SCHEMA,

@@ -28,18 +28,32 @@ class FlightTruth:
     """What the simulator knows of a flight. `epoch_at_boot_us` is when the vehicle's boot clock read 0, by its end.
 
     `stalls` are boot times at which the simulator stood still, and for how long: before one of them, boot time 0 was
-    by so much earlier.
+    by so much earlier. `jumps` are boot times from which on the vehicle told later ones, and by how much.
     """
 
     hits: "Sequence[Hit]"
     series: Series
     epoch_at_boot_us: float
     stalls: Sequence[tuple[int, int]] = ()
+    jumps: Sequence[tuple[int, int]] = ()
 
     def at_us(self, boot_us: Time) -> Time:
         """The companion's clock at a time, or at times, of the vehicle's."""
         earlier = sum(late_us * (boot_us < at_us) for at_us, late_us in self.stalls)
         return boot_us + self.epoch_at_boot_us - earlier
+
+    def told_us(self, boot_us: Time) -> Time:
+        """What the vehicle's messages had for a time, or times, of its clock."""
+        return boot_us + sum(later_us * (boot_us >= at_us) for at_us, later_us in self.jumps)
+
+    def index_of_hit(self, sample_time_boot_us: int) -> int | None:
+        """The latest contact that had begun when the sample's window ended, as told, and was not long over."""
+        for index in range(len(self.hits) - 1, -1, -1):
+            hit = self.hits[index]
+            ended_us = self.told_us(hit.ended_at_boot_us)
+            if self.told_us(hit.contact_at_boot_us) <= sample_time_boot_us <= ended_us + LATE_SAMPLE_US:
+                return index
+        return None
 
     def past_setpoint_and_below(self, hit: "Hit", setpoint_ned_m: Vector3, until_boot_us: float) -> tuple[float, float]:
         """Furthest distance past the setpoint along the wall's normal and greatest loss of height, in metres.
@@ -62,10 +76,10 @@ def read_truth(path: Path) -> FlightTruth | None:
     """None where a simulator has left none: of a real vehicle, or of a PX4 that never flew. Raises RunFolderError."""
     if not path.exists():
         return None
-    from sim_vehicle.shell.truth_file import load_stalls, load_truth
+    from sim_vehicle.shell.truth_file import load_jumps, load_stalls, load_truth
 
     with reading(path):
-        return FlightTruth(*load_truth(path), load_stalls(path))
+        return FlightTruth(*load_truth(path), load_stalls(path), load_jumps(path))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,32 +92,25 @@ class Matches:
     recontacts: int
 
 
-def match_contacts(collisions: Sequence[CollisionReport], hits: "Sequence[Hit]", settled_duration_s: float) -> Matches:
+def match_contacts(collisions: Sequence[CollisionReport], truth: FlightTruth, settled_duration_s: float) -> Matches:
     """Match on the vehicle's boot clock: a detection belongs to the contact that its IMU sample covers, one to one.
 
     The companion calls a vehicle recovered that has stayed settled for `settled_duration_s`.
     """
-    collision_of_hit: dict[int, CollisionReport] = {}
+    hits, collision_of_hit = truth.hits, dict[int, CollisionReport]()
     hit_of_collision: list[Hit | None] = []
     for collision in collisions:
-        index = index_of_hit(collision.sample_time_boot_us, hits)
+        index = truth.index_of_hit(collision.sample_time_boot_us)
         is_new = index is not None and collision_of_hit.setdefault(index, collision) is collision
         hit_of_collision.append(hits[index] if index is not None and is_new else None)
     recontacts = sum(
-        not _is_recovered(collision_of_hit.get(index - 1), hits[index].contact_at_boot_us, settled_duration_s)
+        not _is_recovered(
+            collision_of_hit.get(index - 1), truth.told_us(hits[index].contact_at_boot_us), settled_duration_s
+        )
         for index in range(1, len(hits))
     )
     missed = len(hits) - len(collision_of_hit)
     return Matches(tuple(hit_of_collision), hit_of_collision.count(None), missed, recontacts)
-
-
-def index_of_hit(sample_time_boot_us: int, hits: "Sequence[Hit]") -> int | None:
-    """The latest contact that had begun when the sample's window ended and was not long over."""
-    for index in range(len(hits) - 1, -1, -1):
-        hit = hits[index]
-        if hit.contact_at_boot_us <= sample_time_boot_us <= hit.ended_at_boot_us + LATE_SAMPLE_US:
-            return index
-    return None
 
 
 def _is_recovered(collision: CollisionReport | None, at_boot_us: float, settled_duration_s: float) -> bool:

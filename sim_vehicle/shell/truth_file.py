@@ -45,6 +45,14 @@ def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
         return _HITS.validate_json(str(stored["hits"])), series, int(stored["epoch_at_boot_us"])
 
 
+def load_jumps(path: Path) -> list[tuple[int, int]]:
+    """Boot times from which on the vehicle told later times than its own by so much, by a fault of its clock."""
+    with np.load(path) as stored:
+        faults = json.loads(str(stored["faults"]))
+    jumps = (fault for fault in faults if fault["kind"] == "clock_jump")
+    return [(fault["began_at_boot_us"], round(1e6 * fault["details"]["jump_s"])) for fault in jumps]
+
+
 def load_stalls(path: Path) -> list[tuple[int, int]]:
     """Boot times at which the vehicle's clock stood, and for how long."""
     with np.load(path) as stored:

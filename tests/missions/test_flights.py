@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 
-from rebound_cli.results.truth_match import match_contacts
+from rebound_cli.results.truth_match import FlightTruth, match_contacts
 from tests.missions.test_missions import NAMES, WITHOUT_OBSTACLES
 from tests.simulated import SimulatedFlight, simulated
 
@@ -25,7 +25,7 @@ def test_each_mission_ends_as_its_file_says(name):
     flown = fly(name)
     assert flown.report.outcome == "completed", flown.report.reason
     assert [wish.text for wish in flown.report.expectations if not wish.met] == []
-    matches = match_contacts(flown.report.collisions, flown.hits, 0.5)
+    matches = match_contacts(flown.report.collisions, FlightTruth(flown.hits, flown.series, 0), 0.5)
     assert (matches.false_detections, matches.missed_contacts) == (0, 0)
     assert (len(flown.hits) == 0) is (name in WITHOUT_OBSTACLES)
 

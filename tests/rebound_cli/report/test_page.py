@@ -20,6 +20,7 @@ from rebound_cli.main import main
 from rebound_cli.report.content import NONE, content, kept_rows, packed
 from rebound_cli.report.page import SCRIPTS, file_text, page
 from rebound_cli.report.shown_flight import recorded_flight
+from rebound_cli.report.words import link_rows
 from rebound_cli.results.flight_log import read_flight_log
 from sim_vehicle.obstacles import WallSpec
 from sim_vehicle.truth import TruthRecorder
@@ -305,6 +306,13 @@ def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
     data = Opened(page(recorded_flight(folder))).data
     assert data["sentence"].startswith("Hit a wall at 1.9") and data["sentence"].endswith("stopped with Ctrl-C.")
     assert data["obstacles"] == [] and "truth" not in data["tables"]
+
+
+@pytest.mark.parametrize("jump_us", [100e6, -5e6])
+def test_a_clock_that_jumps_has_lost_no_samples_and_delayed_none(wall_folder, jump_us):
+    flight = recorded_flight(wall_folder)
+    told_us = flight.log.imu_time_boot_us + jump_us * (np.arange(len(flight.log.imu_at_us)) > 1000)
+    assert link_rows(replace(flight, log=replace(flight.log, imu_time_boot_us=told_us))) == link_rows(flight)
 
 
 @pytest.mark.parametrize("command", [("report",), ("logs", "export"), ("logs", "export", "--format", "mcap")])

@@ -122,8 +122,14 @@ def collision(sample_ms, settled_after_s=2.0):
     ],
 )
 def test_what_counts(collisions, hits, expected):
-    matches = match_contacts(collisions, hits, SETTLED_S)
+    matches = match_contacts(collisions, FlightTruth(hits, {}, EPOCH_US), SETTLED_S)
     assert (matches.false_detections, matches.missed_contacts, matches.recontacts) == expected
+
+
+def test_a_contact_is_found_by_the_times_that_a_vehicle_told_whose_clock_had_jumped():
+    truth = FlightTruth([hit(5_000), hit(10_000)], {}, EPOCH_US, jumps=[(9_000_000, 100_000_000)])
+    matches = match_contacts([collision(5_004), collision(110_004)], truth, SETTLED_S)
+    assert matches.hit_of_collision == tuple(truth.hits) and matches.recontacts == 0
 
 
 def path_of(rows):

@@ -1,6 +1,7 @@
 """A vehicle under test, flown in lockstep: faults, obstacles and plates at run time, and the truth of it."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import FaultError, ParameterError, SceneError
 from sim_vehicle.scene import Scene
-from sim_vehicle.testing import FaultRequest, LockstepVehicle, Motion, Pole, Wall, faults
+from sim_vehicle.shell.truth_file import load_jumps
+from sim_vehicle.testing import FaultRequest, LockstepVehicle, Motion, Pole, Wall, faults, save_truth
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, End
 
@@ -77,13 +79,15 @@ def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
     assert pilot.received and pilot.vehicle.truth.is_armed
 
 
-def test_a_clock_jumps_and_jumps_back() -> None:
+def test_a_clock_jumps_and_jumps_back(tmp_path: Path) -> None:
     pilot = standing()
     pilot.fly(0.5)
     pilot.vehicle.inject(faults.clock_jump(100.0), for_s=0.5)
     pilot.fly(1.0)
     jumps = np.diff([message.time_usec for message in pilot.all("HIGHRES_IMU")]) / 1e6
     assert jumps.max() == pytest.approx(100.0, abs=0.03) and jumps.min() == pytest.approx(-100.0, abs=0.03)
+    save_truth(tmp_path / "truth.npz", pilot.vehicle.recorded, 0)
+    assert [later_us for _, later_us in load_jumps(tmp_path / "truth.npz")] == [100_000_000, -100_000_000]
 
 
 def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -> None:
