@@ -60,7 +60,7 @@ def moments_of(flight: ShownFlight) -> list[Moment]:
 def _impact(flight: ShownFlight, finding: Finding) -> Moment:
     first = finding.first
     boot_us = first.impact.sample_time_boot_us
-    touch, touched_us = flight.contact_at(boot_us), None
+    touch, touched_us = flight.contact_of(finding), None
     normal = _normal(flight, finding)
     kind, what = "hit" if finding.is_collision else "contact", kind_text(finding)
     facts = impact_facts(finding, normal, flight.seconds)

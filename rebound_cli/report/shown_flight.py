@@ -75,10 +75,13 @@ class ShownFlight:
         times = (float(event["time_us"]) for event in self.events if event["kind"] == "unconfirmed")
         return next((at_us for at_us in times if hit.at_us < at_us <= until_us), None)
 
-    def contact_at(self, boot_us: int) -> "Hit | None":
-        """The simulator's contact that an IMU sample belongs to."""
-        index = None if self.truth is None else self.truth.index_of_hit(boot_us)
-        return None if self.truth is None or index is None else self.truth.hits[index]
+    def contact_of(self, finding: Finding) -> "Hit | None":
+        """The simulator's contact that an impact belongs to: of several hits in one, the first's, as in summaries."""
+        if self.truth is None:
+            return None
+        indices = [self.truth.index_of_hit(one.first.impact.sample_time_boot_us) for one in (finding, *self.hits)]
+        same = [hit for hit, index in zip(self.hits, indices[1:], strict=True) if index == indices[0]]
+        return None if indices[0] is None or finding in same[1:] else self.truth.hits[indices[0]]
 
     def seconds(self, at_us: Time) -> Time:
         """Since the flight began, of one time or of many."""

@@ -18,6 +18,7 @@ import rebound_cli.report
 from companion.shell.tlog import read_tlog
 from rebound_cli.main import main
 from rebound_cli.report.content import NONE, content, kept_rows, packed
+from rebound_cli.report.moments import moments_of
 from rebound_cli.report.page import SCRIPTS, file_text, page
 from rebound_cli.report.shown_flight import recorded_flight
 from rebound_cli.report.words import link_rows
@@ -306,6 +307,16 @@ def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
     data = Opened(page(recorded_flight(folder))).data
     assert data["sentence"].startswith("Hit a wall at 1.9") and data["sentence"].endswith("stopped with Ctrl-C.")
     assert data["obstacles"] == [] and "truth" not in data["tables"]
+
+
+def test_a_contact_is_told_of_the_first_hit_in_it_as_the_summary_does(wall_folder):
+    flight = recorded_flight(wall_folder)
+    (first,) = flight.hits
+    again = replace(first, at_us=first.at_us + 60_000)
+    flight.findings.impacts.insert(1, again)
+    assert flight.contact_of(first) is not None and flight.contact_of(again) is None
+    told = {moment.at_us: moment.reasons[-1] for moment in moments_of(flight)}
+    assert "a false alarm" in told[again.at_us] and "a false alarm" not in told[first.at_us]
 
 
 @pytest.mark.parametrize("jump_us", [100e6, -5e6])
