@@ -15,7 +15,7 @@ class Meet(FixedSetpoint, ABC):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
 
     def __init__(self) -> None:
-        self._started_us: int | None = None
+        self._started_us: int | None = None  # to look for a vehicle, then with it
         self._requests: Iterator[VehicleCommand] | None = None
         self._asked: float | None = None  # the last message
         self._measuring_since_us: int | None = None
@@ -45,6 +45,7 @@ class Meet(FixedSetpoint, ABC):
             return None
         if self._requests is None:
             self._requests, flight.was_silent, self._is_told = iter(self._commands(flight)), False, False
+            self._started_us = now_us
             name = identity.autopilot.name
             article = "an" if name[0] in "AEIOU" else "a"
             text = f"connected to {article} {name} {identity.vehicle_type}, system {identity.system_id}"
@@ -95,12 +96,17 @@ class Connect(Meet):
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
         too_slow = flight.streams.too_slow(flight.vehicle.autopilot)
-        if too_slow is not None and flight.mission.companion.link.wait:
+        if too_slow is not None and self._may_wait(flight, now_us):
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None
         self._report_streams(flight, now_us)
         complaint = too_slow or ground_check(flight)
         return Transition(Trigger.VEHICLE_READY) if complaint is None else Transition(Trigger.REFUSED, complaint)
+
+    def _may_wait(self, flight: FlightContext, now_us: int) -> bool:
+        """For a stream that is too slow only who wants to. One that has not begun may: its vehicle has just started."""
+        link, since_us = flight.mission.companion.link, now_us - (self._started_us or now_us)
+        return link.wait or (flight.streams.lacks_one and since_us < 1e6 * link.heartbeat_wait_s)
 
 
 class Ready(FixedSetpoint):

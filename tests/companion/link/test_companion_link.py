@@ -12,7 +12,7 @@ from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.flight.test_companion_authority import heartbeat
 
 
-def failed(vehicle: FakeVehicle, limit_s: float = 10.1):
+def failed(vehicle: FakeVehicle, limit_s: float = 14.0):
     f = flight(vehicle)
     report = f.run_to_end(limit_s)
     assert report.outcome == "failed"
@@ -37,6 +37,16 @@ def test_vehicles_that_cannot_be_flown_are_refused_with_the_reason(vehicle, word
     _, report = failed(vehicle)
     assert word in report.reason
     assert [m for _, m in vehicle.commands if m.command in (176, 400)] == []
+
+
+def test_a_vehicle_that_has_just_started_is_given_time_for_its_first_position():
+    # Given one that has none yet when its streams have been measured
+    f = flight(FakeVehicle(no_positions=True))
+    f.run_for(4.0)
+    assert f.state == "connect" and "link: not ready by now" in f.texts()[-1]
+    # When it has one, then the flight begins, though nobody said that it waits
+    f.vehicle.no_positions = False
+    assert f.run_to_end().outcome == "completed"
 
 
 WAITS = {"link": {"wait": True, "heartbeat_wait_s": 1.0}, "streams": {"window_s": 0.5}}
