@@ -120,6 +120,8 @@ class Reflex:
                     force.forget()
                 elif late_us >= 0:
                     continue
+                if self.newest is None or self.newest.is_over:
+                    force.feel(sample, self.monitor.estimator.strapdown.valid_wxyz)
                 held = force.step(sample, self.monitor.estimator.strapdown.valid_wxyz, flown_to)
                 if held is not None:
                     return held
@@ -145,7 +147,15 @@ class Reflex:
             detector=self.config.detector,
             contact=contact,
             peak_specific_force_m_s2=impact.size_m_s2,
-            estimator=MotionEstimator(contact, first_us, expected, self.config.estimate, is_second, fits_models),
+            estimator=MotionEstimator(
+                contact,
+                first_us,
+                expected,
+                self.config.estimate,
+                is_second,
+                fits_models,
+                self.sustained_force.blows_m_s2,
+            ),
             source=self.monitor.estimator,
         )
         if before is None and self._is_attitude_heard:

@@ -16,6 +16,7 @@ from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.vector import ZERO, along, minus, plus, split, towards, unit
 from companion.reflex import config as reflex
+from companion.reflex.detection.classify import hovers
 from companion.reflex.detection.detector import Impact, ImpactKind
 from companion.reflex.detection.free_flight import ThrustGain
 from companion.reflex.detection.impact import ImpactEstimate
@@ -29,7 +30,7 @@ class SustainedForceMonitor:
     gain: ThrustGain = field(default_factory=ThrustGain)
     """Learnt at the setpoint."""
     time_us: int = 0
-    measured_m_s2: float = GRAVITY_M_S2
+    measured_frd_m_s2: Vector3 = (0.0, 0.0, -GRAVITY_M_S2)
     imu_count: int = 0
     """IMU samples in the mean since the last position."""
     velocity_m_s: Vector3 = ZERO
@@ -37,6 +38,8 @@ class SustainedForceMonitor:
     missing_m_s2: Vector3 = ZERO
     wind_m_s2: Vector3 = ZERO
     """Mean of the missing acceleration at the setpoint and in free motion: it balances drag and wind."""
+    blows_m_s2: Vector3 = ZERO
+    """Horizontal, what the accelerometer showed across the thrust when the vehicle hovered last: it is the wind's."""
     pushed_since_us: int = 0
     """Time since which half of a sustained force has been missing."""
 
@@ -46,7 +49,15 @@ class SustainedForceMonitor:
     def add_imu(self, specific_force_frd_m_s2: Vector3) -> None:
         """Take one sample of the accelerometer; the mean of those between two positions counts."""
         self.imu_count += 1
-        self.measured_m_s2 += (-specific_force_frd_m_s2[2] - self.measured_m_s2) / self.imu_count
+        self.measured_frd_m_s2 = towards(self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count)
+
+    def feel(self, sample: LocalPosition, attitude_wxyz: Quaternion) -> None:
+        """Take one sample, before `step` does, of a vehicle that nothing has touched of late."""
+        if self.time_us and hovers(sample.velocity_ned_m_s):
+            x, y, _ = self.measured_frd_m_s2
+            n, e, _ = body_to_ned(attitude_wxyz, (x, y, 0.0))
+            elapsed_s = 1e-6 * (sample.time_boot_us - self.time_us)
+            self.blows_m_s2 = towards(self.blows_m_s2, (n, e, 0.0), elapsed_s / (reflex.SMOOTHING_S + elapsed_s))
 
     def step(
         self, sample: LocalPosition, attitude_wxyz: Quaternion, goal_ned_m: Vector3 | None
@@ -61,18 +72,18 @@ class SustainedForceMonitor:
         if goal_ned_m is None:
             self.gain.known_s = 0.0
         elif is_there or not self.gain.is_known:
-            self.gain.learn(now_us, self.measured_m_s2, elapsed_s)
+            self.gain.learn(now_us, -self.measured_frd_m_s2[2], elapsed_s)
         if is_first:
             self.wind_m_s2 = self.missing_m_s2
         grown = minus(self.missing_m_s2, self.wind_m_s2)
-        towards = unit(grown)
-        force_m_s2 = min(along(grown, towards), along(self.missing_m_s2, towards))
-        along_m_s, across = split(self.velocity_m_s, towards)
+        pushes = unit(grown)
+        force_m_s2 = min(along(grown, pushes), along(self.missing_m_s2, pushes))
+        along_m_s, across = split(self.velocity_m_s, pushes)
         is_free = _is_free(along_m_s, math.hypot(*across))
         if is_there or is_free:
             share = 1.0 if abs(along_m_s) > reflex.FREE_M_S else elapsed_s / (reflex.FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
-        if is_free or force_m_s2 < 0.5 * reflex.HELD_M_S2 or along(short, towards) <= 0.0:
+        if is_free or force_m_s2 < 0.5 * reflex.HELD_M_S2 or along(short, pushes) <= 0.0:
             self.pushed_since_us = now_us
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
         since_us = self.pushed_since_us
@@ -98,7 +109,7 @@ class SustainedForceMonitor:
     def _smooth(self, sample: LocalPosition, attitude_wxyz: Quaternion) -> float:
         """Low-pass velocity and thrust; missing: the thrust less the velocity's change. Returns the time step in s."""
         now_us, velocity = sample.time_boot_us, sample.velocity_ned_m_s
-        thrust_m_s2 = -self.gain.expected_m_s2(now_us, -self.measured_m_s2)
+        thrust_m_s2 = -self.gain.expected_m_s2(now_us, self.measured_frd_m_s2[2])
         thrust = plus((0.0, 0.0, GRAVITY_M_S2), 1.0, body_to_ned(attitude_wxyz, (0.0, 0.0, -thrust_m_s2)))
         if self.time_us == 0:
             self.velocity_m_s, self.thrust_ned_m_s2, self.time_us = velocity, thrust, now_us

@@ -51,6 +51,7 @@ class MotionEstimator:
     config: EstimateConfig
     is_second: bool = False  # the error of an earlier hit was still being corrected
     fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
+    blows_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it
     motion: MotionState = field(init=False)
     normal: Normal = field(init=False)  # by the contact's force
     pushed_boot_us: int = field(init=False)  # the contact's last sample
@@ -82,7 +83,7 @@ class MotionEstimator:
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
     def __post_init__(self) -> None:
-        self.motion, self.pushed_boot_us = self.start, self.hit_boot_us
+        self.motion, self.pushed_boot_us, self.external_m_s2 = self.start, self.hit_boot_us, self.blows_m_s2
         self.normal = Normal(self.contact.normal_ned, self.contact.normal_error_rad)
         self._begin()
 
@@ -132,8 +133,12 @@ class MotionEstimator:
 
     @property
     def _bias_m_s2(self) -> Vector3:
-        """Of a clipped hit PX4's estimator takes a part for the accelerometer's bias, and takes it off HIGHRES_IMU."""
-        return limited(self.external_m_s2, 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2)
+        """Of a clipped hit PX4's estimator takes a part for the accelerometer's bias, and takes it off HIGHRES_IMU.
+
+        What was there before the hit is none.
+        """
+        most_m_s2 = 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2
+        return limited(minus(self.external_m_s2, self.blows_m_s2), most_m_s2)
 
     @property
     def wind_m_s2(self) -> Vector3:
@@ -164,7 +169,7 @@ class MotionEstimator:
         """Take a receiver's velocity and place: the horizontal ones from then on, until the vehicle's own agrees."""
         was = self._measured
         newest_us = self.pushed_boot_us if was is None else was.taken_boot_us
-        is_right = self.is_fully_measured or self._has_agreed or (self.has_converged and was is None)
+        is_right = self.is_fully_measured or (self.has_converged and was is None)
         if is_right or doppler.taken_boot_us <= newest_us:
             return
         now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
@@ -177,6 +182,8 @@ class MotionEstimator:
         since_s = 1e-6 * (now_us - max(known.taken_boot_us, self.hit_boot_us))
         known.update(doppler)
         self._measured = known
+        if self._has_agreed:
+            return
         place = self.motion.position_ned_m
         if doppler.place_ned_m is not None:
             off = limited(flat(minus(doppler.place_ned_m, place)), DOPPLER_GATE * reflex.PLACE_SPREAD_M)

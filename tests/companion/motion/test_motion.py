@@ -228,6 +228,24 @@ def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_
     assert abs(found.velocity_error_m_s[0]) < SAME_M_S
 
 
+def test_what_a_receiver_shows_of_the_tilt_is_learnt_on_when_the_vehicles_estimate_agrees():
+    # Given a tilt that is wrong after a hit, and makes an acceleration that no accelerometer shows
+    air, found = clipped()
+
+    def go_on_unseen(seconds, unseen_m_s2):
+        for _ in range(round(seconds / 0.004)):
+            air.velocities[-1] += 0.004 * unseen_m_s2
+            go_on(air, found, 0.004)
+
+    go_on_unseen(2.0, 0.4)
+    air.reported_off_m_s = 0.0
+    go_on_unseen(2.0, 0.4)
+    assert found.is_reported and found.tilted_m_s2[0] == pytest.approx(0.4, abs=0.1)
+    # When it is right at last, then that is known, too, although the reported velocity counts by now
+    go_on_unseen(4.0, 0.0)
+    assert found.tilted_m_s2[0] == pytest.approx(0.0, abs=0.1)
+
+
 def test_an_error_that_hardly_changes_is_known_and_followed_as_it_fades():
     # Given an estimate that stays wrong, as PX4's by satellites does for ten seconds
     air, found = clipped(rebound_m_s=0.0)

@@ -10,7 +10,8 @@ import pytest
 from companion.messages import LocalPosition
 from companion.reflex.config import HELD_M_S2
 from companion.reflex.detection.sustained_force import SustainedForceMonitor
-from tests.simulated import SimulatedFlight, flown, wall
+from sim_vehicle.airframe import load_built_in
+from tests.simulated import SimulatedFlight, flown, simulated, wall
 
 EVERY_S = 0.02
 
@@ -161,3 +162,17 @@ def test_what_keeps_a_vehicle_off_its_setpoint_is_not_always_in_the_way(fault):
     fast = {"go_to": {"position_ned_m": [1, 0, -4], "speed_m_s": 1.0}}
     flight = in_room({"hold": {"duration_s": 3}}, slow, fast, height_m=1.3, wind_ned_m_s=[2, 1, 0], faults=fault)
     assert flight.told("in_the_way") == [] and flight.report.collisions == ()
+
+
+def test_a_recovery_begins_with_the_wind_of_the_hover_before_it():
+    # Given a hover in a wind that takes 1.0 m/s^2 of the vehicle, and a fast way into a wall
+    fast = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 3.0}}
+    sim = {"wind_ned_m_s": [0, 4, 0], "walls": [wall(3.0)]}
+    flight = simulated([{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 2}}, fast, {"land": {}}], sim=sim)
+    flight.run_to("recovering")
+    # Then the first attitude off the wall stands against that wind, and not against what speed made of it
+    airframe = load_built_in("foldable")
+    blows_m_s2 = 4.0 * airframe.drag_n_s_m / airframe.mass_kg
+    assert flight.companion.core.reflex.recovery.record.estimator.wind_m_s2 == pytest.approx(
+        (0.0, blows_m_s2, 0.0), abs=0.1
+    )
