@@ -119,7 +119,7 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
     if taken_back_us is not None:
         yield f"Taken back {(taken_back_us - finding.at_us) / 1e3:.0f} ms later: nothing else bore it out."
     if flight.truth is not None and touch is None and finding.is_collision:
-        yield "The simulator: a false alarm, nothing was touched."
+        yield "The simulator: a false alarm, no new contact."
 
 
 # What each sign is called, in which unit and to how many digits.

@@ -12,7 +12,7 @@ def ending_text(summary: Mapping[str, Any]) -> str:
     for number, collision in enumerate(collisions, start=1):
         lead = f"{number}. " if len(collisions) > 1 else ""
         if collision["truth"] is None and summary["false_detections"] is not None:
-            lines.append(f"{lead}False alarm: nothing was touched.")
+            lines.append(f"{lead}False alarm: no new contact.")
         else:
             lines.append(lead + _collision(collision))
     if not collisions:

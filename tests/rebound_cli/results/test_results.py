@@ -79,7 +79,7 @@ def test_what_went_wrong_is_told_and_no_landing_is_claimed(summary):
     hits = [hit | {"truth": None}, hit | {"settled_after_s": None}]
     _, _, *lines = ending_text(summary | wrong | {"collisions": hits}).splitlines()
     # Then each is a sentence
-    assert lines[0] == "1. False alarm: nothing was touched."
+    assert lines[0] == "1. False alarm: no new contact."
     assert "Not yet still when the flight went on" in lines[1]
     assert "2 hits not seen." in lines
     assert "1 hit before the vehicle had recovered from the one before." in lines
