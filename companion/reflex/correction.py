@@ -57,22 +57,18 @@ def tilt_response(errors: Floats, pushed_m_s2: Floats, elapsed_s: float) -> Floa
 class VelocityValidity:
     """Changed only by its methods. Times: vehicle's boot clock."""
 
-    invalid_since_boot_us: int | None = None
-    """Time of the latest hit that was not measured whole."""
+    is_valid: bool = True
+    """Whether the latest hit was measured whole, or has been corrected by now."""
+    hit_boot_us: int = 0
+    """Time of the latest hit."""
     _is_again: bool = False
     """Whether the velocity was invalid already when the latest hit came: an earlier hit's part stays hidden."""
     is_disproved: bool = False
     """Whether a receiver's velocity shows that the vehicle's own is not right yet."""
     left_m_s: float = math.inf
     """What is left to correct, once that is known."""
-    _hit_boot_us: int = 0
-    """Of the latest hit."""
     _speed_m_s: float = 0.0
     """Of the latest hit, or of the hardest of those."""
-
-    @property
-    def is_valid(self) -> bool:
-        return self.invalid_since_boot_us is None
 
     @property
     def is_known(self) -> bool:
@@ -82,37 +78,30 @@ class VelocityValidity:
     def tilt_error_rad(self, time_us: int) -> float:
         """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
         begun."""
-        since_us = self.invalid_since_boot_us
-        is_right = since_us is None or (not self._is_again and time_us - since_us < UNCORRECTED_US)
+        is_right = self.is_valid or (not self._is_again and time_us - self.hit_boot_us < UNCORRECTED_US)
         return 0.0 if is_right else TILT_RAD_PER_M_S * (1.0 + self._speed_m_s)
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:
         """By how much the newest of these velocities may differ from the mean of the others, because a hit is being
         corrected: by what is left of it, or an elastic one that was hidden whole, by the worst model of an estimator.
         What struck a vehicle that stood still may have done so at any speed."""
-        if self.invalid_since_boot_us is None:
+        if self.is_valid:
             return 0.0
         if self._speed_m_s < APPROACH_M_S or self.is_disproved:
             return self.left_m_s
-        *before, newest = (error_response(1e-6 * (each - self.invalid_since_boot_us))[0] for each in times_us)
+        *before, newest = (error_response(1e-6 * (each - self.hit_boot_us))[0] for each in times_us)
         swing_m_s = 2.0 * self._speed_m_s * float(np.abs(newest - sum(before) / len(before)).max())
         return min(swing_m_s, self.left_m_s)
 
     def invalidate(self, time_us: int, speed_m_s: float) -> None:
         """A new hit, at this speed: the velocity is not valid until the hit is known to be measured whole."""
-        self._is_again, self.invalid_since_boot_us, self._hit_boot_us = not self.is_valid, time_us, time_us
+        self._is_again, self.is_valid, self.hit_boot_us = not self.is_valid, False, time_us
         self._speed_m_s = max(speed_m_s, self._speed_m_s) if self._is_again else speed_m_s
 
     def assess(self, is_fully_measured: bool) -> None:
         """Take whether the latest hit was measured whole, as known by now."""
-        if not is_fully_measured:
-            self.invalid_since_boot_us = self._hit_boot_us
-        elif not self._is_again:
-            self.invalid_since_boot_us = None
+        self.is_valid = is_fully_measured and (self.is_valid or not self._is_again)
 
     def update(self, time_us: int) -> None:
         """Take the present time."""
-        if self.invalid_since_boot_us is None or self.is_disproved:
-            return
-        if time_us - self.invalid_since_boot_us > CORRECTED_US:
-            self.invalid_since_boot_us = None
+        self.is_valid = self.is_valid or (not self.is_disproved and time_us - self.hit_boot_us > CORRECTED_US)

@@ -197,8 +197,8 @@ class Reflex:
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             newest.follow(self.monitor.state, positions)
             validity, estimator = self.monitor.estimator.validity, newest.estimator
-            if validity.invalid_since_boot_us is not None:
-                is_newest = validity.invalid_since_boot_us == estimator.hit_boot_us
+            if not validity.is_valid:
+                is_newest = validity.hit_boot_us == estimator.hit_boot_us
                 validity.left_m_s = estimator.left_m_s if is_newest else math.inf
                 validity.is_disproved = estimator.is_measured_apart
         self.crash.update(samples, height_m, landed)

@@ -52,6 +52,9 @@ def test_what_is_left_of_one_hit_says_nothing_of_what_came_after_it():
     validity, flight.collisions[-1].estimator.has_converged = flight.reflex.monitor.estimator.validity, True
     for later_us, left_m_s in ((0, SAME_M_S), (500_000, math.inf)):
         validity.invalidate(HIT_US + later_us, 2.0)
+        # Measured whole until arms meet their stop
+        validity.assess(True)
+        validity.assess(False)
         flight.reflex.follow([], 2.0, LandedState.IN_AIR)
         assert validity.left_m_s == left_m_s
 
