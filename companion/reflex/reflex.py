@@ -139,7 +139,7 @@ class Reflex:
             # The vehicle's estimate is still wrong from the hit before.
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
         fits_models = not self.monitor.estimator.hides_clipping
-        contact = Contact(estimate.time_boot_us, place, velocity, normal.direction_ned, normal.error_rad)
+        contact = Contact(place, velocity, normal.direction_ned, normal.error_rad)
         expected, first_us = contact.rebound(self.law_config.restitution), impact.sample_time_boot_us
         record = CollisionRecord(
             detected_at_us=now_us,
@@ -163,11 +163,8 @@ class Reflex:
             force_ned = body_to_ned(reported_wxyz, impact.specific_force_frd_m_s2)
             record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
         record.estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal, estimate.impulse_m_s)
-        surfaces = [
-            Surface(each.contact.position_ned_m, each.normal.direction_ned, self.law_config.clearance_m)
-            for each in earlier
-            if each.contact.time_boot_us < contact.time_boot_us
-        ]
+        clearance_m = self.law_config.clearance_m
+        surfaces = [Surface(each.contact.position_ned_m, each.normal.direction_ned, clearance_m) for each in earlier]
         self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, self.keeps_trim)
         self.hits.append(record)
         self.newest = record

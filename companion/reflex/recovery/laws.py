@@ -36,7 +36,6 @@ class Contact:
     The normal is horizontal, or the obstacle's own where that is steep (see surface.away_from); zero: not known.
     """
 
-    time_boot_us: int
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
     normal_ned: Vector3

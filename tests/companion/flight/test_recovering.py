@@ -38,7 +38,7 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
     flight.vehicle.attitude = reflex.monitor.gate.latest = Attitude(HIT_US, LEVEL)
     reflex.thrust.full_m_s2, reflex.thrust.known_s = 16.0, learnt_s
     if estimator is None:
-        contact = Contact(HIT_US, AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
+        contact = Contact(AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
     source = reflex.monitor.estimator
@@ -121,7 +121,7 @@ def test_the_papers_goal_is_as_near_to_what_was_hit_as_eq_3_says(law):
 
 @pytest.mark.parametrize("law", ["adaptive", "normal", "paper"])
 def test_every_law_rests_clear_of_a_ceiling_also_where_it_was_met_slowly(law):
-    contact = Contact(HIT_US, AT, (0.0, 0.0, -0.4), (0.0, 0.0, 1.0), 0.2)
+    contact = Contact(AT, (0.0, 0.0, -0.4), (0.0, 0.0, 1.0), 0.2)
     flight = flight_with(law=law, estimator=MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig()))
     recover_in(flight)
     assert flight.collisions[-1].setpoint_ned_m == pytest.approx((*AT[:2], AT[2] + 0.35), abs=0.02)
@@ -240,7 +240,7 @@ def test_the_wind_is_sent_to_a_position_control_that_begins_without_it(keeps_tri
 
 def measured_apart() -> MotionEstimator:
     """Of a hit whose error a receiver shows, 13 s later."""
-    contact, now_us = Contact(HIT_US, AT, (2.0, 0.0, 0.0), SOUTH, 0.2), HIT_US + 13_000_000
+    contact, now_us = Contact(AT, (2.0, 0.0, 0.0), SOUTH, 0.2), HIT_US + 13_000_000
     estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
     estimator.imu(Strapdown(time_boot_us=now_us))
     for taken_us in range(now_us, now_us + 100):

@@ -184,7 +184,7 @@ def test_a_receiver_that_gets_worse_is_known_for_worse():
 def clipped(off_m_s=6.0, rebound_m_s=-3.0):
     """A vehicle just after a hit of which its estimate knows nothing, and its belief."""
     air = Air(0.112, noise_m_s=0.02, began_us=HIT_US)
-    contact = Contact(HIT_US, (4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
+    contact = Contact((4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
     found = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
     air.velocities, air.reported_off_m_s = [rebound_m_s], off_m_s
     return air, found
@@ -291,7 +291,7 @@ def test_the_place_is_the_receivers_as_far_as_that_is_good_until_the_vehicles_es
     air.place_noise_m = noise_m
     for _ in range(500):
         air.step()
-    contact = Contact(air.now_us, (4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
+    contact = Contact((4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
     found = MotionEstimator(contact, air.now_us, contact.rebound(0.45), EstimateConfig())
     air.reported_off_m, air.reported_off_m_s = 2.0, 0.4
     # When it is off for longer than any model says

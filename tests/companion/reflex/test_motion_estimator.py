@@ -23,7 +23,7 @@ WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 
 def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True, blows_m_s2=(0.0, 0.0, 0.0)):
-    contact = Contact(HIT_US, AT, velocity, SOUTH, 0.2)
+    contact = Contact(AT, velocity, SOUTH, 0.2)
     return MotionEstimator(contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits, blows_m_s2)
 
 

@@ -30,7 +30,7 @@ def turned(vector, angle_rad):
 
 def hit(speed_m_s, slant_rad=0.0, climb_m_s=0.0):
     """North into a wall whose normal is turned from south by the slant."""
-    return Contact(0, AT, (speed_m_s, 0.0, climb_m_s), turned(SOUTH, slant_rad))
+    return Contact(AT, (speed_m_s, 0.0, climb_m_s), turned(SOUTH, slant_rad))
 
 
 def off_m(touched, place):
@@ -51,7 +51,7 @@ def goal_of(name, touched, motion=None, **config):
 @pytest.mark.parametrize("north", [2.0, -2.0])
 @pytest.mark.parametrize("east", [1.0, -1.0])
 def test_eq_3_lies_back_along_the_approach_in_every_quadrant(north, east):
-    goal = goal_of("paper", Contact(0, AT, (north, east, 0.7), SOUTH), gamma=(0.5, 0.25))
+    goal = goal_of("paper", Contact(AT, (north, east, 0.7), SOUTH), gamma=(0.5, 0.25))
     assert (goal[0] - 4.0) / -north == pytest.approx(0.5), "gamma_1 |v_c1|, against the approach"
     assert (goal[1] + 2.0) / -east == pytest.approx(0.25), "gamma_2 |v_c2|, against the approach"
     assert goal[2] == -1.5, "height kept, climb or not"
@@ -79,11 +79,11 @@ def test_adaptive_keeps_the_guards_clear_by_the_distance_asked_for(speed):
 @pytest.mark.parametrize("name", ["adaptive", "normal"])
 @pytest.mark.parametrize("tangential", ["damped", "kept"])
 def test_turning_or_mirroring_the_world_turns_or_mirrors_the_recovery(name, tangential):
-    touched = Contact(0, (0.0, 0.0, -2.0), (1.7, 0.4, 0.1), turned(SOUTH, 0.4))
+    touched = Contact((0.0, 0.0, -2.0), (1.7, 0.4, 0.1), turned(SOUTH, 0.4))
     goal = goal_of(name, touched, touched.rebound(0.3), tangential=tangential)
     changes: Any = (lambda v: turned(v, 1.234), lambda v: (v[0], -v[1], v[2]))
     for change in changes:
-        other = Contact(0, *(change(v) for v in (touched.position_ned_m, touched.velocity_ned_m_s, touched.normal_ned)))
+        other = Contact(*(change(v) for v in (touched.position_ned_m, touched.velocity_ned_m_s, touched.normal_ned)))
         other_goal = goal_of(name, other, other.rebound(0.3), tangential=tangential)
         assert other_goal == pytest.approx(change(goal))
 
@@ -106,9 +106,9 @@ ROOM = Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4)
 
 
 def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
-    under = Contact(0, (0.0, 0.0, -2.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
+    under = Contact((0.0, 0.0, -2.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
     assert goal_of("adaptive", under) == pytest.approx((0.0, 0.0, -1.65))
-    low = Contact(0, (0.0, 0.0, -0.6), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
+    low = Contact((0.0, 0.0, -0.6), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
     flight: Any = SimpleNamespace(mission=SimpleNamespace(fence=ROOM), origin_ned_m=ZERO)
     in_room = FlightRoom(flight).inside(low.position_ned_m, goal_of("adaptive", low))
     assert in_room == pytest.approx((0.0, 0.0, -0.4))
