@@ -183,7 +183,7 @@ class Reflex:
         """
         recovery = self.recovery
         assert recovery is not None and self.loss_s is not None, "only a known one lets it lean"
-        belief = recovery.record.estimator.belief(self.monitor.estimator.strapdown)
+        belief = recovery.record.estimator.belief(recovery.record.source.strapdown)
         held_s = self.loss_s + numbers.NOTICED_S + numbers.LEAD_S
         acceleration = wanted(belief, recovery.surfaces, recovery.record.setpoint_ned_m[2])
         return acceleration, Lean(belief, recovery.surfaces, self.thrust.full_m_s2, held_s)

@@ -216,7 +216,7 @@ class FusedDetector:
         if is_known or not situation.may_crash:
             return None
         impact = classified(impact, s.velocity_ned_m_s, situation, motion)
-        return None if impact.kind is not ImpactKind.CRASH else self._begun(s, impact)
+        return self._begun(s, impact) if impact.kind is ImpactKind.CRASH else None
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
         elapsed_us = s.last_sample_boot_us - before_us
