@@ -29,7 +29,6 @@ from companion.mission.items import ExpectItem, Step
 from companion.mission.items import Motion as MotionItem
 from companion.mission.model import Mission, steps_to_fly
 from companion.mission.policy import OnCollision
-from companion.mission.trajectory import Motion
 from companion.motion.motors import MotorWatch
 from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus, plus
@@ -141,7 +140,7 @@ class FlightContext:
     stepped_us: int | None = None  # when the step before was
     missed_us: int = 0  # since the last position: the delay of late steps, in which nothing was received
     trajectory_us: int = 0  # the trajectories' clock: it stops while no position comes
-    has_position: bool = True  # a position came within the detector's `silence_s`
+    has_position: bool = True  # one came within the detector's `silence_s`; without, trajectories stand still
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
     conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
@@ -226,11 +225,6 @@ class FlightContext:
     def note_touchdown(self) -> None:
         """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""
         self.has_climbed = False
-
-    def on_trajectory(self, motion: Motion, yaw_rad: float | None) -> Target:
-        """A motion on a trajectory, local NED. While the trajectory stands still, its velocity is left out."""
-        place, velocity, acceleration = motion
-        return Target(place, yaw_rad, velocity, acceleration) if self.has_position else Target(place, yaw_rad)
 
     def heading_towards(self, wanted_rad: float | None, rate_rad_s: float = TURNING_RAD_S) -> float | None:
         """The heading to ask for on the way to a wanted one: it leads the vehicle's own by what turns it at a rate.

@@ -48,12 +48,11 @@ class _OnTrajectory:
 
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
         elapsed_s = self._elapsed_s(flight)
-        motion = self._trajectory.at(elapsed_s)
-        yaw_rad, place = self._turned(flight, motion, now_us), flight.local_ned_m(motion[0])
-        if elapsed_s >= self._trajectory.duration_s:
-            return Target(place, yaw_rad)
+        place, velocity, acceleration = motion = self._trajectory.at(elapsed_s)
+        yaw_rad = self._turned(flight, motion, now_us)
         # Without the acceleration the vehicle falls behind as it speeds up, and then overshoots the speed.
-        return flight.on_trajectory((place, *motion[1:]), yaw_rad)
+        target = Target(flight.local_ned_m(place), yaw_rad, velocity, acceleration)
+        return target if flight.has_position and elapsed_s < self._trajectory.duration_s else target.at_rest()
 
     def _arrived(self, flight: FlightContext, later_s: float) -> bool:
         """Whether it is at its goal; with its speed also so much later."""

@@ -47,7 +47,9 @@ class TakeOff:
             return Target(self._ground_ned_m, flight.yaw_rad)
         if self._is_told:
             return None  # a setpoint ends its take-off
-        return flight.on_trajectory(self._profile.at(self._climbing_s), flight.yaw_rad)
+        place, velocity, acceleration = self._profile.at(self._climbing_s)
+        target = Target(place, flight.yaw_rad, velocity, acceleration)
+        return target if flight.has_position else target.at_rest()
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return self._now(flight, inputs, now_us)
