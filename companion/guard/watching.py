@@ -141,7 +141,6 @@ class StandBy(FixedSetpoint):
         if reason is None and guard.round_trip.complaint() is not None:
             reason = "the round trip to the vehicle takes too long"
         if reason is None:
-            assert vehicle.custom_mode is not None
             return Transition(Trigger.WORTH_GUARDING, f"watching {vehicle.mode_name}")
         if reason != self._told:
             self._told = reason
