@@ -76,10 +76,10 @@ def read_truth(path: Path) -> FlightTruth | None:
     """None where a simulator has left none: of a real vehicle, or of a PX4 that never flew. Raises RunFolderError."""
     if not path.exists():
         return None
-    from sim_vehicle.shell.truth_file import load_jumps, load_stalls, load_truth
+    from sim_vehicle.shell.truth_file import load_clock, load_truth
 
     with reading(path):
-        return FlightTruth(*load_truth(path), load_stalls(path), load_jumps(path))
+        return FlightTruth(*load_truth(path), *load_clock(path))
 
 
 @dataclass(frozen=True, slots=True)

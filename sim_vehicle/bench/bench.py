@@ -45,21 +45,13 @@ class Setup:
 
     def scene(self) -> Scene:
         """The world as a mission file would state it. Raises SceneError."""
-        for spec in self.obstacles:
-            if not isinstance(spec, ObstacleSpec):
-                raise SceneError(f"obstacles are Wall, Pole or Box of sim_vehicle.testing, not {spec!r}.")
+        kinds = {"walls": WallSpec, "poles": PoleSpec, "boxes": BoxSpec}
+        parts = {name: tuple(spec for spec in self.obstacles if isinstance(spec, kind)) for name, kind in kinds.items()}
+        if sum(map(len, parts.values())) < len(self.obstacles):
+            raise SceneError("obstacles are each a Wall, a Pole or a Box of sim_vehicle.testing.")
+        others = {"seed": self.seed, "wind_ned_m_s": self.wind_ned_m_s, "faults": tuple(self.faults)}
         try:
-            return Scene.model_validate(
-                {
-                    "seed": self.seed,
-                    "start": Start(yaw_deg=self.yaw_deg),
-                    "wind_ned_m_s": self.wind_ned_m_s,
-                    "walls": tuple(spec for spec in self.obstacles if isinstance(spec, WallSpec)),
-                    "poles": tuple(spec for spec in self.obstacles if isinstance(spec, PoleSpec)),
-                    "boxes": tuple(spec for spec in self.obstacles if isinstance(spec, BoxSpec)),
-                    "faults": tuple(self.faults),
-                }
-            )
+            return Scene.model_validate({"start": Start(yaw_deg=self.yaw_deg), **others, **parts})
         except ValidationError as problem:
             first = problem.errors()[0]
             raise SceneError(f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}.") from problem

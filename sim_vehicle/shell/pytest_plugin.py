@@ -6,7 +6,7 @@
 On a failed test the report says with which seed and setup, what happened, and where the recorded truth is.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import fields
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from sim_vehicle.bench.bench import LockstepVehicle
     from sim_vehicle.shell.background import RunningVehicle
 
-_FLOWN: "pytest.StashKey[tuple[RunningVehicle | LockstepVehicle, pytest.TempPathFactory]]" = pytest.StashKey()
+# With what writes its truth, and where folders are made for that.
+_FLOWN: "pytest.StashKey[tuple[RunningVehicle | LockstepVehicle, Callable[[Path], None], pytest.TempPathFactory]]"
+_FLOWN = pytest.StashKey()
 # A report is read by a person: the last words matter.
 _MOST_EVENTS = 60
 
@@ -50,16 +52,17 @@ def rebound_vehicle(
     options = _options(request)
     if options.pop("lockstep", False):
         from sim_vehicle.bench.bench import LockstepVehicle
+        from sim_vehicle.shell.truth_file import save_truth
 
         options.pop("speed", None)
         vehicle = LockstepVehicle(**options)
-        request.node.stash[_FLOWN] = vehicle, tmp_path_factory
+        request.node.stash[_FLOWN] = vehicle, lambda path: save_truth(path, vehicle.recorded, 0), tmp_path_factory
         yield vehicle
         return
     from sim_vehicle.shell.background import start_vehicle
 
     with start_vehicle(**options) as running:
-        request.node.stash[_FLOWN] = running, tmp_path_factory
+        request.node.stash[_FLOWN] = running, running.save_truth, tmp_path_factory
         yield running
 
 
@@ -97,21 +100,11 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     report = yield
     flown = item.stash.get(_FLOWN, None)
     if report.when == "call" and report.failed and flown is not None:
-        vehicle, folders = flown
+        vehicle, save_truth, folders = flown
         path = folders.mktemp("rebound") / "truth.npz"
-        _save_truth(vehicle, path)
+        save_truth(path)
         report.sections.append(("rebound vehicle", f"{_told(vehicle)}\ntruth: {path}"))
     return report
-
-
-def _save_truth(vehicle: "RunningVehicle | LockstepVehicle", path: "Path") -> None:
-    from sim_vehicle.shell.background import RunningVehicle
-    from sim_vehicle.shell.truth_file import save_truth
-
-    if isinstance(vehicle, RunningVehicle):
-        vehicle.save_truth(path)
-    else:
-        save_truth(path, vehicle.recorded, epoch_at_boot_us=0)
 
 
 def _told(vehicle: "RunningVehicle | LockstepVehicle") -> str:

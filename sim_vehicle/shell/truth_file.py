@@ -12,8 +12,6 @@ from pydantic import TypeAdapter
 from sim_vehicle.quantities import Floats
 from sim_vehicle.truth import Hit, TruthRecorder
 
-# What else is in the file.
-_NO_SERIES = ("hits", "faults", "epoch_at_boot_us", "stalls")
 _HITS = TypeAdapter(list[Hit])
 
 
@@ -37,23 +35,19 @@ def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
     Raises whatever a file leads to that holds anything else; ValueError for a path without all of its columns.
     """
     with np.load(path) as stored:
-        series = {name: np.asarray(stored[name], float) for name in stored.files if name not in _NO_SERIES}
-        rows, arms = series["arm_fold_m"].shape
-        for name, like in TruthRecorder(rotors=arms).series().items():
-            if series[name].shape != (rows, *like.shape[1:]):
-                raise ValueError(f"{path}: {name} has the shape {series[name].shape}.")
+        rows, arms = stored["arm_fold_m"].shape
+        series = {
+            name: np.asarray(stored[name], float).reshape(rows, *like.shape[1:])
+            for name, like in TruthRecorder(rotors=arms).series().items()
+        }
         return _HITS.validate_json(str(stored["hits"])), series, int(stored["epoch_at_boot_us"])
 
 
-def load_jumps(path: Path) -> list[tuple[int, int]]:
-    """Boot times from which on the vehicle told later times than its own by so much, by a fault of its clock."""
+def load_clock(path: Path) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Boot times at which the vehicle's clock stood, and for how long; boot times from which on it told later times
+    than its own, by a fault, and by how much.
+    """
     with np.load(path) as stored:
-        faults = json.loads(str(stored["faults"]))
+        stalls, faults = stored["stalls"].tolist(), json.loads(str(stored["faults"]))
     jumps = (fault for fault in faults if fault["kind"] == "clock_jump")
-    return [(fault["began_at_boot_us"], round(1e6 * fault["details"]["jump_s"])) for fault in jumps]
-
-
-def load_stalls(path: Path) -> list[tuple[int, int]]:
-    """Boot times at which the vehicle's clock stood, and for how long."""
-    with np.load(path) as stored:
-        return [(int(at), int(late)) for at, late in stored["stalls"]] if "stalls" in stored else []
+    return stalls, [(fault["began_at_boot_us"], round(1e6 * fault["details"]["jump_s"])) for fault in jumps]

@@ -10,7 +10,7 @@ import pytest
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import FaultError, ParameterError, SceneError
 from sim_vehicle.scene import Scene
-from sim_vehicle.shell.truth_file import load_jumps
+from sim_vehicle.shell.truth_file import load_clock
 from sim_vehicle.testing import FaultRequest, LockstepVehicle, Motion, Pole, Wall, faults, save_truth
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, End
@@ -87,7 +87,7 @@ def test_a_clock_jumps_and_jumps_back(tmp_path: Path) -> None:
     jumps = np.diff([message.time_usec for message in pilot.all("HIGHRES_IMU")]) / 1e6
     assert jumps.max() == pytest.approx(100.0, abs=0.03) and jumps.min() == pytest.approx(-100.0, abs=0.03)
     save_truth(tmp_path / "truth.npz", pilot.vehicle.recorded, 0)
-    assert [later_us for _, later_us in load_jumps(tmp_path / "truth.npz")] == [100_000_000, -100_000_000]
+    assert [later_us for _, later_us in load_clock(tmp_path / "truth.npz")[1]] == [100_000_000, -100_000_000]
 
 
 def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -> None:
@@ -247,7 +247,7 @@ def test_bad_setups_are_one_sentence() -> None:
         LockstepVehicle(parameters={"MPC_XY_CRUSE": 3})
     with pytest.raises(SceneError, match=r"faults\.0\.motor_failure"):
         LockstepVehicle(faults=[{"kind": "motor_failure", "at_s": 1, "motor": 9}])
-    with pytest.raises(SceneError, match="obstacles are Wall, Pole or Box"):
+    with pytest.raises(SceneError, match="obstacles are each a Wall, a Pole or a Box"):
         LockstepVehicle(obstacles=[{"point_ned_m": (2, 0, 0), "normal_ned": (-1, 0, 0)}])
     with pytest.raises(SceneError, match="up to 800 m/s, not 1000 m/s"):
         LockstepVehicle().hit(1000.0)

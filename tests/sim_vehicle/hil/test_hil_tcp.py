@@ -14,7 +14,7 @@ from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.hil_tcp import serve_px4
-from sim_vehicle.shell.truth_file import load_stalls, load_truth
+from sim_vehicle.shell.truth_file import load_clock, load_truth
 from tests.ports import free_port
 
 TIMEOUT_S = 5.0
@@ -128,7 +128,7 @@ def test_a_lost_answer_costs_a_second_and_not_the_flight(tmp_path):
         list(px4.fly(20, HOVER))
         assert px4.times_us == [4_000 * i for i in range(1, len(px4.times_us) + 1)]
     # What stood still is told with the truth: times of before count from another start of the clock.
-    (at_us, stood_us), *others = load_stalls(path)
+    (at_us, stood_us), *others = load_clock(path)[0]
     assert not others and at_us == 4_000 * 34 and stood_us >= 900_000
 
 
