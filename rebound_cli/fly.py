@@ -57,10 +57,9 @@ def run_fly(options: Namespace) -> int:
     is_simulated = options.connect is None
     if not is_simulated and (options.airframe is not None or options.seed is not None):
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
-    if is_simulated and options.signing_key is not None:
-        raise ConfigurationError("--signing-key belongs to --connect: leave it out where the vehicle is simulated.")
-    if options.wait and is_simulated:
-        raise ConfigurationError("--wait belongs to --connect: leave it out where the vehicle is simulated.")
+    for option in ("signing-key", "peer", "wait") if is_simulated else ():
+        if getattr(options, option.replace("-", "_")):
+            raise ConfigurationError(f"--{option} belongs to --connect: leave it out where the vehicle is simulated.")
     given = (options.airframe, options.seed, options.companion)
     document = inputs.load_mission_document(options.mission, options.set, *given)
     if options.wait:

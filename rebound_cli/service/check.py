@@ -39,7 +39,7 @@ def findings(
 
 
 def _is_there(path: Path, text: str) -> bool:
-    return path.exists() and path.read_text(encoding="utf-8") == text
+    return path.exists() and path.read_bytes() == text.encode()
 
 
 def _judged(item: str, is_good: bool, good: str, bad: str, remedy: str = _AGAIN) -> PreflightItem:

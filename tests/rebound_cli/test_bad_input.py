@@ -83,6 +83,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("fly", SQUARE, "--lockstep", "--wait"), ("--wait belongs to --connect",)),
         (("fly", SQUARE, "--lockstep", "--watch"), ("--watch belongs to flights in real time",)),
         (("fly", SQUARE, "--lockstep", "--signing-key", "key"), ("--signing-key belongs to --connect",)),
+        (("fly", SQUARE, "--lockstep", "--peer", "10.0.0.1"), ("--peer belongs to --connect",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
         (("watch", "missions"), ("no flight is there; give a run's folder",)),
         (("check", WALL, "--set", "obstacles.file=none.json"), ("none.json: no such file",)),

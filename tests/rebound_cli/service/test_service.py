@@ -257,10 +257,11 @@ def test_an_installation_that_is_not_there_or_not_as_it_was_made_is_found(system
     capsys.readouterr()
     assert service(system, "check") == 0
     assert " no " not in capsys.readouterr().out
-    with (system.root / UNIT).open("a") as file:
-        file.write("MemoryMax=infinity\n")
-    assert service(system, "check") == 1
-    assert f"not as this version writes them: /{UNIT}" in capsys.readouterr().out
+    for more in (b"MemoryMax=infinity\n", b"\xff"):
+        with (system.root / UNIT).open("ab") as file:
+            file.write(more)
+        assert service(system, "check") == 1
+        assert f"not as this version writes them: /{UNIT}" in capsys.readouterr().out
 
 
 def test_a_flight_tells_systemd_that_it_is_ready_alive_how_it_goes_and_when_it_ends(tmp_path, monkeypatch):
