@@ -161,36 +161,27 @@ def _missed(flight: ShownFlight) -> list[Moment]:
     if flight.truth is None:
         return []
     seen = [finding.first.impact.sample_time_boot_us for finding in flight.findings.impacts]
-    told = {flight.truth.index_of_hit(boot_us) for boot_us in seen}
-    missed = [hit for index, hit in enumerate(flight.truth.hits) if index not in told]
-    return [
-        Moment(
-            kind="missed",
-            title=f"Not seen: {impact_text(hit.kind, hit.impact_velocity_ned_m_s)}",
-            at_us=flight.truth.at_us(hit.contact_at_boot_us),
-            boot_us=flight.truth.told_us(hit.contact_at_boot_us),
-            facts=[
-                ("Contact began", f"{flight.seconds(flight.truth.at_us(hit.contact_at_boot_us)):.3f} s"),
-                ("Lasted", f"{1e3 * hit.contact_duration_s:.0f} ms"),
-                ("Largest force", f"{hit.peak_force_n:.0f} N"),
-            ],
-            reasons=list(_why_missed(flight, hit)),
-            normal_ned=hit.normal_ned,
-            position_ned_m=hit.contact_position_ned_m,
-            touched_boot_us=flight.truth.told_us(hit.contact_at_boot_us),
-        )
-        for hit in missed
-    ]
+    told, moments = {flight.truth.index_of_hit(boot_us) for boot_us in seen}, []
+    for hit in (hit for index, hit in enumerate(flight.truth.hits) if index not in told):
+        at_us, boot_us = (clock(hit.contact_at_boot_us) for clock in (flight.truth.at_us, flight.truth.told_us))
+        facts = [
+            ("Contact began", f"{flight.seconds(at_us):.3f} s"),
+            ("Lasted", f"{1e3 * hit.contact_duration_s:.0f} ms"),
+            ("Largest force", f"{hit.peak_force_n:.0f} N"),
+        ]
+        title = f"Not seen: {impact_text(hit.kind, hit.impact_velocity_ned_m_s)}"
+        reasons = list(_why_missed(flight, hit, at_us, boot_us))
+        place = (hit.contact_position_ned_m, hit.normal_ned, 0.0, boot_us)
+        moments.append(Moment("missed", title, at_us, boot_us, facts, reasons, *place))
+    return moments
 
 
-def _why_missed(flight: ShownFlight, hit: "Hit") -> Iterator[str]:
-    assert flight.truth is not None, "a simulated flight has one"
-    at_us, told_us = (clock(hit.contact_at_boot_us) for clock in (flight.truth.at_us, flight.truth.told_us))
+def _why_missed(flight: ShownFlight, hit: "Hit", at_us: float, told_us: float) -> Iterator[str]:
     for word, spans in (("off", flight.findings.off), ("blind", flight.findings.blind)):
         for span in spans:
             if span.start_us <= at_us <= span.end_us:
                 yield f"The detector was {word}: {span.reason}."
-    until_us = flight.truth.told_us(hit.ended_at_boot_us) + flight.config.estimate.imu_averaging_interval_s * 1e6
+    until_us = told_us + 1e6 * hit.contact_duration_s + flight.config.estimate.imu_averaging_interval_s * 1e6
     forces, jumps = flight.findings.listener.forces, flight.findings.listener.velocities
     tested, velocities = forces.all(), jumps.all()
     rows = np.flatnonzero((told_us <= tested.time_boot_us) & (tested.time_boot_us <= until_us))

@@ -103,10 +103,9 @@ def match_contacts(collisions: Sequence[CollisionReport], truth: FlightTruth, se
         index = truth.index_of_hit(collision.sample_time_boot_us)
         is_new = index is not None and collision_of_hit.setdefault(index, collision) is collision
         hit_of_collision.append(hits[index] if index is not None and is_new else None)
+    began_us = [truth.told_us(hit.contact_at_boot_us) for hit in hits]
     recontacts = sum(
-        not _is_recovered(
-            collision_of_hit.get(index - 1), truth.told_us(hits[index].contact_at_boot_us), settled_duration_s
-        )
+        not _is_recovered(collision_of_hit.get(index - 1), began_us[index], settled_duration_s)
         for index in range(1, len(hits))
     )
     missed = len(hits) - len(collision_of_hit)
