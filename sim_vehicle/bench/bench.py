@@ -145,8 +145,8 @@ class Bench:
         # A faster plate would be through itself between two looks at what is near.
         fastest_m_s = 1e6 * THICKNESS_M / vehicle.constants.raw_interval_us
         if not (0.0 < speed_m_s <= fastest_m_s and math.isfinite(bearing_deg + elevation_deg)):
-            told = f"{speed_m_s:g} m/s from {bearing_deg:g} and {elevation_deg:g} deg"
-            raise SceneError(f"a hit needs angles and a speed above 0 up to {fastest_m_s:g} m/s, not {told}.")
+            needed = f"angles and a speed above 0 up to {fastest_m_s:g} m/s"
+            raise SceneError(f"a hit needs {needed}, not {speed_m_s:g} m/s.")
         self._strikes += 1
         name = f"strike {self._strikes}"
         plate = strike(vehicle.state, vehicle.constants, speed_m_s, bearing_deg, elevation_deg, name)

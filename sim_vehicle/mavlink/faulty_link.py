@@ -109,22 +109,19 @@ def restamped(frame: bytes, offset_us: int) -> bytes:
 
 def _move(message: Any, offset_us: int) -> bool:
     """Whether it has stamps to move."""
-    changed, name = False, message.get_type()
+    name = message.get_type()
     if name == "PING" and message.target_system:
         # An answer carries the asker's time.
         return False
-    for field, unit_us in _STAMPS_US.items():
-        value = getattr(message, field, None)
-        if value is not None:
-            mask = _MASKS[message.fieldtypes[message.fieldnames.index(field)]]
-            setattr(message, field, (value + offset_us // unit_us) & mask)
-            changed = True
+    stamps = [field for field in _STAMPS_US if hasattr(message, field)]
+    for field in stamps:
+        mask = _MASKS[message.fieldtypes[message.fieldnames.index(field)]]
+        setattr(message, field, (getattr(message, field) + offset_us // _STAMPS_US[field]) & mask)
     if name == "TIMESYNC":
         # An answer has the vehicle's time in tc1, a request of its own in ts1.
         field = "tc1" if message.tc1 else "ts1"
         setattr(message, field, (getattr(message, field) + 1000 * offset_us + _SIGN) % (2 * _SIGN) - _SIGN)
-        changed = True
-    return changed
+    return bool(stamps) or name == "TIMESYNC"
 
 
 def message_number(name: int | str) -> int:
