@@ -57,10 +57,12 @@ class Setup:
             raise SceneError(f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}.") from problem
 
     def parameters_checked(self) -> dict[str, float]:
-        """Raises ParameterError for a name that there is not."""
-        unknown = [name for name in self.parameters if name not in definitions()]
-        if unknown:
-            raise ParameterError(f"the vehicle has no parameter {unknown[0]!r}; see sim_vehicle/parameters/px4.csv.")
+        """Raises ParameterError for a name that there is not, and for what is no number of a parameter."""
+        for name, value in self.parameters.items():
+            if name not in definitions():
+                raise ParameterError(f"the vehicle has no parameter {name!r}; see sim_vehicle/parameters/px4.csv.")
+            if not -(2**31) <= value < 2**31:
+                raise ParameterError(f"{name} cannot be {value:g}: a parameter has 32 bits.")
         return {name: int(v) if definitions()[name].is_whole else float(v) for name, v in self.parameters.items()}
 
     def airframe_loaded(self) -> Airframe:
@@ -184,9 +186,8 @@ class Bench:
 
     def _built(self, spec: ObstacleSpec, number: int) -> Obstacle:
         obstacle = spec.built(number)
-        if obstacle.motion is None:
-            return obstacle
-        return replace(obstacle, motion=obstacle.motion.later(self.time_s))
+        motion = obstacle.motion
+        return obstacle if motion is None else replace(obstacle, motion=motion.later(self.time_s))
 
 
 class LockstepVehicle(Bench):

@@ -44,9 +44,7 @@ def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
 
 
 def load_clock(path: Path) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Boot times at which the vehicle's clock stood, and for how long; boot times from which on it told later times
-    than its own, by a fault, and by how much.
-    """
+    """Boot times at which the vehicle's clock stood, and how long; from which on a fault had it tell later ones."""
     with np.load(path) as stored:
         stalls, faults = stored["stalls"].tolist(), json.loads(str(stored["faults"]))
     jumps = (fault for fault in faults if fault["kind"] == "clock_jump")

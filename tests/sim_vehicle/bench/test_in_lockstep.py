@@ -245,6 +245,8 @@ def test_the_truth_is_neither_late_nor_noisy() -> None:
 def test_bad_setups_are_one_sentence() -> None:
     with pytest.raises(ParameterError, match="no parameter 'MPC_XY_CRUSE'"):
         LockstepVehicle(parameters={"MPC_XY_CRUSE": 3})
+    with pytest.raises(ParameterError, match="COM_OBL_RC_ACT cannot be inf"):
+        LockstepVehicle(parameters={"COM_OBL_RC_ACT": math.inf})
     with pytest.raises(SceneError, match=r"faults\.0\.motor_failure"):
         LockstepVehicle(faults=[{"kind": "motor_failure", "at_s": 1, "motor": 9}])
     with pytest.raises(SceneError, match="obstacles are each a Wall, a Pole or a Box"):
