@@ -125,10 +125,13 @@ class MotionEstimator:
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed))
         self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
-        if time_us - self.pushed_boot_us > 1e6 * reflex.SMOOTHED_S:
+        since_s = 1e-6 * (time_us - self.pushed_boot_us)
+        if since_s > reflex.SMOOTHED_S:
+            # Drag changes with the speed, until it rests; then wind is left.
+            memory_s = min(max(since_s, reflex.SMOOTHING_S), reflex.FOLLOWED_S)
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
             across = split(plus(strapdown.acceleration_ned_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
-            share = elapsed_s / (reflex.SMOOTHING_S + elapsed_s)
+            share = elapsed_s / (memory_s + elapsed_s)
             self.external_m_s2 = towards(self.external_m_s2, flat(across), share)
 
     @property

@@ -2,6 +2,7 @@
 
 import math
 import random
+import statistics
 
 import pytest
 
@@ -235,11 +236,25 @@ def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(
     found, strapdown = reckoned(blows_m_s2=(blew_m_s2, 0.0, 0.0)), Strapdown()
     assert found.wind_m_s2 == (blew_m_s2, 0.0, 0.0)
     found.note_contact(is_fully_measured, HIT_US, found.normal, 0.0)
-    for tick in range(1, 500):
+    for tick in range(1, 1500):
         strapdown.imu(HIT_US + 4_000 * tick, (across_m_s2, 0.0, -9.81), ZERO)
         found.imu(strapdown)
     # Then it counts as another wind as far as PX4's estimator cannot have made it up
     assert found.belief(strapdown).external_m_s2 == pytest.approx((wind_m_s2, 0.0, 0.0), abs=0.01)
+
+
+def test_the_wind_that_a_vehicle_at_rest_stands_against_is_not_its_sensors_noise():
+    # Given a noisy sensor at 50 Hz, and two seconds since a hit that was measured whole
+    found, strapdown, draw = reckoned(), Strapdown(), random.Random(1)
+    found.note_contact(True, HIT_US, found.normal, 0.0)
+    winds = []
+    for tick in range(1, 200):
+        strapdown.imu(HIT_US + 20_000 * tick, (1.0 + draw.gauss(0.0, 0.5), 0.0, -9.81), ZERO)
+        found.imu(strapdown)
+        winds.append(found.wind_m_s2[0])
+    # Then what is asked of the vehicle against the wind hardly changes
+    assert statistics.fmean(winds[100:]) == pytest.approx(1.0, abs=0.1)
+    assert statistics.stdev(winds[100:]) < 0.08
 
 
 @pytest.mark.parametrize("ahead_us", [1_000_000, 120_000, -70_000])
