@@ -74,11 +74,6 @@ class StreamMonitor:
         seconds = (self._until_us - self.started_us) * 1e-6
         return {s.message_id.name: round(self._counts[s.sample_type] / seconds, 2) for s in self.streams}
 
-    @property
-    def lacks_one(self) -> bool:
-        """Whether nothing has come yet of one that a flight needs."""
-        return any(stream.min_hz > 0.0 and not self._counts[stream.sample_type] for stream in self.streams)
-
     def too_slow(self, autopilot: Autopilot) -> str | None:
         """One sentence on the first stream that is below its least rate, or None."""
         rates = self.rates_hz()

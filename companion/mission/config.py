@@ -47,7 +47,7 @@ class LinkConfig(StrictModel):
     """Patience with the other end."""
 
     heartbeat_wait_s: Positive = 10.0
-    """PX4 announces itself once a second; ten misses are not bad luck. A flight waits as long for each stream that it
+    """PX4 announces itself once a second; ten misses are not bad luck. A flight waits as long for the streams that it
     needs: PX4 sends no attitude before its estimator has aligned itself."""
     wait: bool = False
     """On the ground, wait without end for a vehicle that is missing, restarts, or has no position yet (`--wait`)."""

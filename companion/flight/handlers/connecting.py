@@ -95,18 +95,15 @@ class Connect(Meet):
     """On the ground, with a vehicle that nobody flies."""
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
-        too_slow = flight.streams.too_slow(flight.vehicle.autopilot)
-        if too_slow is not None and self._may_wait(flight, now_us):
+        too_slow, link = flight.streams.too_slow(flight.vehicle.autopilot), flight.mission.companion.link
+        # A vehicle that has just started sends some of them later.
+        may_wait = link.wait or now_us - (self._started_us or now_us) < link.heartbeat_wait_s * 1e6
+        if too_slow is not None and may_wait:
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None
         self._report_streams(flight, now_us)
         complaint = too_slow or ground_check(flight)
         return Transition(Trigger.VEHICLE_READY) if complaint is None else Transition(Trigger.REFUSED, complaint)
-
-    def _may_wait(self, flight: FlightContext, now_us: int) -> bool:
-        """For a stream that is too slow only who wants to. One that has not begun may: its vehicle has just started."""
-        link, since_us = flight.mission.companion.link, now_us - (self._started_us or now_us)
-        return link.wait or (flight.streams.lacks_one and since_us < 1e6 * link.heartbeat_wait_s)
 
 
 class Ready(FixedSetpoint):
