@@ -121,7 +121,7 @@ class Reflex:
                 elif late_us >= 0:
                     continue
                 if self.newest is None or self.newest.is_over:
-                    force.feel(sample, self.monitor.estimator.strapdown.valid_wxyz)
+                    force.learn_wind(sample, self.monitor.estimator.strapdown.valid_wxyz)
                 held = force.step(sample, self.monitor.estimator.strapdown.valid_wxyz, flown_to)
                 if held is not None:
                     return held
@@ -154,7 +154,7 @@ class Reflex:
                 self.config.estimate,
                 is_second,
                 fits_models,
-                self.sustained_force.blows_m_s2,
+                self.sustained_force.hover_wind_m_s2,
             ),
             source=self.monitor.estimator,
         )

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.vector import ZERO, along, minus, plus, split, towards, unit
+from companion.motion.vector import ZERO, along, flat, minus, plus, split, towards, unit
 from companion.reflex import config as reflex
 from companion.reflex.detection.classify import hovers
 from companion.reflex.detection.detector import Impact, ImpactKind
@@ -38,8 +38,8 @@ class SustainedForceMonitor:
     missing_m_s2: Vector3 = ZERO
     wind_m_s2: Vector3 = ZERO
     """Mean of the missing acceleration at the setpoint and in free motion: it balances drag and wind."""
-    blows_m_s2: Vector3 = ZERO
-    """Horizontal, what the accelerometer showed across the thrust when the vehicle hovered last: it is the wind's."""
+    hover_wind_m_s2: Vector3 = ZERO
+    """Horizontal specific force across the thrust when the vehicle hovered last: the wind's."""
     pushed_since_us: int = 0
     """Time since which half of a sustained force has been missing."""
 
@@ -51,13 +51,13 @@ class SustainedForceMonitor:
         self.imu_count += 1
         self.measured_frd_m_s2 = towards(self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count)
 
-    def feel(self, sample: LocalPosition, attitude_wxyz: Quaternion) -> None:
-        """Take one sample, before `step` does, of a vehicle that nothing has touched of late."""
+    def learn_wind(self, sample: LocalPosition, attitude_wxyz: Quaternion) -> None:
+        """Take one sample, before `step` does, of a vehicle that nothing touches."""
         if self.time_us and hovers(sample.velocity_ned_m_s):
             x, y, _ = self.measured_frd_m_s2
-            n, e, _ = body_to_ned(attitude_wxyz, (x, y, 0.0))
+            across = flat(body_to_ned(attitude_wxyz, (x, y, 0.0)))
             elapsed_s = 1e-6 * (sample.time_boot_us - self.time_us)
-            self.blows_m_s2 = towards(self.blows_m_s2, (n, e, 0.0), elapsed_s / (reflex.SMOOTHING_S + elapsed_s))
+            self.hover_wind_m_s2 = towards(self.hover_wind_m_s2, across, elapsed_s / (reflex.SMOOTHING_S + elapsed_s))
 
     def step(
         self, sample: LocalPosition, attitude_wxyz: Quaternion, goal_ned_m: Vector3 | None

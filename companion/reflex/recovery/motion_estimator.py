@@ -51,7 +51,7 @@ class MotionEstimator:
     config: EstimateConfig
     is_second: bool = False  # the error of an earlier hit was still being corrected
     fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
-    blows_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it
+    known_wind_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it
     motion: MotionState = field(init=False)
     normal: Normal = field(init=False)  # by the contact's force
     pushed_boot_us: int = field(init=False)  # the contact's last sample
@@ -83,7 +83,7 @@ class MotionEstimator:
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
     def __post_init__(self) -> None:
-        self.motion, self.pushed_boot_us, self.external_m_s2 = self.start, self.hit_boot_us, self.blows_m_s2
+        self.motion, self.pushed_boot_us, self.external_m_s2 = self.start, self.hit_boot_us, self.known_wind_m_s2
         self.normal = Normal(self.contact.normal_ned, self.contact.normal_error_rad)
         self._begin()
 
@@ -141,7 +141,7 @@ class MotionEstimator:
         What was there before the hit is none.
         """
         most_m_s2 = 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2
-        return limited(minus(self.external_m_s2, self.blows_m_s2), most_m_s2)
+        return limited(minus(self.external_m_s2, self.known_wind_m_s2), most_m_s2)
 
     @property
     def wind_m_s2(self) -> Vector3:

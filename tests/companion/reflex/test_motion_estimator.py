@@ -23,9 +23,11 @@ PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)
 WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 
-def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True, blows_m_s2=(0.0, 0.0, 0.0)):
+def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True, known_wind_m_s2=(0.0, 0.0, 0.0)):
     contact = Contact(AT, velocity, SOUTH, 0.2)
-    return MotionEstimator(contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits, blows_m_s2)
+    return MotionEstimator(
+        contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits, known_wind_m_s2
+    )
 
 
 def said(north_m_s, since_us=60_000, position=AT):
@@ -219,7 +221,7 @@ def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_a
 
 
 @pytest.mark.parametrize(
-    ("is_fully_measured", "blew_m_s2", "across_m_s2", "wind_m_s2"),
+    ("is_fully_measured", "known_m_s2", "across_m_s2", "wind_m_s2"),
     [
         (True, 0.0, -0.35, -0.35),
         (False, 0.0, -0.35, 0.0),
@@ -230,11 +232,11 @@ def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_a
     ],
 )
 def test_a_bias_that_a_clipped_hit_leaves_in_the_accelerometer_is_no_wind(
-    is_fully_measured, blew_m_s2, across_m_s2, wind_m_s2
+    is_fully_measured, known_m_s2, across_m_s2, wind_m_s2
 ):
     # Given a level vehicle after a hit, the wind before it, and a force across its thrust
-    found, strapdown = reckoned(blows_m_s2=(blew_m_s2, 0.0, 0.0)), Strapdown()
-    assert found.wind_m_s2 == (blew_m_s2, 0.0, 0.0)
+    found, strapdown = reckoned(known_wind_m_s2=(known_m_s2, 0.0, 0.0)), Strapdown()
+    assert found.wind_m_s2 == (known_m_s2, 0.0, 0.0)
     found.note_contact(is_fully_measured, HIT_US, found.normal, 0.0)
     for tick in range(1, 1500):
         strapdown.imu(HIT_US + 4_000 * tick, (across_m_s2, 0.0, -9.81), ZERO)

@@ -172,7 +172,7 @@ def test_a_recovery_begins_with_the_wind_of_the_hover_before_it():
     flight.run_to("recovering")
     # Then the first attitude off the wall stands against that wind, and not against what speed made of it
     airframe = load_built_in("foldable")
-    blows_m_s2 = 4.0 * airframe.drag_n_s_m / airframe.mass_kg
+    wind_m_s2 = 4.0 * airframe.drag_n_s_m / airframe.mass_kg
     assert flight.companion.core.reflex.recovery.record.estimator.wind_m_s2 == pytest.approx(
-        (0.0, blows_m_s2, 0.0), abs=0.1
+        (0.0, wind_m_s2, 0.0), abs=0.1
     )
