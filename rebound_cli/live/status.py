@@ -172,9 +172,11 @@ def _answer(path: Path) -> Mapping[str, Any]:
         while len(line) < _MOST_BYTES and (piece := client.recv(_MOST_BYTES)):
             line += piece
     try:
-        return dict(json.loads(line))
-    except (ValueError, TypeError) as error:
-        raise StatusError(f"{path}: what answers there is not Rebound.") from error
+        status = dict(json.loads(line))
+        text_of(status)
+    except (ValueError, TypeError, KeyError) as error:
+        raise StatusError(f"{path}: what answers there is not Rebound, or is of another version.") from error
+    return status
 
 
 def text_of(status: Mapping[str, Any]) -> str:

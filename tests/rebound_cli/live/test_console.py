@@ -265,6 +265,13 @@ def test_in_another_users_folder_no_socket_is_made(path, monkeypatch):
         StatusServer(path, {"command": "fly", "folder": "-"})
 
 
+@pytest.mark.parametrize("told", [b'{"schema": 1, "age_s": 0.1}', b'{"folder": "/runs/now"}', b"[]"])
+def test_an_answer_that_lacks_what_a_status_has_is_one_sentence(server, path, told, capsys, monkeypatch):
+    monkeypatch.setattr(server, "answer", lambda: told)
+    assert main(["status", "--socket", str(path)]) == main(["status", "--socket", str(path), "--json"]) == 1
+    assert capsys.readouterr().err.splitlines()[0].startswith(f"rebound: {path}: what answers there is not Rebound")
+
+
 def test_a_person_reads_lines_and_a_program_json(server, path, capsys):
     hand_over(server, HIT)
     assert main(["status", "--socket", str(path)]) == 0
