@@ -1,6 +1,7 @@
 """YAML files with the line of every value, `--set PATH=VALUE`, and errors that name file, line and remedy."""
 
 import difflib
+import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -157,6 +158,8 @@ def refuse_special(out: Path) -> None:
     """A file that is written whole takes the place of what is there, be it a device. Raises DocumentError."""
     if out.is_symlink() or (out.exists() and not out.is_file()):
         raise DocumentError(f"{out} is no ordinary file: give --out another name.")
+    if not os.access(out.parent, os.W_OK | os.X_OK):
+        raise DocumentError(f"{out}: {out.parent} is no folder that can be written to; give --out another.")
 
 
 def _line(node: yaml.Node) -> int:

@@ -334,6 +334,9 @@ def test_what_is_no_ordinary_file_is_left_as_it_is(wall_folder, tmp_path, capsys
         assert main([*command, str(wall_folder), "--out", str(out)]) == 1
         assert capsys.readouterr().err == f"rebound: {out} is no ordinary file: give --out another name.\n"
     assert link.is_symlink() and list(tmp_path.iterdir()) == [link]
+    # And of a folder that is not there the error names what was typed
+    assert main([*command, str(wall_folder), "--out", str(tmp_path / "no" / "page")]) == 1
+    assert capsys.readouterr().err.startswith(f"rebound: {tmp_path}/no/page: {tmp_path}/no is no folder")
 
 
 def truth_of(**series):
