@@ -24,19 +24,15 @@ class DescribedSchema(GenerateJsonSchema):
     def model_schema(self, schema: ModelSchema) -> JsonSchemaValue:
         written = super().model_schema(schema)
         for base in schema["cls"].__mro__:
-            for name, text in key_docstrings(base).items() if issubclass(base, BaseModel) else ():
+            declared = _docstrings_in(base.__module__).get(base.__name__, {}) if issubclass(base, BaseModel) else {}
+            for name, text in declared.items():
                 written["properties"].get(name, {}).setdefault("description", text)
         return written
 
 
-def key_docstrings(model: type[BaseModel]) -> dict[str, str]:
-    """Of each key that the class itself declares; from its source, as Python keeps no docstring of an attribute."""
-    return _docstrings_in(model.__module__).get(model.__name__, {})
-
-
 @functools.cache
 def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
-    """Of each class of the module, of each of its attributes."""
+    """Of each class, of each key that it declares; from the source, as Python keeps no docstring of an attribute."""
     source = ast.parse(inspect.getsource(sys.modules[module]))
     return {
         declared.name: {

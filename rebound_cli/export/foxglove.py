@@ -7,7 +7,7 @@ Foxglove's scene has z up. Its topics are in two frames: `local` is ENU about th
 import heapq
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from operator import itemgetter
 from typing import IO, Any, TypeAlias
@@ -94,7 +94,10 @@ def _heard(log: Log) -> Iterator[Message]:
             case ImuSample():
                 yield at_us, "/imu", _fields(sample)
             case GpsFix():
-                yield at_us, "/location", _location(at_us, sample)
+                place = {"latitude": sample.latitude_deg, "longitude": sample.longitude_deg}
+                error = {"position_covariance": [0.0] * 9, "position_covariance_type": _UNKNOWN}
+                head = {"timestamp": _time(at_us), "frame_id": "vehicle"}
+                yield at_us, "/location", {**head, **place, "altitude": sample.altitude_m, **error}
 
 
 def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
@@ -176,21 +179,11 @@ def _log(at_us: float, level: int, name: str, text: str) -> Message:
     return at_us, "/log", {"timestamp": _time(at_us), "level": level, "message": text, "name": name, **nowhere}
 
 
-def _location(at_us: float, sample: GpsFix) -> Json:
-    place = {"latitude": sample.latitude_deg, "longitude": sample.longitude_deg, "altitude": sample.altitude_m}
-    error = {"position_covariance": [0.0] * 9, "position_covariance_type": _UNKNOWN}
-    return {"timestamp": _time(at_us), "frame_id": "vehicle", **place, **error}
-
-
 def _pose(position_ned_m: Vector3, attitude_wxyz: Quaternion) -> Json:
     """Of the vehicle. From NED to ENU is half a turn about north-east, from FRD to FLU one about forward."""
+    north, east, down = position_ned_m
     w, x, y, z = (math.sqrt(0.5) * part for part in attitude_wxyz)
-    return {"position": _enu(position_ned_m), "orientation": {**_xyz(x + y, x - y, w - z), "w": w + z}}
-
-
-def _enu(ned: Sequence[float]) -> Json:
-    north, east, down = ned
-    return _xyz(east, north, -down)
+    return {"position": _xyz(east, north, -down), "orientation": {**_xyz(x + y, x - y, w - z), "w": w + z}}
 
 
 def _xyz(x: float, y: float, z: float) -> Json:

@@ -41,7 +41,8 @@ def _collision(collision: Mapping[str, Any]) -> str:
     else:
         hit = f"Hit {impact_text(truth['kind'], truth['impact_velocity_ned_m_s'])}."
         seen = f" Seen after {truth['detection_latency_ms']:.1f} ms."
-        height = f", {_length(truth['height_lost_m'])} of height lost"
+        lost_m = truth["height_lost_m"]
+        height = f", {f'{lost_m:.1f} m' if lost_m >= 1.0 else f'{100 * lost_m:.0f} cm'} of height lost"
     off_m = (truth or collision)["stopped_off_m"]
     if settled_s is None:
         stopped = f"Not yet still when the flight went on{height}."
@@ -73,7 +74,3 @@ def _surroundings(summary: Mapping[str, Any]) -> list[str]:
 
     lines = [f"Remembered: {describe(KnownPatch.model_validate(data).patch())}." for data in summary["obstacles"]]
     return lines + [f"Out of reach: {name if name == 'home' else f'item {name}'}." for name in summary["unreachable"]]
-
-
-def _length(length_m: float) -> str:
-    return f"{length_m:.1f} m" if length_m >= 1.0 else f"{100 * length_m:.0f} cm"

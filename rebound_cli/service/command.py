@@ -94,7 +94,7 @@ def plan(
         _check_run(asked.run, text, str(source))
     planned.append(_in_etc(system, f"{settings.run}.yaml", text if asked.run == settings.run else None))
     has_clients = _check_run(settings.run, planned[-1].text, f"/{planned[-1].path}")
-    planned.append(PlannedFile(SYSUSERS, files.sysusers_text()))
+    planned.append(PlannedFile(SYSUSERS, files.SYSUSERS_TEXT))
     if settings.device is not None:
         planned.append(PlannedFile(UDEV, files.udev_text(settings.device)))
     unit = files.unit_text(settings, sys.executable, system.release(), serial_group(), has_clients)

@@ -35,6 +35,7 @@ _BY_ID = "/dev/serial/by-id/"
 _NO_NETWORK = "PrivateNetwork=yes\nIPAddressDeny=any\nRestrictAddressFamilies=AF_UNIX"
 _UNIT = Path(__file__).with_name(UNIT_NAME).read_text(encoding="utf-8")
 _WRITTEN_BY = _UNIT.partition("\n")[0]
+SYSUSERS_TEXT = f'{_WRITTEN_BY}\nu {USER} - "Rebound" {STATE_FOLDER}\n'
 
 
 def _address(url: str) -> str:
@@ -86,10 +87,6 @@ class PlannedFile:
     text: str
     is_kept: bool = False
     says_otherwise: bool = False  # than what was asked for
-
-
-def sysusers_text() -> str:
-    return f'{_WRITTEN_BY}\nu {USER} - "Rebound" {STATE_FOLDER}\n'
 
 
 def udev_text(device: str) -> str:
