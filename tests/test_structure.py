@@ -184,29 +184,22 @@ OF_PX4 = (
     re.compile(r"\bMAV_(?:[0-9nx]_[A-Z]+|PROTO_VER)\b"),
     re.compile(r"\b\d+ << (?:16|24)\b"),
 )
-OF_ARDUPILOT = re.compile(r"\b(?:ARMING|ATC|BATT|GUID|INS|MOT|PSC|SERIAL[0-9n]|WP)_[A-Z][A-Z0-9_]+\b")
+OF_ARDUPILOT = (re.compile(r"\b(?:ARMING|ATC|BATT|GUID|INS|MOT|PSC|SERIAL[0-9n]|WP)_[A-Z][A-Z0-9_]+\b"),)
 # MAVLink's message; reasons of the numbers of motion are still where the numbers are.
 NO_PARAMETER = {"SYS_STATUS"}
 ROOMS_OF_NUMBERS = ("companion/autopilot/px4/", "companion/reflex/", "companion/motion/")
 
 
-def test_one_folder_names_what_is_px4s() -> None:
+@pytest.mark.parametrize(
+    ("patterns", "rooms"), [(OF_PX4, ROOMS_OF_NUMBERS), (OF_ARDUPILOT, ("companion/autopilot/ardupilot/",))]
+)
+def test_one_folder_names_what_is_one_autopilots(patterns: tuple[re.Pattern[str], ...], rooms: tuple[str, ...]) -> None:
     found = [
         f"{name(path)}: {word}"
         for path in sources("companion")
-        for pattern in OF_PX4
+        for pattern in patterns
         for word in pattern.findall(path.read_text())
-        if word not in NO_PARAMETER and not name(path).startswith(ROOMS_OF_NUMBERS)
-    ]
-    assert found == []
-
-
-def test_another_folder_names_what_is_ardupilots() -> None:
-    found = [
-        f"{name(path)}: {word}"
-        for path in sources("companion")
-        for word in OF_ARDUPILOT.findall(path.read_text())
-        if not name(path).startswith("companion/autopilot/ardupilot/")
+        if word not in NO_PARAMETER and not name(path).startswith(rooms)
     ]
     assert found == []
 

@@ -124,13 +124,6 @@ def test_export_is_one_archive_with_every_byte_of_the_flight(runs, tmp_path, cap
     assert str(archive) in capsys.readouterr().out
 
 
-def test_what_is_not_there_or_cannot_be_written_is_one_sentence(runs, tmp_path, capsys):
-    out = tmp_path / "no" / "out.tar.gz"
-    for words in (("logs", "show", "yesterday"), ("report", "yesterday"), ("logs", "export", LAST, "--out", out)):
-        assert main([*map(str, words), "--runs", str(runs)]) == 1
-        assert capsys.readouterr().err.count("\n") == 1
-
-
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flight")

@@ -114,17 +114,6 @@ def test_a_damaged_folder_is_one_sentence(copied, spoil, words, capsys):
     assert error.startswith("rebound: ") and words in error and len(error.strip().splitlines()) == 1
 
 
-def test_arguments_that_make_no_sense_are_refused(wall_folder, tmp_path, capsys):
-    for arguments, words in (
-        ((tmp_path,), "no flight.tlog in this folder"),
-        ((tmp_path / "none.ulg",), "No such file"),
-        ((wall_folder, "--set", "companion.detector=magic"), "there is no detector 'magic'"),
-        ((wall_folder, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
-    ):
-        code, _, error = said(capsys, "replay", *arguments)
-        assert code == 1 and words in error, error
-
-
 def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(wall_folder, tmp_path, capsys):
     # Given an IMU stream too slow to see a hit by: of 250 samples a second one in 25
     packets, number = [], 0

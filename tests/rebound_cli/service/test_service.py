@@ -169,12 +169,6 @@ def test_what_is_wrong_in_a_persons_files_is_named_with_its_place(system, tmp_pa
     assert service(system, "check") == 1
 
 
-@pytest.mark.parametrize("what", ["status", "check", "uninstall"])
-def test_options_of_install_belong_to_install(what, capsys):
-    assert main(["service", what, "--connect", UDP]) == 1
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 def test_a_system_that_is_unfit_is_one_sentence(system, monkeypatch):
     monkeypatch.setattr("rebound_cli.service.system.sys.prefix", "/home/pi/rebound")
     assert hidden_program() == "/home/pi/rebound"

@@ -186,14 +186,6 @@ def test_frequent_messages_are_framed_as_pymavlink_frames_them(layout, kept):
         assert dialect.MAVLink(None).decode(bytearray(ours)).to_dict() == theirs.to_dict()
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.name)
-def test_frequent_messages_are_signed_as_pymavlink_signs_them(layout):
-    theirs, link, encoder = example(layout, 4), dialect.MAVLink(None, 1, 1), Encoder(Identity())
-    link.signing.secret_key, link.signing.sign_outgoing, link.signing.timestamp = b"k" * 32, True, 77
-    encoder.sign(b"k" * 32, 0, 77)
-    assert encoder.packet((layout, layout.pack(*in_wire_order(theirs)))) == theirs.pack(link)
-
-
 @pytest.mark.parametrize("kept", [0, 2, 100])
 def test_messages_without_texts_and_arrays_are_packed_as_pymavlink_packs_them(kept):
     link, encoder = dialect.MAVLink(None, 1, 1), Encoder(Identity())
