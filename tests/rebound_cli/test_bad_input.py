@@ -85,7 +85,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("fly", SQUARE, "--lockstep", "--signing-key", "key"), ("--signing-key belongs to --connect",)),
         (("fly", SQUARE, "--lockstep", "--peer", "10.0.0.1"), ("--peer belongs to --connect",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
-        *((("service", what, "--connect", "udpin://:1"), ()) for what in ("status", "check", "uninstall")),
+        *((("service", what, "--connect", "udpin://:1"), ("belong to",)) for what in ("status", "check", "uninstall")),
         *(((*words, "yesterday", "--runs", "missions"), ("yesterday",)) for words in (("logs", "show"), ("report",))),
         (("replay", "missions"), ("no flight.tlog in this folder",)),
         (("replay", "none.ulg"), ("No such file",)),
