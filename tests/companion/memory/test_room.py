@@ -12,7 +12,7 @@ from shapely import LineString, Point
 from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, is_same, remembered, touch_of
 from companion.memory.route import route
-from companion.memory.stored import KnownPatch, ObstacleFile, as_data, describe, file_data
+from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
 from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
 from companion.mission.item_trajectory import SpeedLimits, left_of, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem
@@ -242,11 +242,6 @@ def test_of_a_path_round_a_wall_its_own_points_are_left():
     path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5), (6.0, 0.0, -1.5), (6.0, 3.0, -1.5)))
     round_it = trajectory_around(path, START, PACE, around(wall(0.0))).trajectory
     assert left_of(path, round_it, 0.5 * round_it.duration_s).points_ned_m == path.points_ned_m[2:]
-
-
-def test_people_read_no_negative_zero_and_no_360th_degree():
-    words = describe(Patch(((4.0, -0.001, -1.5),), (1.0, -1e-9, 0.0), ERROR_RAD, REACHES_M, 0))
-    assert words == "surface facing 0 deg at [4.00, 0.00, -1.50], touched once, assumed 1.0 m wide"
 
 
 # --- touch after touch

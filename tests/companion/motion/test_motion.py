@@ -96,9 +96,9 @@ class Air:
         self.now_us, self.velocities, self.reported_off_m_s = began_us, [0.0], 0.0
         self.newest, self.reported_off_m, self.place_noise_m = None, 0.0, 0.0
 
-    def step(self, acceleration_m_s2=0.0, is_free=True, receives=True, turns_rad_s=0.0):
+    def step(self, acceleration_m_s2=0.0, is_free=True, receives=True, turns_rad_s=0.0, unseen_m_s2=0.0):
         self.now_us += 4_000
-        self.velocities.append(self.velocities[-1] + 0.004 * acceleration_m_s2)
+        self.velocities.append(self.velocities[-1] + 0.004 * (acceleration_m_s2 + unseen_m_s2))
         self.strapdown.imu(self.now_us, (acceleration_m_s2, 0.0, -G), (0.0, turns_rad_s, 0.0))
         tick, sample = len(self.velocities), None
         if tick % 5 == 0:
@@ -231,18 +231,12 @@ def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_
 def test_what_a_receiver_shows_of_the_tilt_is_learnt_on_when_the_vehicles_estimate_agrees():
     # Given a tilt that is wrong after a hit, and makes an acceleration that no accelerometer shows
     air, found = clipped()
-
-    def go_on_unseen(seconds, unseen_m_s2):
-        for _ in range(round(seconds / 0.004)):
-            air.velocities[-1] += 0.004 * unseen_m_s2
-            go_on(air, found, 0.004)
-
-    go_on_unseen(2.0, 0.4)
+    go_on(air, found, 2.0, unseen_m_s2=0.4)
     air.reported_off_m_s = 0.0
-    go_on_unseen(2.0, 0.4)
+    go_on(air, found, 2.0, unseen_m_s2=0.4)
     assert found.is_reported and found.tilted_m_s2[0] == pytest.approx(0.4, abs=0.1)
     # When it is right at last, then that is known, too, although the reported velocity counts by now
-    go_on_unseen(4.0, 0.0)
+    go_on(air, found, 4.0)
     assert found.tilted_m_s2[0] == pytest.approx(0.0, abs=0.1)
 
 
