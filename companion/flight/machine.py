@@ -117,10 +117,11 @@ class Machine(StateMachine):
     def step(self, inputs: Inputs, now_us: int) -> bool:
         """Take all moves that are due; whether there were any."""
         before = self.handler
-        if self.state not in FINAL_STATES:
-            self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
-        if self.state in IN_THE_AIR:
-            self._take(crashed(self.flight, self.state is State.LANDING, now_us), now_us)
+        flight = self.flight
+        if self.state not in FINAL_STATES and (end := early_end(flight, self.state, inputs, now_us)) is not None:
+            self._take(end, now_us)
+        if self.state in IN_THE_AIR and (crash := crashed(flight, self.state is State.LANDING, now_us)) is not None:
+            self._take(crash, now_us)
         for estimate in inputs.impacts:
             if self.state in IN_THE_AIR and not lands_anyway(self.flight):
                 if isinstance(self.handler, FlyItems):
@@ -129,7 +130,8 @@ class Machine(StateMachine):
                 record_collision(self.flight, estimate, now_us)
                 decide(self.flight, self.state, now_us)
                 self._take(Transition(Trigger.COLLISION), now_us)
-        self._take_all(self.handler.step(self.flight, inputs, now_us), now_us)
+        if (transition := self.handler.step(flight, inputs, now_us)) is not None:
+            self._take_all(transition, now_us)
         # A hit may be taken back until its recovery is over.
         if self.flight.expectations and self.state is not State.RECOVERING:
             expectations.review(self.flight, now_us)

@@ -81,9 +81,12 @@ class Reflex:
         """Take the samples received since the last step, in order; call it without any, too."""
         impacts, seen = advance(self.monitor, samples, situation, now_us)
         # A crash is told where no hit is looked for, too.
-        found = [each for each in impacts if each.impact.is_collision and not situation.off_reason]
+        found = [each for each in impacts if each.impact.is_collision and not situation.off_reason] if impacts else []
+        held = None if found else self._held(samples, situation)
+        if not impacts and held is None:
+            return Reaction(found, False, seen)
         told = [] if situation.is_wreck else [self._contact_notice(each) for each in impacts]
-        if not found and (held := self._held(samples, situation)) is not None:
+        if held is not None:
             found = [held]
             told.append(_held_notice(held))
         notices = [*seen, *(notice for notice in told if notice is not None)]

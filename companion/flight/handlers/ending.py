@@ -54,7 +54,9 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
     vehicle = flight.vehicle
     if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
-    holder = who_decided(flight, flight.command_client.requested_mode)
+    holder, mode = None, vehicle.mode
+    if mode is not None and mode.custom_mode != flight.expected_mode:
+        holder = who_decided(flight, flight.command_client.requested_mode)
     if holder is None:
         flight.foreign_mode_since_us = None
         return None
