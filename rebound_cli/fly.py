@@ -208,9 +208,8 @@ def _fly_stepped(flight: Flight, vehicle: "SteppedVehicle") -> Flown:
     flown, truth = fly_mission_lockstep(
         flight.mission, vehicle, flight.recorder, flight.interrupts, flight.console, flight.followed
     )
-    path = flight.folder / run_folder.TRUTH_NAME
-    save_truth(path, truth, EPOCH_US)
-    return replace(flown, truth=read_truth(path))
+    save_truth(flight.folder / run_folder.TRUTH_NAME, truth, EPOCH_US)
+    return flown
 
 
 def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:

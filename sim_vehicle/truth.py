@@ -1,6 +1,6 @@
 """What really happened: every hit and the path, recorded beside the simulation and never sent by it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -74,6 +74,12 @@ class FaultSpan:
     """None while it acts."""
     details: dict[str, Any]
     """As the mission file has it."""
+
+
+def clock_jumps(faults: Iterable[FaultSpan]) -> list[tuple[int, int]]:
+    """Boot times from which on the vehicle's messages had later ones, and by how much, microseconds."""
+    jumps = (fault for fault in faults if fault.kind == "clock_jump")
+    return [(fault.began_at_boot_us, round(1e6 * fault.details["jump_s"])) for fault in jumps]
 
 
 @dataclass(slots=True)

@@ -116,25 +116,24 @@ class Machine(StateMachine):
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
         """Take all moves that are due; whether there were any."""
-        before = self.handler
-        flight = self.flight
+        flight, before = self.flight, self.handler
         if self.state not in FINAL_STATES and (end := early_end(flight, self.state, inputs, now_us)) is not None:
             self._take(end, now_us)
         if self.state in IN_THE_AIR and (crash := crashed(flight, self.state is State.LANDING, now_us)) is not None:
             self._take(crash, now_us)
         for estimate in inputs.impacts:
-            if self.state in IN_THE_AIR and not lands_anyway(self.flight):
+            if self.state in IN_THE_AIR and not lands_anyway(flight):
                 if isinstance(self.handler, FlyItems):
-                    self.handler.interrupt(self.flight)
-                note_before(self.flight, self.state)
-                record_collision(self.flight, estimate, now_us)
-                decide(self.flight, self.state, now_us)
+                    self.handler.interrupt(flight)
+                note_before(flight, self.state)
+                record_collision(flight, estimate, now_us)
+                decide(flight, self.state, now_us)
                 self._take(Transition(Trigger.COLLISION), now_us)
         if (transition := self.handler.step(flight, inputs, now_us)) is not None:
             self._take_all(transition, now_us)
         # A hit may be taken back until its recovery is over.
-        if self.flight.expectations and self.state is not State.RECOVERING:
-            expectations.review(self.flight, now_us)
+        if flight.expectations and self.state is not State.RECOVERING:
+            expectations.review(flight, now_us)
         return self.handler is not before
 
     def _give_away(self, text: str, now_us: int) -> None:

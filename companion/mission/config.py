@@ -47,8 +47,8 @@ class LinkConfig(StrictModel):
     """Patience with the other end."""
 
     heartbeat_wait_s: Positive = 10.0
-    """PX4 announces itself once a second; ten misses are not bad luck. A flight waits as long for the streams that it
-    needs: PX4 sends no attitude before its estimator has aligned itself."""
+    """For a vehicle's first HEARTBEAT, which PX4 sends once a second, then for the streams that a flight needs. PX4
+    sends no attitude before its estimator has aligned itself."""
     wait: bool = False
     """On the ground, wait without end for a vehicle that is missing, restarts, or has no position yet (`--wait`)."""
     silence_s: Annotated[Positive, Field(ge=0.2)] = 1.5

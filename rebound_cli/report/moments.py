@@ -188,7 +188,7 @@ def _why_missed(flight: ShownFlight, hit: "Hit", at_us: float, told_us: float) -
     if not len(rows):
         yield "No IMU sample came while it lasted."
     elif np.any(np.take(tested.phase, rows) == PHASES.index(Phase.CONTACT)):
-        yield "It belonged to the contact before: one contact is told once."
+        yield "It belonged to the contact before, which is one hit."
     else:
         yield from _signs(forces.one(rows[_loudest(np.take(tested.ratio, rows))]))
     rows = np.flatnonzero(np.abs(velocities.time_boot_us - told_us - 0.5 * SHOWN_US) <= 0.5 * SHOWN_US)

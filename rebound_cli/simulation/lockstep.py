@@ -15,7 +15,7 @@ from rebound_cli.replay.recording import Followed
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
 from rebound_cli.results.truth_match import FlightTruth
-from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.truth import TruthRecorder, clock_jumps
 
 # When virtual time begins: any fixed moment will do, so that the same seed gives the same bytes.
 EPOCH_US = 1_600_000_000_000_000
@@ -72,7 +72,8 @@ def fly_mission_lockstep(
     if not is_finished:
         reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
         report = replace(report, outcome="failed", reason=reason)
-    return Flown(report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US)), truth
+    known = FlightTruth(truth.hits, truth.series(), EPOCH_US, jumps=clock_jumps(truth.faults))
+    return Flown(report, wall_clock_s, known), truth
 
 
 def run_lockstep(

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from sim_vehicle.quantities import Floats
-from sim_vehicle.truth import Hit, TruthRecorder
+from sim_vehicle.truth import FaultSpan, Hit, TruthRecorder, clock_jumps
 
 _HITS = TypeAdapter(list[Hit])
 
@@ -47,5 +47,4 @@ def load_clock(path: Path) -> tuple[list[tuple[int, int]], list[tuple[int, int]]
     """Boot times at which the vehicle's clock stood, and how long; from which on a fault had it tell later ones."""
     with np.load(path) as stored:
         stalls, faults = stored["stalls"].tolist(), json.loads(str(stored["faults"]))
-    jumps = (fault for fault in faults if fault["kind"] == "clock_jump")
-    return stalls, [(fault["began_at_boot_us"], round(1e6 * fault["details"]["jump_s"])) for fault in jumps]
+    return stalls, clock_jumps(FaultSpan(**fault) for fault in faults)

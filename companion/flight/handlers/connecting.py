@@ -96,8 +96,9 @@ class Connect(Meet):
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
         too_slow, link = flight.streams.too_slow(flight.vehicle.autopilot), flight.mission.companion.link
+        assert self._started_us is not None, "somebody has been met"
         # A vehicle that has just started sends some of them later.
-        may_wait = link.wait or now_us - (self._started_us or now_us) < link.heartbeat_wait_s * 1e6
+        may_wait = link.wait or now_us - self._started_us < link.heartbeat_wait_s * 1e6
         if too_slow is not None and may_wait:
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None
