@@ -10,9 +10,10 @@ pytestmark = pytest.mark.flight
 FAST = {"go_to": {"position_ned_m": [9, 0, -3], "speed_m_s": 4.0, "acceleration_m_s2": 3.0, "yaw_deg": 0}}
 
 
-def in_room(*items, then="land", height_m=3.0, **sim) -> SimulatedFlight:
+def in_room(*items, then="land", height_m=3.0, obstacles=(), **sim) -> SimulatedFlight:
     fence = {"radius_m": 12, "max_height_m": 6}
-    return flown(*items, height_m=height_m, on_collision={"then": then}, fence=fence, sim=sim)
+    keys = {"on_collision": {"then": then}, "fence": fence, "obstacles": dict(obstacles)}
+    return flown(*items, height_m=height_m, sim=sim, **keys)
 
 
 def at_the_hit(flight) -> int:
@@ -59,6 +60,21 @@ def test_against_a_wind_it_speeds_up_by_what_that_leaves_of_the_lean():
     # Then it leans as much as it would without the wind, for longer
     assert flight.tilt_deg[begun:fast].max() < 11.0
     assert flight.report.outcome == "completed"
+
+
+@pytest.mark.parametrize(("east_m_s", "wide_m"), [(0.0, 8.0), (0.7, 2.0)], ids=["held", "past its end"])
+def test_a_velocity_that_a_known_wall_holds_back_does_not_catch_up(east_m_s, wide_m):
+    # Given a wall 1.5 m to the north that is known, and an item that leads through it, or along it and past its end
+    ends = [[1.5, -wide_m / 2, -3], [1.5, wide_m / 2, -3]]
+    known = {"known": [{"touches_ned_m": ends, "normal_ned": [-1, 0, 0]}]}
+    item = {"velocity": {"velocity_ned_m_s": [1.0, east_m_s, 0], "duration_s": 7.0}}
+    flight = in_room(item, {"hold": {"duration_s": 3}}, obstacles=known, walls=[wall(1.5, width_m=wide_m)])
+    # Then neither the way past its end nor the hold after it makes up for what was held back
+    north_m, *_ = flight.series["position_ned_m"].T
+    speed_m_s = np.hypot(*flight.series["velocity_ned_m_s"][:, :2].T)
+    assert flight.report.outcome == "completed" and not flight.hits
+    assert speed_m_s.max() < 1.6 and flight.tilt_deg.max() < 20.0
+    assert (north_m.max() < 1.3) == (east_m_s == 0.0) and north_m.max() < 4.0
 
 
 @pytest.mark.parametrize("policy", ["hold", pytest.param("return", marks=pytest.mark.slow)])

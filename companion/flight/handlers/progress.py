@@ -38,6 +38,8 @@ class _OnTrajectory:
 
     _trajectory: Trajectory
     _trajectory_began_us: int
+    _held_m: Vector3 = ZERO
+    """By how much it has been held back for good."""
 
     def _elapsed_s(self, flight: FlightContext) -> float:
         return (flight.trajectory_us - self._trajectory_began_us) * 1e-6
@@ -51,6 +53,7 @@ class _OnTrajectory:
         place, velocity, acceleration = motion = self._trajectory.at(elapsed_s)
         yaw_rad = self._turned(flight, motion, now_us)
         # Without the acceleration the vehicle falls behind as it speeds up, and then overshoots the speed.
+        place = plus(place, 1.0, self._held_m)
         target = Target(flight.local_ned_m(place), yaw_rad, velocity, acceleration)
         return target if flight.has_position and elapsed_s < self._trajectory.duration_s else target.at_rest()
 
@@ -81,6 +84,7 @@ class FlyItems(_OnTrajectory):
         self._heading = Heading(step.action, flight.yaw_rad, now_us)
         self._steady = Lasting()
         self._trajectory: Trajectory = stay(start)
+        self._held_m, self._asked_ned_m = ZERO, flight.target.position_ned_m
         self._motion: items.Motion | None = None
         self._out_of_reach = ""
         match self._action:
@@ -99,13 +103,12 @@ class FlyItems(_OnTrajectory):
         if isinstance(self._action, items.ExpectItem):
             expectations.begin(flight, step.label, self._action, now_us)
         elif isinstance(self._action, items.Motion):
-            self._plan(flight, self._action, start, now_us)
+            left = None if flight.is_retry else flight.tally.left
+            self._plan(flight, left or self._action, start, now_us)
 
     def _plan(self, flight: FlightContext, action: items.Motion, start_m: Vector3, now_us: int) -> None:
-        """The item's own trajectory, or one round known obstacles; of an interrupted item what is left."""
-        if flight.tally.left is not None and not flight.is_retry:
-            action = flight.tally.left
-        self._motion = action
+        """The item's own trajectory, or one round known obstacles."""
+        self._motion, self._trajectory_began_us, self._held_m = action, flight.trajectory_us, ZERO
         known = surroundings(flight)
         speeds = replace(flight.speeds, factor=flight.tally.pace_factor)
         speeds = speeds.against(flight.reflex.sustained_force.wind_m_s2, first_leg(action, start_m))
@@ -126,7 +129,20 @@ class FlyItems(_OnTrajectory):
     def interrupt(self, flight: FlightContext) -> None:
         """A hit ends the present trajectory: note what is left of the item."""
         if self._motion is not None:
-            flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight))
+            flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight), self._held_m)
+
+    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+        """A velocity that is held back goes on from there, and from rest. It does not catch up."""
+        if isinstance(self._motion, items.VelocityItem) and flight.target is not None:
+            sent, was_held = flight.target.position_ned_m, self._held_m != ZERO
+            self._held_m = plus(self._held_m, 1.0, minus(sent, self._asked_ned_m))
+            if was_held and sent == self._asked_ned_m:
+                left = left_of(self._motion, self._trajectory, self._elapsed_s(flight), self._held_m)
+                self._plan(flight, left, flight.mission_ned_m(sent), now_us)
+        target = super().target(flight, now_us)
+        if target is not None:
+            self._asked_ned_m = target.position_ned_m
+        return target
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
         flight.yaw_rad = self._heading.turned(flight.yaw_rad, motion[0], motion[1], now_us)
@@ -148,8 +164,7 @@ class FlyItems(_OnTrajectory):
             self._leave(flight, now_us)
 
     def _leave(self, flight: FlightContext, now_us: int) -> None:
-        """On to the next step, from the setpoint of this moment."""
-        flight.target = self.target(flight, now_us)
+        """On to the next step, from the setpoint as it was sent: one that is held back does not go on behind a wall."""
         flight.step_index += 1
         self._begin(flight, now_us)
 
