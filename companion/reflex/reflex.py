@@ -106,26 +106,28 @@ class Reflex:
         return Notice("crash", text, {"specific_force_m_s2": force_m_s2, "down_m_s": down_m_s, "tilt_deg": tilt_deg})
 
     def _held(self, samples: Sequence[Sample], situation: Situation) -> ImpactEstimate | None:
-        """A sustained external force that no detector shows: only while the vehicle flies to a position."""
-        force, flown_to = self.sustained_force, situation.setpoint_position_ned_m
+        """A sustained external force that no detector shows: of a vehicle that flies to a position, or that tips."""
+        force, is_flying = self.sustained_force, situation.has_position and not situation.descent_commanded
         if not situation.has_position:
             force.forget()  # half a second without a position is no tilt that lasted half a second
-        if situation.off_reason is not None or situation.descent_commanded or not situation.has_position:
-            flown_to = None
+        is_watched = is_flying and situation.off_reason is None
+        flown_to = situation.setpoint_position_ned_m if is_watched else None
+        is_free = self.newest is None or self.newest.is_over
         for sample in samples:
             if type(sample) is ImuSample:
                 force.add_imu(sample.specific_force_frd_m_s2)
             elif type(sample) is AttitudeTarget:
-                force.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
+                force.ask(sample)
             elif isinstance(sample, LocalPosition) and self._is_attitude_heard:
                 late_us = force.time_us - sample.time_boot_us
                 if late_us >= KEPT_US:
                     force.forget()
                 elif late_us >= 0:
                     continue
-                if self.newest is None or self.newest.is_over:
+                if is_free:
                     force.learn_wind(sample, self.monitor.estimator.strapdown.valid_wxyz)
-                held = force.step(sample, self.monitor.estimator.strapdown.valid_wxyz, flown_to)
+                # What has just been hit may have turned it.
+                held = force.step(sample, self.monitor.estimator.strapdown, flown_to, is_watched and is_free)
                 if held is not None:
                     return held
         return None

@@ -20,7 +20,7 @@ HELD_RATIO = {
     "a position": 3.74,
     "an attitude": 2.09,
     "a hit's first sample": 21.0,
-    "a second of flight": 1.88,
+    "a second of flight": 1.99,
 }
 
 

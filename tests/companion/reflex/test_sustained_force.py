@@ -7,7 +7,8 @@ import math
 
 import pytest
 
-from companion.messages import LocalPosition
+from companion.messages import AttitudeTarget, LocalPosition
+from companion.motion.strapdown import Strapdown
 from companion.reflex.config import HELD_M_S2
 from companion.reflex.detection.sustained_force import SustainedForceMonitor
 from sim_vehicle.airframe import load_built_in
@@ -16,12 +17,19 @@ from tests.simulated import SimulatedFlight, flown, simulated, wall
 EVERY_S = 0.02
 
 
-def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True):
+def leaning(m_s2):
+    """Nose north, of a vehicle whose thrust carries it and gives that acceleration."""
+    half = -0.5 * math.atan(m_s2 / 9.80665)
+    return (math.cos(half), 0.0, math.sin(half), 0.0)
+
+
+def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True, asked_m_s2=None):
     """The first time at which something is found in the way of a vehicle that leans north, and what.
 
-    Its velocity and lean are functions of the time. The goal goes with it, unless it stands where it was.
+    Its velocity and lean are functions of the time, and so is what its own control asks for. The goal goes with it,
+    unless it stands where it was.
     """
-    monitor, north_m, east_m = SustainedForceMonitor(), 0.0, 0.0
+    monitor, strapdown, north_m, east_m = SustainedForceMonitor(), Strapdown(), 0.0, 0.0
     for step in range(round(seconds / EVERY_S)):
         t = step * EVERY_S
         n, e = velocity_m_s(t)
@@ -30,9 +38,10 @@ def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True
         monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
         ahead_n, ahead_e = goal_ahead_m
         goal = (north_m + ahead_n, east_m + ahead_e, -1.5) if goes else (ahead_n, ahead_e, -1.5)
-        # Nose north, of a vehicle whose thrust carries it and gives that acceleration
-        half = -0.5 * math.atan(tilt_m_s2(t) / 9.80665)
-        held = monitor.step(sample, (math.cos(half), 0.0, math.sin(half), 0.0), goal)
+        strapdown.attitude(sample.time_boot_us, leaning(tilt_m_s2(t)))
+        if asked_m_s2 is not None:
+            monitor.ask(AttitudeTarget(sample.time_boot_us, 0.0, leaning(asked_m_s2(t))))
+        held = monitor.step(sample, strapdown, goal)
         if held is not None:
             return t, held
     return None
@@ -65,23 +74,55 @@ def glide(t):
     return 0.95 + 2.2 * begun_s - 7.5 * begun_s**2 - 1.4 * braking_s - 2.0 * braking_s**2, 0.0
 
 
+AT = (0.03, 0.03)  # the setpoint
+
+
+def slides(t):
+    return 0.05, 0.6
+
+
+def asked(t):
+    return 2.5 if t < 1.6 else 1.0
+
+
+def tips(t):
+    return asked(t) + 4.0 * max(0.0, t - 2.0)
+
+
+def test_a_vehicle_that_tips_further_than_its_control_asks_for_is_kept_off():
+    # Given a vehicle at its setpoint that slides along a wall, and tips towards it although 6 degrees are asked for
+    at_s, held = watched(4.0, slides, tips, AT, asked_m_s2=asked)
+    # Then it is told at 10 degrees, long before the force has lasted
+    assert tips(at_s) == pytest.approx(1.75, abs=0.15)
+    assert held.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.03)
+
+
 @pytest.mark.parametrize(
-    ("seconds", "velocity_m_s", "tilt_m_s2", "goal_m"),
+    ("seconds", "velocity_m_s", "tilt_m_s2", "goal_m", "asked_m_s2"),
     [
-        (3.0, lambda t: (t, 0.0), lambda t: min(1.0, 5.0 * t), (9.0, 0.0)),
-        (2.0, lambda t: (1.0 - t, 0.0), lambda t: -1.0, (9.0, 0.0)),
+        (3.0, lambda t: (t, 0.0), lambda t: min(1.0, 5.0 * t), (9.0, 0.0), None),
+        (2.0, lambda t: (1.0 - t, 0.0), lambda t: -1.0, (9.0, 0.0), None),
         # Taken up while the vehicle speeds up away from what it hit, with a tail wind that gives it 0.7 m/s^2
-        (0.7, glide, lambda t: 1.5 - 15.0 * min(t, 0.24) - 4.0 * max(0.0, t - 0.24), (0.0, 0.0)),
-        (5.0, still, lambda t: 3.0, (1.0, 0.0)),
+        (0.7, glide, lambda t: 1.5 - 15.0 * min(t, 0.24) - 4.0 * max(0.0, t - 0.24), (0.0, 0.0), None),
+        (5.0, still, lambda t: 3.0, (1.0, 0.0), None),
         # The lean follows late and is what the gust is at last
-        (4.0, lambda t: (gust(t), 0.0), lambda t: min(1.8, 1.2 * t), (1.0, 0.0)),
-        (6.0, lambda t: (gust(t), 3.0), lambda t: min(2.4, 1.6 * t), (0.3, 0.3)),
-        (4.0, lambda t: (0.2, 0.0), lambda t: 0.8 * t, (1.0, 0.0)),
+        (4.0, lambda t: (gust(t), 0.0), lambda t: min(1.8, 1.2 * t), (1.0, 0.0), None),
+        (6.0, lambda t: (gust(t), 3.0), lambda t: min(2.4, 1.6 * t), (0.3, 0.3), None),
+        (4.0, lambda t: (0.2, 0.0), lambda t: 0.8 * t, (1.0, 0.0), None),
+        (2.3, slides, lambda t: 6.0 - 14.0 * max(0.0, t - 2.0), AT, lambda t: 6.0 - 14.0 * max(0.0, t - 1.75)),
+        (2.3, slides, tips, AT, lambda t: 1.0 if math.sin(30.0 * t) > 0.0 else 5.0),
+        (2.3, lambda t: (tips(t) * max(0.0, t - 2.0), 0.6), tips, AT, asked),
+        (2.3, lambda t: (3.0, 0.6), tips, AT, asked),
+        (2.3, slides, lambda t: 2.0 * asked(t) - tips(t), AT, asked),
+        (2.3, slides, lambda t: tips(t) + 0.3 * math.sin(9.0 * t), AT, asked),
     ],
-    ids=["speeds up", "brakes", "glides past its goal", "wind", "gust", "gust across the way", "comes nearer"],
+    ids=[
+        *("speeds up", "brakes", "glides past its goal", "wind", "gust", "gust across the way", "comes nearer"),
+        *("lags", "between two", "speeds up as it tips", "fast", "rights itself", "never follows well"),
+    ],
 )
-def test_a_lean_that_something_else_explains_is_no_wall(seconds, velocity_m_s, tilt_m_s2, goal_m):
-    assert watched(seconds, velocity_m_s, tilt_m_s2, goal_m, goes=goal_m[1] > 0.0) is None
+def test_a_lean_that_something_else_explains_is_no_wall(seconds, velocity_m_s, tilt_m_s2, goal_m, asked_m_s2):
+    assert watched(seconds, velocity_m_s, tilt_m_s2, goal_m, goal_m[1] > 0.0, asked_m_s2) is None
 
 
 # --- in flight
@@ -162,6 +203,14 @@ def test_what_keeps_a_vehicle_off_its_setpoint_is_not_always_in_the_way(fault):
     fast = {"go_to": {"position_ned_m": [1, 0, -4], "speed_m_s": 1.0}}
     flight = in_room({"hold": {"duration_s": 3}}, slow, fast, height_m=1.3, wind_ned_m_s=[2, 1, 0], faults=fault)
     assert flight.told("in_the_way") == [] and flight.report.collisions == ()
+
+
+def test_a_vehicle_that_a_hit_has_turned_is_not_tipped_by_something_else():
+    # Given an oblique hit that turns a vehicle, which flies on by its own loops
+    go_to, oblique = {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}, wall(3.0, normal_ned=[-0.9, 0.4, 0])
+    flight = flown({"go_to": go_to}, recovery={"law": "paper"}, on_collision={"then": "land"}, sim={"walls": [oblique]})
+    # Then that is one hit
+    assert flight.told("in_the_way") == [] and len(flight.report.collisions) == 1
 
 
 def test_a_recovery_begins_with_the_wind_of_the_hover_before_it():
