@@ -151,7 +151,7 @@ class GoToItem(StrictModel):
 
 
 class VelocityItem(StrictModel):
-    """Fly with a velocity for a time, from rest to rest; the setpoint moves on, so that wind does not add to it."""
+    """Fly with a velocity for a time, from rest to rest. Wind does not add to it; what holds it back is not made up."""
 
     velocity_ned_m_s: PositionNed
     """North, east, down; up is negative."""
