@@ -92,7 +92,7 @@ class SustainedForceMonitor:
         now_us, attitude_wxyz, elapsed_s = sample.time_boot_us, strapdown.valid_wxyz, self._smooth(sample, strapdown)
         presses = self._presses(sample, goal_ned_m, elapsed_s)
         if presses == ZERO and may_tip:
-            presses = self._tips(strapdown.attitude_wxyz, now_us)
+            presses = self._tips(strapdown, now_us)
         if presses == ZERO:
             return None
         force_m_s2, since_us, self.pushed_since_us = math.hypot(*presses), self.pushed_since_us, now_us
@@ -135,17 +135,21 @@ class SustainedForceMonitor:
             return ZERO
         return plus(ZERO, force_m_s2, pushes)
 
-    def _tips(self, attitude_wxyz: Quaternion, now_us: int) -> Vector3:
+    def _tips(self, strapdown: Strapdown, now_us: int) -> Vector3:
         """The force per mass with which the vehicle presses to where it leans beyond all that its own control has asked
         for of late; zero for none. What is missing there is no wind, which does not turn it.
         """
-        asked, half_m_s2, since_us = self.asked, 0.5 * reflex.HELD_M_S2, now_us - self.looked_us
+        asked, fixes, since_us = self.asked, strapdown.fixes, now_us - self.looked_us
+        half_m_s2 = 0.5 * reflex.HELD_M_S2
         # Where nothing presses, it is only learnt how well the vehicle follows.
         if since_us < reflex.FOLLOWS_US and math.hypot(*flat(self.missing_m_s2)) < half_m_s2:
             return ZERO
         if not asked or not reflex.FOLLOWS_US <= now_us - asked[0][0] < len(asked) * reflex.LONGEST_STEP_US:
             return ZERO
-        place = _lean(attitude_wxyz)
+        # After a silence or a reset the two do not compare.
+        if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:
+            return ZERO
+        place = _lean(strapdown.attitude_wxyz)
         square, beyond = min(_beyond(place, start, end) for (_, start), (_, end) in pairwise(asked))
         limit = max(reflex.TIPS, reflex.TIPS_GATE * math.sqrt(self.tips_variance))
         elapsed_s, self.looked_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us

@@ -23,11 +23,11 @@ def leaning(m_s2):
     return (math.cos(half), 0.0, math.sin(half), 0.0)
 
 
-def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True, asked_m_s2=None):
+def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True, asked_m_s2=None, unbroken_s=9.0):
     """The first time at which something is found in the way of a vehicle that leans north, and what.
 
     Its velocity and lean are functions of the time, and so is what its own control asks for. The goal goes with it,
-    unless it stands where it was.
+    unless it stands where it was. From `unbroken_s` on the estimate is reset again and again.
     """
     monitor, strapdown, north_m, east_m = SustainedForceMonitor(), Strapdown(), 0.0, 0.0
     for step in range(round(seconds / EVERY_S)):
@@ -38,7 +38,12 @@ def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True
         monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
         ahead_n, ahead_e = goal_ahead_m
         goal = (north_m + ahead_n, east_m + ahead_e, -1.5) if goes else (ahead_n, ahead_e, -1.5)
+        strapdown.imu(sample.time_boot_us, monitor.measured_frd_m_s2, (0.0, 0.0, 0.0))
         strapdown.attitude(sample.time_boot_us, leaning(tilt_m_s2(t)))
+        if t < unbroken_s:
+            strapdown.velocity(sample)
+        else:
+            strapdown.fixes.clear()
         if asked_m_s2 is not None:
             monitor.ask(AttitudeTarget(sample.time_boot_us, 0.0, leaning(asked_m_s2(t))))
         held = monitor.step(sample, strapdown, goal)
@@ -95,6 +100,8 @@ def test_a_vehicle_that_tips_further_than_its_control_asks_for_is_kept_off():
     # Then it is told at 10 degrees, long before the force has lasted
     assert tips(at_s) == pytest.approx(1.75, abs=0.15)
     assert held.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.03)
+    # And not where the attitude has been silent, or the estimate was reset
+    assert watched(2.3, slides, tips, AT, asked_m_s2=asked, unbroken_s=2.1) is None
 
 
 @pytest.mark.parametrize(
