@@ -1,6 +1,8 @@
 """A vehicle that moves as asked, without noise: an integrator over flat ground, and flights that tests begin with."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE
@@ -132,18 +134,9 @@ class Flight:
         return [text.text for text in self.autopilot.texts]
 
 
-def target(position: Axis3 = FREE, velocity: Axis3 = FREE, **others: object) -> PositionTarget:
+def target(position: Axis3 = FREE, velocity: Axis3 = FREE, **others: Any) -> PositionTarget:
     """A setpoint for this vehicle in the local frame."""
-    fields: dict[str, object] = {
-        "frame": 1,
-        "position_m": position,
-        "velocity_m_s": velocity,
-        "acceleration_m_s2": FREE,
-        "yaw_rad": None,
-        "yaw_rate_rad_s": None,
-        "is_force": False,
-    }
-    return PositionTarget(**{**fields, **others})  # type: ignore[arg-type]
+    return replace(PositionTarget(1, position, velocity, FREE, None, None, is_force=False), **others)
 
 
 ORIGIN = Origin()

@@ -17,30 +17,19 @@ from sim_vehicle.faults.wire import Wire
 from sim_vehicle.mavlink.services.mission_transfer import RETRY_US, TIMEOUT_US, MissionTransfer, TransferState
 from sim_vehicle.mavlink.services.mission_wire import MissionResult
 
+MISSION = MissionType.MISSION
 CLIENT, STRANGER = (245, 190), (246, 190)
 STEP_US = 4_000
 # MAVSDK asks again after half a second.
 CLIENT_RETRY_US = 500_000
 
 
-def wire_item(number, command=commands.WAYPOINT, kind=MissionType.MISSION, **fields):
+def wire_item(
+    number, command=commands.WAYPOINT, kind=MISSION, frame=commands.FRAME_GLOBAL_RELATIVE_INT, params=(0.0,) * 4
+):
     """A waypoint north of home, 10 m up, in MISSION_ITEM_INT."""
-    params = fields.pop("params", (0.0, 0.0, 0.0, 0.0))
-    values = {
-        "frame": commands.FRAME_GLOBAL_RELATIVE_INT,
-        "current": int(number == 0),
-        "autocontinue": 1,
-        "x": 473_977_420 + 100 * number,
-        "y": 85_455_940,
-        "z": 10.0,
-        **fields,
-    }
-    frame, current, autocontinue, *place = values.values()
-    return sent(
-        dialect.MAVLink_mission_item_int_message(
-            1, 1, number, frame, command, current, autocontinue, *params, *place, kind
-        )
-    )
+    place = (473_977_420 + 100 * number, 85_455_940, 10.0)
+    return said("item_int", number, frame, command, int(number == 0), 1, *params, *place, kind)
 
 
 def sent(message, peer=CLIENT):
@@ -126,7 +115,6 @@ class Exchange:
         return items
 
 
-MISSION = MissionType.MISSION
 SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(3, commands.LAND)]
 
 
