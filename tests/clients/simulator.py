@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[2]
 
@@ -36,7 +37,7 @@ def free_port(kind: int = socket.SOCK_DGRAM) -> int:
     raise OSError("no port between 20 000 and 32 000 is free")
 
 
-def _rebound(*words: str, **pipes: int) -> subprocess.Popen:
+def _rebound(*words: str, **pipes: Any) -> subprocess.Popen:
     """A command of ours, of which what it prints is read."""
     command = [os.environ.get("REBOUND_PYTHON", sys.executable), "-m", "rebound_cli", *words]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -10,7 +10,7 @@ from companion.errors import AddressError
 from companion.guard.between import Between
 from companion.shell.connections.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
 from companion.shell.connections.connection import bound_socket, udp_out
-from tests.ports import free_port
+from tests.clients.simulator import free_port
 
 HEARTBEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 LOOPBACK = "127.0.0.1"

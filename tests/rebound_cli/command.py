@@ -13,7 +13,7 @@ from pymavlink import mavutil
 
 from rebound_cli.main import main
 from rebound_cli.replay.recording import read_recording, reproduce
-from tests.ports import free_port
+from tests.clients.simulator import free_port
 
 ROOT = Path(__file__).parents[2]
 WALL = ROOT / "missions" / "wall.yaml"

@@ -17,7 +17,7 @@ from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
 from sim_vehicle.testing import start_vehicle
-from tests.ports import free_port
+from tests.clients.simulator import free_port
 from tests.rebound_cli import command
 from tests.rebound_cli.command import assert_comes_again, events_of, guarding, taken_off, vehicle_on_air, wait_for_event
 from tests.rebound_cli.live.cable import Cable

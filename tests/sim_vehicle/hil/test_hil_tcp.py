@@ -15,7 +15,7 @@ from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.hil_tcp import serve_px4
 from sim_vehicle.shell.truth_file import load_clock, load_truth
-from tests.ports import free_port
+from tests.clients.simulator import free_port
 
 TIMEOUT_S = 5.0
 HOVER = [0.78] * 4

@@ -23,7 +23,7 @@ from sim_vehicle.physics.layout import GRAVITY_M_S2
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell import json_udp
 from sim_vehicle.shell.json_udp import ArduPilotVehicle
-from tests.ports import free_port
+from tests.clients.simulator import free_port
 
 FOLDABLE = load_built_in("foldable")
 FULL, STOPPED = 2000, 1000
