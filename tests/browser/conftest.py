@@ -7,9 +7,8 @@ from playwright.sync_api import sync_playwright
 
 from bench.pictures import ARGUMENTS, NoBrowserError, browser_path
 from rebound_cli.report.page import write_page
-from rebound_cli.report.shown_flight import recorded_flight
 from tests.browser.opened_page import OpenedPage
-from tests.rebound_cli.command import WALL, run_here
+from tests.rebound_cli.conftest import wall, wall_flight, wall_folder  # noqa: F401
 
 
 def pytest_sessionstart():
@@ -26,22 +25,9 @@ def browser():
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory):
-    """Of the flight into the wall."""
-    path = tmp_path_factory.mktemp("flights") / "wall"
-    run_here("fly", WALL, "--lockstep", "--json", "--out", path)
-    return path
-
-
-@pytest.fixture(scope="session")
-def flight(folder):
-    return recorded_flight(folder)
-
-
-@pytest.fixture(scope="session")
-def file(flight, tmp_path_factory):
+def file(wall, tmp_path_factory):  # noqa: F811
     """Its page, where nothing else is."""
-    return write_page(flight, tmp_path_factory.mktemp("page") / "flight.html")
+    return write_page(wall, tmp_path_factory.mktemp("page") / "flight.html")
 
 
 @pytest.fixture

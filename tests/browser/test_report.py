@@ -49,12 +49,12 @@ def test_nothing_on_it_is_empty_covers_another_or_leaves_the_window(shown):
     assert shown.page.evaluate("document.documentElement.scrollWidth") <= shown.page.viewport_size["width"]
 
 
-def test_it_leans_as_it_flew_and_each_place_has_the_setpoint_of_its_time(shown, flight):
+def test_it_leans_as_it_flew_and_each_place_has_the_setpoint_of_its_time(shown, wall):
     columns = {one["title"]: one["columns"] for one in shown.page.evaluate(_OVERVIEWS)}
     # Given a vehicle that pitches nose down to gain speed, and that the wall pushes nose up
     t, roll, pitch = map(np.array, columns["Lean"])
     assert -15.0 < pitch[(t > 8.0) & (t < 10.0)].min() < -5.0 and abs(roll).max() < 10.0
-    w, x, y, z = flight.log.attitude_wxyz[row := int(abs(pitch).argmax())]
+    w, x, y, z = wall.log.attitude_wxyz[row := int(abs(pitch).argmax())]
     assert pitch[row] == pytest.approx(np.degrees(np.arcsin(2 * (w * y - x * z))), abs=0.05)
     # and setpoints 20 to 50 times a second, none before the first
     t, north, asked, *_ = (np.array(one, float) for one in columns["Place and setpoint"])
@@ -62,8 +62,8 @@ def test_it_leans_as_it_flew_and_each_place_has_the_setpoint_of_its_time(shown, 
     assert np.isnan(asked[0]) and abs(north - asked)[is_flown].max() < 0.3
 
 
-def test_every_moment_is_reached_by_keys_alone(shown, flight):
-    moments_s = [moment["t"] for moment in report_content.content(flight)["moments"]]
+def test_every_moment_is_reached_by_keys_alone(shown, wall):
+    moments_s = [moment["t"] for moment in report_content.content(wall)["moments"]]
     assert len(moments_s) > 1
     shown.press("Home")
     assert shown.time_s == 0.0
@@ -124,12 +124,12 @@ def test_the_manuals_animation_is_the_replay_from_before_the_hit_to_after_it(bro
     assert min(abs(after - before).max() for before, after in pairwise(frames)) > 30
 
 
-def test_what_was_heard_is_text_and_never_an_element_or_a_script(opened, flight, tmp_path):
+def test_what_was_heard_is_text_and_never_an_element_or_a_script(opened, wall, tmp_path):
     # Given a flight with texts that would be elements where a page took them for such
-    log = replace(flight.log, texts=((flight.started_at_us, HOSTILE),))
+    log = replace(wall.log, texts=((wall.started_at_us, HOSTILE),))
     file = tmp_path / "hostile.html"
-    events = [*flight.events, {"time_us": flight.started_at_us, "kind": HOSTILE, "text": HOSTILE, "data": {}}]
-    file.write_text(page(replace(flight, name=HOSTILE, log=log, events=events)))
+    events = [*wall.events, {"time_us": wall.started_at_us, "kind": HOSTILE, "text": HOSTILE, "data": {}}]
+    file.write_text(page(replace(wall, name=HOSTILE, log=log, events=events)))
     with opened(file.as_uri(), width=390) as shown:
         assert shown.text("#name") == HOSTILE
         cells = shown.page.locator("#events td").all_inner_texts()
@@ -138,19 +138,19 @@ def test_what_was_heard_is_text_and_never_an_element_or_a_script(opened, flight,
         assert shown.asked == [file.as_uri()] and shown.complaints == []
 
 
-def test_a_long_flight_with_its_longer_texts_has_room_on_a_phone(opened, flight, tmp_path, monkeypatch):
+def test_a_long_flight_with_its_longer_texts_has_room_on_a_phone(opened, wall, tmp_path, monkeypatch):
     # Given as many rows as are shown of half an hour
     monkeypatch.setattr(report_content, "_ROWS", 1000)
-    file = write_page(flight, tmp_path / "long.html")
+    file = write_page(wall, tmp_path / "long.html")
     with opened(file.as_uri(), width=390) as shown:
         assert "rows: all round the hits, the loudest elsewhere" in shown.text("#downloads")
         assert shown.overlaps() == [] and shown.complaints == []
 
 
-def test_downloads_hold_all_rows_with_their_units(shown, flight):
+def test_downloads_hold_all_rows_with_their_units(shown, wall):
     header, *rows = saved(shown, "wall-imu.csv").splitlines()
-    assert header.startswith("t [s],boot [s],fx [m/s2]") and len(rows) == len(flight.log.imu_at_us)
-    assert json.loads(saved(shown, "wall-summary.json")) == json.loads(json.dumps(flight.summary))
+    assert header.startswith("t [s],boot [s],fx [m/s2]") and len(rows) == len(wall.log.imu_at_us)
+    assert json.loads(saved(shown, "wall-summary.json")) == json.loads(json.dumps(wall.summary))
 
 
 def test_a_mission_that_is_checked_is_shown_before_it_is_flown(opened, tmp_path):
@@ -166,9 +166,9 @@ def test_a_mission_that_is_checked_is_shown_before_it_is_flown(opened, tmp_path)
             assert not shown.page.locator("#moment-title").is_visible()
 
 
-def test_without_position_nothing_shows_where_it_was(opened, flight, tmp_path):
+def test_without_position_nothing_shows_where_it_was(opened, wall, tmp_path):
     file = tmp_path / "shared.html"
-    file.write_text(page(flight, no_position=True))
+    file.write_text(page(wall, no_position=True))
     with opened(file.as_uri()) as shown:
         assert shown.text("#readout").splitlines()[0] == "recovering, OFFBOARD"
         assert "north" not in shown.text("#readout") and shown.complaints == []
