@@ -86,18 +86,15 @@ class Watched(Told, Commanded):
 
 
 class BetweenFlight(Watched, commanded.BetweenFlight):
-    """The guard is the link."""
+    """The guard is the link; `heard` is what comes through it to the others, and when."""
 
     def __init__(self, *arguments: Any, **scene: Any) -> None:
         super().__init__(*arguments, **scene)
-        self.texts_heard: list[tuple[float, str]] = []
-        self.on_heard: Callable[[Any], None] = lambda message: None
+        self.heard: list[tuple[float, Any]] = []
 
     def others_heard(self, message: Any) -> None:
         super().others_heard(message)
-        self.on_heard(message)
-        if message.get_type() == "STATUSTEXT":
-            self.texts_heard.append((self.time_s, message.text))
+        self.heard.append((self.time_s, message))
 
 
 class GuardedFlight(Watched):

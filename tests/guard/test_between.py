@@ -66,7 +66,8 @@ def test_whoever_flies_into_the_wall_is_recovered_and_nothing_of_his_moves_the_v
         assert air.between.kept_out > 20
         assert len(air.sent_by("program", "SET_", back_s + 0.1, back_s + 1.1)) > 15, "let through again"
     # Its program sees it in OFFBOARD, and is told when it begins and when it ends
-    told = [text for at_s, text in air.texts_heard if at_s >= taken_s - 0.01]
+    heard = [message for at_s, message in air.heard if at_s >= taken_s - 0.01]
+    told = [message.text for message in heard if message.get_type() == "STATUSTEXT"]
     assert any(text.startswith("Taking over") for text in told) and told[-1].startswith("Given back to AUTO.LOITER")
 
 
@@ -247,14 +248,13 @@ def test_a_stream_that_a_program_slows_down_is_asked_for_again_and_one_that_it_s
 
 def test_the_vehicles_questions_of_the_time_are_the_programs_to_answer_and_the_guards_answers_are_its_own():
     air = BetweenFlight()
-    heard = []
-    air.on_heard = lambda message: heard.append(message) if message.get_type() == "TIMESYNC" else None
     theirs = 8_000_000
     air.run_to(State.STANDING_BY, 10.0)
     air.send(dialect.MAVLink_timesync_message(0, theirs))
     air.run_for(1.5)
     sent = air.sent_by("guard", "TIMESYNC")
     assert sent and all(message.tc1 == 0 for message in sent), "the guard asks, and does not answer"
+    heard = [message for _, message in air.heard if message.get_type() == "TIMESYNC"]
     assert {message.ts1 for message in heard if message.tc1} == {theirs}
     assert any(message.tc1 == 0 for message in heard)
     assert air.guard.core.flight.round_trip.median_us is not None
