@@ -13,7 +13,7 @@ from pymavlink import mavutil
 
 from rebound_cli.main import main
 from rebound_cli.replay.recording import read_recording, reproduce
-from tests.clients.simulator import free_port
+from tests.clients.simulator import free_port, wait_until
 
 ROOT = Path(__file__).parents[2]
 WALL = ROOT / "missions" / "wall.yaml"
@@ -114,10 +114,7 @@ def processes_naming(text):
 
 def wait_until_there(text, is_there=True):
     """A process that has just been started has no command line for a moment."""
-    end_s = time.monotonic() + 5.0
-    while bool(processes_naming(text)) is not is_there:
-        assert time.monotonic() < end_s, f"running: {processes_naming(text)}"
-        time.sleep(0.05)
+    wait_until(lambda: bool(processes_naming(text)) is is_there, 5.0, f"{text} is there: {is_there}")
 
 
 def assert_comes_again(folder):
