@@ -165,8 +165,6 @@ def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
     ("url", "says"),
     [
         ("serial:///dev/ttyUSB0:57600", "clients come by udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"),
-        ("udpout://0.0.0.0", "names no host and port"),
-        ("udpout://:14540", "names no remote host and port"),
         ("udpout://0.0.0.0:14540", "names any host"),
     ],
 )

@@ -1,5 +1,6 @@
 """A stream that ended is there again within a second of the other end's return, and nothing waits for it meanwhile."""
 
+import contextlib
 import os
 import pty
 import socket
@@ -51,15 +52,8 @@ def through_attempts(connection):
 @pytest.fixture
 def closing():
     """Closes what it is given at the end."""
-    given = []
-
-    def remember(one):
-        given.append(one)
-        return one
-
-    yield remember
-    for one in given:
-        one.close()
+    with contextlib.ExitStack() as given:
+        yield lambda one: given.enter_context(contextlib.closing(one))
 
 
 class Line:
