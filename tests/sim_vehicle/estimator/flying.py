@@ -10,7 +10,6 @@ import numpy.typing as npt
 from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import Estimate
-from sim_vehicle.estimator.onboard import OnboardEstimator
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 
@@ -34,11 +33,6 @@ class Flight:
         self.output: Estimate
         for _ in range(500):
             self.output = self.plant.step(None, armed=False)
-
-    @property
-    def onboard(self) -> OnboardEstimator:
-        assert self.plant.onboard is not None
-        return self.plant.onboard
 
     @property
     def velocity_error_m_s(self) -> Floats:

@@ -200,7 +200,7 @@ def test_innovations_are_as_large_as_the_filter_says():
         flight.climb()
         flight.fly_along(way, 4.0)
         for sensor, totals in pooled.items():
-            count_innovations(flight.onboard.filter, f"fuse_{sensor}", totals)
+            count_innovations(flight.plant.onboard.filter, f"fuse_{sensor}", totals)
         flight.fly_along(lambda time_s, way=way: way(4.0 + time_s), 12.0)
     # Then each sensor's summed squares are chi-square distributed with as many degrees of freedom as values
     for sensor, (freedom, total_nis, rejected) in pooled.items():
@@ -225,7 +225,7 @@ def test_position_by_flow_drifts_and_by_cameras_does_not(hover):
 def test_the_filter_finds_the_gyroscopes_bias(hover):
     flight, _ = hover
     true = flight.plant.constants.gyroscope_bias_frd_rad_s
-    assert flight.onboard.filter.nominal[10:13] == pytest.approx(true, abs=0.0007)
+    assert flight.plant.onboard.filter.nominal[10:13] == pytest.approx(true, abs=0.0007)
 
 
 def test_a_hit_on_the_arms_stop_clips_and_flow_brings_the_velocity_back():
@@ -247,13 +247,13 @@ def test_flow_that_comes_back_after_seconds_resets_the_velocity():
     flight.fly(low, 6.0)
     flight.fly(HOVER, 4.0)
     assert flight.output.reset_counter == 0
-    deviation_m_s = flight.onboard.variances()[1] ** 0.5
+    deviation_m_s = flight.plant.onboard.variances()[1] ** 0.5
     # When it sees the ground again
     while flight.output.reset_counter == 0:
         flight.fly(low, 0.1)
     # Then the velocity jumps to it, once, and the filter is sure again
     assert flight.output.reset_counter == 1
-    assert flight.onboard.variances()[1] ** 0.5 < 0.5 * deviation_m_s
+    assert flight.plant.onboard.variances()[1] ** 0.5 < 0.5 * deviation_m_s
     assert np.linalg.norm(flight.velocity_error_m_s[:2]) < 0.15
     flight.fly(low, 3.0)
     assert flight.output.reset_counter == 1
