@@ -17,6 +17,7 @@ from companion.mavlink.encode import Encoder
 from companion.mavlink.named import named
 from companion.mavlink.packet import payload_of
 from companion.mavlink.readers import GUARD_READERS, Reader
+from tests.sim_vehicle.mavlink.test_vehicle_packets import example
 
 HEARTBEAT = (
     mav.MAVLink_heartbeat_message(2, 12, 0x9D, 4 << 16 | 3 << 24, 4, 3),
@@ -284,17 +285,12 @@ def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs
 def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
     """Zeros at the end of a payload, which are not sent, included."""
     # Given a message whose fields are zero but for the first on the wire
-    kind, values, number = mav.mavlink_map[mav.__dict__[f"MAVLINK_MSG_ID_{reader.name}"]], {}, 1
-    for name, length in zip(kind.ordered_fieldnames, kind.lengths, strict=True):
-        field = kind.fieldtypes[kind.fieldnames.index(name)]
-        given = [(number + i if "int" in field else 0.5 * (number + i)) * (number <= kept) for i in range(length)]
-        values[name] = b"NAME" if field == "char" else given[0] if length == 1 else given
-        number += length
-    packet = packed(kind(**values))
+    number = mav.__dict__[f"MAVLINK_MSG_ID_{reader.name}"]
+    packet = packed(example(number, kept))
     # When it is read
     seen = []
     make = functools.wraps(reader._make)(lambda *fields: seen.append(fields))
-    Reader(kind, make).from_payload(payload_of(packet), (1, 1))
+    Reader(mav.mavlink_map[number], make).from_payload(payload_of(packet), (1, 1))
     # Then the fields are those that pymavlink's own parser finds
     theirs, (fields,) = mav.MAVLink(None).decode(bytearray(packet)), seen
     names = list(inspect.signature(reader._make).parameters)
