@@ -12,7 +12,7 @@ from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig
 from companion.mission.trajectory import LEAST_GAP_M, Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
-from companion.motion.vector import ZERO, minus, plus
+from companion.motion.vector import minus
 
 # Least acceleration against a strong wind: 4 m/s after ten seconds.
 LEAST_SPEEDING_UP_M_S2 = 0.4
@@ -210,13 +210,11 @@ def lines(places_m: Sequence[Vector3], limits: SpeedAndAccelerations) -> Chain:
     return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
 
-def left_of(item: items.Motion, trajectory: Trajectory, elapsed_s: float, held_m: Vector3 = ZERO) -> items.Motion:
-    """What is left of an interrupted item, held back by so much. Of a path: its points that the trajectory still
-    passes.
-    """
+def left_of(item: items.Motion, trajectory: Trajectory, elapsed_s: float) -> items.Motion:
+    """What is left of an interrupted item. Of a path: its points that the trajectory still passes."""
     left_s = trajectory.duration_s - elapsed_s
     if left_s <= 0.0:
-        return items.GoToItem(position_ned_m=plus(trajectory.target_m, 1.0, held_m))
+        return items.GoToItem(position_ned_m=trajectory.target_m)
     match item, trajectory:
         case items.VelocityItem(), _:
             return item.model_copy(update={"duration_s": left_s})

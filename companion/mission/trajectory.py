@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import TypeAlias
@@ -90,6 +90,10 @@ class LineProfile:
         way, rate, change = self._ramps.at(max(0.0, elapsed_s))
         n, e, d = (part / self.distance_m for part in minus(self.target_m, self.start_m))
         return plus(self.start_m, way, (n, e, d)), (n * rate, e * rate, d * rate), (n * change, e * change, d * change)
+
+    def moved(self, by_m: Vector3) -> "LineProfile":
+        """The same elsewhere."""
+        return replace(self, start_m=plus(self.start_m, 1.0, by_m), target_m=plus(self.target_m, 1.0, by_m))
 
 
 @dataclass(frozen=True)

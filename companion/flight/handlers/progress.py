@@ -19,7 +19,7 @@ from companion.mission.item_trajectory import (
     stay,
     trajectory_around,
 )
-from companion.mission.trajectory import Motion, Trajectory
+from companion.mission.trajectory import LineProfile, Motion, Trajectory
 from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus, plus
 
@@ -38,8 +38,6 @@ class _OnTrajectory:
 
     _trajectory: Trajectory
     _trajectory_began_us: int
-    _held_m: Vector3 = ZERO
-    """By how much it has been held back for good."""
 
     def _elapsed_s(self, flight: FlightContext) -> float:
         return (flight.trajectory_us - self._trajectory_began_us) * 1e-6
@@ -53,7 +51,6 @@ class _OnTrajectory:
         place, velocity, acceleration = motion = self._trajectory.at(elapsed_s)
         yaw_rad = self._turned(flight, motion, now_us)
         # Without the acceleration the vehicle falls behind as it speeds up, and then overshoots the speed.
-        place = plus(place, 1.0, self._held_m)
         target = Target(flight.local_ned_m(place), yaw_rad, velocity, acceleration)
         return target if flight.has_position and elapsed_s < self._trajectory.duration_s else target.at_rest()
 
@@ -84,7 +81,7 @@ class FlyItems(_OnTrajectory):
         self._heading = Heading(step.action, flight.yaw_rad, now_us)
         self._steady = Lasting()
         self._trajectory: Trajectory = stay(start)
-        self._held_m, self._asked_ned_m = ZERO, flight.target.position_ned_m
+        self._is_held, self._wanted_ned_m = False, flight.target.position_ned_m
         self._motion: items.Motion | None = None
         self._out_of_reach = ""
         match self._action:
@@ -108,7 +105,7 @@ class FlyItems(_OnTrajectory):
 
     def _plan(self, flight: FlightContext, action: items.Motion, start_m: Vector3, now_us: int) -> None:
         """The item's own trajectory, or one round known obstacles."""
-        self._motion, self._trajectory_began_us, self._held_m = action, flight.trajectory_us, ZERO
+        self._motion, self._trajectory_began_us = action, flight.trajectory_us
         known = surroundings(flight)
         speeds = replace(flight.speeds, factor=flight.tally.pace_factor)
         speeds = speeds.against(flight.reflex.sustained_force.wind_m_s2, first_leg(action, start_m))
@@ -129,19 +126,22 @@ class FlyItems(_OnTrajectory):
     def interrupt(self, flight: FlightContext) -> None:
         """A hit ends the present trajectory: note what is left of the item."""
         if self._motion is not None:
-            flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight), self._held_m)
+            flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight))
 
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
         """A velocity that is held back goes on from there, and from rest. It does not catch up."""
-        if isinstance(self._motion, items.VelocityItem) and flight.target is not None:
-            sent, was_held = flight.target.position_ned_m, self._held_m != ZERO
-            self._held_m = plus(self._held_m, 1.0, minus(sent, self._asked_ned_m))
-            if was_held and sent == self._asked_ned_m:
-                left = left_of(self._motion, self._trajectory, self._elapsed_s(flight), self._held_m)
+        line = self._trajectory
+        if isinstance(self._motion, items.VelocityItem) and isinstance(line, LineProfile) and flight.target is not None:
+            sent, was_held = flight.target.position_ned_m, self._is_held
+            self._is_held = sent != self._wanted_ned_m
+            if self._is_held:
+                self._trajectory = line.moved(minus(sent, self._wanted_ned_m))
+            elif was_held:
+                left = left_of(self._motion, line, self._elapsed_s(flight))
                 self._plan(flight, left, flight.mission_ned_m(sent), now_us)
         target = super().target(flight, now_us)
         if target is not None:
-            self._asked_ned_m = target.position_ned_m
+            self._wanted_ned_m = target.position_ned_m
         return target
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
