@@ -115,13 +115,13 @@ SMOOTHING_S = 0.2
 # of 5 m/s takes 1.5 m/s^2 with a drag of 0.3 per second. Arms that press on a wall carry a vehicle that leans by 15
 # degrees; from 22 on it is tipped over.
 HELD_M_S2 = 2.0
-# A vehicle has followed what its control asks for by then: twice its attitude's lag. What it leans beyond all of that,
-# and beyond what lies in between, is by an obstacle's torque. In free flight real PX4s lean beyond it by a sine of
-# 0.05 at most (bench/notes/decisions.md).
-FOLLOWS_US, TIPS = 300_000, 0.07
-# Other vehicles follow worse. So many of their own standard deviations, over a time in which no touch is seen, count:
-# five as PX4's gates.
-TIPS_GATE, TIPS_MEMORY_S = 5.0, 10.0
+# By then a vehicle has followed its attitude setpoint: twice its attitude's lag. A lean beyond all setpoints since, and
+# beyond what lies between them, is by an external torque. Of real PX4s in free flight it is a sine of 0.05 at most
+# (bench/notes/decisions.md).
+FOLLOWS_US, LEAN_ERROR = 300_000, 0.07
+# Other vehicles follow worse. So many of their own standard deviations count, five as PX4's gates, over a time that is
+# long beside a touch's.
+LEAN_ERROR_GATE, LEAN_ERROR_MEMORY_S = 5.0, 10.0
 
 # --- confirmation of a hit
 # A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.

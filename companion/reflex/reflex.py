@@ -107,17 +107,17 @@ class Reflex:
 
     def _held(self, samples: Sequence[Sample], situation: Situation) -> ImpactEstimate | None:
         """A sustained external force that no detector shows: of a vehicle that flies to a position, or that tips."""
-        force, is_flying = self.sustained_force, situation.has_position and not situation.descent_commanded
+        force, is_watched = self.sustained_force, situation.off_reason is None and not situation.descent_commanded
         if not situation.has_position:
+            is_watched = False
             force.forget()  # half a second without a position is no tilt that lasted half a second
-        is_watched = is_flying and situation.off_reason is None
         flown_to = situation.setpoint_position_ned_m if is_watched else None
         is_free = self.newest is None or self.newest.is_over
         for sample in samples:
             if type(sample) is ImuSample:
                 force.add_imu(sample.specific_force_frd_m_s2)
             elif type(sample) is AttitudeTarget:
-                force.ask(sample)
+                force.set_attitude(sample)
             elif isinstance(sample, LocalPosition) and self._is_attitude_heard:
                 late_us = force.time_us - sample.time_boot_us
                 if late_us >= KEPT_US:

@@ -7,8 +7,8 @@ The missing one is the external force, unless the vehicle moves: with the thrust
 The thrust is the commanded one (ATTITUDE_TARGET): a ceiling cancels what the accelerometer would show of it. Without
 that message the thrust is what the accelerometer shows along body z.
 
-A vehicle that slides along a surface, or touches it below its centre, tips towards it. Its thrust then presses it on,
-and tips it more. In free flight its tilt is one that its own control has asked for lately, or lies between two of them.
+A vehicle that slides along a surface, or touches it below its centre, is tipped towards it by an external torque, and
+more so by its own thrust. In free flight its lean is a recent setpoint of its attitude control, or lies between two.
 """
 
 import math
@@ -48,25 +48,26 @@ class SustainedForceMonitor:
     """Horizontal specific force across the thrust when the vehicle hovered last: the wind's."""
     pushed_since_us: int = 0
     """Time since which half of a sustained force has been missing."""
-    asked: deque[tuple[int, tuple[float, float]]] = field(default_factory=deque)
-    """Leans that the vehicle's own control asked for, in its own frame, with their times."""
-    tips_variance: float = 0.0
-    """Mean square of the lean beyond them."""
-    tips_known_s: float = 0.0
-    looked_us: int = 0
+    setpoints: deque[tuple[int, tuple[float, float]]] = field(default_factory=deque)
+    """Lean that the vehicle's attitude control was set to, with its time."""
+    error_variance: float = 0.0
+    """Mean square of the lean's error, beyond them."""
+    error_known_s: float = 0.0
+    error_us: int = 0
+    """When it was looked at last."""
 
     def forget(self) -> None:
-        self.time_us = self.looked_us = 0
-        self.asked.clear()
+        self.time_us = self.error_us = 0
+        self.setpoints.clear()
 
-    def ask(self, sample: AttitudeTarget) -> None:
-        """Take what the vehicle's own control asks for; what it may still follow is kept."""
+    def set_attitude(self, sample: AttitudeTarget) -> None:
+        """Take the setpoint of the vehicle's attitude control; those that it may still follow are kept."""
         self.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-        if sample.attitude_wxyz is None or (self.asked and sample.time_boot_us <= self.asked[-1][0]):
-            return
-        self.asked.append((sample.time_boot_us, _lean(sample.attitude_wxyz)))
-        while len(self.asked) > 1 and self.asked[1][0] < sample.time_boot_us - reflex.FOLLOWS_US:
-            self.asked.popleft()
+        kept, time_us = self.setpoints, sample.time_boot_us
+        if sample.attitude_wxyz is not None and not (kept and time_us <= kept[-1][0]):
+            kept.append((time_us, _lean(sample.attitude_wxyz)))
+            while len(kept) > 1 and kept[1][0] < time_us - reflex.FOLLOWS_US:
+                kept.popleft()
 
     def add_imu(self, specific_force_frd_m_s2: Vector3) -> None:
         """Take one sample of the accelerometer; the mean of those between two positions counts."""
@@ -90,13 +91,13 @@ class SustainedForceMonitor:
         `may_tip`: a vehicle that tips is looked for, too.
         """
         now_us, attitude_wxyz, elapsed_s = sample.time_boot_us, strapdown.valid_wxyz, self._smooth(sample, strapdown)
-        presses = self._presses(sample, goal_ned_m, elapsed_s)
-        if presses == ZERO and may_tip:
-            presses = self._tips(strapdown, now_us)
-        if presses == ZERO:
+        thrust = self._held(sample, goal_ned_m, elapsed_s)
+        if thrust is None and may_tip:
+            thrust = self._tipped(strapdown, now_us)
+        if thrust is None:
             return None
-        force_m_s2, since_us, self.pushed_since_us = math.hypot(*presses), self.pushed_since_us, now_us
-        normal = away_from(plus(ZERO, -1.0, presses))
+        force_m_s2, since_us, self.pushed_since_us = math.hypot(*thrust), self.pushed_since_us, now_us
+        normal = away_from(plus(ZERO, -1.0, thrust))
         force = ned_to_body(attitude_wxyz, plus(ZERO, force_m_s2, normal))
         return ImpactEstimate(
             impact=Impact(now_us, since_us, force, ImpactKind.STRUCK),
@@ -112,8 +113,8 @@ class SustainedForceMonitor:
             is_final=True,
         )
 
-    def _presses(self, sample: LocalPosition, goal_ned_m: Vector3 | None, elapsed_s: float) -> Vector3:
-        """The force per mass with which the vehicle has long pressed on something; zero while it has not."""
+    def _held(self, sample: LocalPosition, goal_ned_m: Vector3 | None, elapsed_s: float) -> Vector3 | None:
+        """The thrust per mass that an external force has held for FOLLOWS_US, horizontal or not; None for none."""
         now_us, short = sample.time_boot_us, ZERO if goal_ned_m is None else minus(goal_ned_m, sample.position_ned_m)
         is_there = math.hypot(*short) < reflex.PLACE_SPREAD_M
         if goal_ned_m is None:
@@ -132,34 +133,35 @@ class SustainedForceMonitor:
             self.pushed_since_us = now_us
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
         if force_m_s2 < reflex.HELD_M_S2 or now_us - self.pushed_since_us < reflex.FOLLOWS_US:
-            return ZERO
+            return None
         return plus(ZERO, force_m_s2, pushes)
 
-    def _tips(self, strapdown: Strapdown, now_us: int) -> Vector3:
-        """The force per mass with which the vehicle presses to where it leans beyond all that its own control has asked
-        for of late; zero for none. What is missing there is no wind, which does not turn it.
+    def _tipped(self, strapdown: Strapdown, now_us: int) -> Vector3 | None:
+        """The thrust per mass that is held where an external torque leans the vehicle to: beyond all setpoints of the
+        last FOLLOWS_US. None for none. What is missing there is no wind, which does not turn it.
         """
-        asked, fixes, since_us = self.asked, strapdown.fixes, now_us - self.looked_us
-        half_m_s2 = 0.5 * reflex.HELD_M_S2
-        # Where nothing presses, it is only learnt how well the vehicle follows.
-        if since_us < reflex.FOLLOWS_US and math.hypot(*flat(self.missing_m_s2)) < half_m_s2:
-            return ZERO
-        if not asked or not reflex.FOLLOWS_US <= now_us - asked[0][0] < len(asked) * reflex.LONGEST_STEP_US:
-            return ZERO
+        setpoints, fixes, since_us = self.setpoints, strapdown.fixes, now_us - self.error_us
+        (n, e, _), half_m_s2 = self.missing_m_s2, 0.5 * reflex.HELD_M_S2
+        # Where no force is missing, it is only learnt how well the vehicle follows.
+        if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < half_m_s2:
+            return None
+        if not setpoints or not reflex.FOLLOWS_US <= now_us - setpoints[0][0] < len(setpoints) * reflex.LONGEST_STEP_US:
+            return None
         # After a silence or a reset the two do not compare.
         if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:
-            return ZERO
-        place = _lean(strapdown.attitude_wxyz)
-        square, beyond = min(_beyond(place, start, end) for (_, start), (_, end) in pairwise(asked))
-        limit = max(reflex.TIPS, reflex.TIPS_GATE * math.sqrt(self.tips_variance))
-        elapsed_s, self.looked_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
-        known_s = self.tips_known_s = min(self.tips_known_s + elapsed_s, reflex.TIPS_MEMORY_S)
-        self.tips_variance += elapsed_s / known_s * (min(square, limit * limit) - self.tips_variance)
-        pushes = unit(beyond)
-        force_m_s2, along_m_s = along(self.missing_m_s2, pushes), along(self.velocity_m_s, pushes)
-        is_pressed = force_m_s2 >= half_m_s2 and along_m_s <= reflex.FREE_M_S
-        tips = square > limit * limit and known_s >= reflex.LEARNT_S
-        return plus(ZERO, force_m_s2, pushes) if is_pressed and tips else ZERO
+            return None
+        lean = _lean(strapdown.attitude_wxyz)
+        square, error = min(_beyond(lean, start, end) for (_, start), (_, end) in pairwise(setpoints))
+        limit = max(reflex.LEAN_ERROR, reflex.LEAN_ERROR_GATE * math.sqrt(self.error_variance))
+        elapsed_s, self.error_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
+        known_s = self.error_known_s = min(self.error_known_s + elapsed_s, reflex.LEAN_ERROR_MEMORY_S)
+        self.error_variance += elapsed_s / known_s * (min(square, limit * limit) - self.error_variance)
+        if square <= limit * limit or known_s < reflex.LEARNT_S:
+            return None
+        leant = unit(error)
+        force_m_s2 = along(self.missing_m_s2, leant)
+        is_free = along(self.velocity_m_s, leant) > reflex.FREE_M_S
+        return None if is_free or force_m_s2 < half_m_s2 else plus(ZERO, force_m_s2, leant)
 
     def _smooth(self, sample: LocalPosition, strapdown: Strapdown) -> float:
         """Low-pass velocity and thrust; missing: the thrust less the velocity's change. Returns the time step in s."""

@@ -45,7 +45,7 @@ def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True
         else:
             strapdown.fixes.clear()
         if asked_m_s2 is not None:
-            monitor.ask(AttitudeTarget(sample.time_boot_us, 0.0, leaning(asked_m_s2(t))))
+            monitor.set_attitude(AttitudeTarget(sample.time_boot_us, 0.0, leaning(asked_m_s2(t))))
         held = monitor.step(sample, strapdown, goal)
         if held is not None:
             return t, held
