@@ -17,7 +17,7 @@ from companion.mavlink.encode import Encoder
 from companion.mavlink.named import named
 from companion.mavlink.packet import payload_of
 from companion.mavlink.readers import GUARD_READERS, Reader
-from tests.sim_vehicle.mavlink.test_vehicle_packets import example
+from tests.filled import example
 
 HEARTBEAT = (
     mav.MAVLink_heartbeat_message(2, 12, 0x9D, 4 << 16 | 3 << 24, 4, 3),

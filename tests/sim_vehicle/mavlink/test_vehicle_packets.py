@@ -16,6 +16,7 @@ from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.services.command_service import command_from_int, command_from_long
 from sim_vehicle.mavlink.services.setpoint_service import position_target
 from sim_vehicle.mavlink.services.texts import TextLink
+from tests.filled import example
 from tests.sim_vehicle.autopilot.kinematic_plant import target
 from tests.sim_vehicle.vehicle_client import Client
 
@@ -182,21 +183,6 @@ def test_messages_without_texts_and_arrays_are_packed_as_pymavlink_packs_them(ke
         message = example(layout.number, kept)
         assert encoder.packet(message) == message.pack(link), layout.name
         link.seq = (link.seq + 1) % 256
-
-
-def example(number_of_kind, kept):
-    """One of pymavlink's messages, whose fields are zero but for the first on the wire. Halves and small whole numbers
-    are the same in every type.
-    """
-    kind = dialect.mavlink_map[number_of_kind]
-    values, number = {}, 1
-    for name, length in zip(kind.ordered_fieldnames, kind.lengths, strict=True):
-        field = kind.fieldtypes[kind.fieldnames.index(name)]
-        given = [(number + place if "int" in field else -0.5 * (number + place)) for place in range(length)]
-        given = [value if number <= kept else 0 for value in given]
-        values[name] = b"NAME" if field == "char" else given[0] if length == 1 else given
-        number += length
-    return kind(**values)
 
 
 def in_wire_order(message):
