@@ -11,7 +11,7 @@ from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, RECEI
 from companion.motion.delay import Delay
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
-from companion.motion.rotation import body_to_ned, turned, yaw_rad
+from companion.motion.rotation import body_to_ned, tilt_rad, turned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO
@@ -122,6 +122,18 @@ def test_between_two_reports_the_gyroscope_turns_the_attitude():
         for number in range(1, 26):
             strapdown.imu(4_000 * number, (0.0, 0.0, -G), (p * number, q * number, r * number))
         assert 2.0 * math.asin(sum(strapdown.valid_wxyz[1:])) == pytest.approx(0.1, abs=1e-4)
+
+
+@pytest.mark.parametrize(("silent_us", "roll_rad"), [(20_000, 0.0), (250_000, 0.3)])
+def test_across_a_gap_no_gyroscope_carries_the_attitude_until_the_vehicle_has_corrected_its_own(silent_us, roll_rad):
+    strapdown, time_us, rolled = Strapdown(time_boot_us=4_000), 4_000 + silent_us, turned(LEVEL, (0.3, 0.0, 0.0), 1.0)
+    strapdown.imu(time_us, (0.0, 0.0, -G), ZERO)
+    for told_wxyz in (LEVEL, rolled):
+        strapdown.attitude(time_us, told_wxyz, 0.4)
+    assert tilt_rad(strapdown.valid_wxyz) == pytest.approx(roll_rad)
+    strapdown.attitude(time_us, rolled, 0.0)
+    strapdown.attitude(time_us, LEVEL, 0.4)
+    assert tilt_rad(strapdown.valid_wxyz) == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("most_wrong_rad", [0.0, 0.2])
