@@ -56,7 +56,7 @@ def test_what_cannot_be_compared_is_one_sentence_before_anything_is_flown(tmp_pa
 
 def test_speeds_are_a_range_or_a_list(capsys):
     assert speeds_m_s("1..4") == [1, 2, 3, 4] and speeds_m_s("1.5..3") == [1.5, 2.5] and speeds_m_s("1,2.5") == [1, 2.5]
-    for wrong in ("4..1", "fast", "0,1", "nan", "1..inf"):
+    for wrong in ("4..1", "fast", "0,1", "nan", "1..inf", "1..99999999"):
         with pytest.raises(SystemExit):
             main(["compare", "wall", "--speeds", wrong])
         assert f"'{wrong}' is not speeds" in capsys.readouterr().err
