@@ -1,6 +1,6 @@
 """The guard as the link: whole packets of the vehicle's and of its clients', bytes in and bytes out.
 
-While `is_closed` what would move the vehicle is kept out (see moves.KEPT_OUT), and setpoints while it `awaits_choice`.
+While `is_closed` what would move the vehicle is kept out (see moves.py), and setpoints while it `awaits_choice`.
 All else passes unchanged and in the order of its sender. Packets of different senders take turns, so that no sender's
 bytes come inside another's packet: an unfinished packet stays here, and so do bytes that begin none.
 """

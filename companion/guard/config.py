@@ -29,7 +29,7 @@ class GuardConfig(StrictModel):
     flight are no accident."""
     between: tuple[str, ...] = ()
     """Where programs reach the vehicle through the guard, e.g. udpin://0.0.0.0:14540. While the guard recovers it, what
-    would move it is kept out (see moves.KEPT_OUT)."""
+    would move it is kept out (see moves.py)."""
     confirm_within_s: Annotated[Positive, Field(ge=0.2)] = 1.0
     """How long OFFBOARD may take; then the vehicle is asked to hold. The answer takes 10 ms, CURRENT_MODE at 10 Hz 100
     ms; a command lost on the way is repeated after 500 ms."""

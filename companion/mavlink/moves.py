@@ -1,10 +1,10 @@
-"""What would move a vehicle that the guard recovers: one table, each entry with its reason.
+"""What would move a vehicle that the guard recovers.
 
 Everything else passes, a person's words above all: sticks, every mode but OFFBOARD, disarming, flight termination.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from itertools import accumulate
 from typing import Any, TypeAlias
 
@@ -14,9 +14,7 @@ from companion.autopilot.interface import Autopilot, Pilot
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Asked, Vector3
 
-Source: TypeAlias = tuple[int, int]
 Fields: TypeAlias = Mapping[str, Any]
-Test: TypeAlias = Callable[[Fields, Source, Autopilot], bool]
 
 # COMMAND_INT: a place of whole numbers that is not given.
 _NO_PLACE_INT = 0x7FFF_FFFF
@@ -36,19 +34,41 @@ def fields_of(packet: bytes) -> dict[str, Any]:
     return {name: values[place] for name, place in zip(message.ordered_fieldnames, places, strict=False)}
 
 
-def _always(fields: Fields, source: Source, autopilot: Autopilot) -> bool:
-    return True
+# PX4 flies by the latest setpoint, whoever sent it.
+SETPOINT_IDS = frozenset(
+    {
+        dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+        dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
+        dialect.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET,
+    }
+)
+# The same by name, for MAVSDK.
+SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
+_STICKS = (dialect.MAVLINK_MSG_ID_MANUAL_CONTROL, dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
+_ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 
 
-def _on_board(fields: Fields, source: Source, autopilot: Autopilot) -> bool:
-    return source[1] in _ON_BOARD
+def would_move(packet: bytes, autopilot: Autopilot) -> bool:
+    """Whether a whole packet, on its way to a vehicle that is being recovered, is to be kept out.
+
+    OFFBOARD is the guard's meanwhile, and a place that was named before the hit may be behind it.
+    """
+    message_id = message_id_of(packet)
+    if message_id in SETPOINT_IDS:
+        return True
+    if message_id in _STICKS:
+        # A program's look like a pilot's, for whom the guard stands down.
+        return source_of(packet)[1] in _ON_BOARD
+    if message_id == dialect.MAVLINK_MSG_ID_SET_MODE:
+        return autopilot.pilot(fields_of(packet)["custom_mode"]) is Pilot.SETPOINTS
+    if message_id in _ITEMS:
+        # ArduPilot's older way to be sent somewhere, as DroneKit's simple_goto has it: 2 is a place, 3 a height.
+        return fields_of(packet)["current"] in (2, 3)
+    return message_id in _COMMANDS and _command_moves(fields_of(packet), autopilot)
 
 
-def _mode_flies_setpoints(fields: Fields, source: Source, autopilot: Autopilot) -> bool:
-    return autopilot.pilot(fields["custom_mode"]) is Pilot.SETPOINTS
-
-
-def _command_moves(fields: Fields, source: Source, autopilot: Autopilot) -> bool:
+def _command_moves(fields: Fields, autopilot: Autopilot) -> bool:
     """A reposition to no place is how QGroundControl stops the vehicle."""
     match fields["command"]:
         case dialect.MAV_CMD_DO_SET_MODE:
@@ -65,31 +85,6 @@ def _has_place(fields: Fields) -> bool:
     if "x" in fields:
         return {fields["x"], fields["y"]} != {_NO_PLACE_INT} or math.isfinite(fields["z"])
     return any(math.isfinite(fields[name]) for name in ("param5", "param6", "param7"))
-
-
-def _is_flown_at_once(fields: Fields, source: Source, autopilot: Autopilot) -> bool:
-    """ArduPilot's older way to be sent somewhere, as DroneKit's simple_goto has it: 2 is a place, 3 a height."""
-    return fields["current"] in (2, 3)
-
-
-_SETPOINT = "PX4 flies by the latest setpoint, whoever sent it"
-_STICKS = "a program's sticks look like a pilot's, for whom the guard stands down"
-_COMMAND = "OFFBOARD is the guard's meanwhile, and a place that was named before the hit may be behind it"
-KEPT_OUT: Mapping[int, tuple[Test, str]] = {
-    dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: (_always, _SETPOINT),
-    dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: (_always, _SETPOINT),
-    dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: (_always, _SETPOINT),
-    dialect.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: (_always, _SETPOINT),
-    dialect.MAVLINK_MSG_ID_MANUAL_CONTROL: (_on_board, _STICKS),
-    dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: (_on_board, _STICKS),
-    dialect.MAVLINK_MSG_ID_MISSION_ITEM: (_is_flown_at_once, _COMMAND),
-    dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT: (_is_flown_at_once, _COMMAND),
-    dialect.MAVLINK_MSG_ID_SET_MODE: (_mode_flies_setpoints, _COMMAND),
-    **dict.fromkeys(_COMMANDS, (_command_moves, _COMMAND)),
-}
-SETPOINT_IDS = frozenset(number for number, (_, reason) in KEPT_OUT.items() if reason is _SETPOINT)
-# The same by name, for MAVSDK.
-SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
 
 
 def is_for(packet: bytes, system_id: int | None) -> bool:
@@ -111,12 +106,6 @@ def asked_by(packet: bytes) -> Asked | None:
 
 def _unless(ignored: int, vector: Vector3) -> Vector3 | None:
     return None if ignored or not all(map(math.isfinite, vector)) else vector
-
-
-def would_move(packet: bytes, autopilot: Autopilot) -> bool:
-    """Whether a whole packet, on its way to a vehicle that is being recovered, is to be kept out."""
-    test, _ = KEPT_OUT.get(message_id_of(packet), (None, ""))
-    return test is not None and test(fields_of(packet), source_of(packet), autopilot)
 
 
 def interval_asked(packet: bytes) -> tuple[int | None, int] | None:
