@@ -24,17 +24,14 @@ CONTACT_US = 10_000_000
 
 def test_history_keeps_two_seconds_drops_late_packets_and_starts_anew_after_a_reboot():
     history = MotionHistory()
-    samples = [
-        LocalPosition(t_us, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        for t_us in range(CONTACT_US - 5_000_000, CONTACT_US, 20_000)
-    ]
+    samples = [LocalPosition(t_us, ZERO, ZERO) for t_us in range(CONTACT_US - 5_000_000, CONTACT_US, 20_000)]
     assert all(history.add(sample) for sample in samples)
     kept = history.between(0, CONTACT_US)
     assert kept[-1] is samples[-1]
     assert 1.95 <= (kept[-1].time_boot_us - kept[0].time_boot_us) * 1e-6 <= 2.0
     assert not history.add(samples[-2])
     assert history.latest is samples[-1]
-    rebooted = LocalPosition(1000, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    rebooted = LocalPosition(1000, ZERO, ZERO)
     assert history.add(rebooted)
     assert history.between(0, CONTACT_US) == [rebooted]
     assert history.before(1001) is rebooted and history.before(1000) is None
