@@ -107,7 +107,8 @@ def _injected(row: Row, chance: random.Random) -> Injector:
     if "do" in row:
         name, *arguments = row["do"]
         return DOES[name](chance, *arguments)
-    when = When(row["when"]) if "when" in row else When.flying(chance, row.get("for_s", math.inf))
+    for_s = row.get("for_s", math.inf)
+    when = When(row["when"], for_s=for_s) if "when" in row else When.flying(chance, for_s)
     if "vehicle" in row:
         kind, *_ = row["vehicle"].values()
         return simulated(FaultRequest(kind, {k: v for k, v in row["vehicle"].items() if k != "kind"}), when)
