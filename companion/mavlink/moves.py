@@ -23,17 +23,6 @@ _NO_PLACE, _NO_VELOCITY = 0x007, 0x038
 # Companion computers, planners and cameras that fly (MAV_COMP_ID_ONBOARD_COMPUTER to VISUAL_INERTIAL_ODOMETRY). A hand
 # has its sticks on a ground station, which has any other number.
 _ON_BOARD = range(dialect.MAV_COMP_ID_ONBOARD_COMPUTER, dialect.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY + 1)
-_COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
-
-
-def fields_of(packet: bytes) -> dict[str, Any]:
-    """Of a whole packet of this dialect: its fields by name; of an array the first value."""
-    message, payload = dialect.mavlink_map[message_id_of(packet)], payload_of(packet)
-    values = message.unpacker.unpack(payload.ljust(message.unpacker.size, b"\0")[: message.unpacker.size])
-    places = accumulate(message.lengths, initial=0)
-    return {name: values[place] for name, place in zip(message.ordered_fieldnames, places, strict=False)}
-
-
 # PX4 flies by the latest setpoint, whoever sent it.
 SETPOINT_IDS = frozenset(
     {
@@ -47,6 +36,15 @@ SETPOINT_IDS = frozenset(
 SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
 _STICKS = (dialect.MAVLINK_MSG_ID_MANUAL_CONTROL, dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
+_COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
+
+
+def fields_of(packet: bytes) -> dict[str, Any]:
+    """Of a whole packet of this dialect: its fields by name; of an array the first value."""
+    message, payload = dialect.mavlink_map[message_id_of(packet)], payload_of(packet)
+    values = message.unpacker.unpack(payload.ljust(message.unpacker.size, b"\0")[: message.unpacker.size])
+    places = accumulate(message.lengths, initial=0)
+    return {name: values[place] for name, place in zip(message.ordered_fieldnames, places, strict=False)}
 
 
 def would_move(packet: bytes, autopilot: Autopilot) -> bool:

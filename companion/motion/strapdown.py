@@ -68,7 +68,7 @@ class Strapdown:
         if not most_wrong_rad or self._has_gap or -d < math.cos(most_wrong_rad):
             self.valid_wxyz, self.level_acceleration_m_s2 = attitude_wxyz, ZERO
             self.heading_error_rad = self.sinks_m_s2 = 0.0
-            self._has_gap = self._has_gap and most_wrong_rad > 0.0
+            self._has_gap &= most_wrong_rad > 0.0
         else:
             self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
             self.heading_error_rad = math.remainder(yaw_rad(attitude_wxyz) - yaw_rad(self.valid_wxyz), math.tau)
