@@ -106,14 +106,6 @@ def answer(time_us: int, armed: bool = True, is_lockstep: bool = True) -> Actuat
     return ActuatorControls(time_us, armed, is_lockstep, (0.5,) * 4)
 
 
-def in_lockstep() -> Exchange:
-    """PX4 has answered the sample of 4 ms, sent at the machine's time 1000."""
-    exchange = Exchange(0)
-    exchange.sent(4_000, 1_000)
-    exchange.received(answer(4_000))
-    return exchange
-
-
 def test_an_answer_to_an_older_sample_gives_its_commands_but_not_the_turn():
     exchange = Exchange(0)
     exchange.sent(4_000, 0)
@@ -128,7 +120,9 @@ def test_an_answer_to_an_older_sample_gives_its_commands_but_not_the_turn():
 
 
 def test_an_answer_that_does_not_come_is_given_up_after_the_timeout_and_told_once():
-    exchange = in_lockstep()
+    exchange = Exchange(0)
+    exchange.sent(4_000, 1_000)
+    exchange.received(answer(4_000))
     exchange.notices.clear()
     exchange.sent(8_000, 10)
     exchange.look_at_clock(10 + ANSWER_TIMEOUT_US - 1)
