@@ -137,7 +137,7 @@ def _signs(tested: Tested) -> Iterator[str]:
         if value < 0.0:
             yield f"{name}: within what the propellers can do: says nothing."
         elif not math.isnan(value):
-            says = "speaks for a contact" if value >= limit else "says nothing"
+            says = "speaks for a contact" if value >= limit else "says nothing by itself"
             needed = f"a hit from {limit:.{digits}f} on ({value / limit:.1f} times)"
             yield f"{name}: {value:.{digits}f} {unit}, {needed}: {says}."
 

@@ -102,9 +102,8 @@ def hypothesis_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s
     impact, size_m_s2 = estimate.impact, math.hypot(*force_ned_m_s2)
     hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
     is_jump, earlier = impact.evidence is Evidence.VELOCITY_JUMP, estimate.earlier
-    # A rate jump is one of two samples.
-    is_sure = impact.evidence is Evidence.RATE_JUMP or estimate.is_final or earlier is None
-    if size_m_s2 == 0.0 or (not is_jump and is_sure):
+    is_sure = not is_jump and (estimate.is_final or earlier is None)
+    if size_m_s2 == 0.0 or impact.is_shown_twice or is_sure:
         return None
     away = plus(ZERO, 1.0 / size_m_s2, force_ned_m_s2)
     if is_jump:

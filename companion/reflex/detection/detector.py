@@ -90,7 +90,7 @@ class Impact:
     the sample's averaging window, or the previous sample where the stream left a gap before it.
     `specific_force_frd_m_s2` is what the contact alone did to the vehicle, in body axes; where only the aftermath
     was seen, the mean over the gap that the contact must have fallen into.
-    `confidence` is the detector's own, 0 to 1.
+    `confidence` is the detector's own, 0 to 1. `is_shown_twice`: by more than one message.
     """
 
     sample_time_boot_us: int
@@ -99,6 +99,7 @@ class Impact:
     kind: ImpactKind = ImpactKind.UNKNOWN
     evidence: Evidence = Evidence.FORCE
     confidence: float = 1.0
+    is_shown_twice: bool = False
 
     @property
     def size_m_s2(self) -> float:

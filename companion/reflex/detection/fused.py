@@ -81,6 +81,9 @@ class FusedState(DetectorState):
     """Of the sample before the last."""
     before_threshold_m_s2: float = 0.0
     """Before the last sample was learnt: it may be a hit's first."""
+    force_ratio: float = 0.0
+    """Of the newest sample's force to its limit."""
+    before_ratio: float = 0.0
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
@@ -110,6 +113,12 @@ class FusedState(DetectorState):
         (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
         x, y = f_x + g_x, f_y + g_y
         return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
+
+    @property
+    def weak_force(self) -> float:
+        """The larger force of the last two samples, in limits; 0 where it is a hit by itself."""
+        larger = max(self.force_ratio, self.before_ratio)
+        return larger if larger < 1.0 else 0.0
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""
@@ -168,6 +177,7 @@ class FusedDetector:
         s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
         s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
         ratio = max(side / s.side.limit, beyond / s.vertical.limit)
+        s.before_ratio, s.force_ratio = s.force_ratio, ratio
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -179,7 +189,8 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            return self._turned(s, earlier_us, situation, motion) if s.turn.value > s.turn.limit else None
+            does_turn = s.turn.value > 0.0 and math.hypot(s.turn.value / s.turn.limit, s.weak_force) > 1.0
+            return self._turned(s, earlier_us, situation, motion) if does_turn else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         x, y, z = s.floor.mean_frd_m_s2
         force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
@@ -206,7 +217,7 @@ class FusedDetector:
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
         force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.value / s.turn.limit)
-        impact = Impact(now_us, free_until_us, force, evidence=Evidence.RATE_JUMP, confidence=confidence)
+        impact = Impact(now_us, free_until_us, force, ImpactKind.UNKNOWN, Evidence.RATE_JUMP, confidence, True)
         return self._fire(s, situation, motion, impact)
 
     def _unwatched(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact | None:
@@ -288,7 +299,8 @@ class FusedDetector:
         size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
-        is_jump = size / s.velocity.limit > 1.0
+        weak = 0.0 if s.may_be_hand(time_us) else s.weak_force
+        is_jump = math.hypot(size / s.velocity.limit, weak) > 1.0
         if s.phase is not Phase.ARMED or not is_jump:
             # What is told as a hit is no noise.
             if is_jump or motion.validity.is_valid:
@@ -301,7 +313,8 @@ class FusedDetector:
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(strapdown.valid_wxyz, push)
         s.velocity_ned_m_s = minus(v, step)
+        confidence, is_shown_twice = min(1.0, 0.5 * size / least), size <= s.velocity.limit
         impact = Impact(
-            now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
+            now_us, free_until_us, force, ImpactKind.UNKNOWN, Evidence.VELOCITY_JUMP, confidence, is_shown_twice
         )
         return self._fire(s, situation, motion, impact)

@@ -16,6 +16,7 @@ from companion.reflex.detection.detector import Evidence, ImpactKind, Phase, Sit
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import promise_of
 from companion.reflex.detection.impact import ImpactEstimator
+from companion.reflex.detection.velocity_jump import VelocityJump
 
 TICK_US = 1_000
 WINDOW_US = 4_000
@@ -190,7 +191,8 @@ def test_what_turns_a_vehicle_more_and_more_does_not_hide_behind_its_own_first_s
     def graze(t_us):
         return tuple(size * (t_us > 3_005_000 + 20_000 * n) for n, size in enumerate((1.9, 1.9, 2.7)))
 
-    impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), rates=graze).fly(until_us=3_150_000)
+    flight = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), rates=graze, noise=0.1)
+    impacts = flight.fly(until_us=3_150_000)
     assert [(impact.evidence, impact.sample_time_boot_us) for impact in impacts] == [(Evidence.RATE_JUMP, 3_080_000)]
 
 
@@ -217,6 +219,12 @@ def test_a_hit_is_no_noise_that_would_hide_the_next_one():
     struck, free = (Flight(pulse((f, 0.0, 0.0)), 20_000, velocity_noise=0.05) for f in (-3000.0, 0.0))
     assert (len(struck.fly(3_400_000)), len(free.fly(3_400_000))) == (1, 0)
     assert struck.state.velocity.limit < 1.1 * free.state.velocity.limit
+    # Nor does the first of its steps raise what the next must reach
+    jump, limits_m_s = VelocityJump(WINDOW_US), []
+    for size_m_s in [0.1] * 100 + [0.4, 0.1]:
+        jump.learn((size_m_s, 0.0, 0.0))
+        limits_m_s.append(jump.least_m_s(FusedConfig(), 1.0, 0.0, 0))
+    assert limits_m_s[-1] > limits_m_s[-2] == pytest.approx(limits_m_s[-3], rel=0.01)
 
 
 # --- no collision -------------------------------------------------------------------------------------------
@@ -249,7 +257,7 @@ def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
 
 
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
-    once = Flight(pulse((0.0, 10.0, 0.0), 3_000_500, 4_000), noise=1.5)
+    once = Flight(pulse((0.0, 10.0, 0.0), 3_000_500, 4_000), noise=1.5, heard=(Attitude, AttitudeTarget))
     assert once.fly() == []
     assert once.state.threshold_m_s2 > 8.0
     twice = Flight(pulse((0.0, 13.0, 0.0), 3_000_500, 20_000), noise=1.5)
@@ -259,6 +267,8 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert together.state.peak_specific_force_m_s2 < together.state.threshold_m_s2
     strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5)
     assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
+    with_its_velocity = Flight(once.push, noise=1.5).fly()
+    assert [(i.evidence, i.is_shown_twice) for i in with_its_velocity] == [(Evidence.VELOCITY_JUMP, True)]
     to_and_fro = Flight(lambda t: (0.0, {750: 10.0, 751: -10.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5)
     assert to_and_fro.fly() == []
 
