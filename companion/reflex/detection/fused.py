@@ -116,9 +116,8 @@ class FusedState(DetectorState):
 
     @property
     def weak_force(self) -> float:
-        """The larger force of the last two samples, in limits; 0 where it is a hit by itself."""
-        larger = max(self.force_ratio, self.before_ratio)
-        return larger if larger < 1.0 else 0.0
+        """The larger force of the last two samples, in limits."""
+        return max(self.force_ratio, self.before_ratio)
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""

@@ -162,6 +162,7 @@ def at_once(p, q, r, until_us=4_000_000):
         (at_once(2.4, -2.0, 0.0), {}, 1),
         (at_once(0.0, 0.0, 2.1), {}, 1),
         (at_once(1.2, -1.2, 0.0), {}, 0),
+        (at_once(1.2, -1.2, 0.0), {"push": pulse((0.0, 2.2, 0.0), 3_016_500, 4_000)}, 1),
         # It has stopped the vehicle by then
         (at_once(2.4, -2.0, 0.0), {"is_filtered": True, "jump": (3_002_000, (0.0, 0.0, 0.7), 0)}, 1),
         # A broken sample, a failed motor, vibration
@@ -191,8 +192,7 @@ def test_what_turns_a_vehicle_more_and_more_does_not_hide_behind_its_own_first_s
     def graze(t_us):
         return tuple(size * (t_us > 3_005_000 + 20_000 * n) for n, size in enumerate((1.9, 1.9, 2.7)))
 
-    flight = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), rates=graze, noise=0.1)
-    impacts = flight.fly(until_us=3_150_000)
+    impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), rates=graze, noise=0.1).fly(until_us=3_150_000)
     assert [(impact.evidence, impact.sample_time_boot_us) for impact in impacts] == [(Evidence.RATE_JUMP, 3_080_000)]
 
 
