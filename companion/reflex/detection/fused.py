@@ -9,6 +9,8 @@ contact, each compared with this vehicle's own flight:
 * the body rates jump, and stay (see `rate_jump`);
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
 
+Both jumps follow a contact that the samples hold a part of at most: a force below its limit adds to them, by squares.
+
 A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
 push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
 from one sample to the next. So a weak force on a hovering vehicle is observed for a moment, and is a strike as soon as
@@ -216,7 +218,8 @@ class FusedDetector:
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
         force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.value / s.turn.limit)
-        impact = Impact(now_us, free_until_us, force, ImpactKind.UNKNOWN, Evidence.RATE_JUMP, confidence, True)
+        evidence = Evidence.RATE_JUMP
+        impact = Impact(now_us, free_until_us, force, evidence=evidence, confidence=confidence, is_shown_twice=True)
         return self._fire(s, situation, motion, impact)
 
     def _unwatched(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact | None:
@@ -312,8 +315,12 @@ class FusedDetector:
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(strapdown.valid_wxyz, push)
         s.velocity_ned_m_s = minus(v, step)
-        confidence, is_shown_twice = min(1.0, 0.5 * size / least), size <= s.velocity.limit
         impact = Impact(
-            now_us, free_until_us, force, ImpactKind.UNKNOWN, Evidence.VELOCITY_JUMP, confidence, is_shown_twice
+            now_us,
+            free_until_us,
+            force,
+            evidence=Evidence.VELOCITY_JUMP,
+            confidence=min(1.0, 0.5 * size / least),
+            is_shown_twice=size <= s.velocity.limit,
         )
         return self._fire(s, situation, motion, impact)
