@@ -34,7 +34,7 @@ from companion.messages import (
 )
 from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
-from companion.motion.vector import ZERO, limited, minus, plus
+from companion.motion.vector import ZERO, limited, minus, plus, unit
 from companion.reflex import config as reflex
 from companion.reflex.config import FusedConfig
 from companion.reflex.detection.classify import classified, hovers
@@ -121,6 +121,11 @@ class FusedState(DetectorState):
         """The larger force of the last two samples, in limits."""
         return max(self.force_ratio, self.before_ratio)
 
+    def external_frd_m_s2(self, force_frd_m_s2: Vector3) -> Vector3:
+        """What of a sample's force free flight does not explain."""
+        (f_x, f_y, f_z), (x, y, z) = force_frd_m_s2, self.floor.mean_frd_m_s2
+        return (f_x - x, f_y - y, f_z - self.thrust.expected_m_s2(self.last_sample_boot_us, z))
+
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""
         is_slow = math.hypot(*self.velocity_ned_m_s or ZERO) < reflex.APPROACH_M_S
@@ -193,10 +198,9 @@ class FusedDetector:
             does_turn = s.turn.value > 0.0 and math.hypot(s.turn.value / s.turn.limit, s.weak_force) > 1.0
             return self._turned(s, earlier_us, situation, motion) if does_turn else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
-        x, y, z = s.floor.mean_frd_m_s2
-        force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
+        force = s.external_frd_m_s2(f)
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
-        is_learnt = math.dist(f, (x, y, z)) < s.threshold_m_s2
+        is_learnt = math.dist(f, s.floor.mean_frd_m_s2) < s.threshold_m_s2
         if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
             self._learn(s, f, before_us)  # a shaking that stays
         free_until_us = min(now_us - self._averaging_us, free_until_us)
@@ -313,7 +317,12 @@ class FusedDetector:
         free_until_us = strapdown.fixes[-2].time_boot_us - LONGEST_DELAY_US
         over_s = max(now_us - free_until_us, 1) * 1e-6
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
-        force = ned_to_body(strapdown.valid_wxyz, push)
+        force, is_shown_twice = ned_to_body(strapdown.valid_wxyz, push), size <= s.velocity.limit
+        if is_shown_twice:
+            # Its direction is that of both, each as clear as it is large beside its limit.
+            felt = s.last_frd_m_s2 if s.force_ratio >= s.before_ratio else s.before_frd_m_s2
+            both = plus(plus(ZERO, size / s.velocity.limit, unit(force)), weak, unit(s.external_frd_m_s2(felt)))
+            force = plus(ZERO, size / over_s, unit(both))
         s.velocity_ned_m_s = minus(v, step)
         impact = Impact(
             now_us,
@@ -321,6 +330,6 @@ class FusedDetector:
             force,
             evidence=Evidence.VELOCITY_JUMP,
             confidence=min(1.0, 0.5 * size / least),
-            is_shown_twice=size <= s.velocity.limit,
+            is_shown_twice=is_shown_twice,
         )
         return self._fire(s, situation, motion, impact)
