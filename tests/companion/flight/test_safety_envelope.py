@@ -160,7 +160,7 @@ def test_one_position_outside_the_fence_ends_no_flight_and_two_do():
     # Given one forged packet between two of the vehicle's own, which come with every fifth interval
     f.run_until(lambda: f.vehicle.ticks % 5 == 1)
     attacked(f, [far(1)])
-    f.run_for(0.5)
+    f.run_for(3.0)
     assert f.state != "aborted"
     # When two come in a row
     f.run_until(lambda: f.vehicle.ticks % 5 == 1)

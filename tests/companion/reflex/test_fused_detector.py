@@ -267,8 +267,9 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert together.state.peak_specific_force_m_s2 < together.state.threshold_m_s2
     strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5)
     assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
-    with_its_velocity = Flight(once.push, noise=1.5).fly()
-    assert [(i.evidence, i.is_shown_twice) for i in with_its_velocity] == [(Evidence.VELOCITY_JUMP, True)]
+    (with_its_velocity,) = Flight(once.push, noise=1.5).fly()
+    assert with_its_velocity.is_shown_twice
+    assert with_its_velocity.specific_force_frd_m_s2[1] > 0.9 * with_its_velocity.size_m_s2
     to_and_fro = Flight(lambda t: (0.0, {750: 10.0, 751: -10.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5)
     assert to_and_fro.fly() == []
 
