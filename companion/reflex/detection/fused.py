@@ -9,7 +9,7 @@ contact, each compared with this vehicle's own flight:
 * the body rates jump, and stay (see `rate_jump`);
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
 
-Both jumps follow a contact that the samples hold a part of at most: a force below its limit adds to them, by squares.
+Both jumps follow a contact of which the samples hold a part at most: a force below its limit adds to them, by squares.
 
 A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
 push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
@@ -86,6 +86,7 @@ class FusedState(DetectorState):
     force_ratio: float = 0.0
     """Of the newest sample's force to its limit."""
     before_ratio: float = 0.0
+    """Of the sample before the last."""
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
