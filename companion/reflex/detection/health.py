@@ -94,7 +94,8 @@ class SampleGate:
 
 
 class Promise(NamedTuple):
-    """Of Gaussian noise as it was learnt in this flight; a false alarm by anything else is not in it.
+    """Of Gaussian noise as it was learnt in this flight; a false alarm by anything else, or by two signs
+    together, is not in it.
 
     A hit shows from `force_m_s2` on in a sample that holds it, and from `jump_m_s` on where it falls between the
     samples: infinite before velocities are known.

@@ -309,7 +309,7 @@ def test_a_radios_pulses_are_the_pilots_sticks():
 
 @pytest.mark.parametrize("asked", [(27, 1_000_000), (None, 0)])
 def test_a_board_without_highres_imu_is_asked_for_its_raw_one_and_a_client_that_slows_it_down_is_noticed(asked):
-    vehicle = FakeCopter(ack=lambda command, count: [2] if command == 511 and count == 1 else [0])  # the IMU's
+    vehicle = FakeCopter(ack=lambda command, count: [2] if command == 511 and count == 1 else [0])  # first the IMU's
     guard = guarded(vehicle, lambda guard: guard.status().state == "standing by")
     intervals_us = [(int(sent.param1), sent.param2) for _, sent in vehicle.commands if sent.command == 511]
     assert intervals_us[:2] == [(105, intervals_us[0][1]), (27, intervals_us[0][1])]
