@@ -8,13 +8,13 @@ The thrust is the commanded one (ATTITUDE_TARGET): a ceiling cancels what the ac
 that message the thrust is what the accelerometer shows along body z.
 
 A vehicle that slides along a surface, or touches it below its centre, is tipped towards it by an external torque, and
-more so by its own thrust. In free flight its lean is a recent setpoint of its attitude control, or lies between two.
+more so by its own thrust. In free flight no lean is beyond all recent setpoints of its attitude control, in any
+direction.
 """
 
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 from companion.messages import AttitudeTarget, LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
@@ -48,7 +48,7 @@ class SustainedForceMonitor:
     """Horizontal specific force across the thrust when the vehicle hovered last: the wind's."""
     pushed_since_us: int = 0
     """Time since which half of a sustained force has been missing."""
-    setpoints: deque[tuple[int, tuple[float, float]]] = field(default_factory=deque)
+    setpoints: deque[tuple[int, Vector3]] = field(default_factory=deque)
     """Lean that the vehicle's attitude control was set to, with its time."""
     error_variance: float = 0.0
     """Mean square of the lean's error, beyond them."""
@@ -137,31 +137,31 @@ class SustainedForceMonitor:
         return plus(ZERO, force_m_s2, pushes)
 
     def _tipped(self, strapdown: Strapdown, now_us: int) -> Vector3 | None:
-        """The thrust per mass that is held where an external torque leans the vehicle to: beyond all setpoints of the
-        last FOLLOWS_US. None for none. What is missing there is no wind, which does not turn it.
+        """The thrust per mass that is held where an external torque leans the vehicle to: along it beyond all setpoints
+        of the last FOLLOWS_US. None for none. What is missing there is no wind, which does not turn it.
         """
         setpoints, fixes, since_us = self.setpoints, strapdown.fixes, now_us - self.error_us
-        (n, e, _), half_m_s2 = self.missing_m_s2, 0.5 * reflex.HELD_M_S2
+        missing, half_m_s2 = flat(self.missing_m_s2), 0.5 * reflex.HELD_M_S2
+        force_m_s2, pushes = math.hypot(*missing), unit(missing)
         # Where no force is missing, it is only learnt how well the vehicle follows.
-        if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < half_m_s2:
+        if since_us < reflex.FOLLOWS_US and force_m_s2 < half_m_s2:
             return None
         if not setpoints or not reflex.FOLLOWS_US <= now_us - setpoints[0][0] < len(setpoints) * reflex.LONGEST_STEP_US:
             return None
         # After a silence or a reset the two do not compare.
         if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:
             return None
-        lean = _lean(strapdown.attitude_wxyz)
-        square, error = min(_beyond(lean, start, end) for (_, start), (_, end) in pairwise(setpoints))
+        lean, asked = along(_lean(strapdown.attitude_wxyz), pushes), [along(each, pushes) for _, each in setpoints]
+        beyond = lean - max(asked)
+        error = max(0.0, beyond, min(asked) - lean)
         limit = max(reflex.LEAN_ERROR, reflex.LEAN_ERROR_GATE * math.sqrt(self.error_variance))
         elapsed_s, self.error_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
         known_s = self.error_known_s = min(self.error_known_s + elapsed_s, reflex.LEAN_ERROR_MEMORY_S)
-        self.error_variance += elapsed_s / known_s * (min(square, limit * limit) - self.error_variance)
-        if square <= limit * limit or known_s < reflex.LEARNT_S:
+        self.error_variance += elapsed_s / known_s * (min(error, limit) ** 2 - self.error_variance)
+        if beyond <= limit or known_s < reflex.LEARNT_S:
             return None
-        leant = unit(error)
-        force_m_s2 = along(self.missing_m_s2, leant)
-        is_free = along(self.velocity_m_s, leant) > reflex.FREE_M_S
-        return None if is_free or force_m_s2 < half_m_s2 else plus(ZERO, force_m_s2, leant)
+        is_free = along(self.velocity_m_s, pushes) > reflex.FREE_M_S
+        return None if is_free or force_m_s2 < half_m_s2 else missing
 
     def _smooth(self, sample: LocalPosition, strapdown: Strapdown) -> float:
         """Low-pass velocity and thrust; missing: the thrust less the velocity's change. Returns the time step in s."""
@@ -181,20 +181,10 @@ class SustainedForceMonitor:
         return elapsed_s
 
 
-def _lean(attitude_wxyz: Quaternion) -> tuple[float, float]:
-    """North and east of the unit vector along the thrust."""
+def _lean(attitude_wxyz: Quaternion) -> Vector3:
+    """The unit vector along the thrust, its horizontal part, local NED."""
     w, x, y, z = attitude_wxyz
-    return -2.0 * (x * z + w * y), 2.0 * (w * x - y * z)
-
-
-def _beyond(place: tuple[float, float], start: tuple[float, float], end: tuple[float, float]) -> tuple[float, Vector3]:
-    """How far north and east a lean is from the nearest one between start and end: the square, and the way."""
-    (n, e), (a, b), (c, d) = place, start, end
-    n, e, c, d = n - a, e - b, c - a, d - b
-    whole = c * c + d * d
-    share = min(max((n * c + e * d) / whole, 0.0), 1.0) if whole > 0.0 else 0.0
-    n, e = n - share * c, e - share * d
-    return n * n + e * e, (n, e, 0.0)
+    return (-2.0 * (x * z + w * y), 2.0 * (w * x - y * z), 0.0)
 
 
 def _is_free(along_m_s: float, across_m_s: float) -> bool:

@@ -18,9 +18,9 @@ EVERY_S = 0.02
 
 
 def leaning(m_s2):
-    """Nose north, of a vehicle whose thrust carries it and gives that acceleration."""
-    half = -0.5 * math.atan(m_s2 / 9.80665)
-    return (math.cos(half), 0.0, math.sin(half), 0.0)
+    """Nose north, of a vehicle whose thrust carries it and gives that acceleration, north + east j."""
+    half, way = 0.5 * math.atan(abs(m_s2) / 9.80665), m_s2 / max(abs(m_s2), 1e-9)
+    return (math.cos(half), way.imag * math.sin(half), -way.real * math.sin(half), 0.0)
 
 
 def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True, asked_m_s2=None, unbroken_s=9.0):
@@ -90,6 +90,10 @@ def asked(t):
     return 2.5 if t < 1.6 else 1.0
 
 
+def turns(t):
+    return 2.5 if t < 1.8 else 4.0j if t < 1.9 else -4.0j
+
+
 def tips(t):
     return asked(t) + 4.0 * max(0.0, t - 2.0)
 
@@ -118,6 +122,7 @@ def test_a_vehicle_that_tips_further_than_its_control_asks_for_is_kept_off():
         (4.0, lambda t: (0.2, 0.0), lambda t: 0.8 * t, (1.0, 0.0), None),
         (2.3, slides, lambda t: 6.0 - 14.0 * max(0.0, t - 2.0), AT, lambda t: 6.0 - 14.0 * max(0.0, t - 1.75)),
         (2.3, slides, tips, AT, lambda t: 1.0 if math.sin(30.0 * t) > 0.0 else 5.0),
+        (2.1, slides, lambda t: 2.5 - 5.0 * max(0.0, t - 1.8), AT, turns),
         (2.3, lambda t: (tips(t) * max(0.0, t - 2.0), 0.6), tips, AT, asked),
         (2.3, lambda t: (3.0, 0.6), tips, AT, asked),
         (2.3, slides, lambda t: 2.0 * asked(t) - tips(t), AT, asked),
@@ -125,7 +130,7 @@ def test_a_vehicle_that_tips_further_than_its_control_asks_for_is_kept_off():
     ],
     ids=[
         *("speeds up", "brakes", "glides past its goal", "wind", "gust", "gust across the way", "comes nearer"),
-        *("lags", "between two", "speeds up as it tips", "fast", "rights itself", "never follows well"),
+        *("lags", "between two", "amid three", "speeds up as it tips", "fast", "rights itself", "never follows well"),
     ],
 )
 def test_a_lean_that_something_else_explains_is_no_wall(seconds, velocity_m_s, tilt_m_s2, goal_m, asked_m_s2):
