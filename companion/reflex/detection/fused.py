@@ -34,7 +34,7 @@ from companion.messages import (
 )
 from companion.motion.config import CURRENT_US, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
-from companion.motion.vector import ZERO, limited, minus, plus, unit
+from companion.motion.vector import ZERO, along, limited, minus, plus, towards, unit
 from companion.reflex import config as reflex
 from companion.reflex.config import FusedConfig
 from companion.reflex.detection.classify import classified, hovers
@@ -83,9 +83,9 @@ class FusedState(DetectorState):
     """Of the sample before the last."""
     before_threshold_m_s2: float = 0.0
     """Before the last sample was learnt: it may be a hit's first."""
-    force_ratio: float = 0.0
-    """Of the newest sample's force to its limit."""
-    before_ratio: float = 0.0
+    force: tuple[float, Vector3] = (0.0, ZERO)
+    """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
+    before: tuple[float, Vector3] = (0.0, ZERO)
     """Of the sample before the last."""
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
@@ -120,7 +120,16 @@ class FusedState(DetectorState):
     @property
     def weak_force(self) -> float:
         """The larger force of the last two samples, in limits."""
-        return max(self.force_ratio, self.before_ratio)
+        return max(self.force, self.before)[0]
+
+    def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
+        """The direction of a velocity jump and the weak force before it, body FRD: each is as clear as it is large
+        beside its limit. None for opposite ones: a bias of the accelerometer is a force, and makes a jump the other
+        way.
+        """
+        weak, felt = max(self.force, self.before)
+        felt, steps = unit(self.external_frd_m_s2(felt)), unit(step_frd_m_s)
+        return unit(plus(plus(ZERO, ratio, steps), weak, felt)) if along(felt, steps) >= 0.0 else None
 
     def external_frd_m_s2(self, force_frd_m_s2: Vector3) -> Vector3:
         """What of a sample's force free flight does not explain."""
@@ -184,7 +193,7 @@ class FusedDetector:
         s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
         s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
         ratio = max(side / s.side.limit, beyond / s.vertical.limit)
-        s.before_ratio, s.force_ratio = s.force_ratio, ratio
+        s.before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -306,8 +315,10 @@ class FusedDetector:
         size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
-        weak = 0.0 if s.may_be_hand(time_us) else s.weak_force
-        is_jump = math.hypot(size / s.velocity.limit, weak) > 1.0
+        ratio, weak = size / s.velocity.limit, 0.0 if s.may_be_hand(time_us) else s.weak_force
+        is_weak = ratio <= 1.0 < math.hypot(ratio, weak)
+        both = s.both(ratio, ned_to_body(strapdown.valid_wxyz, step)) if is_weak else None
+        is_jump = ratio > 1.0 or both is not None
         if s.phase is not Phase.ARMED or not is_jump:
             # What is told as a hit is no noise.
             if is_jump or motion.validity.is_valid:
@@ -317,13 +328,7 @@ class FusedDetector:
         now_us = max(time_us, s.last_sample_boot_us)
         free_until_us = strapdown.fixes[-2].time_boot_us - LONGEST_DELAY_US
         over_s = max(now_us - free_until_us, 1) * 1e-6
-        push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
-        force, is_shown_twice = ned_to_body(strapdown.valid_wxyz, push), size <= s.velocity.limit
-        if is_shown_twice:
-            # Its direction is that of both, each as clear as it is large beside its limit.
-            felt = s.last_frd_m_s2 if s.force_ratio >= s.before_ratio else s.before_frd_m_s2
-            both = plus(plus(ZERO, size / s.velocity.limit, unit(force)), weak, unit(s.external_frd_m_s2(felt)))
-            force = plus(ZERO, size / over_s, unit(both))
+        force = plus(ZERO, size / over_s, both or unit(ned_to_body(strapdown.valid_wxyz, step)))
         s.velocity_ned_m_s = minus(v, step)
         impact = Impact(
             now_us,
@@ -331,6 +336,6 @@ class FusedDetector:
             force,
             evidence=Evidence.VELOCITY_JUMP,
             confidence=min(1.0, 0.5 * size / least),
-            is_shown_twice=is_shown_twice,
+            is_shown_twice=both is not None,
         )
         return self._fire(s, situation, motion, impact)

@@ -14,7 +14,10 @@ direction.
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from companion.messages import AttitudeTarget, LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
@@ -27,6 +30,10 @@ from companion.reflex.detection.detector import Impact, ImpactKind
 from companion.reflex.detection.free_flight import ThrustGain
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.surface import Normal, away_from
+
+# The nearest of so many directions shows a distance to 2 %.
+_RAD = np.arange(16) * (math.tau / 16)
+_WAYS = np.array([np.cos(_RAD), np.sin(_RAD)])
 
 
 @dataclass(slots=True)
@@ -48,7 +55,7 @@ class SustainedForceMonitor:
     """Horizontal specific force across the thrust when the vehicle hovered last: the wind's."""
     pushed_since_us: int = 0
     """Time since which half of a sustained force has been missing."""
-    setpoints: deque[tuple[int, Vector3]] = field(default_factory=deque)
+    setpoints: deque[tuple[int, tuple[float, float]]] = field(default_factory=deque)
     """Lean that the vehicle's attitude control was set to, with its time."""
     error_variance: float = 0.0
     """Mean square of the lean's error, beyond them."""
@@ -137,31 +144,29 @@ class SustainedForceMonitor:
         return plus(ZERO, force_m_s2, pushes)
 
     def _tipped(self, strapdown: Strapdown, now_us: int) -> Vector3 | None:
-        """The thrust per mass that is held where an external torque leans the vehicle to: along it beyond all setpoints
-        of the last FOLLOWS_US. None for none. What is missing there is no wind, which does not turn it.
+        """The thrust per mass that is held where an external torque leans the vehicle to: beyond all setpoints of the
+        last FOLLOWS_US. None for none. What is missing there is no wind, which does not turn it.
         """
         setpoints, fixes, since_us = self.setpoints, strapdown.fixes, now_us - self.error_us
-        missing, half_m_s2 = flat(self.missing_m_s2), 0.5 * reflex.HELD_M_S2
-        force_m_s2, pushes = math.hypot(*missing), unit(missing)
+        (n, e, _), half_m_s2 = self.missing_m_s2, 0.5 * reflex.HELD_M_S2
         # Where no force is missing, it is only learnt how well the vehicle follows.
-        if since_us < reflex.FOLLOWS_US and force_m_s2 < half_m_s2:
+        if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < half_m_s2:
             return None
         if not setpoints or not reflex.FOLLOWS_US <= now_us - setpoints[0][0] < len(setpoints) * reflex.LONGEST_STEP_US:
             return None
         # After a silence or a reset the two do not compare.
         if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:
             return None
-        lean, asked = along(_lean(strapdown.attitude_wxyz), pushes), [along(each, pushes) for _, each in setpoints]
-        beyond = lean - max(asked)
-        error = max(0.0, beyond, min(asked) - lean)
+        beyond, leant = _beyond(_lean(strapdown.attitude_wxyz), [each for _, each in setpoints])
         limit = max(reflex.LEAN_ERROR, reflex.LEAN_ERROR_GATE * math.sqrt(self.error_variance))
         elapsed_s, self.error_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
         known_s = self.error_known_s = min(self.error_known_s + elapsed_s, reflex.LEAN_ERROR_MEMORY_S)
-        self.error_variance += elapsed_s / known_s * (min(error, limit) ** 2 - self.error_variance)
+        self.error_variance += elapsed_s / known_s * (min(beyond, limit) ** 2 - self.error_variance)
         if beyond <= limit or known_s < reflex.LEARNT_S:
             return None
-        is_free = along(self.velocity_m_s, pushes) > reflex.FREE_M_S
-        return None if is_free or force_m_s2 < half_m_s2 else missing
+        force_m_s2 = along(self.missing_m_s2, leant)
+        is_free = along(self.velocity_m_s, leant) > reflex.FREE_M_S
+        return None if is_free or force_m_s2 < half_m_s2 else plus(ZERO, force_m_s2, leant)
 
     def _smooth(self, sample: LocalPosition, strapdown: Strapdown) -> float:
         """Low-pass velocity and thrust; missing: the thrust less the velocity's change. Returns the time step in s."""
@@ -181,10 +186,17 @@ class SustainedForceMonitor:
         return elapsed_s
 
 
-def _lean(attitude_wxyz: Quaternion) -> Vector3:
-    """The unit vector along the thrust, its horizontal part, local NED."""
+def _lean(attitude_wxyz: Quaternion) -> tuple[float, float]:
+    """North and east of the unit vector along the thrust."""
     w, x, y, z = attitude_wxyz
-    return (-2.0 * (x * z + w * y), 2.0 * (w * x - y * z), 0.0)
+    return -2.0 * (x * z + w * y), 2.0 * (w * x - y * z)
+
+
+def _beyond(lean: tuple[float, float], setpoints: Sequence[tuple[float, float]]) -> tuple[float, Vector3]:
+    """How far north and east a lean is beyond all setpoints, 0 amid them, and the way."""
+    off = ((np.array(lean) - np.array(setpoints)) @ _WAYS).min(axis=0)
+    way = int(off.argmax())
+    return max(0.0, float(off[way])), (float(_WAYS[0, way]), float(_WAYS[1, way]), 0.0)
 
 
 def _is_free(along_m_s: float, across_m_s: float) -> bool:
