@@ -31,9 +31,9 @@ from companion.reflex.detection.free_flight import ThrustGain
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.surface import Normal, away_from
 
-# The nearest of so many directions shows a distance to 2 %.
-_RAD = np.arange(16) * (math.tau / 16)
-_WAYS = np.array([np.cos(_RAD), np.sin(_RAD)])
+_UP_FRD = (0.0, 0.0, -1.0)
+_RAD = np.arange(reflex.LEAN_WAYS) * (math.tau / reflex.LEAN_WAYS)
+_WAYS = np.array([np.cos(_RAD), np.sin(_RAD), np.zeros_like(_RAD)])
 
 
 @dataclass(slots=True)
@@ -55,8 +55,8 @@ class SustainedForceMonitor:
     """Horizontal specific force across the thrust when the vehicle hovered last: the wind's."""
     pushed_since_us: int = 0
     """Time since which half of a sustained force has been missing."""
-    setpoints: deque[tuple[int, tuple[float, float]]] = field(default_factory=deque)
-    """Lean that the vehicle's attitude control was set to, with its time."""
+    setpoints: deque[tuple[int, Vector3]] = field(default_factory=deque)
+    """Direction of the thrust that the vehicle's attitude control was set to, with its time."""
     error_variance: float = 0.0
     """Mean square of the lean's error, beyond them."""
     error_known_s: float = 0.0
@@ -72,7 +72,7 @@ class SustainedForceMonitor:
         self.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         kept, time_us = self.setpoints, sample.time_boot_us
         if sample.attitude_wxyz is not None and not (kept and time_us <= kept[-1][0]):
-            kept.append((time_us, _lean(sample.attitude_wxyz)))
+            kept.append((time_us, body_to_ned(sample.attitude_wxyz, _UP_FRD)))
             while len(kept) > 1 and kept[1][0] < time_us - reflex.FOLLOWS_US:
                 kept.popleft()
 
@@ -157,7 +157,7 @@ class SustainedForceMonitor:
         # After a silence or a reset the two do not compare.
         if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:
             return None
-        beyond, leant = _beyond(_lean(strapdown.attitude_wxyz), [each for _, each in setpoints])
+        beyond, leant = _beyond(body_to_ned(strapdown.attitude_wxyz, _UP_FRD), [each for _, each in setpoints])
         limit = max(reflex.LEAN_ERROR, reflex.LEAN_ERROR_GATE * math.sqrt(self.error_variance))
         elapsed_s, self.error_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
         known_s = self.error_known_s = min(self.error_known_s + elapsed_s, reflex.LEAN_ERROR_MEMORY_S)
@@ -186,17 +186,12 @@ class SustainedForceMonitor:
         return elapsed_s
 
 
-def _lean(attitude_wxyz: Quaternion) -> tuple[float, float]:
-    """North and east of the unit vector along the thrust."""
-    w, x, y, z = attitude_wxyz
-    return -2.0 * (x * z + w * y), 2.0 * (w * x - y * z)
-
-
-def _beyond(lean: tuple[float, float], setpoints: Sequence[tuple[float, float]]) -> tuple[float, Vector3]:
-    """How far north and east a lean is beyond all setpoints, 0 amid them, and the way."""
-    off = ((np.array(lean) - np.array(setpoints)) @ _WAYS).min(axis=0)
+def _beyond(up: Vector3, setpoints: Sequence[Vector3]) -> tuple[float, Vector3]:
+    """How far north and east the thrust's direction is beyond all setpoints, 0 amid them, and the way."""
+    off = ((np.array(up) - np.array(setpoints)) @ _WAYS).min(axis=0)
     way = int(off.argmax())
-    return max(0.0, float(off[way])), (float(_WAYS[0, way]), float(_WAYS[1, way]), 0.0)
+    n, e, _ = _WAYS[:, way].tolist()
+    return max(0.0, float(off[way])), (n, e, 0.0)
 
 
 def _is_free(along_m_s: float, across_m_s: float) -> bool:
