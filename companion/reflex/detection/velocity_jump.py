@@ -27,8 +27,6 @@ class VelocityJump:
     delay: Delay = field(default_factory=Delay)
     variance_m2_s2: float = 0.0
     known: int = 0
-    pending: Vector3 | None = None
-    """The last step, which is learnt with the next one: it may be a hit's first."""
     newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
     """The newest step without correction for the delay, and the change of the acceleration."""
 
@@ -63,10 +61,7 @@ class VelocityJump:
         `free_flight`).
         """
         self.delay.learn(*self.newest)
-        last, self.pending = self.pending, step
-        if last is None:
-            return
-        square = along(last, last) / 3.0
+        square = along(step, step) / 3.0
         self.known = min(self.known + 1, reflex.MEMORY)
         change = square - self.variance_m2_s2
         self.variance_m2_s2 += change / (min(self.known, reflex.RISE) if change > 0.0 else self.known)
