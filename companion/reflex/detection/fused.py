@@ -214,7 +214,9 @@ class FusedDetector:
         if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
             self._learn(s, f, before_us)  # a shaking that stays
         free_until_us = min(now_us - self._averaging_us, free_until_us)
-        impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio))
+        # Noise hardly brings the sample before so near to its limit, too.
+        is_twice = s.before[0] > 1.0 / reflex.CLEAR
+        impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio), is_shown_twice=is_twice)
         if s.phase is Phase.OFF:
             s.observed = None
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.

@@ -275,6 +275,12 @@ def test_a_hits_first_sample_does_not_raise_what_it_must_reach_with_its_second()
     assert [i.sample_time_boot_us for i in graze.fly()] == [3_040_000]
 
 
+@pytest.mark.parametrize(("before_m_s2", "is_shown_twice"), [(1.0, False), (1.7, True)])
+def test_a_sample_that_almost_was_a_hit_shows_the_next_one_too(before_m_s2, is_shown_twice):
+    hit = Flight(lambda t: (0.0, {750: before_m_s2, 751: 20.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=0.02)
+    assert [i.is_shown_twice for i in hit.fly()] == [is_shown_twice]
+
+
 def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
     def grip(t):
         return (6.0 * min(1.0, (t - HIT_US) / 150_000), 0.0, 0.0) if HIT_US < t < HIT_US + 400_000 else (0.0, 0.0, 0.0)
