@@ -85,8 +85,8 @@ class FusedState(DetectorState):
     """Before the last sample was learnt: it may be a hit's first."""
     force: tuple[float, Vector3] = (0.0, ZERO)
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
-    before: tuple[float, Vector3] = (0.0, ZERO)
-    """Of the sample before the last."""
+    force_before: tuple[float, Vector3] = (0.0, ZERO)
+    """The one before."""
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
@@ -120,14 +120,14 @@ class FusedState(DetectorState):
     @property
     def weak_force(self) -> float:
         """The larger force of the last two samples, in limits."""
-        return max(self.force, self.before)[0]
+        return max(self.force, self.force_before)[0]
 
     def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
         """The direction of a velocity jump and the weak force before it, body FRD: each is as clear as it is large
         beside its limit. None for opposite ones: a bias of the accelerometer is a force, and makes a jump the other
         way.
         """
-        weak, felt = max(self.force, self.before)
+        weak, felt = max(self.force, self.force_before)
         felt, steps = unit(self.external_frd_m_s2(felt)), unit(step_frd_m_s)
         return unit(plus(plus(ZERO, ratio, steps), weak, felt)) if along(felt, steps) >= 0.0 else None
 
@@ -193,7 +193,7 @@ class FusedDetector:
         s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
         s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
         ratio = max(side / s.side.limit, beyond / s.vertical.limit)
-        s.before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
+        s.force_before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -215,7 +215,7 @@ class FusedDetector:
             self._learn(s, f, before_us)  # a shaking that stays
         free_until_us = min(now_us - self._averaging_us, free_until_us)
         # Noise hardly brings the sample before so near to its limit, too.
-        is_twice = s.before[0] > 1.0 / reflex.CLEAR
+        is_twice = s.force_before[0] > 1.0 / reflex.CLEAR
         impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio), is_shown_twice=is_twice)
         if s.phase is Phase.OFF:
             s.observed = None
