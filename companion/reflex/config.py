@@ -119,8 +119,6 @@ HELD_M_S2 = 2.0
 # beyond what lies between them, is by an external torque. Of real PX4s in free flight it is a sine of 0.05 at most
 # (bench/notes/decisions.md).
 FOLLOWS_US, LEAN_ERROR = 300_000, 0.07
-# The nearest of so many directions shows a distance to 2 %.
-LEAN_WAYS = 16
 # Other vehicles follow worse. So many of their own standard deviations count, five as PX4's gates, over a time that is
 # long beside a touch's.
 LEAN_ERROR_GATE, LEAN_ERROR_MEMORY_S = 5.0, 10.0

@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
+import shapely
 
 from companion.messages import AttitudeTarget, LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
@@ -32,8 +32,6 @@ from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.surface import Normal, away_from
 
 _UP_FRD = (0.0, 0.0, -1.0)
-_RAD = np.arange(reflex.LEAN_WAYS) * (math.tau / reflex.LEAN_WAYS)
-_WAYS = np.array([np.cos(_RAD), np.sin(_RAD), np.zeros_like(_RAD)])
 
 
 @dataclass(slots=True)
@@ -157,7 +155,8 @@ class SustainedForceMonitor:
         # After a silence or a reset the two do not compare.
         if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:
             return None
-        beyond, leant = _beyond(body_to_ned(strapdown.attitude_wxyz, _UP_FRD), [each for _, each in setpoints])
+        error = _beyond(body_to_ned(strapdown.attitude_wxyz, _UP_FRD), [each for _, each in setpoints])
+        beyond, leant = math.hypot(*error), unit(error)
         limit = max(reflex.LEAN_ERROR, reflex.LEAN_ERROR_GATE * math.sqrt(self.error_variance))
         elapsed_s, self.error_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
         known_s = self.error_known_s = min(self.error_known_s + elapsed_s, reflex.LEAN_ERROR_MEMORY_S)
@@ -186,12 +185,11 @@ class SustainedForceMonitor:
         return elapsed_s
 
 
-def _beyond(up: Vector3, setpoints: Sequence[Vector3]) -> tuple[float, Vector3]:
-    """How far north and east the thrust's direction is beyond all setpoints, 0 amid them, and the way."""
-    off = ((np.array(up) - np.array(setpoints)) @ _WAYS).min(axis=0)
-    way = int(off.argmax())
-    n, e, _ = _WAYS[:, way].tolist()
-    return max(0.0, float(off[way])), (n, e, 0.0)
+def _beyond(up: Vector3, setpoints: Sequence[Vector3]) -> Vector3:
+    """From what lies between the setpoints to the thrust's direction, north and east; zero for one amid them."""
+    amid = shapely.convex_hull(shapely.multipoints(setpoints))
+    (a, b), (n, e) = shapely.get_coordinates(shapely.shortest_line(amid, shapely.points(up))).tolist()
+    return (n - a, e - b, 0.0)
 
 
 def _is_free(along_m_s: float, across_m_s: float) -> bool:
