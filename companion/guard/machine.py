@@ -7,7 +7,7 @@ from typing import TypeAlias
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs, Transition
 from companion.flight.handlers.crash import Crashed, crashed
-from companion.flight.handlers.ending import LINK_RESTORED, Released, silent_link, silent_position, who_decided
+from companion.flight.handlers.ending import LINK_RESTORED, Released, silent_link, silent_position, taken_by
 from companion.flight.handlers.recovering import record_collision
 from companion.flight.machine import StateMachine
 from companion.flight.states import State as FlightState
@@ -35,9 +35,6 @@ _KINDS = {
     Trigger.REFUSED: "ended",
 }
 STICKS = "the pilot moved the sticks"
-# Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD and takes it again by itself 0.09 s
-# after the next one. Its mode is reported every 0.1 s. A failsafe that lasts for twice all that is for another reason.
-RETURNS_US = 400_000
 # After these the vehicle is given back to hold whatever is configured.
 _TO_HOLD = (Trigger.STOPPED, Trigger.NOT_CONFIRMED, Trigger.POSITION_SILENT, Trigger.CROSSED)
 
@@ -155,17 +152,9 @@ class GuardMachine(StateMachine):
         requested = guard.command_client.requested_mode
         if isinstance(self.handler, GiveBack):
             requested = self.handler.wish
-        holder = who_decided(guard, requested)
-        report = guard.vehicle.mode
-        if holder is None or report is None:
-            guard.foreign_mode_since_us = None
+        holder = taken_by(guard, requested)
+        if holder is None:
             return None
-        is_late = offboard in (guard.expected_mode, requested) and report.intended_custom_mode in (None, offboard)
-        if holder == "failsafe" and is_late:
-            if guard.foreign_mode_since_us is None:
-                guard.foreign_mode_since_us = guard.trajectory_us
-            if guard.trajectory_us - guard.foreign_mode_since_us < RETURNS_US:
-                return None
         who = "a failsafe of the vehicle" if holder == "failsafe" else "the pilot or a program"
         return f"{who} took over in {guard.vehicle.mode_name}"
 

@@ -56,8 +56,9 @@ class Strapdown:
     has_new_fix: bool = False
     """Whether the newest velocity is one of them; while ODOMETRY comes, only its velocities are."""
     _odometry: Odometry | None = None
-    _has_gap: bool = False
-    """Whether rates are missing since an attitude was certainly right: nothing is better than the reported one."""
+    _lacks_rates: bool = False
+    """Whether rates were missing or wrong since an attitude was certainly right: nothing is better than the reported
+    one."""
 
     def attitude(self, time_us: int, attitude_wxyz: Quaternion, most_wrong_rad: float = 0.0) -> None:
         """Take one reported attitude, whose tilt may be wrong by so much; one that is further off has its reason."""
@@ -65,10 +66,10 @@ class Strapdown:
         if abs(behind_us) < LONGEST_GAP_US:
             attitude_wxyz = turned(attitude_wxyz, self.rates_frd_rad_s, 1e-6 * behind_us)
         n, e, d = body_to_ned(self.valid_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
-        if not most_wrong_rad or self._has_gap or -d < math.cos(most_wrong_rad):
+        if not most_wrong_rad or self._lacks_rates or -d < math.cos(most_wrong_rad):
             self.valid_wxyz, self.level_acceleration_m_s2 = attitude_wxyz, ZERO
             self.heading_error_rad = self.sinks_m_s2 = 0.0
-            self._has_gap &= most_wrong_rad > 0.0
+            self._lacks_rates = most_wrong_rad > 0.0
         else:
             self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
             self.heading_error_rad = math.remainder(yaw_rad(attitude_wxyz) - yaw_rad(self.valid_wxyz), math.tau)
@@ -83,7 +84,7 @@ class Strapdown:
             p, q, r = self.rates_frd_rad_s
             self.valid_wxyz = turned(self.valid_wxyz, (p + w[0], q + w[1], r + w[2]), half_s)
         else:
-            self.valid_wxyz, self._has_gap = self.attitude_wxyz, True
+            self.valid_wxyz, self._lacks_rates = self.attitude_wxyz, True
             self.fixes.clear()
         a_n, a_e, a_d = body_to_ned(self.valid_wxyz, f)
         a_d += GRAVITY_M_S2

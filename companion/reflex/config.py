@@ -58,9 +58,8 @@ MEMORY, RISE = 100, 10
 SHAKEN_S, STAMP_S = 0.15, 0.008
 
 # --- rate jumps
-# Two steps of the rates are compared where neither lasts longer than the other by this factor: beside a lost sample it
-# is two, and a step back may be what is lost.
-EVEN = 1.5
+# A jump is one from the mean of the rate over this time: as long as the shortest contact of spring arms.
+RATE_MEMORY_US = 20_000
 
 # --- the kind of an impact
 # Sine of 45 degrees: a force nearer to the vertical is that of a ceiling or a floor.
@@ -262,9 +261,9 @@ class FusedConfig(StrictModel):
     """Least velocity jump that is a hit. A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
     clipping leaves the estimate 0.16."""
-    rate_step_rad_s: Positive = 2.0
-    """Least rate jump that is a hit: more than motors make in 20 ms. A push at 0.15 m from the centre that turns the
-    vehicle by 2 rad/s changes its velocity by 0.06 m/s, half of `velocity_step_m_s`."""
+    rate_step_rad_s: Positive = 0.6
+    """Least jump of the yaw rate that is a hit: twice what motors make in 20 ms. ArduPilot has them turn a vehicle with
+    12.6 rad/s^2 at most (ATC_ACCEL_Y_MAX); in public logs they made 17."""
     rearm_quiet_s: Positive = 0.04
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5

@@ -54,13 +54,8 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
     vehicle = flight.vehicle
     if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
-    holder, mode = None, vehicle.mode
-    if mode is not None and mode.custom_mode != flight.expected_mode:
-        holder = who_decided(flight, flight.command_client.requested_mode)
-    if holder is None:
-        flight.foreign_mode_since_us = None
-        return None
-    if state is State.LANDING and _may_be_down(flight, now_us):
+    holder = taken_by(flight, flight.command_client.requested_mode)
+    if holder is None or (state is State.LANDING and _may_be_down(flight, now_us)):
         return None
     who = "a failsafe of the vehicle" if holder == "failsafe" else "the pilot"
     return Transition(Trigger.CONTROL_LOST, f"{who} took over in {vehicle.mode_name}; setpoints stopped")
@@ -157,6 +152,27 @@ def who_decided(flight: FlightContext, requested_mode: int | None) -> Literal["f
     intended_mode = report.intended_custom_mode
     still_intended = intended_mode is not None and intended_mode in (expected_mode, requested_mode)
     return "failsafe" if report.failsafe or still_intended else "pilot"
+
+
+# Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD and takes it again by itself 0.09 s
+# after the next one. Its mode is reported every 0.1 s. A failsafe that lasts for twice all that is for another reason.
+RETURNS_US = 400_000
+
+
+def taken_by(flight: FlightContext, requested_mode: int | None) -> Literal["failsafe", "pilot"] | None:
+    """Who has taken the vehicle (see `who_decided`): not a failsafe for want of setpoints that may end by itself."""
+    holder, report = who_decided(flight, requested_mode), flight.vehicle.mode
+    if holder is None or report is None:
+        flight.foreign_mode_since_us = None
+        return None
+    offboard = flight.vehicle.autopilot.setpoints
+    is_late = offboard in (flight.expected_mode, requested_mode) and report.intended_custom_mode in (None, offboard)
+    if holder == "failsafe" and is_late:
+        if flight.foreign_mode_since_us is None:
+            flight.foreign_mode_since_us = flight.trajectory_us
+        if flight.trajectory_us - flight.foreign_mode_since_us < RETURNS_US:
+            return None
+    return holder
 
 
 # As long as two modes take that are refused: a hand-over that does not end keeps nobody in OFFBOARD.

@@ -6,7 +6,7 @@ contact, each compared with this vehicle's own flight:
 * horizontal: f_x, f_y differ from their running mean and from zero, with an allowance for drag on a turning vehicle;
 * vertical: f_z is outside the range of the propellers, from zero to their maximum (see `free_flight`). A failed motor,
   free fall, a dropped payload and every manoeuvre stay inside;
-* the body rates jump, and stay (see `rate_jump`);
+* the yaw rate jumps, and stays (see `rate_jump`);
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
 
 Both jumps follow a contact of which the samples hold a part at most: a force below its limit adds to them, by squares.
@@ -87,6 +87,8 @@ class FusedState(DetectorState):
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)
     """The one before."""
+    weak_force: float = 0.0
+    """The larger of the two, in limits."""
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
@@ -116,11 +118,6 @@ class FusedState(DetectorState):
         (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
         x, y = f_x + g_x, f_y + g_y
         return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
-
-    @property
-    def weak_force(self) -> float:
-        """The larger force of the last two samples, in limits."""
-        return max(self.force, self.force_before)[0]
 
     def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
         """The direction of a velocity jump and the weak force before it, body FRD: each is as clear as it is large
@@ -185,7 +182,7 @@ class FusedDetector:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
-        s.turn.imu(before_us, now_us, w, config)
+        s.turn.imu(before_us, now_us, w[2], config)
         side, thresholds, is_of_two = s.side_force(config, f)
         if is_of_two:
             free_until_us = earlier_us
@@ -194,6 +191,7 @@ class FusedDetector:
         s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
         ratio = max(side / s.side.limit, beyond / s.vertical.limit)
         s.force_before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
+        weak = s.weak_force = ratio if ratio > s.force_before[0] else s.force_before[0]
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -205,8 +203,8 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            does_turn = s.turn.value > 0.0 and math.hypot(s.turn.value / s.turn.limit, s.weak_force) > 1.0
-            return self._turned(s, earlier_us, situation, motion) if does_turn else None
+            turn = s.turn.value / s.turn.limit
+            return self._turned(s, earlier_us, situation, motion) if turn * turn + weak * weak > 1.0 else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         force = s.external_frd_m_s2(f)
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
@@ -228,12 +226,12 @@ class FusedDetector:
         now_us = s.last_sample_boot_us
         before = motion.history.before(free_until_us + 1) if motion.validity.is_known else None
         is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
-        if s.phase is not Phase.ARMED or is_again or before is None:
-            return None
-        if math.hypot(*before.velocity_ned_m_s) < reflex.APPROACH_M_S:
+        flew = before is not None and math.hypot(*before.velocity_ned_m_s) >= reflex.APPROACH_M_S
+        if s.phase is not Phase.ARMED or is_again or before is None or not flew:
+            s.turn.value = 0.0  # of a velocity that jumps then, it is no sign either
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
-        force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.value / s.turn.limit)
+        force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.ratio)
         evidence = Evidence.RATE_JUMP
         impact = Impact(now_us, free_until_us, force, evidence=evidence, confidence=confidence, is_shown_twice=True)
         return self._fire(s, situation, motion, impact)
@@ -317,10 +315,10 @@ class FusedDetector:
         size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
-        ratio, weak = size / s.velocity.limit, 0.0 if s.may_be_hand(time_us) else s.weak_force
-        is_weak = ratio <= 1.0 < math.hypot(ratio, weak)
+        ratio = s.velocity.ratio
+        is_weak = ratio <= 1.0 < math.hypot(ratio, s.turn.ratio, s.weak_force) and not s.may_be_hand(time_us)
         both = s.both(ratio, ned_to_body(strapdown.valid_wxyz, step)) if is_weak else None
-        is_jump = ratio > 1.0 or both is not None
+        is_jump = ratio > 1.0 or both is not None or (is_weak and math.hypot(ratio, s.turn.ratio) > 1.0)
         if s.phase is not Phase.ARMED or not is_jump:
             # What is told as a hit is no noise.
             if is_jump or motion.validity.is_valid:
@@ -338,6 +336,6 @@ class FusedDetector:
             force,
             evidence=Evidence.VELOCITY_JUMP,
             confidence=min(1.0, 0.5 * size / least),
-            is_shown_twice=both is not None,
+            is_shown_twice=is_weak,
         )
         return self._fire(s, situation, motion, impact)

@@ -1,55 +1,41 @@
-"""A rate jump: body rates that change from one sample to the next, and stay changed.
+"""A rate jump: a yaw rate that changes sooner than motors can change it, and stays changed.
 
-A contact beside the centre turns the vehicle at once. Failed motors and commands turn it on and on: the next step is as
-large. A broken sample, and vibration, turn back with the next step.
+A contact beside the centre turns the vehicle about its thrust. Motors do so by their drag alone, which is weak. One
+broken sample is no median of three.
 """
 
 import math
 from dataclasses import dataclass
 
-from companion.messages import Vector3
-from companion.motion.config import MOTORS_RAD_S2
-from companion.motion.vector import ZERO
-from companion.reflex.config import EVEN, SPREAD_MEMORY_S, FusedConfig
+from companion.reflex.config import EXCESS, RATE_MEMORY_US, SPREAD_MEMORY_S, FusedConfig
 from companion.reflex.detection.detector import Innovation
 
-_MEMORY_US, _BY_MOTORS_RAD_S_US = 1e6 * SPREAD_MEMORY_S, 1e-6 * MOTORS_RAD_S2
+_MEMORY_US = 1e6 * SPREAD_MEMORY_S
 
 
 @dataclass(slots=True)
 class RateJump(Innovation):
-    """Of the step before the newest one, rad/s, and from when on it is a hit. Changed only by `imu`.
+    """Of the yaw rate, the median of the last three samples, beside its mean before, rad/s. Changed only by `imu`.
 
-    Rates: body FRD; times: vehicle's boot clock.
+    Times: vehicle's boot clock.
     """
 
-    rates_frd_rad_s: Vector3 = ZERO
-    step_frd_rad_s: Vector3 = ZERO
+    last_rad_s: tuple[float, float] = (0.0, 0.0)
     over_us: int = 0
-    shared_rad2_s2: float = 0.0
-    """Size of the product of that step and the one before it."""
+    mean_rad_s: float = 0.0
     variance_rad2_s2: float = 0.0
 
-    def imu(self, before_us: int, time_us: int, rates_frd_rad_s: Vector3, config: FusedConfig) -> None:
-        """Take one sample; the one before it was at `before_us`.
-
-        What a step has beyond the parts of it that its neighbours have, either way, is neither a turn that goes on nor
-        one that goes back. Steps over different times, beside a lost sample, cannot tell.
-        """
-        p, q, r = self.rates_frd_rad_s
-        a, b, c = self.step_frd_rad_s
-        was_us, was_shared, elapsed_us = self.over_us, self.shared_rad2_s2, time_us - before_us
-        self.rates_frd_rad_s, self.over_us = rates_frd_rad_s, elapsed_us
-        x, y, z = rates_frd_rad_s
-        self.step_frd_rad_s = x, y, z = x - p, y - q, z - r
-        self.shared_rad2_s2 = shared = abs(x * a + y * b + z * c)
-        size, self.value = math.hypot(a, b, c), 0.0
-        if size == 0.0 or elapsed_us >= EVEN * was_us or was_us >= EVEN * elapsed_us:
-            return
-        value = size - (shared if shared > was_shared else was_shared) / size
-        if value > 0.0:
-            self.value = value
-        spreads_rad_s = config.noise_factor * math.sqrt(self.variance_rad2_s2)
-        self.limit = limit = max(config.rate_step_rad_s, _BY_MOTORS_RAD_S_US * was_us, spreads_rad_s)
-        learnt, share = size if size < limit else limit, elapsed_us / (_MEMORY_US + elapsed_us)
-        self.variance_rad2_s2 += share * (learnt * learnt - self.variance_rad2_s2)
+    def imu(self, before_us: int, time_us: int, yaw_rate_rad_s: float, config: FusedConfig) -> None:
+        """Take one sample; the one before it was at `before_us`."""
+        (a, b), c, was_us = self.last_rad_s, yaw_rate_rad_s, self.over_us
+        self.last_rad_s, self.over_us = (b, c), time_us - before_us
+        median = b if (b - a) * (c - b) >= 0.0 else a if (a - b) * (c - a) >= 0.0 else c
+        jump, share, least = median - self.mean_rad_s, was_us / RATE_MEMORY_US, config.rate_step_rad_s
+        if share >= 1.0:
+            self.mean_rad_s, least = median, least * share
+        else:
+            self.mean_rad_s += share * jump
+        spreads_rad_s = EXCESS * config.noise_factor * math.sqrt(self.variance_rad2_s2)
+        self.value, self.limit = size, limit = abs(jump), least if least > spreads_rad_s else spreads_rad_s
+        learnt = size if size < limit else limit
+        self.variance_rad2_s2 += was_us / (_MEMORY_US + was_us) * (learnt * learnt - self.variance_rad2_s2)

@@ -98,7 +98,7 @@ class SustainedForceMonitor:
         now_us, attitude_wxyz, elapsed_s = sample.time_boot_us, strapdown.valid_wxyz, self._smooth(sample, strapdown)
         thrust = self._held(sample, goal_ned_m, elapsed_s)
         if thrust is None and may_tip:
-            thrust = self._tipped(strapdown, now_us)
+            thrust = self._tipped(strapdown)
         if thrust is None:
             return None
         force_m_s2, since_us, self.pushed_since_us = math.hypot(*thrust), self.pushed_since_us, now_us
@@ -141,16 +141,20 @@ class SustainedForceMonitor:
             return None
         return plus(ZERO, force_m_s2, pushes)
 
-    def _tipped(self, strapdown: Strapdown, now_us: int) -> Vector3 | None:
+    def _tipped(self, strapdown: Strapdown) -> Vector3 | None:
         """The thrust per mass that is held where an external torque leans the vehicle to: beyond all setpoints of the
         last FOLLOWS_US. None for none. What is missing there is no wind, which does not turn it.
         """
-        setpoints, fixes, since_us = self.setpoints, strapdown.fixes, now_us - self.error_us
+        setpoints, fixes, now_us = self.setpoints, strapdown.fixes, strapdown.time_boot_us
+        since_us = now_us - self.error_us
         (n, e, _), half_m_s2 = self.missing_m_s2, 0.5 * reflex.HELD_M_S2
         # Where no force is missing, it is only learnt how well the vehicle follows.
         if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < half_m_s2:
             return None
-        if not setpoints or not reflex.FOLLOWS_US <= now_us - setpoints[0][0] < len(setpoints) * reflex.LONGEST_STEP_US:
+        # Lost ones, and what comes of them before a stall, say nothing of the attitude now.
+        if not setpoints or now_us - setpoints[-1][0] >= reflex.LONGEST_STEP_US:
+            return None
+        if not reflex.FOLLOWS_US <= now_us - setpoints[0][0] < len(setpoints) * reflex.LONGEST_STEP_US:
             return None
         # After a silence or a reset the two do not compare.
         if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:

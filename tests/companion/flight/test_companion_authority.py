@@ -29,9 +29,10 @@ def is_disarmed(vehicle: FakeVehicle) -> None:
     ("takes", "seen_in", "within_s", "words"),
     [
         (lambda vehicle: vehicle.pilot_takes(POSCTL), "current_mode", 0.2, "the pilot took over in POSCTL"),
-        (lambda vehicle: vehicle.failsafe_takes(LOITER), "current_mode", 0.2, "a failsafe of the vehicle took over"),
+        # one for want of setpoints would end by itself within 0.4 s
+        (lambda vehicle: vehicle.failsafe_takes(LOITER), "current_mode", 0.6, "a failsafe of the vehicle took over"),
         # HEARTBEAT alone tells it once a second, and tells it twice before it counts
-        (lambda vehicle: vehicle.failsafe_takes(LOITER), "heartbeat", 2.1, "a failsafe of the vehicle took over"),
+        (lambda vehicle: vehicle.failsafe_takes(LOITER), "heartbeat", 2.5, "a failsafe of the vehicle took over"),
         (is_disarmed, "heartbeat", 2.1, "disarmed"),
     ],
     ids=["pilot", "failsafe", "failsafe in heartbeats", "disarmed"],
@@ -48,10 +49,12 @@ def test_whoever_takes_the_vehicle_ends_the_flight_and_is_named(state, takes, se
     assert_silent_from_now(f)
 
 
-def test_a_warning_status_while_still_in_offboard_is_not_a_loss_of_control():
+def test_a_warning_status_in_offboard_or_for_late_setpoints_after_which_px4_takes_it_again_is_no_loss_of_control():
     f = flying_in("mission")
     f.vehicle.failsafe = True
-    f.run_for(1.1)
+    for mode, lasts_s in ((OFFBOARD, 1.1), (LOITER, 0.3), (OFFBOARD, 0.5)):
+        f.vehicle.mode = mode
+        f.run_for(lasts_s)
     assert f.state in ("mission", "recovering")
 
 

@@ -121,11 +121,15 @@ def test_between_two_reports_the_gyroscope_turns_the_attitude():
         assert 2.0 * math.asin(sum(strapdown.valid_wxyz[1:])) == pytest.approx(0.1, abs=1e-4)
 
 
-@pytest.mark.parametrize(("silent_us", "roll_rad"), [(20_000, 0.0), (250_000, 0.3)])
-def test_across_a_gap_no_gyroscope_carries_the_attitude_until_the_vehicle_has_corrected_its_own(silent_us, roll_rad):
+@pytest.mark.parametrize(
+    ("silent_us", "told_rad", "roll_rad"), [(20_000, 0.0, 0.0), (250_000, 0.0, 0.3), (20_000, 0.6, 0.3)]
+)
+def test_after_a_gap_or_when_wrong_no_gyroscope_carries_the_attitude_until_the_vehicles_is_right(
+    silent_us, told_rad, roll_rad
+):
     strapdown, time_us, rolled = Strapdown(time_boot_us=4_000), 4_000 + silent_us, turned(LEVEL, (0.3, 0.0, 0.0), 1.0)
     strapdown.imu(time_us, (0.0, 0.0, -G), ZERO)
-    for told_wxyz in (LEVEL, rolled):
+    for told_wxyz in (turned(LEVEL, (told_rad, 0.0, 0.0), 1.0), rolled):
         strapdown.attitude(time_us, told_wxyz, 0.4)
     assert tilt_rad(strapdown.valid_wxyz) == pytest.approx(roll_rad)
     strapdown.attitude(time_us, rolled, 0.0)

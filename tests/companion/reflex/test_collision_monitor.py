@@ -242,14 +242,14 @@ def test_a_jump_beyond_what_is_left_of_a_hit_is_another(speed, later_s, left_m_s
 
 @pytest.mark.parametrize(("left_m_s", "hits"), [(math.inf, 1), (0.3, 2)])
 def test_a_turn_is_a_hit_where_it_is_known_whereto_the_vehicle_flies(left_m_s, hits):
-    rates = {"rates": lambda t: (3.0 if t >= 2_500_000 else 0.0, 0.0, 0.0)}
+    rates = {"rates": lambda t: (0.0, 0.0, 3.0 if t >= 2_500_000 else 0.0)}
     impacts, _, _ = after_a_hit(2.6, 120.0, 3, lambda since_s: 0.0, speed=2.0, left_m_s=left_m_s, **rates)
     assert len(impacts) == hits
 
 
 def test_a_turn_shows_no_direction_and_needs_no_other_evidence():
     watch = Watch().fly(
-        2_600_000, velocity=lambda t: (2.0, 0.0, 0.0), rates=lambda t: (3.0 if t >= 2_500_000 else 0.0, 0.0, 0.0)
+        2_600_000, velocity=lambda t: (2.0, 0.0, 0.0), rates=lambda t: (0.0, 0.0, 3.0 if t >= 2_500_000 else 0.0)
     )
     (hit,) = watch.impacts
     assert hit.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.1)

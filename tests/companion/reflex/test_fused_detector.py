@@ -147,57 +147,69 @@ def test_of_what_no_sample_showed_the_velocity_that_it_leaves_tells(change_m_s, 
     assert [impact.evidence for impact in impacts] == [Evidence.VELOCITY_JUMP] * hits
 
 
+@pytest.mark.parametrize(("jump_m_s", "hits"), [(0.2, 0), (0.3, 1)])
+def test_vibration_between_the_samples_hides_as_much_as_the_root_of_squares(jump_m_s, hits):
+    flight = Flight(
+        imu_every_us=20_000, noise=1.0, jump=(3_002_000, (-jump_m_s, 0.0, 0.0), 0), velocity=(1.0, 0.0, 0.0)
+    )
+    assert len(flight.fly(3_060_000)) == hits
+
+
 # --- rate jump ----------------------------------------------------------------------------------------------
 
 
-def at_once(p, q, r, until_us=4_000_000):
+def at_once(yaw_rate_rad_s, until_us=4_000_000):
     """Rates that a contact between the samples makes, and that stay, or go with one broken sample."""
-    return lambda t: (p, q, r) if HIT_US < t <= until_us else (0.0, 0.0, 0.0)
+    return lambda t: (0.0, 0.0, yaw_rate_rad_s if HIT_US < t <= until_us else 0.0)
 
 
 @pytest.mark.parametrize(
     ("rates", "scene", "hits"),
     [
-        (at_once(2.4, -2.0, 0.0), {}, 1),
-        (at_once(0.0, 0.0, 2.1), {}, 1),
-        (at_once(1.2, -1.2, 0.0), {}, 0),
-        (at_once(1.2, -1.2, 0.0), {"push": pulse((0.0, 2.2, 0.0), 3_016_500, 4_000)}, 1),
+        (at_once(0.7), {}, 1),
+        (at_once(-0.5), {}, 0),
+        (at_once(-0.5), {"push": pulse((0.0, 2.0, 0.0), 3_016_500, 4_000)}, 1),
         # It has stopped the vehicle by then
-        (at_once(2.4, -2.0, 0.0), {"is_filtered": True, "jump": (3_002_000, (0.0, 0.0, 0.7), 0)}, 1),
-        # A broken sample, a failed motor, vibration
-        (at_once(9.0, 0.0, 0.0, until_us=3_020_000), {}, 0),
-        (lambda t: (150e-6 * max(0, t - HIT_US), 0.0, 0.0), {}, 0),
-        (lambda t: (random.Random(t).gauss(0.0, 2.0), 0.0, 0.0), {}, 0),
-        # Beside a lost sample nothing shows whether a turn stays
-        (at_once(2.4, -2.0, 0.0), {"lost_us": (3_040_000,)}, 0),
-        # Motors turn the vehicle by as much in the longer time
-        (at_once(2.4, -2.0, 0.0), {"imu_every_us": 40_000}, 0),
+        (at_once(0.7), {"is_filtered": True, "jump": (3_002_000, (-0.7, 0.0, 0.0), 0)}, 1),
+        # A broken sample, motors that turn it as fast as they can, vibration
+        (at_once(9.0, until_us=3_020_000), {}, 0),
+        (lambda t: (0.0, 0.0, 25e-6 * max(0, t - HIT_US)), {}, 0),
+        (lambda t: (0.0, 0.0, random.Random(t).gauss(0.0, 2.0)), {}, 0),
+        # They turn the vehicle by as much in the longer time, and tilt it as soon as that
+        (at_once(1.1), {"imu_every_us": 40_000}, 0),
+        (lambda t: (3.0 * (t > HIT_US), 0.0, 0.0), {}, 0),
         # What turns a vehicle that flies nowhere may be a hand
-        (at_once(2.4, -2.0, 0.0), {"velocity": (0.0, 0.0, -0.4)}, 0),
-        # A person who flips it on the ground
-        (at_once(2.4, -2.0, 0.0), {"situation": lambda t: IN_FLIGHT._replace(off_reason="below 0.5 m")}, 0),
+        (at_once(0.7), {"velocity": (0.4, 0.0, 0.0)}, 0),
     ],
 )
-def test_a_beam_that_only_turns_a_climbing_vehicle_is_a_hit_once_the_turn_has_stayed(rates, scene, hits):
-    scene = {"imu_every_us": 20_000, "velocity": (0.0, 0.0, -1.0), "rates": rates} | scene
+def test_an_edge_that_only_turns_a_vehicle_is_a_hit_once_the_turn_has_stayed(rates, scene, hits):
+    scene = {"imu_every_us": 20_000, "velocity": (1.0, 0.0, 0.0), "rates": rates} | scene
     impacts = Flight(**scene).fly(until_us=3_100_000)
     found = [(impact.evidence, impact.kind, impact.sample_time_boot_us) for impact in impacts]
-    assert found == [(Evidence.RATE_JUMP, ImpactKind.CEILING, 3_040_000)] * hits
+    assert found == [(Evidence.RATE_JUMP, ImpactKind.WALL, 3_040_000)] * hits
     assert all(impact.contact_free_until_boot_us == 3_000_000 for impact in impacts)
 
 
-def test_what_turns_a_vehicle_more_and_more_does_not_hide_behind_its_own_first_steps():
-    # Given a graze that turns it about one axis after the other, by more than 2 rad/s at last
-    def graze(t_us):
-        return tuple(size * (t_us > 3_005_000 + 20_000 * n) for n, size in enumerate((1.9, 1.9, 2.7)))
+@pytest.mark.parametrize(("turns_rad_s2", "hits"), [(25.0, 0), (60.0, 1)])
+def test_a_contact_of_many_samples_turns_a_vehicle_faster_than_motors_do(turns_rad_s2, hits):
+    def contact(t_us):
+        return (0.0, 0.0, 1e-6 * turns_rad_s2 * min(max(0, t_us - HIT_US), 50_000))
 
-    impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), rates=graze, noise=0.1).fly(until_us=3_150_000)
-    assert [(impact.evidence, impact.sample_time_boot_us) for impact in impacts] == [(Evidence.RATE_JUMP, 3_080_000)]
+    impacts = Flight(imu_every_us=4_000, velocity=(1.0, 0.0, 0.0), rates=contact).fly(until_us=3_150_000)
+    assert [impact.evidence for impact in impacts] == [Evidence.RATE_JUMP] * hits
+
+
+@pytest.mark.parametrize(("turn_rad_s", "hits"), [(0.0, 0), (0.45, 1)])
+def test_a_turn_and_a_velocity_jump_that_are_each_too_small_are_a_hit_together(turn_rad_s, hits):
+    flight = Flight(imu_every_us=20_000, velocity=(1.0, 0.0, 0.0), rates=at_once(turn_rad_s))
+    flight.jump = (3_002_000, (-0.1, 0.0, 0.0), 0)
+    found = [(impact.evidence, impact.is_shown_twice) for impact in flight.fly(3_100_000)]
+    assert found == [(Evidence.VELOCITY_JUMP, True)] * hits
 
 
 def test_what_a_felt_contact_still_turns_is_no_other_hit():
     flight = Flight(pulse((-30.0, 0.0, 0.0), 3_009_000, 12_000), imu_every_us=20_000)
-    flight.rates = lambda t: (3.0 if t > 3_020_000 else 0.0, 0.0, 0.0)
+    flight.rates = lambda t: (0.0, 0.0, 3.0 if t > 3_020_000 else 0.0)
     assert [impact.evidence for impact in flight.fly(until_us=3_150_000)] == [Evidence.FORCE]
 
 
@@ -263,7 +275,7 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert with_jump.is_shown_twice and with_jump.specific_force_frd_m_s2[1] > 0.9 * with_jump.size_m_s2
     assert Flight(once.push, noise=1.5, jump=(3_005_000, (0.0, -0.1, 0.0), 0)).fly() == []  # as of a bias
     for until_us in (3_008_500, 3_012_500):  # two together point where their sum does, though the last is opposite
-        two = Flight(lambda t: (0.0, {750: 10.0, 751: -3.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5)
+        two = Flight(lambda t: (0.0, {750: 9.0, 751: -3.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5)
         assert two.fly(until_us) == [] and two.state.both(0.9, (0.0, 1.0, 0.0)) is not None
     assert Flight(lambda t: (0.0, {750: 10.0, 751: -10.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5).fly() == []
 

@@ -23,13 +23,17 @@ def leaning(m_s2):
     return (math.cos(half), way.imag * math.sin(half), -way.real * math.sin(half), 0.0)
 
 
-def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True, asked_m_s2=None, unbroken_s=9.0):
+def watched(
+    seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True, asked_m_s2=None, unbroken_s=9.0, stalls_s=9.0
+):
     """The first time at which something is found in the way of a vehicle that leans north, and what.
 
     Its velocity and lean are functions of the time, and so is what its own control asks for. The goal goes with it,
-    unless it stands where it was. From `unbroken_s` on the estimate is reset again and again.
+    unless it stands where it was. From `unbroken_s` on the estimate is reset again and again. What comes from
+    `stalls_s` on is looked at once all has come.
     """
     monitor, strapdown, north_m, east_m = SustainedForceMonitor(), Strapdown(), 0.0, 0.0
+    waiting = []
     for step in range(round(seconds / EVERY_S)):
         t = step * EVERY_S
         n, e = velocity_m_s(t)
@@ -44,11 +48,16 @@ def watched(seconds, velocity_m_s, tilt_m_s2, goal_ahead_m=(1.0, 0.0), goes=True
             strapdown.velocity(sample)
         else:
             strapdown.fixes.clear()
-        if asked_m_s2 is not None:
-            monitor.set_attitude(AttitudeTarget(sample.time_boot_us, 0.0, leaning(asked_m_s2(t))))
-        held = monitor.step(sample, strapdown, goal)
-        if held is not None:
-            return t, held
+        waiting.append((t, sample, goal))
+        if stalls_s <= t < seconds - EVERY_S:
+            continue
+        for at_s, sample, goal in waiting:
+            if asked_m_s2 is not None:
+                monitor.set_attitude(AttitudeTarget(sample.time_boot_us, 0.0, leaning(asked_m_s2(at_s))))
+            held = monitor.step(sample, strapdown, goal)
+            if held is not None:
+                return at_s, held
+        waiting.clear()
     return None
 
 
@@ -102,6 +111,13 @@ def test_a_vehicle_that_tips_further_than_its_control_asks_for_is_kept_off():
     assert held.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.03)
     # And not where the attitude has been silent, or the estimate was reset
     assert watched(2.3, slides, tips, AT, asked_m_s2=asked, unbroken_s=2.1) is None
+
+
+def test_setpoints_of_before_a_stall_are_not_compared_with_the_attitude_after_it():
+    def leans(t):
+        return 1.0 if t < 2.5 else 4.0
+
+    assert watched(3.1, slides, lambda t: leans(t - 0.15), AT, asked_m_s2=leans, stalls_s=1.9) is None
 
 
 @pytest.mark.parametrize(
