@@ -7,6 +7,7 @@ broken sample is no median of three.
 import math
 from dataclasses import dataclass
 
+from companion.motion.config import LONGEST_GAP_US
 from companion.reflex.config import EXCESS, RATE_MEMORY_US, SPREAD_MEMORY_S, FusedConfig
 from companion.reflex.detection.detector import Innovation
 
@@ -27,7 +28,9 @@ class RateJump(Innovation):
 
     def imu(self, before_us: int, time_us: int, yaw_rate_rad_s: float, config: FusedConfig) -> None:
         """Take one sample; the one before it was at `before_us`."""
-        (a, b), c, was_us = self.last_rad_s, yaw_rate_rad_s, self.over_us
+        (a, b), c = self.last_rad_s, yaw_rate_rad_s
+        # After a gap or a reboot it has the weight of the longest interval.
+        was_us = self.over_us if 0 < self.over_us < LONGEST_GAP_US else LONGEST_GAP_US
         self.last_rad_s, self.over_us = (b, c), time_us - before_us
         median = b if (b - a) * (c - b) >= 0.0 else a if (a - b) * (c - a) >= 0.0 else c
         jump, share, least = median - self.mean_rad_s, was_us / RATE_MEMORY_US, config.rate_step_rad_s

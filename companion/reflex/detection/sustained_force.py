@@ -151,7 +151,7 @@ class SustainedForceMonitor:
         # Where no force is missing, it is only learnt how well the vehicle follows.
         if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < half_m_s2:
             return None
-        # Lost ones, and what comes of them before a stall, say nothing of the attitude now.
+        # Some may be lost, and those of before a stall say nothing of the attitude after it.
         if not setpoints or now_us - setpoints[-1][0] >= reflex.LONGEST_STEP_US:
             return None
         if not reflex.FOLLOWS_US <= now_us - setpoints[0][0] < len(setpoints) * reflex.LONGEST_STEP_US:
