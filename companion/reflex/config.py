@@ -263,7 +263,7 @@ class FusedConfig(StrictModel):
     clipping leaves the estimate 0.16."""
     rate_step_rad_s: Positive = 0.6
     """Least jump of the yaw rate that is a hit: twice what motors make in 20 ms. ArduPilot has them turn a vehicle with
-    12.6 rad/s^2 at most (ATC_ACCEL_Y_MAX); in public logs they made 17."""
+    12.6 rad/s^2 at most; in public logs they made 17."""
     rearm_quiet_s: Positive = 0.04
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5
