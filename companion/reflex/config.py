@@ -261,9 +261,9 @@ class FusedConfig(StrictModel):
     """Least velocity jump that is a hit. A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
     clipping leaves the estimate 0.16."""
-    rate_step_rad_s: Positive = 0.6
-    """Least jump of the yaw rate that is a hit: twice what motors make in 20 ms. ArduPilot has them turn a vehicle with
-    12.6 rad/s^2 at most; in public logs they made 17."""
+    rate_step_rad_s: Positive = 1.2
+    """Least jump of the yaw rate that is a hit: 60 rad/s^2 for 20 ms. ArduPilot has motors turn a vehicle with 12.6 at
+    most, in public logs they made 17; those of the smallest vehicles make 30."""
     rearm_quiet_s: Positive = 0.04
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5

@@ -72,8 +72,8 @@ class VelocityJump:
         Noise exceeds it as rarely as `noise_factor` standard deviations, by Student's t (its quantile, expanded in
         1 / degrees of freedom): a standard deviation from few steps is uncertain. Each has three axes, and shares
         velocities with those around it: four are worth as much as one. It is larger by `caution` where the estimate may
-        jump without a hit. Vibration between the samples (standard deviation `shaking_m_s2`) is independent of it; of
-        their newest interval of `apart_us` an averaging window covers a part.
+        jump without a hit, and by vibration between the samples (standard deviation `shaking_m_s2`), of whose newest
+        interval of `apart_us` an averaging window covers a part.
         """
         if not self.known:
             return math.inf
@@ -81,7 +81,7 @@ class VelocityJump:
         noise_m_s = spreads * math.sqrt(self.variance_m2_s2) * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
         unseen_share = max(0.0, 1.0 - self.averaging_us / max(apart_us, 1))
         unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
-        return math.hypot(caution * max(config.velocity_step_m_s, noise_m_s), unseen_m_s)
+        return caution * max(config.velocity_step_m_s, noise_m_s) + unseen_m_s
 
 
 def _rate(a: Vector3, b: Vector3, seconds: float) -> Vector3:

@@ -147,14 +147,6 @@ def test_of_what_no_sample_showed_the_velocity_that_it_leaves_tells(change_m_s, 
     assert [impact.evidence for impact in impacts] == [Evidence.VELOCITY_JUMP] * hits
 
 
-@pytest.mark.parametrize(("jump_m_s", "hits"), [(0.2, 0), (0.3, 1)])
-def test_vibration_between_the_samples_hides_as_much_as_the_root_of_squares(jump_m_s, hits):
-    flight = Flight(
-        imu_every_us=20_000, noise=1.0, jump=(3_002_000, (-jump_m_s, 0.0, 0.0), 0), velocity=(1.0, 0.0, 0.0)
-    )
-    assert len(flight.fly(3_060_000)) == hits
-
-
 # --- rate jump ----------------------------------------------------------------------------------------------
 
 
@@ -166,20 +158,20 @@ def at_once(yaw_rate_rad_s, until_us=4_000_000):
 @pytest.mark.parametrize(
     ("rates", "scene", "hits"),
     [
-        (at_once(0.7), {}, 1),
-        (at_once(-0.5), {}, 0),
-        (at_once(-0.5), {"push": pulse((0.0, 2.0, 0.0), 3_016_500, 4_000)}, 1),
+        (at_once(1.4), {}, 1),
+        (at_once(-1.0), {}, 0),
+        (at_once(-1.0), {"push": pulse((0.0, 2.0, 0.0), 3_016_500, 4_000)}, 1),
         # It has stopped the vehicle by then
-        (at_once(0.7), {"is_filtered": True, "jump": (3_002_000, (-0.7, 0.0, 0.0), 0)}, 1),
+        (at_once(1.4), {"is_filtered": True, "jump": (3_002_000, (-0.7, 0.0, 0.0), 0)}, 1),
         # A broken sample, motors that turn it as fast as they can, vibration
         (at_once(9.0, until_us=3_020_000), {}, 0),
-        (lambda t: (0.0, 0.0, 25e-6 * max(0, t - HIT_US)), {}, 0),
+        (lambda t: (0.0, 0.0, 50e-6 * max(0, t - HIT_US)), {}, 0),
         (lambda t: (0.0, 0.0, random.Random(t).gauss(0.0, 2.0)), {}, 0),
         # They turn the vehicle by as much in the longer time, and tilt it as soon as that
-        (at_once(1.1), {"imu_every_us": 40_000}, 0),
+        (at_once(2.2), {"imu_every_us": 40_000}, 0),
         (lambda t: (3.0 * (t > HIT_US), 0.0, 0.0), {}, 0),
         # What turns a vehicle that flies nowhere may be a hand
-        (at_once(0.7), {"velocity": (0.4, 0.0, 0.0)}, 0),
+        (at_once(1.4), {"velocity": (0.4, 0.0, 0.0)}, 0),
     ],
 )
 def test_an_edge_that_only_turns_a_vehicle_is_a_hit_once_the_turn_has_stayed(rates, scene, hits):
@@ -190,7 +182,7 @@ def test_an_edge_that_only_turns_a_vehicle_is_a_hit_once_the_turn_has_stayed(rat
     assert all(impact.contact_free_until_boot_us == 3_000_000 for impact in impacts)
 
 
-@pytest.mark.parametrize(("turns_rad_s2", "hits"), [(25.0, 0), (60.0, 1)])
+@pytest.mark.parametrize(("turns_rad_s2", "hits"), [(50.0, 0), (120.0, 1)])
 def test_a_contact_of_many_samples_turns_a_vehicle_faster_than_motors_do(turns_rad_s2, hits):
     def contact(t_us):
         return (0.0, 0.0, 1e-6 * turns_rad_s2 * min(max(0, t_us - HIT_US), 50_000))
@@ -199,7 +191,7 @@ def test_a_contact_of_many_samples_turns_a_vehicle_faster_than_motors_do(turns_r
     assert [impact.evidence for impact in impacts] == [Evidence.RATE_JUMP] * hits
 
 
-@pytest.mark.parametrize(("turn_rad_s", "hits"), [(0.0, 0), (0.45, 1)])
+@pytest.mark.parametrize(("turn_rad_s", "hits"), [(0.0, 0), (0.9, 1)])
 def test_a_turn_and_a_velocity_jump_that_are_each_too_small_are_a_hit_together(turn_rad_s, hits):
     flight = Flight(imu_every_us=20_000, velocity=(1.0, 0.0, 0.0), rates=at_once(turn_rad_s))
     flight.jump = (3_002_000, (-0.1, 0.0, 0.0), 0)
