@@ -25,7 +25,7 @@ PHASES = tuple(Phase)
 _NUMBERS = {phase: float(number) for number, phase in enumerate(PHASES)}
 
 # What is tested of an IMU sample: f_x and f_y, and f_z outside what propellers can do, negative inside, m/s^2; and the
-# rate jump before it, rad/s. And of a velocity: its jump, m/s.
+# yaw rate's jump, rad/s. And of a velocity: its jump, m/s.
 FORCES, JUMPS = ("side", "beyond", "turn"), ("jump",)
 
 

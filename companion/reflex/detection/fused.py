@@ -9,7 +9,7 @@ contact, each compared with this vehicle's own flight:
 * the yaw rate jumps, and stays (see `rate_jump`);
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
 
-Both jumps follow a contact of which the samples hold a part at most: a force below its limit adds to them, by squares.
+Both jumps follow a contact of which the samples hold a part at most: what is below its limit adds up, by squares.
 
 A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
 push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
@@ -87,8 +87,6 @@ class FusedState(DetectorState):
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)
     """The one before."""
-    weak_force: float = 0.0
-    """The larger of the two, in limits."""
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
@@ -118,6 +116,11 @@ class FusedState(DetectorState):
         (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
         x, y = f_x + g_x, f_y + g_y
         return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
+
+    @property
+    def weak_force(self) -> float:
+        """The larger force of the last two samples, in limits."""
+        return max(self.force[0], self.force_before[0])
 
     def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
         """The direction of a velocity jump and the weak force before it, body FRD: each is as clear as it is large
@@ -191,7 +194,6 @@ class FusedDetector:
         s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
         ratio = max(side / s.side.limit, beyond / s.vertical.limit)
         s.force_before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
-        weak = s.weak_force = ratio if ratio > s.force_before[0] else s.force_before[0]
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -203,7 +205,7 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            turn = s.turn.value / s.turn.limit
+            turn, weak = s.turn.value / s.turn.limit, s.weak_force
             return self._turned(s, earlier_us, situation, motion) if turn * turn + weak * weak > 1.0 else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         force = s.external_frd_m_s2(f)

@@ -172,6 +172,8 @@ def at_once(yaw_rate_rad_s, until_us=4_000_000):
         (lambda t: (3.0 * (t > HIT_US), 0.0, 0.0), {}, 0),
         # What turns a vehicle that flies nowhere may be a hand
         (at_once(1.4), {"velocity": (0.4, 0.0, 0.0)}, 0),
+        # A person who turns it on the ground
+        (at_once(1.4), {"situation": lambda t: IN_FLIGHT._replace(off_reason="below 0.5 m")}, 0),
     ],
 )
 def test_an_edge_that_only_turns_a_vehicle_is_a_hit_once_the_turn_has_stayed(rates, scene, hits):
