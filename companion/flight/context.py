@@ -169,6 +169,7 @@ class FlightContext:
     flies: bool = False  # armed, and off the ground or about to be
     flew_us: int | None = None  # when it last did
     may_crash: bool = False  # flies, or did a moment ago: whose motors stop in the air says at once that it has landed
+    height_m: float | None = None  # above the arming position, where that and a place of late are known
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     blind: Lasting = field(default_factory=Lasting)  # the detector, while it is on
     plan_confirmed: bool = False
@@ -200,17 +201,6 @@ class FlightContext:
         """Whether the present item is tried again after a hit."""
         is_asked = self.after_recovery.trigger is Trigger.RECOVERED_TO_RETRY
         return is_asked and self.tally.hits > 0 and not self.going_home
-
-    @property
-    def height_m(self) -> float | None:
-        """Above the arming position. None before that, and where other messages come and no position does of late: a
-        vehicle whose estimator fails sends none.
-        """
-        vehicle, origin = self.vehicle, self.origin_ned_m
-        latest, heard_us = vehicle.history.latest, vehicle.last_position_us
-        if latest is None or origin is None or heard_us is None or vehicle.last_received_us - heard_us >= OLD_NEWS_US:
-            return None
-        return origin[2] - latest.position_ned_m[2]
 
     @property
     def collisions(self) -> list[CollisionRecord]:

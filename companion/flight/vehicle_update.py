@@ -120,11 +120,19 @@ def _report_conflict(flight: FlightContext, now_us: int) -> None:
 
 
 def note_height(flight: FlightContext) -> None:
-    """Note whether the vehicle has left the ground, and flies. A hit that pushes it down again does not undo that."""
-    height_m = flight.height_m
+    """Note the height, whether the vehicle has left the ground, and whether it flies. A hit that pushes it down again
+    does not undo that.
+    """
+    vehicle, origin = flight.vehicle, flight.origin_ned_m
+    latest, heard_us, height_m = vehicle.history.latest, vehicle.last_position_us, None
+    # A vehicle whose estimator fails sends no position, and other messages.
+    is_current = heard_us is not None and vehicle.last_received_us - heard_us < OLD_NEWS_US
+    if latest is not None and origin is not None and is_current:
+        height_m = origin[2] - latest.position_ned_m[2]
+    flight.height_m = height_m
     if height_m is not None and height_m >= flight.mission.companion.min_detection_height_m:
         flight.has_climbed = True
-    elif height_m is None or flight.vehicle.stands:
+    elif height_m is None or vehicle.stands:
         flight.has_climbed = False
     if flight.flies and not flight.is_wreck:
         flight.flew_us = flight.stepped_us

@@ -25,7 +25,7 @@ PHASES = tuple(Phase)
 _NUMBERS = {phase: float(number) for number, phase in enumerate(PHASES)}
 
 # What is tested of an IMU sample: f_x and f_y, and f_z outside what propellers can do, negative inside, m/s^2; and the
-# yaw rate's jump, rad/s. And of a velocity: its jump, m/s.
+# rates' jump, rad/s of yaw. And of a velocity: its jump, m/s.
 FORCES, JUMPS = ("side", "beyond", "turn"), ("jump",)
 
 

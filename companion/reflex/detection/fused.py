@@ -6,7 +6,7 @@ contact, each compared with this vehicle's own flight:
 * horizontal: f_x, f_y differ from their running mean and from zero, with an allowance for drag on a turning vehicle;
 * vertical: f_z is outside the range of the propellers, from zero to their maximum (see `free_flight`). A failed motor,
   free fall, a dropped payload and every manoeuvre stay inside;
-* the yaw rate jumps, and stays (see `rate_jump`);
+* the body rates jump, and stay (see `rate_jump`);
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
 
 Both jumps follow a contact of which the samples hold a part at most: what is below its limit adds up, by squares.
@@ -185,7 +185,7 @@ class FusedDetector:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
-        s.turn.imu(before_us, now_us, w[2], config)
+        s.turn.imu(before_us, now_us, w, config)
         side, thresholds, is_of_two = s.side_force(config, f)
         if is_of_two:
             free_until_us = earlier_us

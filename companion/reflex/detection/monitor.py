@@ -187,8 +187,8 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
     monitor.no_data_reason = reason
     if (reason is None) != (was is None) and is_on:
         notices.append(Notice("link", "the detector sees again" if reason is None else f"detector blind: {reason}"))
-    has_waited = now_us - monitor.stream_health.started_us >= KEPT_US
-    if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
+    is_new = not monitor.is_introduced and monitor.state.phase is Phase.ARMED
+    if is_new and now_us - monitor.stream_health.started_us >= KEPT_US:
         monitor.is_introduced = True
         text = f"detector '{monitor.detector.name}' armed: from {monitor.seen_from}"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(monitor.state.threshold_m_s2, 3)}))

@@ -150,26 +150,28 @@ def test_of_what_no_sample_showed_the_velocity_that_it_leaves_tells(change_m_s, 
 # --- rate jump ----------------------------------------------------------------------------------------------
 
 
-def at_once(yaw_rate_rad_s, until_us=4_000_000):
+def at_once(yaw_rate_rad_s=0.0, until_us=4_000_000, roll=0.0, pitch=0.0):
     """Rates that a contact between the samples makes, and that stay, or go with one broken sample."""
-    return lambda t: (0.0, 0.0, yaw_rate_rad_s if HIT_US < t <= until_us else 0.0)
+    return lambda t: (roll, pitch, yaw_rate_rad_s) if HIT_US < t <= until_us else (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
     ("rates", "scene", "hits"),
     [
         (at_once(1.4), {}, 1),
+        (at_once(roll=2.5, pitch=-2.5), {}, 1),
         (at_once(-1.0), {}, 0),
         (at_once(-1.0), {"push": pulse((0.0, 2.0, 0.0), 3_016_500, 4_000)}, 1),
         # It has stopped the vehicle by then
         (at_once(1.4), {"is_filtered": True, "jump": (3_002_000, (-0.7, 0.0, 0.0), 0)}, 1),
-        # A broken sample, motors that turn it as fast as they can, vibration
+        # A broken sample, also after a step the other way; motors that turn it as fast as they can, vibration
         (at_once(9.0, until_us=3_020_000), {}, 0),
+        (lambda t: (0.0, 0.0, {3_000_000: -0.01, 3_020_000: 9.0}.get(t, 0.0)), {}, 0),
         (lambda t: (0.0, 0.0, 50e-6 * max(0, t - HIT_US)), {}, 0),
         (lambda t: (0.0, 0.0, random.Random(t).gauss(0.0, 2.0)), {}, 0),
         # They turn the vehicle by as much in the longer time, and tilt it as soon as that
         (at_once(2.2), {"imu_every_us": 40_000}, 0),
-        (lambda t: (3.0 * (t > HIT_US), 0.0, 0.0), {}, 0),
+        (at_once(roll=1.8, pitch=-1.8), {}, 0),
         # What turns a vehicle that flies nowhere may be a hand
         (at_once(1.4), {"velocity": (0.4, 0.0, 0.0)}, 0),
         # A person who turns it on the ground
