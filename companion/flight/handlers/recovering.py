@@ -74,7 +74,7 @@ class Recover:
             flight.report(now_us, "hand_over", text, after_s=shown.rested_s, recovery_setpoint_ned_m=place)
         if shown.rebound_m_s is not None:
             goal, off_m_s = as_text(flight.mission_ned_m(place)), shown.rebound_m_s
-            way = "away from" if off_m_s >= 0.0 else "towards"
+            way = "away from" if round(off_m_s, 2) >= 0.0 else "towards"
             text = f"{way} the obstacle at {abs(off_m_s):.2f} m/s; recovery setpoint {goal}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
         if shown.settled_s is not None:
