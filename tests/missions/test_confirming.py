@@ -77,7 +77,7 @@ def fly_on(work: Callable[[Flight], None], *sets: str) -> None:
 
 def assert_goes_on(air: Flight, unconfirmed: int) -> None:
     """To the item's goal, as if nothing had been there."""
-    air.run_to("landing", 4.0)
+    air.run_to("landing", 4.5)
     assert motion(air)[0] == pytest.approx(6.0, abs=0.3)
     assert (air.report.collisions, air.report.unconfirmed, air.report.obstacles) == ((), unconfirmed, ())
     assert air.told("expect") == []

@@ -38,6 +38,7 @@ class _OnTrajectory:
 
     _trajectory: Trajectory
     _trajectory_began_us: int
+    _steady: Lasting
 
     def _elapsed_s(self, flight: FlightContext) -> float:
         return (flight.trajectory_us - self._trajectory_began_us) * 1e-6
@@ -54,13 +55,18 @@ class _OnTrajectory:
         target = Target(flight.local_ned_m(place), yaw_rad, velocity, acceleration)
         return target if flight.has_position and elapsed_s < self._trajectory.duration_s else target.at_rest()
 
-    def _arrived(self, flight: FlightContext, later_s: float) -> bool:
-        """Whether it is at its goal; with its speed also so much later."""
+    def _off_m(self, flight: FlightContext, later_s: float = 0.0) -> float:
+        """Distance from its goal, now or with its speed so much later, m."""
         latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
-        radius_m = flight.mission.companion.flight.acceptance_radius_m
         assert latest is not None, "the flight is in the air"
-        ahead = plus(latest.position_ned_m, later_s, latest.velocity_ned_m_s)
-        return max(math.dist(latest.position_ned_m, goal), math.dist(ahead, goal)) <= radius_m
+        return math.dist(plus(latest.position_ned_m, later_s, latest.velocity_ned_m_s), goal)
+
+    def _rests(self, flight: FlightContext, now_us: int) -> bool:
+        """Whether it stays at its goal: one that turns round is slow for a moment, too."""
+        config = flight.mission.companion
+        is_there = max(self._off_m(flight), self._off_m(flight, BRAKES_S)) <= config.flight.acceptance_radius_m
+        self._steady.update(is_there, now_us)
+        return self._steady.lasts_us >= config.settled.duration_s * 1e6
 
 
 class FlyItems(_OnTrajectory):
@@ -187,7 +193,8 @@ class FlyItems(_OnTrajectory):
                     self._over_since_us = now_us
                 ahead = (flight.steps[number].action for number in range(flight.step_index + 1, len(flight.steps)))
                 lands = isinstance(next(one for one in ahead if not isinstance(one, items.ExpectItem)), items.LandItem)
-                return self._arrived(flight, BRAKES_S if lands else 0.0)
+                is_there = self._off_m(flight) <= flight.mission.companion.flight.acceptance_radius_m
+                return self._rests(flight, now_us) if lands else is_there
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
@@ -279,7 +286,7 @@ class FlyHome(_OnTrajectory):
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         assert flight.target is not None, "the flight is in the air"
-        self._trajectory_began_us = flight.trajectory_us
+        self._trajectory_began_us, self._steady = flight.trajectory_us, Lasting()
         flight.going_home = True
         start = flight.mission_ned_m(flight.target.position_ned_m)
         speeds = flight.speeds.against(flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0))
@@ -302,7 +309,7 @@ class FlyHome(_OnTrajectory):
         overdue_s = self._elapsed_s(flight) - self._trajectory.duration_s
         if overdue_s < 0.0:
             return None
-        if self._arrived(flight, BRAKES_S):
+        if self._rests(flight, now_us):
             return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
