@@ -49,8 +49,8 @@ COMPARED = 3
 # Velocities further apart are not compared: samples cover a quarter of the time, and the filter corrects itself in
 # between. At 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
-# Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz.
-MEMORY, RISE = 100, 10
+# Memory of the standard deviation in steps: 3 s at 30 Hz.
+MEMORY = 100
 # Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
 # samples 8 and 12 ms apart) has one sign there for tenths of a second. Its amplitude is 1.4 times the standard
 # deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.

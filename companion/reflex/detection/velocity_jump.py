@@ -55,30 +55,24 @@ class VelocityJump:
         return [fixes[place] for place in range(-reflex.COMPARED - 1, 0)]
 
     def learn(self, step: Vector3) -> None:
-        """Learn delay and standard deviation from the newest step, limited to what is no hit.
-
-        An estimate that jumps repeatedly gets a larger standard deviation. It rises fast and falls slowly (see
-        `free_flight`).
-        """
+        """Learn delay and standard deviation from the newest step, limited to what is no hit."""
         self.delay.learn(*self.newest)
         square = along(step, step) / 3.0
         self.known = min(self.known + 1, reflex.MEMORY)
-        change = square - self.variance_m2_s2
-        self.variance_m2_s2 += change / (min(self.known, reflex.RISE) if change > 0.0 else self.known)
+        self.variance_m2_s2 += (square - self.variance_m2_s2) / self.known
 
     def least_m_s(self, config: FusedConfig, caution: float, shaking_m_s2: float, apart_us: int) -> float:
         """The step, m/s, that is a hit; infinite before the first step.
 
-        Noise exceeds it as rarely as `noise_factor` standard deviations, by Student's t (its quantile, expanded in
-        1 / degrees of freedom): a standard deviation from few steps is uncertain. Each has three axes, and shares
-        velocities with those around it: four are worth as much as one. It is larger by `caution` where the estimate may
-        jump without a hit, and by vibration between the samples (standard deviation `shaking_m_s2`), of whose newest
-        interval of `apart_us` an averaging window covers a part.
+        It is `noise_factor` spreads, and more after few steps, by Student's t (its quantile, expanded in 1 / degrees of
+        freedom). Each has three axes, and shares velocities with those around it: four are worth as much as one. It is
+        larger by `caution` where the estimate may jump without a hit, and by vibration between the samples (standard
+        deviation `shaking_m_s2`), of whose newest interval of `apart_us` an averaging window covers a part.
         """
         if not self.known:
             return math.inf
-        spreads = config.noise_factor
-        noise_m_s = spreads * math.sqrt(self.variance_m2_s2) * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
+        spreads, spread_m_s = config.noise_factor, reflex.EXCESS * math.sqrt(self.variance_m2_s2)
+        noise_m_s = spreads * spread_m_s * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
         unseen_share = max(0.0, 1.0 - self.averaging_us / max(apart_us, 1))
         unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
         return caution * max(config.velocity_step_m_s, noise_m_s) + unseen_m_s

@@ -258,7 +258,7 @@ def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
 
 
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
-    once = Flight(pulse((0.0, 10.0, 0.0), 3_000_500, 4_000), noise=1.5, heard=(Attitude, AttitudeTarget))
+    once = Flight(pulse((0.0, 10.5, 0.0), 3_000_500, 4_000), noise=1.5, heard=(Attitude, AttitudeTarget))
     assert once.fly() == [] and once.state.threshold_m_s2 > 8.0
     (twice,) = Flight(pulse((0.0, 13.0, 0.0), 3_000_500, 20_000), noise=1.5).fly()
     assert twice.sample_time_boot_us in (3_004_000, 3_008_000)
