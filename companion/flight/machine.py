@@ -9,10 +9,10 @@ from typing import Any, ClassVar, TypeAlias
 
 from companion.flight import expectations
 from companion.flight.after_hit import decide, lands_anyway, note_before
-from companion.flight.context import FlightContext, Inputs, Transition
+from companion.flight.context import FlightContext, Inputs, Target, Transition
 from companion.flight.handlers.connecting import Connect, Ready
 from companion.flight.handlers.crash import Crashed, crashed
-from companion.flight.handlers.ending import ON_THE_GROUND, HandOver, Released, early_end
+from companion.flight.handlers.ending import FOLLOWING, ON_THE_GROUND, HandOver, Released, early_end
 from companion.flight.handlers.progress import FlyHome, FlyItems, HoldAfterRecovery
 from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.handlers.takeoff_and_landing import Land, TakeBack, TakeOff
@@ -109,6 +109,7 @@ class Machine(StateMachine):
     flight: FlightContext
     handler: Handler
     state: State = State.CONNECT
+    away_us: int | None = None  # since when the vehicle has not followed, as far as that is dealt with
 
     @property
     def finished(self) -> bool:
@@ -119,6 +120,10 @@ class Machine(StateMachine):
         flight, before = self.flight, self.handler
         if self.state not in FINAL_STATES and (end := early_end(flight, self.state, inputs, now_us)) is not None:
             self._take(end, now_us)
+        if flight.foreign_mode_since_us != self.away_us and flight.has_position and self.state in FOLLOWING:
+            self.away_us = flight.foreign_mode_since_us
+            if self.away_us is not None:
+                self._begin_here(now_us)
         if self.state in IN_THE_AIR and (crash := crashed(flight, self.state is State.LANDING, now_us)) is not None:
             self._take(crash, now_us)
         for estimate in inputs.impacts:
@@ -135,6 +140,15 @@ class Machine(StateMachine):
         if flight.expectations and self.state is not State.RECOVERING:
             expectations.review(flight, now_us)
         return self.handler is not before
+
+    def _begin_here(self, now_us: int) -> None:
+        """Go on from where the vehicle is: it has stopped, and would chase its setpoint."""
+        flight, latest = self.flight, self.flight.vehicle.history.latest
+        assert latest is not None, "it has a position"
+        if isinstance(self.handler, FlyItems):
+            self.handler.interrupt(flight)
+        flight.target = Target(latest.position_ned_m, flight.yaw_rad)
+        self.handler = self._begin(self.state, Transition(Trigger.LINK_RESTORED), now_us)
 
     def _give_away(self, text: str, now_us: int) -> None:
         self._take(Transition(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)

@@ -160,14 +160,18 @@ RETURNS_US = 400_000
 
 
 def taken_by(flight: FlightContext, requested_mode: int | None) -> Literal["failsafe", "pilot"] | None:
-    """Who has taken the vehicle (see `who_decided`): not a failsafe for want of setpoints that may end by itself."""
+    """Who has taken the vehicle (see `who_decided`): not a failsafe for want of setpoints that may end by itself.
+
+    One that has landed the vehicle does not, or nearly: nobody expects it to take off.
+    """
     holder, report = who_decided(flight, requested_mode), flight.vehicle.mode
     if holder is None or report is None:
         flight.foreign_mode_since_us = None
         return None
     offboard = flight.vehicle.autopilot.setpoints
     is_late = offboard in (flight.expected_mode, requested_mode) and report.intended_custom_mode in (None, offboard)
-    if holder == "failsafe" and is_late:
+    is_low = flight.height_m is not None and flight.height_m < flight.mission.companion.min_detection_height_m
+    if holder == "failsafe" and is_late and not is_low:
         if flight.foreign_mode_since_us is None:
             flight.foreign_mode_since_us = flight.trajectory_us
         if flight.trajectory_us - flight.foreign_mode_since_us < RETURNS_US:

@@ -1,5 +1,7 @@
 """Who flies: requests, failsafes and the pilot are told apart, at any instant; and the companion never fights."""
 
+import math
+
 import pytest
 
 from bench.fly.packets import made
@@ -56,6 +58,24 @@ def test_a_warning_status_in_offboard_or_for_late_setpoints_after_which_px4_take
         f.vehicle.mode = mode
         f.run_for(lasts_s)
     assert f.state in ("mission", "recovering")
+
+
+def test_what_stopped_for_want_of_setpoints_goes_on_from_where_it_is():
+    f = flying_in("mission")
+    f.run_until(lambda: f.vehicle.velocity[0] > 0.5)
+    f.vehicle.failsafe_takes(LOITER)
+    f.run_for(0.3)
+    f.vehicle.mode = OFFBOARD
+    f.run_for(0.1)
+    _, sent = f.vehicle.setpoints[-1]
+    assert f.state == "mission" and math.dist((sent.x, sent.y, sent.z), f.vehicle.position) < 0.1
+
+
+def test_what_a_failsafe_has_all_but_landed_does_not_take_off_again():
+    f = flying_in("takeoff")
+    f.run_until(lambda: f.vehicle.position[2] < -0.2)
+    f.vehicle.failsafe_takes(LAND)
+    f.run_to("aborted", 0.2)
 
 
 def test_px4_leaving_land_mode_once_it_is_down_is_not_a_pilot():
