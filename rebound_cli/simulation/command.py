@@ -90,7 +90,7 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
     # Compiled, or loaded from numba's cache, before PX4 waits for it.
     new_vehicle().step(MOTORS_STOPPED)
     console.print(f"Body of '{world.airframe.name}' for PX4. Ctrl-C stops it.")
-    port = PX4_SIMULATOR_PORT if options.port is None else options.port
+    port = PX4_SIMULATOR_PORT + options.instance if options.port is None else options.port
     serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, console.print, options.host)
 
 

@@ -104,7 +104,7 @@ def next_line_with(process, words):
 
 def test_the_body_alone_serves_a_px4_and_writes_the_truth(tmp_path):
     port, path = SIMULATOR_PORT, tmp_path / "truth.npz"
-    options = ("--port", port, "--mission", WALL, "--speed", "0", "--truth", path)
+    options = ("--instance", INSTANCE, "--mission", WALL, "--speed", "0", "--truth", path)
     process = start("sim", "--autopilot", "px4", *options)
     next_line_with(process, f"TCP port {port}")
     px4 = Px4Client(port)
