@@ -37,9 +37,10 @@ class RateJump(Innovation):
         was_us = self.over_us if 0 < self.over_us < LONGEST_GAP_US else LONGEST_GAP_US
         self.newest_rad_s, self.over_us = (p, q, r), time_us - before_us
         self.step_rad_s = i, j, k = p - x, q - y, r - z
-        back = a * i + b * j + c * k
-        if back < 0.0:
-            if back + a * a + b * b + c * c < 0.0:
+        on = a * i + b * j + c * k
+        # The one between is the middle one, unless the newest step goes back: behind where the last began, or less far.
+        if on < 0.0:
+            if on + a * a + b * b + c * c < 0.0:
                 x, y, z = x - a, y - b, z - c
             else:
                 x, y, z = p, q, r
