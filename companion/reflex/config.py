@@ -62,7 +62,7 @@ SHAKEN_S, STAMP_S = 0.15, 0.008
 RATE_MEMORY_US = 20_000
 # Of a rate about roll and pitch so much counts, as motors turn a vehicle about them sooner: with up to 96 rad/s^2 in
 # public logs.
-ACROSS_THRUST = 0.4
+ACROSS_THRUST = 1.0 / 3.0
 
 # --- the kind of an impact
 # Sine of 45 degrees: a force nearer to the vertical is that of a ceiling or a floor.
@@ -265,7 +265,7 @@ class FusedConfig(StrictModel):
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
     clipping leaves the estimate 0.16."""
     rate_step_rad_s: Positive = 1.2
-    """Least jump of the yaw rate that is a hit: 60 rad/s^2 for 20 ms; about roll and pitch 2.5 times as much. In public
+    """Least jump of the yaw rate that is a hit: 60 rad/s^2 for 20 ms; about roll and pitch three times as much. In public
     logs motors turn a vehicle about its thrust with 17 at most; drawn ones that are flown by hand exceed 30. A small
     one that is tuned to turn faster needs more."""
     rearm_quiet_s: Positive = 0.04

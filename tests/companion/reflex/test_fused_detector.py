@@ -159,7 +159,7 @@ def at_once(yaw_rate_rad_s=0.0, until_us=4_000_000, roll=0.0, pitch=0.0):
     ("rates", "scene", "hits"),
     [
         (at_once(1.4), {}, 1),
-        (at_once(roll=2.5, pitch=-2.5), {}, 1),
+        (at_once(roll=2.8, pitch=-2.8), {}, 1),
         (at_once(-1.0), {}, 0),
         (at_once(-1.0), {"push": pulse((0.0, 2.0, 0.0), 3_016_500, 4_000)}, 1),
         # It has stopped the vehicle by then
