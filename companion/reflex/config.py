@@ -265,9 +265,9 @@ class FusedConfig(StrictModel):
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
     clipping leaves the estimate 0.16."""
     rate_step_rad_s: Positive = 1.2
-    """Least jump of the yaw rate that is a hit: 60 rad/s^2 for 20 ms; about roll and pitch three times as much. In public
-    logs motors turn a vehicle about its thrust with 17 at most; drawn ones that are flown by hand exceed 30. A small
-    one that is tuned to turn faster needs more."""
+    """Least jump of the yaw rate that is a hit: 60 rad/s^2 for 20 ms; about roll and pitch three times as much. In
+    public logs motors turn a vehicle about its thrust with 17 at most; drawn ones that are flown by hand exceed 30. A
+    small one that is tuned to turn faster needs more."""
     rearm_quiet_s: Positive = 0.04
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5
