@@ -225,10 +225,9 @@ def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit(peak_
 
 @pytest.mark.parametrize(("jump_m_s", "later_s", "hits"), [(1.0, 1.5, 2), (0.3, 3.0, 2), (0.3, 0.6, 1)])
 def test_a_hit_that_only_the_velocity_shows_is_found_while_another_is_corrected(jump_m_s, later_s, hits):
-    """Given a clipped hit at 2 m/s, a contact between the samples is one where no correction makes such a jump."""
+    """After a clipped hit at 2 m/s a contact is one where no correction makes such a jump; it makes nothing valid."""
     impacts, told, _ = after_a_hit(7.0, 120.0, 3, lambda s: swing(s) + jump_m_s * (s >= later_s), speed=2.0)
     assert len(impacts) == hits
-    # The second hit makes nothing valid
     assert [text for _, text in told].count(IN_DOUBT) == 1
 
 
