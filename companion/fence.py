@@ -19,6 +19,8 @@ DEFAULT_RADIUS_M = 15.0
 LEAST_EDGE_M = 0.01
 # Of a quarter of a circle: straight edges within it are nowhere further inside than 0.01 % of the radius.
 _ARC_SEGMENTS = 64
+# GEOS finds no direction in a way that is shorter by far.
+_LEAST_M = 1e-9
 
 
 class Fence(StrictModel):
@@ -120,7 +122,7 @@ class Fence(StrictModel):
             b = start[0] * step[0] + start[1] * step[1]
             c = start[0] ** 2 + start[1] ** 2 - self.radius_m**2
             leaves_at = (-b + math.sqrt(max(0.0, b * b - a * c))) / a
-        if self._polygon is not None and step != (0.0, 0.0):
+        if self._polygon is not None and math.hypot(*step) > _LEAST_M:
             line = LineString((start, end))
             for outside in shapely.get_coordinates(line.difference(self._polygon)):
                 leaves_at = min(leaves_at, line.project(Point(outside), normalized=True))

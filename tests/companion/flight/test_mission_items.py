@@ -149,7 +149,6 @@ def test_a_vehicle_that_comes_past_its_goal_does_not_land_before_it_stays_slow(e
     wanted_m_s = 0.6
     f.run_for(2.0)
     assert f.state == state
-    # When it becomes slower
     wanted_m_s = 0.2
     f.run_to("landing", 2.0)
     assert vehicle.velocity[0] == pytest.approx(0.26, abs=0.03)

@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from shapely import LineString, Point
@@ -41,6 +41,7 @@ def test_fences_that_make_no_sense(polygon, words):
         Fence(polygon_ne_m=polygon)
 
 
+@example(0.0, 5e-324, HOOK)
 @given(COORDINATE, COORDINATE, st.sampled_from([ROOM, ROUND, HOOK]))
 def test_ways_from_home_end_inside(north_m, east_m, fence):
     """And what was inside already is left alone."""
