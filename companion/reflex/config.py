@@ -18,7 +18,8 @@ SPREAD_MEMORY_S = 2.0
 LEARNT_S = 1.0
 # After take-off the rotors' vibration is not learnt yet: the time that a rising standard deviation needs.
 SETTLED_US = 300_000
-# The standard deviation is told larger by this factor: vibration grows with the throttle, sooner than it is learnt.
+# The standard deviation is told larger by this factor: vibration grows with the throttle, sooner than it is learnt. One
+# factor for all tests.
 EXCESS = 1.5
 
 # --- a sample's force
@@ -255,9 +256,8 @@ class FusedConfig(StrictModel):
     """Least vertical external force that is a hit. Beyond nothing and beyond the propellers' most: those bounds are
     themselves uncertain by a tenth of hover."""
     noise_factor: Positive = 4.2
-    """Threshold over the spread of the specific force learnt in flight, which reads at least 1.5 times the true
-    one: 6.3 standard deviations, which sideways two of 10^9 normal samples exceed, one in half a
-    thousand hours at 250 Hz."""
+    """Threshold over the spread learnt in flight, of each test, which reads 1.5 times the true one: 6.3 standard
+    deviations, which sideways two of 10^9 normal samples exceed, one in half a thousand hours at 250 Hz."""
     drag_per_s: NotNegative = 0.3
     """Room for drag: per mass it is 0.2 to 0.4 /s times the speed, and turns with the vehicle."""
     velocity_step_m_s: Positive = 0.12

@@ -80,6 +80,11 @@ def terms():
     return [[part.strip("`") for part in row] for row in cells[1:]]
 
 
+def test_the_glossarys_terms_are_in_the_order_of_the_alphabet():
+    names = [row[0] for row in terms()]
+    assert len(names) > 40 and names == sorted(names)
+
+
 @pytest.mark.parametrize("row", terms(), ids=lambda row: row[0])
 def test_a_name_of_the_glossary_is_in_its_file(row):
     *_, name, file = row

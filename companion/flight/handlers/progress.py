@@ -61,11 +61,12 @@ class _OnTrajectory:
         assert latest is not None, "the flight is in the air"
         return math.dist(plus(latest.position_ned_m, later_s, latest.velocity_ned_m_s), goal)
 
-    def _rests(self, flight: FlightContext, now_us: int) -> bool:
+    def _rests(self, flight: FlightContext) -> bool:
         """Whether it stays at its goal: one that turns round is slow for a moment, too."""
-        config = flight.mission.companion
+        config, latest = flight.mission.companion, flight.vehicle.history.latest
+        assert latest is not None, "the flight is in the air"
         is_there = max(self._off_m(flight), self._off_m(flight, BRAKES_S)) <= config.flight.acceptance_radius_m
-        self._steady.update(is_there, now_us)
+        self._steady.update(is_there, latest.time_boot_us)
         return self._steady.lasts_us >= config.settled.duration_s * 1e6
 
 
@@ -194,7 +195,7 @@ class FlyItems(_OnTrajectory):
                 ahead = (flight.steps[number].action for number in range(flight.step_index + 1, len(flight.steps)))
                 lands = isinstance(next(one for one in ahead if not isinstance(one, items.ExpectItem)), items.LandItem)
                 is_there = self._off_m(flight) <= flight.mission.companion.flight.acceptance_radius_m
-                return self._rests(flight, now_us) if lands else is_there
+                return self._rests(flight) if lands else is_there
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
@@ -309,7 +310,7 @@ class FlyHome(_OnTrajectory):
         overdue_s = self._elapsed_s(flight) - self._trajectory.duration_s
         if overdue_s < 0.0:
             return None
-        if self._rests(flight, now_us):
+        if self._rests(flight):
             return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)

@@ -46,6 +46,10 @@ def verdicts(bars, word):
     return [bar.verdict for bar in bars if word in bar.what]
 
 
+def test_perfect_missions_meet_every_bar():
+    assert {bar.verdict for bar in bars_of(made_up()) if bar.is_met is not None} == {MET}
+
+
 @pytest.mark.parametrize("changes", [{"past_m": 0.06}, {"again": 1}])
 def test_one_hit_in_fifty_that_overshoots_or_touches_again_is_too_many(changes):
     assert verdicts(bars_of(made_up(count=50, **changes)), "overshoot")[0] == MISSED
