@@ -1,8 +1,7 @@
 """The companion as a step function: bytes and the time in, bytes and events out."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from companion.core import NOTHING, Core, FlightCore
 from companion.flight.obstacle_map import all_known
@@ -17,8 +16,7 @@ from companion.mission.model import Mission
 from companion.report import Event, FlightReport, Status
 
 
-@dataclass(frozen=True, slots=True)
-class StepResult:
+class StepResult(NamedTuple):
     """Packets and events of one step. `received_frames` are in order; bytes of no packet are `Stray`.
 
     An incomplete packet appears in the step that completes it.

@@ -79,12 +79,16 @@ def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
     """After a silence or a late step a trajectory goes on where it was. It does not catch up."""
     before_us, position_us = flight.stepped_us, flight.vehicle.last_position_us
     flight.stepped_us = now_us
-    longest_us = flight.mission.companion.sight.silence_s * 1e6
-    late_us = 0 if before_us is None else max(0, now_us - before_us - round(longest_us))
-    flight.missed_us = 0 if position_us == now_us else flight.missed_us + late_us
+    longest_us = round(flight.mission.companion.sight.silence_s * 1e6)
+    elapsed_us = 0 if before_us is None else now_us - before_us
+    is_late = elapsed_us > longest_us
+    if position_us == now_us:
+        flight.missed_us = 0
+    elif is_late:
+        flight.missed_us += elapsed_us - longest_us
     flight.has_position = position_us is not None and now_us - position_us <= longest_us
-    if before_us is not None and flight.has_position and now_us - before_us <= longest_us:
-        flight.trajectory_us += now_us - before_us
+    if flight.has_position and not is_late:
+        flight.trajectory_us += elapsed_us
 
 
 def _measure_round_trip(flight: FlightContext, now_us: int) -> None:

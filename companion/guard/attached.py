@@ -1,7 +1,6 @@
 """The guard on a program's own connection: between the program and its vehicle, whose packets both pass it."""
 
 from collections import deque
-from dataclasses import replace
 
 from companion.autopilot.known import ASSUMED
 from companion.companion import StepResult
@@ -48,7 +47,7 @@ class AttachedGuard(Guard):
             self.stop("a guard inside a program guards PX4 alone: use `rebound guard --between`")
         sent = [packet for packet in result.sent_frames if message_id_of(packet) not in _PROGRAMS_OWN]
         self._own += [payload_of(packet) for packet in sent if message_id_of(packet) in SETPOINT_IDS]
-        return replace(result, sent_frames=tuple(sent))
+        return result._replace(sent_frames=tuple(sent))
 
     def _is_draining(self, now_us: int) -> bool:
         if self._drained_us is None:

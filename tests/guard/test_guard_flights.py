@@ -35,7 +35,7 @@ def mute(air: Air, *message_ids: int) -> None:
 
     def muted(received, now_us):
         result = steps(received, now_us)
-        return replace(result, sent_frames=tuple(frame for frame in result.sent_frames if frame[7] not in message_ids))
+        return result._replace(sent_frames=tuple(frame for frame in result.sent_frames if frame[7] not in message_ids))
 
     air.guard.step = muted
 

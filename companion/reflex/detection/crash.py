@@ -19,6 +19,7 @@ class CrashWatch:
     tipped: Lasting = field(default_factory=Lasting)
     low: Lasting = field(default_factory=Lasting)  # and still
     lying: Lasting = field(default_factory=Lasting)
+    is_near: bool = False  # to the ground, by its last position
     is_carried: bool = False  # not by its thrust, which points along body z
     force_frd_m_s2: Vector3 = ZERO
     rates_frd_rad_s: Vector3 = ZERO
@@ -37,19 +38,20 @@ class CrashWatch:
 
     def update(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """`height_m`: above the arming position, None where it is not known."""
-        share = reflex.LYING_SHARE
         for sample in samples:
             match sample:
-                case ImuSample():
-                    self.force_frd_m_s2 = towards(self.force_frd_m_s2, sample.specific_force_frd_m_s2, share)
-                    self.rates_frd_rad_s = towards(self.rates_frd_rad_s, sample.angular_velocity_frd_rad_s, share)
+                case ImuSample(specific_force_frd_m_s2=f, angular_velocity_frd_rad_s=w):
+                    share = reflex.LYING_SHARE
+                    self.force_frd_m_s2 = towards(self.force_frd_m_s2, f, share) if self.is_near else f
+                    self.rates_frd_rad_s = towards(self.rates_frd_rad_s, w, share) if self.is_near else w
                 case Attitude():
                     self.tipped.update(tilt_rad(sample.attitude_wxyz) > reflex.TIPPED_RAD, sample.time_boot_us)
                 case LocalPosition():
-                    self._rest(sample, height_m is not None and height_m < reflex.LOW_M, landed)
+                    self.is_near = height_m is not None and height_m < reflex.LOW_M
+                    self._rest(sample, landed)
 
-    def _rest(self, sample: LocalPosition, is_low: bool, landed: LandedState) -> None:
-        is_still = is_low and math.hypot(*sample.velocity_ned_m_s) < reflex.RESTS_M_S
+    def _rest(self, sample: LocalPosition, landed: LandedState) -> None:
+        is_still = self.is_near and math.hypot(*sample.velocity_ned_m_s) < reflex.RESTS_M_S
         self.low.update(is_still, sample.time_boot_us)
         is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < reflex.STILL_M_S2
         self.is_carried = is_weight and -self.force_frd_m_s2[2] < reflex.CARRIED_SHARE * GRAVITY_M_S2
