@@ -87,6 +87,13 @@ class Refused(Sample):
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleText(Sample):
+    """STATUSTEXT of the vehicle, a warning or worse: why it does not arm, or which failsafe acts."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Heartbeat(Sample):
     system_id: int
     component_id: int

@@ -47,6 +47,9 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             if text is not None:
                 flight.report(now_us, "implausible", text, message=sample.message)
             continue
+        elif isinstance(sample, messages.VehicleText) and sample.text != vehicle.said:
+            vehicle.said = sample.text
+            flight.report(now_us, "warning", f"the vehicle warns: {sample.text}")
         elif isinstance(sample, messages.Parameter) and sample.name in vehicle.autopilot.attitude_parameters:
             _note_attitude_parameter(flight, sample, now_us)
         elif isinstance(sample, messages.TimeSync):

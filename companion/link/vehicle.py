@@ -93,6 +93,7 @@ class Vehicle:
     attitude: messages.Attitude | None = None
     thrust_fraction: float | None = None  # as last commanded
     battery_percent: int | None = None
+    said: str = ""  # its newest warning
     history: MotionHistory = field(default_factory=MotionHistory)
     last_received_us: int = 0
     last_position_us: int | None = None

@@ -300,6 +300,11 @@ def _radio(chan1_raw: int, chan2_raw: int, chan3_raw: int, chan4_raw: int) -> Sa
     return messages.Sticks((-back, right, up, clockwise))
 
 
+def _vehicle_text(severity: int, text: bytes) -> Sample | None:
+    said = "".join(filter(str.isprintable, text.decode("utf-8", errors="replace")))
+    return messages.VehicleText(said) if said and severity <= messages.Severity.WARNING else None
+
+
 def _autopilot_version(flight_sw_version: int) -> Sample:
     # major, minor, patch, type: one byte each, from the top
     version = flight_sw_version
@@ -342,6 +347,7 @@ READERS = _readers(
         dialect.MAVLink_param_value_message: _parameter,
         dialect.MAVLink_estimator_status_message: _estimator_status,
         dialect.MAVLink_autopilot_version_message: _autopilot_version,
+        dialect.MAVLink_statustext_message: _vehicle_text,
     }
 )
 # What only a guard looks at: another's setpoints and the pilot's hands.

@@ -24,7 +24,7 @@ from rebound_cli.replay.listening import Listener
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
 _MOST_POLLS = 20
 # Of the guard's own events these tell what the vehicle did.
-_TOLD = ("mode", "disarmed", "implausible", "crashed")
+_TOLD = ("mode", "disarmed", "implausible", "crashed", "warning")
 
 
 class Circumstances:

@@ -3,12 +3,13 @@
 import itertools
 
 import pytest
+from pymavlink.dialects.v20 import development as mav
 
-from bench.fly.virtual_time import EPOCH_US
+from bench.fly.virtual_time import EPOCH_US, INTERVAL_US
 from companion.link.round_trip import RoundTrip
 from companion.messages import TimeSync
 from rebound_cli.live.console import state_fields
-from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
+from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight, flying_in
 from tests.companion.flight.test_companion_authority import heartbeat
 
 
@@ -160,6 +161,14 @@ def test_what_is_refused_to_the_end_fails_with_the_vehicles_answer(asked, answer
     assert not vehicle.armed and f.vehicle.mode == LOITER, "left in its own hold, not in OFFBOARD"
 
 
+def test_what_the_vehicle_warns_of_is_told_once_in_its_own_words():
+    f = flying_in("mission")
+    for text in (b"Low battery", b"Low battery", b"Failsafe"):
+        f.step(bytes(mav.MAVLink_statustext_message(4, text).pack(f.vehicle.tx)))
+    told = [event.text for event in f.events if event.kind == "warning"]
+    assert told == ["the vehicle warns: Low battery", "the vehicle warns: Failsafe"]
+
+
 @pytest.mark.parametrize(("on_interrupt", "mode"), [("hold", LOITER), ("land", LAND)])
 def test_a_silent_link_hands_over_all_the_same_and_is_reported(on_interrupt, mode):
     f = flight(on_interrupt=on_interrupt)
@@ -224,11 +233,8 @@ def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told_once(los
     assert vehicle.lost_answers == -1, "it was asked until it had answered"
 
 
-TICK_US = 4_000
-
-
 def asked_over(trip: RoundTrip, seconds: float, start_us: int = EPOCH_US) -> list[TimeSync]:
-    times = range(start_us, start_us + round(seconds * 1e6), TICK_US)
+    times = range(start_us, start_us + round(seconds * 1e6), INTERVAL_US)
     return [trip.ask(now_us) for now_us in times if now_us >= trip.due_us]
 
 

@@ -85,6 +85,8 @@ CASES = [
         ours.AutopilotVersion((1, 15, 2)),
     ),
     (mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 42, 0, 0, 0, 0, 0, 0), ours.Battery(42)),
+    # What a terminal would obey is left out, PX4's closing tab, too
+    (mav.MAVLink_statustext_message(4, b"Preflight Fail: \x1b[2J\t"), ours.VehicleText("Preflight Fail: [2J")),
 ]
 
 
@@ -96,6 +98,7 @@ NOT_TAKEN = [
     mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190),
     mav.MAVLink_highres_imu_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x38),
     mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 101, 0, 0, 0, 0, 0, 0),
+    mav.MAVLink_statustext_message(6, b"Takeoff detected"),
     mav.MAVLink_param_value_message(b"MPC_XY_P", math.nan, mav.MAV_PARAM_TYPE_REAL32, 1, 0),
 ]
 
