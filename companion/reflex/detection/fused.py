@@ -230,7 +230,7 @@ class FusedDetector:
         is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
         flew = before is not None and math.hypot(*before.velocity_ned_m_s) >= reflex.APPROACH_M_S
         if s.phase is not Phase.ARMED or is_again or before is None or not flew:
-            s.turn.value = 0.0  # of a velocity that jumps then, it is no sign either
+            s.turn.value = s.turn.shown = 0.0  # of a velocity that jumps then, it is no sign either
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
         force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.ratio)
@@ -318,9 +318,9 @@ class FusedDetector:
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.ratio
-        is_weak = ratio <= 1.0 < math.hypot(ratio, s.turn.ratio, s.weak_force) and not s.may_be_hand(time_us)
+        is_weak = ratio <= 1.0 < math.hypot(ratio, s.turn.shown, s.weak_force) and not s.may_be_hand(time_us)
         both = s.both(ratio, ned_to_body(strapdown.valid_wxyz, step)) if is_weak else None
-        is_jump = ratio > 1.0 or both is not None or (is_weak and math.hypot(ratio, s.turn.ratio) > 1.0)
+        is_jump = ratio > 1.0 or both is not None or (is_weak and math.hypot(ratio, s.turn.shown) > 1.0)
         if s.phase is not Phase.ARMED or not is_jump:
             # What is told as a hit is no noise.
             if is_jump or motion.validity.is_valid:

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.config import LONGEST_GAP_US
+from companion.motion.config import LONGEST_GAP_US, SHOWN_US
 from companion.motion.vector import ZERO
 from companion.reflex.config import ACROSS_THRUST, EXCESS, RATE_MEMORY_US, SPREAD_MEMORY_S, FusedConfig
 from companion.reflex.detection.detector import Innovation
@@ -28,6 +28,9 @@ class RateJump(Innovation):
     over_us: int = 0
     mean_rad_s: Vector3 = ZERO
     variance_rad2_s2: float = 0.0
+    shown: float = 0.0
+    """The largest ratio of late: an estimator that has missed a hit shows it later than the gyroscopes."""
+    shown_us: int = 0
 
     def imu(self, before_us: int, time_us: int, rates_frd_rad_s: Vector3, config: FusedConfig) -> None:
         """Take one sample; the one before it was at `before_us`."""
@@ -55,3 +58,5 @@ class RateJump(Innovation):
         limit = self.limit = least if least > spreads_rad_s else spreads_rad_s
         learnt = size if size < limit else limit
         self.variance_rad2_s2 += was_us / (_MEMORY_US + was_us) * (learnt * learnt - self.variance_rad2_s2)
+        if size >= self.shown * limit or time_us - self.shown_us > SHOWN_US:
+            self.shown, self.shown_us = size / limit, time_us
