@@ -375,7 +375,7 @@ class FlightCore(Core[FlightContext, Machine]):
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         self.stop_reason = None
         moved = self.machine.step(inputs, now_us)
-        if self.machine.finished and self.flight.ended_at_us is None:
+        if self.flight.ended_at_us is None and self.machine.state in FINAL_STATES and self.machine.finished:
             self.flight.ended_at_us = now_us
         return moved
 
