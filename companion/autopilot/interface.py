@@ -28,13 +28,14 @@ class Mode:
 
 @dataclass(frozen=True, slots=True)
 class Remedies:
-    """Of what preflight finds by listening, for people."""
+    """Of what preflight finds by listening, and of a vehicle that does not arm, for people."""
 
     slow_streams: str
     full_link: str
     no_time: str
     no_battery: str
     no_estimator: str
+    not_armed: str
 
 
 @dataclass(frozen=True, slots=True)

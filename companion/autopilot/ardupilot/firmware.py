@@ -66,6 +66,7 @@ ARDUPILOT = Autopilot(
         no_time="MAVLink 2 on the link (SERIAL2_PROTOCOL 2)",
         no_battery="set up the power module (BATT_MONITOR)",
         no_estimator="look at EKF in Mission Planner",
+        not_armed="its messages in Mission Planner say why",
     ),
     loss_text=setup.loss_text,
     stick_deadzone=0.2,  # THR_DZ, of 500 from the middle

@@ -48,6 +48,7 @@ PX4 = Autopilot(
         no_time="MAVLink 2 on the link (MAV_PROTO_VER 2)",
         no_battery="set up the power module (BAT1_SOURCE)",
         no_estimator="look at EKF2 in QGroundControl",
+        not_armed="`commander check` in PX4's console says why",
     ),
     loss_text=setup.loss_text,
     stick_deadzone=0.1,  # MPC_HOLD_DZ

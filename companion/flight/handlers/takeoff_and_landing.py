@@ -78,7 +78,8 @@ class TakeOff:
         if outcome is None:
             return None
         if not outcome.succeeded:
-            return Transition(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
+            why = flight.vehicle.said or flight.vehicle.autopilot.remedies.not_armed
+            return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}", hand_over=True)
         self._now = self._climb
         if self._is_told:
             self._now, flight.target = self._leave_ground, None

@@ -9,7 +9,7 @@ from bench.fly.virtual_time import EPOCH_US, INTERVAL_US
 from companion.link.round_trip import RoundTrip
 from companion.messages import TimeSync
 from rebound_cli.live.console import state_fields
-from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight, flying_in
+from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.flight.test_companion_authority import heartbeat
 
 
@@ -142,17 +142,15 @@ def test_lost_answers_and_lost_commands_are_repeated():
 
 
 def test_px4s_double_answer_to_the_mode_is_believed_only_when_the_mode_is_seen():
-    f = flight(
-        FakeVehicle(ack=lambda c, n: [0, 1] if c == 176 and n == 1 else [0], obey=lambda c, n: c != 176 or n > 1)
-    )
+    double = FakeVehicle(ack=lambda c, n: [0, 1] if (c, n) == (176, 1) else [0], obey=lambda c, n: c != 176 or n > 1)
+    f = flight(double)
     assert f.run_to_end().outcome == "completed"
     assert f.vehicle.counts[176] >= 2
 
 
 @pytest.mark.parametrize(
     ("asked", "answer", "words"),
-    [(400, 1, ("not armed", "TEMPORARILY_REJECTED")), (176, 2, ("no OFFBOARD", "DENIED"))],
-    ids=["arming", "offboard"],
+    [(400, 1, ("not armed", "TEMPORARILY_REJECTED", "commander check")), (176, 2, ("no OFFBOARD", "DENIED"))],
 )
 def test_what_is_refused_to_the_end_fails_with_the_vehicles_answer(asked, answer, words):
     vehicle = FakeVehicle(ack=lambda c, n: [answer if c == asked else 0], obey=lambda c, n: c != asked)
@@ -162,11 +160,13 @@ def test_what_is_refused_to_the_end_fails_with_the_vehicles_answer(asked, answer
 
 
 def test_what_the_vehicle_warns_of_is_told_once_in_its_own_words():
-    f = flying_in("mission")
-    for text in (b"Low battery", b"Low battery", b"Failsafe"):
+    f = flight(FakeVehicle(ack=lambda c, n: [4 if c == 400 else 0], obey=lambda c, n: c != 400))
+    f.run_to("takeoff")
+    for text in (b"Low battery", b"Low battery", b"Arm: Not level"):
         f.step(bytes(mav.MAVLink_statustext_message(4, text).pack(f.vehicle.tx)))
     told = [event.text for event in f.events if event.kind == "warning"]
-    assert told == ["the vehicle warns: Low battery", "the vehicle warns: Failsafe"]
+    assert told == ["the vehicle warns: Low battery", "the vehicle warns: Arm: Not level"]
+    assert f.run_to_end().reason == "not armed: arm: the vehicle answered FAILED; Arm: Not level"
 
 
 @pytest.mark.parametrize(("on_interrupt", "mode"), [("hold", LOITER), ("land", LAND)])
