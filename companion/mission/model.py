@@ -18,7 +18,15 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
-from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, stay, trajectory_around
+from companion.mission.item_trajectory import (
+    LEAST_TRY_M_S,
+    Planned,
+    SpeedLimits,
+    climb,
+    home_around,
+    stay,
+    trajectory_around,
+)
 from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, Handover, OnCollision, OnCrash, OnDamage, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
@@ -207,3 +215,10 @@ def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:
 def longest_s(mission: Mission, wait_s: float) -> float:
     """Time of all steps, `wait_s` for each wait without a known end."""
     return sum(wait_s if leg.lasts_s is None else leg.lasts_s for leg in itinerary(mission))
+
+
+def tried_again_s(mission: Mission) -> float:
+    """Time of the longest way that `retry` flies again after each hit, always as slowly as it ever does."""
+    flown = [(leg.step.item.on_collision or mission.on_collision, leg.trajectory) for leg in itinerary(mission)]
+    ways_m = [policy.max_hits * way.distance_m for policy, way in flown if way is not None and policy.then == "retry"]
+    return max(ways_m, default=0.0) / LEAST_TRY_M_S

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Protocol
 
 from companion.companion import Companion
-from companion.mission.model import Mission, longest_s
+from companion.mission.model import Mission, longest_s, tried_again_s
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import look_for_file
@@ -22,7 +22,7 @@ EPOCH_US = 1_600_000_000_000_000
 
 # What a mission may take beyond its own distances and durations: connecting, arming, landing.
 _LIMIT_MARGIN_S = 60.0
-# Times the planned duration: recoveries, and ways tried again slower, take longer.
+# Times the planned duration: recoveries, and ways round what was hit, take longer.
 _LIMIT_FACTOR = 3.0
 # A wait without a time-out; in lockstep nobody comes to end it.
 _LONGEST_WAIT_S = 60.0
@@ -46,7 +46,7 @@ class SteppedVehicle(Protocol):
 def virtual_time_limit_s(mission: Mission) -> float:
     """Longest virtual time a mission may reasonably take; a flight beyond it hangs."""
     hits = mission.on_collision.max_hits * (mission.on_collision.hold_s + mission.companion.settled.timeout_s)
-    return _LIMIT_MARGIN_S + _LIMIT_FACTOR * longest_s(mission, _LONGEST_WAIT_S) + hits
+    return _LIMIT_MARGIN_S + _LIMIT_FACTOR * longest_s(mission, _LONGEST_WAIT_S) + hits + tried_again_s(mission)
 
 
 def fly_mission_lockstep(
