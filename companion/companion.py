@@ -159,7 +159,7 @@ class Companion(Stepped[FlightCore]):
             collisions=core.collisions(),
             origin_ned_m=flight.origin_ned_m,
             started_at_us=core.started_at_us,
-            ended_at_us=core.now_us if flight.ended_at_us is None else flight.ended_at_us,
+            ended_at_us=core.now_us,
             armed_at_us=flight.armed_at_us,
             expectations=tuple([wish.report for wish in flight.expectations]),
             obstacles=all_known(flight).patches,

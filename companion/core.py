@@ -374,10 +374,7 @@ class FlightCore(Core[FlightContext, Machine]):
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         self.stop_reason = None
-        moved = self.machine.step(inputs, now_us)
-        if self.flight.ended_at_us is None and self.machine.state in FINAL_STATES and self.machine.finished:
-            self.flight.ended_at_us = now_us
-        return moved
+        return self.machine.step(inputs, now_us)
 
     def next_deadline_us(self) -> int:
         return super().next_deadline_us() if self.stop_reason is None else self.now_us

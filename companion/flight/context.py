@@ -176,7 +176,6 @@ class FlightContext:
     stop_put_off: str | None = None  # the reason of a stop that waits until the vehicle is clear of what it has hit
     outcome: Outcome | None = None
     reason: str = ""
-    ended_at_us: int | None = None
     fault: str = ""  # of this program
 
     def __post_init__(self) -> None:

@@ -134,10 +134,11 @@ def test_one_that_flies_again_is_in_other_hands():
 
 
 def watched(force_frd, height_m=0.1, speed_m_s=0.0, rate_rad_s=0.0, landed=LandedState.IN_AIR) -> CrashWatch:
-    """For three seconds."""
-    watch = CrashWatch()
+    """For three seconds, while its motors shake it."""
+    watch, (x, y, z) = CrashWatch(), force_frd
     for time_us in range(0, 3_000_000, 4_000):
-        samples: list[Sample] = [ImuSample(time_us, force_frd, (rate_rad_s, 0.0, 0.0))]
+        shakes, rates = 0.8 + 0.4 * (time_us % 8_000 == 0), (rate_rad_s + 0.5 - 1.0 * (time_us % 8_000 == 0), 0.0, 0.0)
+        samples: list[Sample] = [ImuSample(time_us, (shakes * x, shakes * y, shakes * z), rates)]
         if time_us % 20_000 == 0:
             samples.append(LocalPosition(time_us, (0.0, 0.0, 0.0), (0.0, 0.0, speed_m_s)))
         watch.update(samples, height_m, landed)
