@@ -17,9 +17,8 @@ from companion.report import Event, FlightReport, Status
 
 
 class StepResult(NamedTuple):
-    """Packets and events of one step. `received_frames` are in order; bytes of no packet are `Stray`.
-
-    An incomplete packet appears in the step that completes it.
+    """Packets and events. A tuple, as one is made in every step. `received_frames` are in order; bytes of no packet are
+    `Stray`. An incomplete packet appears in the step that completes it.
     """
 
     received_frames: tuple[bytes, ...]

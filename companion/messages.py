@@ -88,7 +88,9 @@ class Refused(Sample):
 
 @dataclass(frozen=True, slots=True)
 class VehicleText(Sample):
-    """STATUSTEXT of the vehicle, a warning or worse: why it does not arm, or which failsafe acts."""
+    """STATUSTEXT of the vehicle, a warning or worse: why it does not arm, or which failsafe acts. A long one comes in
+    pieces, each by itself.
+    """
 
     text: str
 

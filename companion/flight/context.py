@@ -242,8 +242,7 @@ class FlightContext:
 
     def is_silent(self, now_us: int) -> bool:
         """Whether an identified vehicle has been silent for longer than `link.silence_s`."""
-        since_us, longest_s = now_us - self.vehicle.last_received_us, self.mission.companion.link.silence_s
-        return self.vehicle.identity is not None and since_us > longest_s * 1e6
+        return self.vehicle.identity is not None and self.silent_s(now_us) > self.mission.companion.link.silence_s
 
     def may_command(self, now_us: int) -> bool:
         """Whether a command to a held vehicle may be sent: not on an old mode report, as the pilot may have changed the

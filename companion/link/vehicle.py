@@ -93,7 +93,7 @@ class Vehicle:
     attitude: messages.Attitude | None = None
     thrust_fraction: float | None = None  # as last commanded
     battery_percent: int | None = None
-    said: str = ""  # its newest warning
+    said: str = ""  # its newest warning, since it was asked to arm
     history: MotionHistory = field(default_factory=MotionHistory)
     last_received_us: int = 0
     last_position_us: int | None = None

@@ -218,7 +218,11 @@ def longest_s(mission: Mission, wait_s: float) -> float:
 
 
 def tried_again_s(mission: Mission) -> float:
-    """Time of the longest way that `retry` flies again after each hit, always as slowly as it ever does."""
-    flown = [(leg.step.item.on_collision or mission.on_collision, leg.trajectory) for leg in itinerary(mission)]
-    ways_m = [policy.max_hits * way.distance_m for policy, way in flown if way is not None and policy.then == "retry"]
-    return max(ways_m, default=0.0) / LEAST_TRY_M_S
+    """Time of the longest step that `retry` flies again after each hit, always as slowly as it ever does."""
+    longest = 0.0
+    for leg in itinerary(mission):
+        policy = leg.step.item.on_collision or mission.on_collision
+        if policy.then == "retry" and leg.trajectory is not None:
+            slowest_s = max(leg.lasts_s or 0.0, leg.trajectory.distance_m / LEAST_TRY_M_S)
+            longest = max(longest, policy.max_hits * slowest_s)
+    return longest

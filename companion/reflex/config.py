@@ -18,8 +18,8 @@ SPREAD_MEMORY_S = 2.0
 LEARNT_S = 1.0
 # After take-off the rotors' vibration is not learnt yet: the time that a rising standard deviation needs.
 SETTLED_US = 300_000
-# The standard deviation is told larger by this factor: vibration grows with the throttle, sooner than it is learnt. One
-# factor for all tests.
+# The standard deviation is taken larger by this factor, for all tests: vibration grows with the throttle, sooner than
+# it is learnt.
 EXCESS = 1.5
 
 # --- a sample's force

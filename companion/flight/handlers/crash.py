@@ -12,7 +12,7 @@ from companion.motion.rotation import tilt_rad
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition | None:
     """Told with how, and what is known; None of a vehicle that flies, or stands."""
     watch, latest, attitude = flight.reflex.crash, flight.vehicle.history.latest, flight.vehicle.attitude
-    if latest is None or attitude is None or not (flight.may_crash and (watch.is_tipped or flight.reflex.hits)):
+    if latest is None or attitude is None or not flight.may_crash:
         return None
     hits = flight.hits
     has_unsettled = bool(hits) and hits[-1].settled_after_s is None

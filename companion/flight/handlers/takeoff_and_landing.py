@@ -70,6 +70,7 @@ class TakeOff:
             return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
         flight.expected_mode = flight.vehicle.autopilot.setpoints
         self._now = self._arm
+        flight.vehicle.said = ""  # what it warned of before may have another reason
         flight.command_client.begin(ARM)
         return self._arm(flight, Inputs(), now_us)
 

@@ -58,5 +58,5 @@ class RateJump(Innovation):
         limit = self.limit = least if least > spreads_rad_s else spreads_rad_s
         learnt = size if size < limit else limit
         self.variance_rad2_s2 += was_us / (_MEMORY_US + was_us) * (learnt * learnt - self.variance_rad2_s2)
-        if size >= self.shown * limit or time_us - self.shown_us > SHOWN_US:
+        if size >= self.shown * limit or not 0 <= time_us - self.shown_us <= SHOWN_US:
             self.shown, self.shown_us = size / limit, time_us

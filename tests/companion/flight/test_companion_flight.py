@@ -174,8 +174,7 @@ def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
     f.run_to("holding", 3.0)
     assert "not settled" in f.event("recovered").text
     report = f.run_to_end()
-    assert report.outcome == "completed"
-    assert report.collisions[0].settled_after_s is None
+    assert (report.outcome, report.collisions[0].settled_after_s) == ("completed", None)
 
 
 def test_headings_turn_the_shorter_way_at_a_limited_rate():

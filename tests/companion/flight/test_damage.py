@@ -10,6 +10,7 @@ from companion.flight.plan import mission_lines
 from companion.messages import ImuSample, LandedState, LocalPosition, MotorOutputs, Sample
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.motors import Damage, MotorWatch
+from companion.motion.vector import plus
 from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
 from companion.reflex.detection.crash import CrashWatch
 from tests.companion.fake_vehicle import flying_in, mission
@@ -135,10 +136,11 @@ def test_one_that_flies_again_is_in_other_hands():
 
 def watched(force_frd, height_m=0.1, speed_m_s=0.0, rate_rad_s=0.0, landed=LandedState.IN_AIR) -> CrashWatch:
     """For three seconds, while its motors shake it."""
-    watch, (x, y, z) = CrashWatch(), force_frd
+    watch = CrashWatch()
     for time_us in range(0, 3_000_000, 4_000):
-        shakes, rates = 0.8 + 0.4 * (time_us % 8_000 == 0), (rate_rad_s + 0.5 - 1.0 * (time_us % 8_000 == 0), 0.0, 0.0)
-        samples: list[Sample] = [ImuSample(time_us, (shakes * x, shakes * y, shakes * z), rates)]
+        shake = 1.0 if time_us % 8_000 else -1.0
+        force, rates = plus(force_frd, 0.2 * shake, force_frd), (rate_rad_s + 0.5 * shake, 0.0, 0.0)
+        samples: list[Sample] = [ImuSample(time_us, force, rates)]
         if time_us % 20_000 == 0:
             samples.append(LocalPosition(time_us, (0.0, 0.0, 0.0), (0.0, 0.0, speed_m_s)))
         watch.update(samples, height_m, landed)
