@@ -29,8 +29,6 @@ from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
 from rebound_cli.results.truth_match import read_truth
-from rebound_cli.simulation.compiling import prepare_vehicle
-from rebound_cli.simulation.vehicle_process import READY_WORDS, VehicleProcess
 
 if TYPE_CHECKING:
     from rebound_cli.simulation.lockstep import SteppedVehicle
@@ -79,6 +77,8 @@ def run_fly(options: Namespace) -> int:
     with console_for(options.json, Background("console")) as console:
         is_lockstep = is_simulated and (options.lockstep or options.sim == "ardupilot")
         if world is not None and is_lockstep:
+            from rebound_cli.simulation.compiling import prepare_vehicle
+
             prepare_vehicle(console, world)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
         connection = None if is_simulated else open_signed(options, mission.companion.link.wait)
@@ -102,11 +102,11 @@ def run_fly(options: Namespace) -> int:
 
 
 def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> Flown:
-    if options.lockstep:
-        return _fly_lockstep(flight)
-    if options.connect is None and options.sim == "ardupilot":
-        return _fly_ardupilot(flight, options.instance)
-    if options.connect is None:
+    if flight.world is not None and options.lockstep:
+        return _fly_lockstep(flight, flight.world)
+    if flight.world is not None and options.sim == "ardupilot":
+        return _fly_ardupilot(flight, flight.world, options.instance)
+    if flight.world is not None:
         return _fly_beside_vehicle(flight, connection, options.instance)
     assert connection is not None, "--connect has one"
     confirmation = ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
@@ -154,6 +154,8 @@ def _fly_connected(
 
 def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -> Flown:
     """A simulated vehicle of our own; or its body, for the PX4 that the person starts, at the connection `px4`."""
+    from rebound_cli.simulation.vehicle_process import READY_WORDS, VehicleProcess
+
     waits = ""
     if px4 is None:
         own, words = udp_in("127.0.0.1", 0), READY_WORDS
@@ -178,22 +180,19 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
     return replace(flown, truth=read_truth(flight.folder / run_folder.TRUTH_NAME))
 
 
-def _fly_lockstep(flight: Flight) -> Flown:
+def _fly_lockstep(flight: Flight, world: inputs.SimulatedWorld) -> Flown:
     from sim_vehicle.vehicle import SimulatedVehicle
 
-    assert flight.world is not None, "a lockstep flight has a simulated world"
-    world = flight.world
-    return _fly_stepped(flight, SimulatedVehicle(world.airframe, world.scene, world.seed))
+    return _fly_stepped(flight, SimulatedVehicle(world.airframe, world.scene, world.scene.seed))
 
 
-def _fly_ardupilot(flight: Flight, instance: int) -> Flown:
+def _fly_ardupilot(flight: Flight, world: inputs.SimulatedWorld, instance: int) -> Flown:
     """The body of the vehicle, for the ArduPilot that the person starts."""
     from sim_vehicle.json.vehicle import JsonVehicle
     from sim_vehicle.shell.json_udp import MAVLINK_PORT, PORTS_APART, ArduPilotVehicle
 
-    assert flight.world is not None, "a simulated flight has a simulated world"
-    world, port = flight.world, MAVLINK_PORT + PORTS_APART * instance
-    body = JsonVehicle(world.airframe, world.scene, world.seed)
+    port = MAVLINK_PORT + PORTS_APART * instance
+    body = JsonVehicle(world.airframe, world.scene, world.scene.seed)
     flight.console.print(f"Waiting for ArduPilot's SITL at TCP port {port} (docs/how-to/ardupilot.md) ...")
 
     with ArduPilotVehicle(body, instance, lambda: flight.interrupts.reason is not None) as vehicle:
@@ -214,7 +213,7 @@ def _fly_stepped(flight: Flight, vehicle: "SteppedVehicle") -> Flown:
 
 def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     world = flight.world
-    airframe, seed = (world.airframe.name, world.seed) if world else (None, None)
+    airframe, seed = (world.airframe.name, world.scene.seed) if world else (None, None)
     settled_s = flight.mission.companion.settled.duration_s
     summary = build_summary(flown, FlightFacts(flight.mission.name, airframe, seed, settled_s))
     console, writer = flight.console, flight.recorder.writer

@@ -48,7 +48,7 @@ def simulated(mission: str | list[Any], *sets: str, **keys: Any) -> SimulatedFli
     world = world_from(document)
     companion = Companion(mission_from(document, world))
     companion.confirm_plan()
-    return SimulatedFlight(companion, SimulatedVehicle(world.airframe, world.scene, world.seed))
+    return SimulatedFlight(companion, SimulatedVehicle(world.airframe, world.scene, world.scene.seed))
 
 
 def flown(*items: Any, height_m: float = 1.5, **keys: Any) -> SimulatedFlight:

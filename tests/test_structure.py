@@ -325,12 +325,13 @@ def test_help_imports_nothing_that_is_slow():
     assert not {"numpy", "pydantic", "pymavlink", "shapely", "sim_vehicle", "yaml"} & set(imported)
 
 
-def test_a_guards_start_reads_no_source_starts_no_process_and_loads_no_simulated_vehicle(tmp_path):
+@pytest.mark.parametrize("command", [("guard",), ("fly", "wall", "--yes")])
+def test_a_drones_start_reads_no_source_starts_no_process_and_loads_no_simulated_vehicle(tmp_path, command):
     code = f"""
 import gc, linecache, sys
 from rebound_cli.main import main
 sys.addaudithook(lambda event, _: event in {STARTS!r} and print("started:", event))
-main(["guard", "--connect", "udpin://127.0.0.1:0", "--out", {str(tmp_path / "guarded")!r}, *{QUICK!r}])
+main([*{command!r}, "--connect", "udpin://127.0.0.1:0", "--out", {str(tmp_path / "run")!r}, *{QUICK!r}])
 simulated = {{name for name in sys.modules if name.startswith("sim_vehicle.")}} - {{"sim_vehicle.errors"}}
 print(*linecache.cache, *simulated, gc.isenabled(), gc.get_freeze_count())
 """

@@ -11,27 +11,21 @@ from rebound_cli.inputs.documents import Document, DocumentError, DocumentPath, 
 from rebound_cli.inputs.shipped import shipped_missions
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import HIT_KINDS, RESOLVED_NAME, read_records, read_text, reading, whole_lines
-from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
-from sim_vehicle.faults.spec import check_motor
-from sim_vehicle.mavlink.faulty_link import check_messages
-from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 
 if TYPE_CHECKING:
     from companion.mission.config import CompanionConfig
     from companion.mission.model import Mission
+    from sim_vehicle.airframe import Airframe
+    from sim_vehicle.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
 class SimulatedWorld:
     """What the simulated vehicle needs."""
 
-    scene: Scene
-    airframe: Airframe
-
-    @property
-    def seed(self) -> int:
-        return self.scene.seed
+    scene: "Scene"
+    airframe: "Airframe"
 
 
 def load_mission_document(
@@ -78,7 +72,7 @@ def mission_from(document: Document, world: SimulatedWorld | None = None) -> "Mi
     return validated(Mission, document, data)
 
 
-def with_guards(data: Mapping[str, Any], airframe: Airframe) -> Mapping[str, Any]:
+def with_guards(data: Mapping[str, Any], airframe: "Airframe") -> Mapping[str, Any]:
     """A mission, with the airframe's guards where it names none of its own."""
     companion = data.get("companion", {})
     estimate = companion.get("estimate", {}) if isinstance(companion, dict) else None
@@ -87,7 +81,7 @@ def with_guards(data: Mapping[str, Any], airframe: Airframe) -> Mapping[str, Any
     return {**data, "companion": {**companion, "estimate": {**estimate, "guards": guards_of(airframe)}}}
 
 
-def guards_of(airframe: Airframe) -> dict[str, Any]:
+def guards_of(airframe: "Airframe") -> dict[str, Any]:
     """What its owner writes into `companion.estimate.guards`, from a ruler: to a tenth of a millimetre."""
     frame = airframe.geometry
     centre_m = round(frame.motor_radius_m, 4)
@@ -115,6 +109,11 @@ def read_obstacles(document: Document) -> None:
 
 def world_from(document: Document) -> SimulatedWorld:
     """The `sim:` part and its airframe. Raises DocumentError, also for a wall through the start position."""
+    # A drone loads nothing of the simulation.
+    from sim_vehicle.faults.spec import check_motor
+    from sim_vehicle.mavlink.faulty_link import check_messages
+    from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
+
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
     airframe = _load_airframe(scene.airframe, document)
     for number, fault in enumerate(scene.faults):
@@ -142,8 +141,10 @@ def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, see
     return world_from(document)
 
 
-def _load_airframe(name: str, document: Document) -> Airframe:
+def _load_airframe(name: str, document: Document) -> "Airframe":
     """A built-in airframe by name, or one from a file when the name looks like a path."""
+    from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
+
     try:
         if "/" not in name and not name.endswith((".yaml", ".yml")):
             return load_built_in(name)

@@ -16,8 +16,6 @@ Columns: TypeAlias = dict[str, tuple[Floats, float]]
 TIME_S, PLACE_M, SPEED_M_S, UNIT, FORCE_M_S2, RATE_RAD_S, FOLD_M = 1e-5, 1e-3, 1e-3, 1e-4, 1e-2, 1e-3, 1e-4
 ANGLE_DEG, RATIO = 1e-2, 1e-2
 NED, VELOCITY, TURN = ("n", "e", "d"), ("vn", "ve", "vd"), ("qw", "qx", "qy", "qz")
-
-
 # Every one of them says where the vehicle was.
 PLACES = (*NED, "height")
 

@@ -62,7 +62,7 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
     parameters = {"MAV_SYS_ID": options.instance + 1, **time_outs_at(options.speed)}
     parameters |= {} if key is None else {"MAV_SIGN_CFG": 1.0}
     epoch_us = time.time_ns() // 1000
-    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed, True, epoch_us, parameters, Signing(key))
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.scene.seed, True, epoch_us, parameters, Signing(key))
     vehicle.truth.on_hit = partial(_tell_of, console)
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)
@@ -83,7 +83,7 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
     from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
 
     def new_vehicle() -> HilVehicle:
-        vehicle = HilVehicle(world.airframe, world.scene, world.seed, 1_000_000 // options.sensor_rate)
+        vehicle = HilVehicle(world.airframe, world.scene, world.scene.seed, 1_000_000 // options.sensor_rate)
         vehicle.truth.on_hit = partial(_tell_of, console)
         return vehicle
 

@@ -29,7 +29,7 @@ def prepare_vehicle(console: Console, world: "SimulatedWorld") -> None:
         console.print(f"{COMPILING} the simulated vehicle's physics, which takes half a minute, {often}")
     if NOT_KEPT is not None:
         console.print(f"{COMPILED} is not kept ({NOT_KEPT}): give NUMBA_CACHE_DIR a folder that can be written to.")
-    SimulatedVehicle(world.airframe, world.scene, world.seed, keeps_path=False)
+    SimulatedVehicle(world.airframe, world.scene, world.scene.seed, keeps_path=False)
 
 
 def stand_own(world: "SimulatedWorld") -> None:
