@@ -230,8 +230,8 @@ def watch_all(
     found: list[Found] = []
     touches: list[ImpactEstimate] = []
     for step in heard:
-        seen = advance(monitor, step.samples, situations[step.index], step.time_boot_us)
-        for estimate in seen.impacts:
+        impacts, _ = advance(monitor, step.samples, situations[step.index], step.time_boot_us)
+        for estimate in impacts:
             if estimate.impact.is_collision:
                 found.append(Found(step.time_boot_us, estimate, estimate))
             else:

@@ -39,6 +39,9 @@ class Reaction(NamedTuple):
     notices: Sequence[Notice]
 
 
+NOTHING_SHOWN = Reaction((), False, ())
+
+
 class LeftWrong(NamedTuple):
     """What a vehicle's own estimate has wrong after a hit, and what pushes it; local NED. `share`: of them, by now."""
 
@@ -84,7 +87,7 @@ class Reflex:
         found = [each for each in impacts if each.impact.is_collision and not situation.off_reason] if impacts else []
         held = None if found else self._held(samples, situation)
         if not impacts and held is None:
-            return Reaction(found, False, seen)
+            return Reaction((), False, seen) if seen else NOTHING_SHOWN
         told = [] if situation.is_wreck else [self._contact_notice(each) for each in impacts]
         if held is not None:
             found = [held]

@@ -194,11 +194,11 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
         situation = circumstances.situation
-        result = advance(monitor, samples, situation, now_us)
-        for notice in result.notices:
+        impacts, notices = advance(monitor, samples, situation, now_us)
+        for notice in notices:
             findings.tell(now_us, notice.text)
         findings.note(monitor, situation, circumstances.guard.vehicle.is_airborne, now_us)
-        circumstances.note(result.impacts)
+        circumstances.note(impacts)
 
     for at_us, group in groupby(log.heard, key=lambda item: max(item.at_us, start_us)):
         last_poll_us = min(at_us, last_us + _MOST_POLLS * POLL_INTERVAL_US)

@@ -52,7 +52,7 @@ def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=
             height_m=3.0,
             setpoint_position_ned_m=(2.0 * t * 1e-6, 0.0, -3.0),
         )
-        impacts += advance(monitor, samples, situation, t).impacts
+        impacts += advance(monitor, samples, situation, t)[0]
     return impacts
 
 

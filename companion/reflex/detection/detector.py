@@ -90,7 +90,8 @@ class Impact:
     the sample's averaging window, or the previous sample where the stream left a gap before it.
     `specific_force_frd_m_s2` is what the contact alone did to the vehicle, in body axes; where only the aftermath
     was seen, the mean over the gap that the contact must have fallen into.
-    `confidence` is the detector's own, 0 to 1. `is_shown_twice`: by more than one message.
+    `confidence` is the detector's own, 0 to 1. `is_shown_twice`: by more than one message. `free_frd_m_s2`: of
+    a contact that its force has not shown and may show yet, what the accelerometer shows without it.
     """
 
     sample_time_boot_us: int
@@ -100,6 +101,7 @@ class Impact:
     evidence: Evidence = Evidence.FORCE
     confidence: float = 1.0
     is_shown_twice: bool = False
+    free_frd_m_s2: Vector3 | None = None
 
     @property
     def size_m_s2(self) -> float:

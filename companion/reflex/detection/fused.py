@@ -128,13 +128,14 @@ class FusedState(DetectorState):
         way.
         """
         weak, felt = max(self.force, self.force_before)
-        felt, steps = unit(self.external_frd_m_s2(felt)), unit(step_frd_m_s)
+        felt, steps = unit(minus(felt, self.free_frd_m_s2)), unit(step_frd_m_s)
         return unit(plus(plus(ZERO, ratio, steps), weak, felt)) if along(felt, steps) >= 0.0 else None
 
-    def external_frd_m_s2(self, force_frd_m_s2: Vector3) -> Vector3:
-        """What of a sample's force free flight does not explain."""
-        (f_x, f_y, f_z), (x, y, z) = force_frd_m_s2, self.floor.mean_frd_m_s2
-        return (f_x - x, f_y - y, f_z - self.thrust.expected_m_s2(self.last_sample_boot_us, z))
+    @property
+    def free_frd_m_s2(self) -> Vector3:
+        """What a sample shows in free flight."""
+        x, y, z = self.floor.mean_frd_m_s2
+        return (x, y, self.thrust.expected_m_s2(self.last_sample_boot_us, z))
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""
@@ -205,10 +206,10 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            turn, weak = s.turn.value / s.turn.limit, s.weak_force
+            turn, weak = s.turn.value / s.turn.limit, max(ratio, s.force_before[0])
             return self._turned(s, earlier_us, situation, motion) if turn * turn + weak * weak > 1.0 else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
-        force = s.external_frd_m_s2(f)
+        force = minus(f, s.free_frd_m_s2)
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
         is_learnt = math.dist(f, s.floor.mean_frd_m_s2) < s.threshold_m_s2
         if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
@@ -224,18 +225,17 @@ class FusedDetector:
         return self._loud(s, situation, motion, impact, s.jumps(f))
 
     def _turned(self, s: FusedState, free_until_us: int, situation: Situation, motion: Motion) -> Impact | None:
-        """What turned a vehicle that flew somewhere pushed it back: where to, only its velocity before says."""
+        """What turned a vehicle that did not hover pushed it back: where to, only its velocity before says."""
         now_us = s.last_sample_boot_us
         before = motion.history.before(free_until_us + 1) if motion.validity.is_known else None
         is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
-        flew = before is not None and math.hypot(*before.velocity_ned_m_s) >= reflex.APPROACH_M_S
-        if s.phase is not Phase.ARMED or is_again or before is None or not flew:
+        if s.phase is not Phase.ARMED or is_again or before is None or s.may_be_hand(now_us):
             s.turn.value = s.turn.shown = 0.0  # of a velocity that jumps then, it is no sign either
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
         force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.ratio)
-        evidence = Evidence.RATE_JUMP
-        impact = Impact(now_us, free_until_us, force, evidence=evidence, confidence=confidence, is_shown_twice=True)
+        unknown, turn, free = ImpactKind.UNKNOWN, Evidence.RATE_JUMP, s.free_frd_m_s2
+        impact = Impact(now_us, free_until_us, force, unknown, turn, confidence, True, free)
         return self._fire(s, situation, motion, impact)
 
     def _unwatched(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact | None:

@@ -8,7 +8,7 @@ from companion.motion.config import SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.doppler import Doppler
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus, unit
-from companion.reflex.config import CLIPPED_SHARE, SHORT, EstimateConfig
+from companion.reflex.config import APPROACH_RAD, CLIPPED_SHARE, SHORT, EstimateConfig
 from companion.reflex.detection.detector import DetectorState, Evidence, Impact, Motion, Phase
 from companion.reflex.surface import Normal, normal_of
 
@@ -55,10 +55,12 @@ class ContactForce:
     @property
     def is_fully_measured(self) -> bool:
         """Whether the force so far was measured without clipping, as far as the samples show."""
+        if self.is_clipped:
+            return False
         largest = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
         least = 0.5 * along(largest, largest)
         lasting = sum(along(force, largest) >= least for force in self.forces_ned_m_s2)
-        return not self.is_clipped and lasting > SHORT and not self._lacks_some
+        return lasting > SHORT and not self._lacks_some
 
     @property
     def _lacks_some(self) -> bool:
@@ -132,14 +134,12 @@ class ImpactEstimator(Motion):
         place, velocity, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
-        self.contact, came = None, velocity if self.validity.is_valid else ZERO
-        # A velocity that alone shows a contact has no force of its own.
-        if self.imu is not None and impact.evidence is Evidence.FORCE:
-            free = minus(self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
-            averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
-            range_m_s2 = self.config.accelerometer_range_m_s2
-            self.contact = ContactForce(free, averaging_us, range_m_s2, came, is_clipped=self.hides_clipping)
-            self.contact.add(self.imu, self.imu.time_boot_us - free_until_us, self.strapdown.valid_wxyz)
+        came = velocity if self.validity.is_valid else ZERO
+        self.contact = self._contact_force(impact, came)
+        normal = normal_of(force_ned, came, self.hides_clipping)
+        if impact.evidence is Evidence.RATE_JUMP:
+            # Of the way that the vehicle came.
+            normal = Normal().with_direction(force_ned, APPROACH_RAD)
         self.validity.invalidate(sample_us, math.hypot(*velocity))
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
@@ -147,13 +147,27 @@ class ImpactEstimator(Motion):
             time_error_us=(sample_us - free_until_us) // 2,
             position_ned_m=place,
             velocity_ned_m_s=velocity,
-            normal=normal_of(force_ned, came, self.hides_clipping or impact.evidence is Evidence.RATE_JUMP),
+            normal=normal,
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             velocity_error_m_s=error_m_s,
             earlier=self.earlier_imu,
         )
         return estimate
+
+    def _contact_force(self, impact: Impact, came_ned_m_s: Vector3) -> ContactForce | None:
+        """Of a contact that a turn shows the first force is still to come; one that a velocity shows is over."""
+        imu, free, is_shown = self.imu, impact.free_frd_m_s2, impact.evidence is Evidence.FORCE
+        if imu is not None and is_shown:
+            free = minus(imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
+        if imu is None or free is None:
+            return None
+        averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
+        contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2, came_ned_m_s)
+        contact.is_clipped = self.hides_clipping or not is_shown
+        if is_shown:
+            contact.add(imu, imu.time_boot_us - impact.contact_free_until_boot_us, self.strapdown.valid_wxyz)
+        return contact
 
     def follow(self, sample: ImuSample, state: DetectorState) -> None:
         """Take an IMU sample, and the detector's state after it, until the estimate is final: the contact is over."""
@@ -173,7 +187,7 @@ class ImpactEstimator(Motion):
 
     def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
         begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
-        if contact.begun_boot_us is not None:
+        if contact.begun_boot_us is not None and estimate.impact.evidence is Evidence.FORCE:
             begun_us, error_us = contact.begun_boot_us, contact.averaging_us // 4
         return replace(
             estimate,

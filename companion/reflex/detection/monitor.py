@@ -6,7 +6,7 @@ samples at the same times give the same impacts and notices.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from pydantic import field_validator
 
@@ -95,13 +95,6 @@ class CollisionMonitor:
         return f"{self.state.phase.value} at {self.seen_from}"
 
 
-class MonitorResult(NamedTuple):
-    """Result of one step: impacts at their first sample, and notices. The estimator refines the latest impact."""
-
-    impacts: Sequence[ImpactEstimate]
-    notices: Sequence[Notice]
-
-
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
     """A monitor before its first sample; ``now_us`` is on the clock of `advance`."""
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
@@ -111,8 +104,13 @@ def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonit
     )
 
 
-def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Situation, now_us: int) -> MonitorResult:
-    """Take the samples received since the last call, in order. Call it without samples, too: that shows a silence."""
+def advance(
+    monitor: CollisionMonitor, samples: Sequence[Sample], situation: Situation, now_us: int
+) -> tuple[list[ImpactEstimate], list[Notice]]:
+    """Take the samples received since the last call, in order; call it without any, too: that shows a silence.
+
+    Impacts at their first sample, and notices. The estimator refines the latest impact.
+    """
     impacts: list[ImpactEstimate] = []
     imu_samples, is_on, sight, estimator = 0, situation.off_reason is None, monitor.config.sight, monitor.estimator
     if is_on and monitor.state.threshold_m_s2 > sight.max_threshold_m_s2:
@@ -148,7 +146,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     monitor.stream_health.imu(imu_samples, sight, now_us)
     if now_us - monitor.promised_us >= 1e6:
         _promise(monitor, now_us)
-    return MonitorResult(impacts, _notices(monitor, is_on, now_us))
+    return impacts, _notices(monitor, is_on, now_us)
 
 
 def _promise(monitor: CollisionMonitor, now_us: int) -> None:

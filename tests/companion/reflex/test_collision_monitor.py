@@ -18,7 +18,7 @@ from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
-from companion.reflex.config import APPROACH_RAD, RecoveryConfig
+from companion.reflex.config import APPROACH_RAD, IMPULSE_RAD, RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.detector import ImpactKind, Phase, Situation
 from companion.reflex.detection.monitor import advance, start_monitor
@@ -68,9 +68,9 @@ class Watch:
                 samples += [Odometry(t, place(t), told, 0), LocalPosition(t, place(t), told)]
                 wxyz = attitude(t)
                 samples += [] if wxyz is None else [Attitude(t, wxyz, rates(t))]
-            seen = advance(self.monitor, samples, situation, t)
-            self.impacts += seen.impacts
-            self.told += [(t, notice.kind, notice.text) for notice in seen.notices]
+            impacts, notices = advance(self.monitor, samples, situation, t)
+            self.impacts += impacts
+            self.told += [(t, notice.kind, notice.text) for notice in notices]
             look(t)
         return self
 
@@ -79,7 +79,7 @@ def test_late_and_doubled_samples_are_dropped_and_a_reboot_is_not():
     watch = Watch().fly(2_900_000, rates=lambda t: (0.0, 0.0, 0.9 * (2_800_000 <= t < 2_860_000)))
     strapdown, turn = watch.monitor.estimator.strapdown, watch.monitor.state.turn
     late = ImuSample(strapdown.time_boot_us - INTERVAL_US, (-50.0, 0.0, -9.81), STILL)
-    assert not advance(watch.monitor, [late], IN_FLIGHT, 2_900_000).impacts
+    assert not advance(watch.monitor, [late], IN_FLIGHT, 2_900_000)[0]
     watch.fly(16_000, rates=lambda t: (0.0, 0.0, 0.3))
     assert strapdown.time_boot_us < 16_000 and 0.0 <= turn.mean_rad_s[2] <= 0.3 and turn.shown_us < 16_000
 
@@ -248,13 +248,25 @@ def test_a_turn_is_a_hit_where_it_is_known_whereto_the_vehicle_flies(left_m_s, h
     assert len(impacts) == hits
 
 
-def test_a_turn_shows_no_direction_and_needs_no_other_evidence():
+@pytest.mark.parametrize(
+    ("push", "normal", "error_rad"),
+    [
+        (STILL, (-1.0, 0.0, 0.0), APPROACH_RAD),
+        ((-20.0, 20.0, 0.0), (-math.sqrt(0.5), math.sqrt(0.5), 0.0), IMPULSE_RAD),
+    ],
+    ids=["of one sample", "whose force comes later"],
+)
+def test_a_turn_shows_no_direction_and_needs_no_other_evidence(push, normal, error_rad):
     watch = Watch().fly(
-        2_600_000, velocity=lambda t: (2.0, 0.0, 0.0), rates=lambda t: (0.0, 0.0, 3.0 if t >= 2_500_000 else 0.0)
+        2_600_000,
+        push=lambda t: push if 2_516_000 <= t < 2_540_000 else STILL,
+        velocity=lambda t: (2.0, 0.0, 0.0),
+        rates=lambda t: (0.0, 0.0, 3.0 if t >= 2_500_000 else 0.0),
     )
-    (hit,) = watch.impacts
-    assert hit.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.1)
+    (hit,), known = watch.impacts, watch.monitor.estimator.estimate
     assert hit.normal.error_rad == APPROACH_RAD
+    assert known.normal.direction_ned == pytest.approx(normal, abs=0.1)
+    assert known.normal.error_rad == error_rad and not known.is_fully_measured
     assert hypothesis_of(hit, hit.impact.specific_force_frd_m_s2, 0.005) is None
 
 

@@ -171,8 +171,9 @@ def at_once(yaw=0.0, roll=0.0, pitch=0.0):
         # They turn the vehicle by as much in the longer time, and tilt it as soon as that
         (at_once(2.2), {"imu_every_us": 40_000}, 0),
         (at_once(roll=1.8, pitch=-1.8), {}, 0),
-        # What turns a vehicle that flies nowhere may be a hand
-        (at_once(1.4), {"velocity": (0.4, 0.0, 0.0)}, 0),
+        # What turns a vehicle that hovers may be a hand
+        (at_once(1.4), {"velocity": (0.2, 0.0, 0.0)}, 1),
+        (at_once(1.4), {"velocity": (0.1, 0.0, 0.0)}, 0),
         # A person who turns it on the ground
         (at_once(1.4), {"situation": lambda t: IN_FLIGHT._replace(off_reason="below 0.5 m")}, 0),
     ],
