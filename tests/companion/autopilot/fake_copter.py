@@ -10,13 +10,12 @@ GUIDED, COPTER_LAND, BRAKE = 4, 9, 17
 NUMBERS = {OFFBOARD: GUIDED, LAND: COPTER_LAND, LOITER: BRAKE}
 BY_NUMBER = {number: mode for mode, number in NUMBERS.items()}
 SET_MODE, TAKE_OFF, ARM, AUX_FUNCTION = 176, 22, 400, 218
-VERSION = 4 << 24 | 6 << 16
 
 
 @dataclass
 class FakeCopter(FakeVehicle):
     autopilot: int = 3
-    flight_version: int = VERSION
+    flight_version: int = 4 << 24 | 6 << 16
     parameters: dict[str, float] = field(default_factory=lambda: {"GUID_TIMEOUT": 0.3, "GUID_OPTIONS": 8.0})
     takes_off_to_m: float | None = None
 

@@ -225,8 +225,7 @@ def test_gyroscopes_that_are_never_a_number_are_no_hits_but_told_and_end_the_mis
 
 
 DOCS = Path(__file__).parents[3] / "bench" / "notes" / "px4.md"
-HOME = (0.0, 0.0, 0.0)
-REST = (0.0, 0.0, 0.0)
+HOME = REST = (0.0, 0.0, 0.0)
 ROOM, DEFAULTS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), SetpointLimits()
 HERE = (0.0, 0.0, -1.5)
 HELD_BY_ATTITUDE_S = MOST_HELD_S + NOTICED_S

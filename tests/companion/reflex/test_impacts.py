@@ -12,7 +12,6 @@ from companion.reflex.detection.detector import Impact, ImpactKind, Situation
 from companion.reflex.detection.impact import ContactForce, ImpactEstimator
 from companion.reflex.surface import Normal, normal_of, with_change
 
-CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000
 STILL = (0.0, 0.0, 0.0)
 
@@ -25,7 +24,7 @@ def told(estimator, t_us, velocity_ned_m_s, position_ned_m=STILL):
 
 def approaching(acceleration_m_s2=0.0):
     """An estimator that was told of a vehicle on its way north, at x = 4 m with 2 m/s when the contact begins."""
-    estimator = ImpactEstimator(CONFIG)
+    estimator = ImpactEstimator(EstimateConfig())
     for t_us in range(CONTACT_US - 1_000_000, CONTACT_US, 20_000):
         t = (t_us - CONTACT_US) * 1e-6
         speed_m_s, north_m = 2.0 + acceleration_m_s2 * t, 4.0 + 2.0 * t + 0.5 * acceleration_m_s2 * t * t

@@ -16,7 +16,6 @@ from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import HOP, SQUARE
 
 EPOCH_US = 1_600_000_000_000_000
-HEARTBEAT = 0
 HOP_SETS = [word for word in HOP if word != "--set"]
 
 
@@ -60,7 +59,7 @@ class World:
         frames = self.vehicle.step(self._pending)
         self._pending = b""
         for frame in frames:
-            if frame[7:10] == bytes([HEARTBEAT, 0, 0]):
+            if frame[7:10] == b"\0\0\0":  # HEARTBEAT
                 self.custom_mode = int.from_bytes(frame[10:14], "little")
         if 0 < self.cut_until_us <= self.vehicle.time_boot_us:
             self.cut_until_us = 0

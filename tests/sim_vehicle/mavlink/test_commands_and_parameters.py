@@ -14,7 +14,6 @@ from sim_vehicle.physics.layout import constants_from
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_INTERVAL, SET_MODE, Client
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
-NAN = math.nan
 PREARM_CHECK = 0x10000000
 REBOOT, INJECT_FAILURE = 246, 420
 
@@ -46,7 +45,7 @@ def client() -> Client:
         # Another link's interval, or an answer to somebody else, cannot be asked for
         (SET_INTERVAL, (105, 4_000, 1), [FAILED]),
         (SET_INTERVAL, (105, 4_000, 0, 0, 0, 0, 1), [FAILED]),
-        (SET_INTERVAL, (105, NAN), [ACCEPTED]),
+        (SET_INTERVAL, (105, math.nan), [ACCEPTED]),
         (REQUEST_MESSAGE, (27,), [DENIED]),
         (REQUEST_MESSAGE, (360,), [DENIED]),
         (REQUEST_MESSAGE, (65,), [DENIED]),

@@ -62,9 +62,6 @@ def addressed_to(kind: type, payload: bytes, system: int, component: int) -> byt
     return packed
 
 
-NAN = math.nan
-
-
 def packed(message, v1=False) -> bytes:
     link = dialect.MAVLink(None, srcSystem=1, srcComponent=191)
     return message.pack(link, force_mavlink1=v1)
@@ -85,7 +82,7 @@ TARGETS = [
     (target_message(1, 0xE3F, *NUMBERS), target(acceleration_m_s2=(7.0, 8.0, 9.0), is_force=True)),
     (target_message(1, 0xFFF, *NUMBERS), target(is_force=True)),
     (target_message(1, 0xDFB, *NUMBERS), target(position=(None, None, -3.0))),
-    (target_message(1, 0xDF8, NAN, math.inf, -3.0, *NUMBERS[3:]), target(position=(None, None, -3.0))),
+    (target_message(1, 0xDF8, math.nan, math.inf, -3.0, *NUMBERS[3:]), target(position=(None, None, -3.0))),
 ]
 
 
