@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
-from companion.reflex.detection.detector import ImpactKind
+from companion.reflex.detection.detector import Evidence, ImpactKind
 from companion.reflex.surface import Normal
 from rebound_cli.logs.log import WANTED, Log, clipped
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
 from rebound_cli.replay.watching import Finding, Findings, watch_log
 
 _WIDTH = 110
+_SEEN_BY = {Evidence.VELOCITY_JUMP: "a velocity that jumped", Evidence.RATE_JUMP: "a turn"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +105,9 @@ def _verdict(replay: Replay) -> str:
 
 def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
     what = "CRASH" if finding.is_crash else "HIT" if finding.is_collision else "contact, no collision"
-    force_m_s2 = math.hypot(*finding.first.impact.specific_force_frd_m_s2)
-    yield f"{what}: {kind_text(finding)}, seen by {force_m_s2:.1f} m/s², a hit from {finding.threshold_m_s2:.1f} on"
+    impact = finding.first.impact
+    force = f"{impact.size_m_s2:.1f} m/s², a hit from {finding.threshold_m_s2:.1f} on"
+    yield f"{what}: {kind_text(finding)}, seen by {_SEEN_BY.get(impact.evidence, force)}"
     yield from (
         f"{name.lower()}: {text}" for name, text in impact_facts(finding, finding.final.normal, replay.log.seconds)
     )

@@ -21,7 +21,7 @@ from companion.messages import Attitude, LocalPosition
 from companion.mission.config import CompanionConfig
 from rebound_cli.live.console import Console
 from rebound_cli.replay.recording import Followed
-from rebound_cli.replay.report import replay_log
+from rebound_cli.replay.report import replay_log, report_text
 from rebound_cli.replay.watching import Findings
 from rebound_cli.report import showing
 from rebound_cli.report.content import content
@@ -197,8 +197,7 @@ def of_a_log(log):
 
 def test_a_log_of_anybodys_has_a_page_too():
     # Given a push of 40 m/s^2 from ahead at 6 s, in flight at 1 m/s
-    shown = of_a_log(flight())
-    data = content(shown)
+    data = content(of_a_log(flight()))
     (moment,) = (moment for moment in data["moments"] if moment["kind"] == "hit")
     assert abs(moment["t"] - HIT_US * 1e-6) < 0.01
     assert data["sentence"].startswith("Hit ") and "of the flight was watched" in data["sentence"]
@@ -214,7 +213,8 @@ def test_a_hit_between_the_samples_is_told_by_the_velocity_that_shows_it():
             velocity = ((1.0 if one.at_us < HIT_US else 0.4) + chance.gauss(0.0, 0.01), 0.0, 0.0)
             one = replace(one, sample=replace(one.sample, velocity_ned_m_s=velocity))
         heard.append(one)
-    shown = of_a_log(replace(log, heard=tuple(heard)))
+    shown = of_a_log(log := replace(log, heard=tuple(heard)))
+    assert "HIT: wall, seen by a velocity that jumped" in report_text(replay_log(log, CompanionConfig()))
     (moment,) = (moment for moment in moments_of(shown) if moment.kind == "hit")
     (told,) = (reason for reason in moment.reasons if reason.startswith("Velocity jump: 0.6"))
     assert told.endswith("speaks for a contact.") and not any("Push" in reason for reason in moment.reasons)
