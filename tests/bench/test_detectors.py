@@ -25,8 +25,6 @@ from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, 
 
 TICK_US = 4_000
 PUSHED_US = 4_000_000
-HOVER = 0.7
-LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
 def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=6_000_000, off=None):
@@ -43,8 +41,8 @@ def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=
         samples: list[Sample] = [ImuSample(t, (force[0] + wobble, force[1], force[2]), (0.0, 0.0, 0.0))]
         if t % 20_000 == 0:
             samples.append(LocalPosition(t, position, velocity))
-            samples.append(Attitude(t, LEVEL))
-            samples.append(AttitudeTarget(t, HOVER * thrust / 9.81))
+            samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
+            samples.append(AttitudeTarget(t, 0.7 * thrust / 9.81))
         situation = Situation(
             off_reason=off,
             may_crash=True,

@@ -9,7 +9,7 @@ contact, each compared with this vehicle's own flight:
 * the body rates jump, and stay (see `rate_jump`);
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
 
-Both jumps follow a contact of which the samples hold a part at most: what is below its limit adds up, by squares.
+Both jumps follow a contact of which the samples hold a part at most: two signs below their limits add up, by squares.
 
 A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
 push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
@@ -318,7 +318,8 @@ class FusedDetector:
         corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.ratio
-        is_weak = ratio <= 1.0 < math.hypot(ratio, s.turn.shown, s.weak_force) and not s.may_be_hand(time_us)
+        # What is not of one moment adds to a jump, and not to each other.
+        is_weak = ratio <= 1.0 < math.hypot(ratio, max(s.turn.shown, s.weak_force)) and not s.may_be_hand(time_us)
         both = s.both(ratio, ned_to_body(strapdown.valid_wxyz, step)) if is_weak else None
         is_jump = ratio > 1.0 or both is not None or (is_weak and math.hypot(ratio, s.turn.shown) > 1.0)
         if s.phase is not Phase.ARMED or not is_jump:

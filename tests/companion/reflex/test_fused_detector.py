@@ -195,10 +195,15 @@ def test_a_contact_of_many_samples_turns_a_vehicle_faster_than_motors_do(turns_r
     assert [impact.evidence for impact in impacts] == [Evidence.RATE_JUMP] * hits
 
 
-@pytest.mark.parametrize(("late_us", "hits"), [(2_000, 1), (82_000, 1), (202_000, 0)])
-def test_a_turn_and_a_velocity_jump_soon_after_it_that_are_each_too_small_are_a_hit_together(late_us, hits):
-    flight = Flight(imu_every_us=20_000, velocity=(1.0, 0.0, 0.0), rates=at_once(0.9))
-    flight.jump = (3_000_000 + late_us, (-0.1, 0.0, 0.0), 0)
+# The last: a force that comes later than the turn, and hardly a jump
+@pytest.mark.parametrize(
+    ("late_us", "jump", "push", "hits"),
+    [(2_000, -0.1, 0.0, 1), (82_000, -0.1, 0.0, 1), (202_000, -0.1, 0.0, 0), (82_000, 0.05, 0.8, 0)],
+)
+def test_a_turn_and_a_velocity_jump_soon_after_it_that_are_each_too_small_are_a_hit_together(late_us, jump, push, hits):
+    pushed = pulse((push, 0.0, 0.0), 2_994_500 + late_us, 4_000)
+    flight = Flight(pushed, imu_every_us=20_000, velocity=(1.0, 0.0, 0.0), rates=at_once(0.9))
+    flight.jump = (3_000_000 + late_us, (jump, 0.0, 0.0), 0)
     found = [(impact.evidence, impact.is_shown_twice) for impact in flight.fly(3_300_000)]
     assert found == [(Evidence.VELOCITY_JUMP, True)] * hits
 

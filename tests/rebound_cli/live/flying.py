@@ -15,7 +15,6 @@ from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import HOP, SQUARE
 
-EPOCH_US = 1_600_000_000_000_000
 HOP_SETS = [word for word in HOP if word != "--set"]
 
 
@@ -31,7 +30,7 @@ class World:
     def now_us(self):
         # A clock that is read goes on.
         self._readings += 1
-        return EPOCH_US + self.vehicle.time_boot_us + 4 * self._readings
+        return 1_600_000_000_000_000 + self.vehicle.time_boot_us + 4 * self._readings
 
     def sleep(self, duration_s):
         until_us = self.now_us() + duration_s * 1e6

@@ -140,7 +140,6 @@ def target(position: Axis3 = FREE, velocity: Axis3 = FREE, **others: Any) -> Pos
 
 
 ORIGIN = Origin()
-LINK = 2
 
 
 def hovering(height_m: float = 5.0, **parameters: float) -> Flight:
@@ -210,4 +209,4 @@ def sticks(
     flight: Flight, seconds: float, roll: float = 0, pitch: float = 0, throttle: float = 0, yaw: float = 0
 ) -> None:
     """Hold the sticks, sent at 50 Hz."""
-    flight.fly(seconds, StickInput(roll, pitch, throttle, yaw, LINK), rate_hz=50.0)
+    flight.fly(seconds, StickInput(roll, pitch, throttle, yaw, source=2), rate_hz=50.0)
