@@ -15,6 +15,7 @@ from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import HOP, SQUARE
 
+EPOCH_US = 1_600_000_000_000_000
 HOP_SETS = [word for word in HOP if word != "--set"]
 
 
@@ -22,7 +23,7 @@ class World:
     """A connection to a simulated vehicle, and the clock: waiting for bytes lets virtual time pass."""
 
     def __init__(self, scene):
-        self.vehicle = SimulatedVehicle(scene.airframe, scene.scene, scene.seed)
+        self.vehicle = SimulatedVehicle(scene.airframe, scene.scene, scene.scene.seed)
         self.sent, self.custom_mode, self.is_deaf = [], None, False
         self.cut_until_us, self.told = 0, []  # by the connection
         self._pending, self._readings = b"", 0
@@ -30,7 +31,7 @@ class World:
     def now_us(self):
         # A clock that is read goes on.
         self._readings += 1
-        return 1_600_000_000_000_000 + self.vehicle.time_boot_us + 4 * self._readings
+        return EPOCH_US + self.vehicle.time_boot_us + 4 * self._readings
 
     def sleep(self, duration_s):
         until_us = self.now_us() + duration_s * 1e6

@@ -12,7 +12,6 @@ import pytest
 from mcap.reader import make_reader
 
 from companion.messages import GpsFix, LocalPosition
-from rebound_cli import fly
 from rebound_cli.export.foxglove import write_mcap
 from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.reader import read_telemetry
@@ -21,6 +20,7 @@ from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import TLOG_NAME, RunFolderError, check_place
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
+from rebound_cli.simulation import compiling
 from tests.bench.random_missions import made_up
 from tests.bench.random_missions.made_up import EPOCH_US
 from tests.docs.pages import ROOT
@@ -30,7 +30,7 @@ from tests.rebound_cli.command import WALL
 @pytest.mark.parametrize("command", [("fly", str(WALL), "--lockstep"), ("guard", "--connect", "udpin://127.0.0.1:0")])
 def test_a_folder_below_a_file_or_with_a_flight_is_refused_at_once(command, tmp_path, capsys, monkeypatch):
     # Minutes of compiling are too many for a flight that cannot be kept
-    monkeypatch.setattr(fly, "prepare_vehicle", lambda *_: pytest.fail("compiles"))
+    monkeypatch.setattr(compiling, "prepare_vehicle", lambda *_: pytest.fail("compiles"))
     (tmp_path / TLOG_NAME).write_bytes(b"")
     assert main([*command, "--out", str(tmp_path / TLOG_NAME / "run")]) == 1
     assert f"run cannot be made: nothing can be written to {tmp_path / TLOG_NAME}." in capsys.readouterr().err
