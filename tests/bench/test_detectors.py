@@ -23,8 +23,7 @@ from sim_vehicle.plant.plant import Plant
 from tests.rebound_cli.replay.flying import HIT_US, flight
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 
-TICK_US = 4_000
-PUSHED_US = 4_000_000
+TICK_US, PUSHED_US, HOVER = 4_000, 4_000_000, 0.7
 
 
 def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=6_000_000, off=None):
@@ -42,7 +41,7 @@ def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=
         if t % 20_000 == 0:
             samples.append(LocalPosition(t, position, velocity))
             samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
-            samples.append(AttitudeTarget(t, 0.7 * thrust / 9.81))
+            samples.append(AttitudeTarget(t, HOVER * thrust / 9.81))
         situation = Situation(
             off_reason=off,
             may_crash=True,

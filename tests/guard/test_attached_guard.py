@@ -21,7 +21,7 @@ from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
 from tests.guard.flying import PROGRAM, AttachedFlight, by_name
 
-STALL_S = 1.6  # more than the silence after which the guard lets go (link.silence_s)
+RUN_CHECKS, STALL_S = 401, 1.6  # more than the silence after which the guard lets go (link.silence_s)
 
 
 def setpoint(system_id: int = 1) -> bytes:
@@ -73,7 +73,7 @@ def test_in_the_programs_own_offboard_nothing_is_streamed_beforehand_and_nothing
     assert air.setpoints("guard", taken_s - 1.0, taken_s) == []
     # but that PX4 changes its controllers, with the hit to attitudes and with the hand-over to places
     for at_s in (taken_s, air.event_s("hand_over")):
-        assert [message.command for message in air.sent_by("guard", "LONG", at_s - 0.1, at_s + 0.1)] == [401]
+        assert [message.command for message in air.sent_by("guard", "LONG", at_s - 0.1, at_s + 0.1)] == [RUN_CHECKS]
     assert air.event("confirmed").data["after_ms"] == 0.0
 
 

@@ -44,7 +44,7 @@ class Evidence(Enum):
 
     FORCE = "force"  # a sample's averaging window held the contact's own force
     VELOCITY_JUMP = "aftermath"  # the contact fell between the samples; what followed it showed
-    RATE_JUMP = "turn"  # the same; the vehicle turned at once, and turns on as fast
+    RATE_JUMP = "turn"  # the vehicle turned at once, and turns on as fast; its force may follow
 
 
 class Situation(NamedTuple):

@@ -234,8 +234,15 @@ class FusedDetector:
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
         force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.ratio)
-        unknown, turn, free = ImpactKind.UNKNOWN, Evidence.RATE_JUMP, s.free_frd_m_s2
-        impact = Impact(now_us, free_until_us, force, unknown, turn, confidence, True, free)
+        impact = Impact(
+            now_us,
+            free_until_us,
+            force,
+            evidence=Evidence.RATE_JUMP,
+            confidence=confidence,
+            is_shown_twice=True,
+            free_frd_m_s2=s.free_frd_m_s2,
+        )
         return self._fire(s, situation, motion, impact)
 
     def _unwatched(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact | None:

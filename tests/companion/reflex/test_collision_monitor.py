@@ -260,7 +260,7 @@ def test_a_turn_shows_no_direction_and_needs_no_other_evidence(push, normal, err
         rates=lambda t: (0.0, 0.0, 3.0 if t >= 2_500_000 else 0.0),
     )
     (hit,), known = watch.impacts, watch.monitor.estimator.estimate
-    assert hit.normal.error_rad == APPROACH_RAD
+    assert hit.normal.error_rad == APPROACH_RAD and known.time_boot_us == hit.time_boot_us
     assert known.normal.direction_ned == pytest.approx(normal, abs=0.1)
     assert known.normal.error_rad == error_rad and not known.is_fully_measured
     assert hypothesis_of(hit, hit.impact.specific_force_frd_m_s2, 0.005) is None
