@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.config import LONGEST_GAP_US, SHOWN_US
+from companion.motion.config import LONGEST_GAP_US, MOTORS_RAD_S2, SHOWN_US
 from companion.motion.vector import ZERO
 from companion.reflex.config import ACROSS_THRUST, EXCESS, RATE_MEMORY_US, SPREAD_MEMORY_S, FusedConfig
 from companion.reflex.detection.detector import Innovation
@@ -43,10 +43,12 @@ class RateJump(Innovation):
         on = a * i + b * j + c * k
         # The one between is the middle one, unless the newest step goes back: behind where the last began, or less far.
         if on < 0.0:
-            if on + a * a + b * b + c * c < 0.0:
-                x, y, z = x - a, y - b, z - c
-            else:
-                x, y, z = p, q, r
+            if on + a * a + b * b + c * c >= 0.0:
+                a, b, c = -i, -j, -k
+            # Motors brake a true one, too.
+            braked_rad_s = MOTORS_RAD_S2 * ACROSS_THRUST * 1e-6 * self.over_us
+            share = max(0.0, 1.0 - braked_rad_s / math.sqrt(a * a + b * b + c * c))
+            x, y, z = x - share * a, y - share * b, z - share * c
         (m, n, o), share, least = self.mean_rad_s, was_us / RATE_MEMORY_US, config.rate_step_rad_s
         i, j, k = x - m, y - n, z - o
         if share >= 1.0:
