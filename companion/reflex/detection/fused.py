@@ -304,7 +304,6 @@ class FusedDetector:
     ) -> Impact | None:
         time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, motion.strapdown
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
-        s.velocity.value, s.velocity.limit = 0.0, math.inf
         if not hovers(v):
             s.moved_boot_us = time_us
         elif time_us - s.moved_boot_us >= CURRENT_US:
@@ -312,6 +311,7 @@ class FusedDetector:
         # A filter makes a pulse of a contact, of which samples hold a part. A jump beside them is the estimator's own.
         if not strapdown.has_new_fix or motion.hides_clipping:
             return None
+        s.velocity.value, s.velocity.limit = 0.0, math.inf
         if time_us - s.last_loud_boot_us < SHOWN_US:
             jump.since_us = time_us
             return None
