@@ -1,7 +1,7 @@
 """A rate jump: body rates that change sooner than motors can change them, and stay changed.
 
 A contact beside the centre turns the vehicle. Motors do so about the thrust by their drag alone, which is weak, and
-faster across it. One broken sample is never the middle one of three.
+faster across it. One broken sample is never the middle one of three; motors brake a true one by so much at most.
 """
 
 import math
@@ -45,8 +45,8 @@ class RateJump(Innovation):
         if on < 0.0:
             if on + a * a + b * b + c * c >= 0.0:
                 a, b, c = -i, -j, -k
-            # Motors brake a true one, too.
-            braked_rad_s = MOTORS_RAD_S2 * ACROSS_THRUST * 1e-6 * self.over_us
+            # A gap lets no broken sample count.
+            braked_rad_s = MOTORS_RAD_S2 * ACROSS_THRUST * 1e-6 * min(max(self.over_us, 0), RATE_MEMORY_US)
             share = max(0.0, 1.0 - braked_rad_s / math.sqrt(a * a + b * b + c * c))
             x, y, z = x - share * a, y - share * b, z - share * c
         (m, n, o), share, least = self.mean_rad_s, was_us / RATE_MEMORY_US, config.rate_step_rad_s
