@@ -4,6 +4,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from companion.reflex.detection.detector import Evidence, ImpactKind, Phase, Sit
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import promise_of
 from companion.reflex.detection.impact import ImpactEstimator
+from companion.reflex.detection.rate_jump import RateJump
 
 TICK_US = 1_000
 WINDOW_US = 4_000
@@ -117,15 +119,6 @@ def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push,
     assert [(i.sample_time_boot_us, i.kind) for i in impacts] == [(3_004_000, kind)]
 
 
-def test_vibration_that_grows_with_the_throttle_is_no_hit():
-    def lift(t_us):
-        return GRAVITY * (1.0 + min(1.5, max(0, t_us - HIT_US) / 60_000))
-
-    flight = Flight(noise=1.0, lift=lift)
-    assert flight.fly() == []
-    assert flight.state.threshold_m_s2 == pytest.approx(6.3 * 2.5, rel=0.15)
-
-
 # --- velocity jump ------------------------------------------------------------------------------------------
 
 
@@ -176,8 +169,9 @@ def at_once(yaw=0.0, roll=0.0, pitch=0.0):
         (at_once(-1.0), {"push": pulse((0.0, 2.0, 0.0), 3_016_500, 4_000)}, 1),
         # It has stopped the vehicle by then
         (at_once(1.4), {"is_filtered": True, "jump": (3_002_000, (-0.7, 0.0, 0.0), 0)}, 1),
-        # A broken sample after a step the other way, motors that turn it as fast as they can, vibration
+        # A broken sample after a step the other way, one before a gap, motors that turn it all they can, vibration
         (lambda t: (0.0, 0.0, {3_000_000: -0.01, 3_020_000: 9.0}.get(t, 0.0)), {}, 0),
+        (lambda t: (0.0, 0.0, 9.0 if t == 3_020_000 else 0.0), {"lost_us": (3_040_000, 3_060_000)}, 0),
         (lambda t: (0.0, 0.0, 50e-6 * max(0, t - HIT_US)), {}, 0),
         (lambda t: (0.0, 0.0, random.Random(t).gauss(0.0, 2.0)), {}, 0),
         # They turn the vehicle by as much in the longer time, and tilt it as soon as that
@@ -205,6 +199,13 @@ def test_a_contact_of_many_samples_turns_a_vehicle_faster_than_motors_do(turns_r
 
     impacts = Flight(imu_every_us=4_000, velocity=(1.0, 0.0, 0.0), rates=contact).fly(until_us=3_150_000)
     assert [impact.evidence for impact in impacts] == [Evidence.RATE_JUMP] * hits
+
+
+def test_a_clock_that_begins_anew_is_no_turn():
+    turn = RateJump()
+    for before_us, time_us in pairwise((1_000_000, 1_020_000, 1_040_000, 20_000, 40_000)):
+        turn.imu(before_us, time_us, (0.0, 0.0, 1e-7 * (time_us % 40_000)), FusedConfig())
+        assert turn.value < 0.01
 
 
 JUMP, TURN = Evidence.VELOCITY_JUMP, Evidence.RATE_JUMP
@@ -268,9 +269,10 @@ def gone(t):
         {"lift": lambda t: GRAVITY * (1.0 + 0.4 * math.sin(t * 20e-6))},  # climbs and dives
         {"push": lambda t: (1.1 * min(1.0, max(0.0, (t - HIT_US) / 3e5)), 0.0, 0.0)},  # a gust of 5 m/s in 0.3 s
         {"noise": 2.5},
+        {"noise": 1.0, "lift": lambda t: GRAVITY * (1.0 + min(1.5, max(0, t - HIT_US) / 6e4))},  # and more as it climbs
         {"push": lambda t: (1.5 * (t > HIT_US), 0.0, 0.0)},  # an accelerometer whose zero moves at once
     ],
-    ids=["free fall", "motor failure", "payload drop", "climbs", "gust", "shaking", "zero moves"],
+    ids=["free fall", "motor failure", "payload drop", "climbs", "gust", "shaking", "shaking climb", "zero moves"],
 )
 def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
     until_us = 3_150_000 if "rates" in scene else 6_000_000
@@ -338,6 +340,12 @@ def test_one_contact_is_one_impact_and_a_shaking_that_stays_is_learnt():
     assert len(loud.fly(8_000_000)) == 1
     assert loud.state.phase is Phase.ARMED
     assert loud.state.threshold_m_s2 > 20.0
+
+
+def test_the_noise_of_a_climb_is_that_of_its_samples():
+    climbing = Flight(noise=1.0, lift=lambda t: 2.0 * GRAVITY)
+    climbing.fly()
+    assert climbing.state.threshold_m_s2 == pytest.approx(6.3 * 2.0, rel=0.15)
 
 
 def test_what_thrust_there_is_is_learnt_before_the_detector_trusts_its_noise():
