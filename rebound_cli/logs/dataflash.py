@@ -12,6 +12,7 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pymavlink.DFReader import DFReader_binary
@@ -34,12 +35,11 @@ from rebound_cli.logs.log import (
 )
 from rebound_cli.logs.topic import Floats, Topic
 
-# Each message begins with these two bytes; 128 is the type of FMT, whose own begins with a type and a length.
+# Each message begins with these two bytes.
 _HEAD = b"\xa3\x95"
-_FORMAT = re.compile(re.escape(_HEAD) + b"\x80.(.)", re.DOTALL)
 _HEADER_SIZE = 3
 
-_NAMES = ("MSG", "PARM", "IMU", "ATT", "CTUN", "VIBE", "MODE", "EV", "PSCD", "XKF1", "XKF4")
+_NAMES = ("MSG", "PARM", "IMU", "ATT", "CTUN", "MODE", "EV", "PSCD", "XKF1", "XKF4")
 # What a missing message costs, in the words of docs/how-to/recorded-flights.md.
 _COSTS = {
     "XKF1": "height and velocity are not known: no v_c, and landings are told by the land detector",
@@ -90,12 +90,22 @@ _Topics = Mapping[str, Topic]
 _Parameters = Mapping[str, float]
 
 
+class _Formats(dict[int, Any]):
+    """What messages look like, by their type. One of no length would be read for ever."""
+
+    def __setitem__(self, kind: int, described: Any) -> None:
+        if described.len < _HEADER_SIZE:
+            raise ValueError("the log is damaged: a message in it has no length")
+        super().__setitem__(kind, described)
+
+
 class _Reader(DFReader_binary):  # type: ignore[misc]  # pymavlink has no types
     def init_clock(self) -> None:
         """Stamps are taken as they stand: no search through the whole log for the time of day."""
 
     def init_arrays_fast(self, progress_callback: None = None) -> None:
         """The compiled index is no faster, and prints what it complains of where nothing can catch it."""
+        self.formats = _Formats(self.formats)
         self.init_arrays(progress_callback)
 
 
@@ -120,7 +130,6 @@ def read_dataflash(path: Path) -> Log:
         *_pairs(messages.LocalPosition, estimate, "PN", "PE", "PD", "VN", "VE", "VD"),
         *_attitude(topics["ATT"] or estimate),
         *_attitude_targets(topics["CTUN"], topics["ATT"]),
-        *_vibration(topics["VIBE"]),
         *_heartbeats(topics["EV"], topics["MODE"]),
         *_landed_states(topics["EV"], int(imu.time_us[0])),
         *_demand(topics["PSCD"]),
@@ -139,12 +148,8 @@ def read_dataflash(path: Path) -> Log:
 
 def _content(path: Path) -> tuple[_Topics, Sequence[str], _Parameters]:
     """Columns of numbers, the vehicle's own texts and its parameters, each as last told."""
-    content = path.read_bytes()
-    if not content.startswith(_HEAD):
+    if not path.read_bytes().startswith(_HEAD):
         raise LogError(f"{path}: not a log of ArduPilot; give the .bin as the vehicle wrote it.")
-    # A message of no length would be read for ever.
-    if any(length[0] < _HEADER_SIZE for length in _FORMAT.findall(content)):
-        raise LogError(f"{path}: the log is damaged: a message in it has no length.")
     columns: dict[str, tuple[tuple[str, ...], array[float]]] = {}
     texts, parameters = [], {}
     with _Reader(str(path)) as reader:
@@ -203,7 +208,7 @@ def _losses(topics: _Topics, estimate: Topic, window_us: float | None) -> Iterat
         )
     if estimate:
         yield from slow_velocity("XKF1", estimate.rate_hz())
-    flags = topics["XKF4"].column("SS")
+    flags = _of_primary(topics["XKF4"], topics["XKF4"]).column("SS")
     for what, bit in _GOOD.items():
         if flags is not None and (share := 100 * float(np.mean(flags.astype(np.int64) & bit == 0))):
             yield f"the {what} is invalid by the estimator's own word for {share:.0f} % of the log: so is v_c"
@@ -238,13 +243,6 @@ def _attitude_targets(throttle: Topic, attitude: Topic) -> Iterator[LoggedSample
     held[~is_known] = math.nan
     for _, time_us, (fraction, w, x, y, z) in attitude.rows(np.column_stack([held, asked])):
         yield LoggedSample(time_us, messages.AttitudeTarget(time_us, fraction, (w, x, y, z)))
-
-
-def _vibration(topic: Topic) -> Iterator[LoggedSample]:
-    """Of the first accelerometer: each has its own messages."""
-    for _, time_us, (number, clipped) in topic.rows(topic.vector("IMU", "Clip")):
-        if number == 0:
-            yield LoggedSample(time_us, messages.Vibration(time_us, (int(clipped), 0, 0)))
 
 
 def _heartbeats(events: Topic, modes: Topic) -> Iterator[LoggedSample]:

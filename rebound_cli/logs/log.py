@@ -20,7 +20,6 @@ WANTED = {
     MessageId.EXTENDED_SYS_STATE: messages.ExtendedState,
     MessageId.ATTITUDE_TARGET: messages.AttitudeTarget,
     MessageId.ODOMETRY: messages.Odometry,
-    MessageId.VIBRATION: messages.Vibration,
 }
 # MAV_STATE, as PX4 fills HEARTBEAT.system_status; MAV_TYPE where a log names none.
 _STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5

@@ -1,7 +1,7 @@
 """PX4's own logs (.ulg) as the samples that its MAVLink link would have carried; pyulog reads the file.
 
 The conversions are those of PX4's mavlink/streams (HIGHRES_IMU, LOCAL_POSITION_NED, ODOMETRY, ATTITUDE_QUATERNION,
-ATTITUDE_TARGET, VIBRATION, EXTENDED_SYS_STATE, HEARTBEAT). A log holds most topics at lower rates than the wire
+ATTITUDE_TARGET, EXTENDED_SYS_STATE, HEARTBEAT). A log holds most topics at lower rates than the wire
 would, and which it holds differs from version to version (v1.11 to v1.16 and later): what is not there is said.
 """
 
@@ -32,7 +32,7 @@ from rebound_cli.logs.log import (
 from rebound_cli.logs.topic import Floats, Topic
 
 _NAMES = [
-    *("sensor_combined", "vehicle_imu", "vehicle_imu_status", "estimator_sensor_bias", "estimator_selector_status"),
+    *("sensor_combined", "vehicle_imu", "estimator_sensor_bias", "estimator_selector_status"),
     *("vehicle_local_position", "vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_status"),
     *("vehicle_land_detected", "vehicle_control_mode", "position_setpoint_triplet", "trajectory_setpoint"),
     "vehicle_local_position_setpoint",
@@ -44,7 +44,6 @@ _COSTS = {
     "vehicle_attitude_setpoint": "thrust is not known: hits along body z are judged by the force's own change alone",
     "vehicle_land_detected": "landed or not is not known: a touchdown can look like a hit",
     "vehicle_status": "armed or not is not known: the whole log is taken for a flight",
-    "vehicle_imu_status": "clipping and vibration are not known beyond the samples themselves",
 }
 # A topic that begins this much later than the IMU samples was not there when something may have happened.
 _LATE_US = 1_000_000
@@ -242,14 +241,6 @@ def _attitude_target(topic: Topic) -> Iterator[LoggedSample]:
         yield LoggedSample(time_us, messages.AttitudeTarget(_ms(time_us), math.hypot(*thrust), attitude))
 
 
-def _vibration(topic: Topic) -> Iterator[LoggedSample]:
-    clipping = topic.array("accel_clipping")
-    if clipping is None:
-        return
-    for time_us, count in zip(topic.time_us.tolist(), clipping.sum(axis=1), strict=True):
-        yield LoggedSample(time_us, messages.Vibration(time_us, (int(count), 0, 0)))
-
-
 def _heartbeat(topic: Topic) -> Iterator[LoggedSample]:
     count = len(topic.time_us)
     arming, none = topic.column("arming_state"), np.full(count, -1.0)
@@ -305,7 +296,6 @@ _CONVERSIONS = {
     ("vehicle_local_position",): _local_position,
     ("vehicle_attitude",): _attitude,
     ("vehicle_attitude_setpoint",): _attitude_target,
-    ("vehicle_imu_status",): _vibration,
     ("vehicle_status",): _heartbeat,
     ("trajectory_setpoint", "vehicle_local_position_setpoint"): _demand,
 }

@@ -13,7 +13,7 @@ from scipy.signal import butter, lfilter
 
 from companion import messages
 from companion.autopilot.px4.firmware import PX4
-from companion.messages import Attitude, ExtendedState, Heartbeat, ImuSample, LandedState, PositionTarget, Vibration
+from companion.messages import Attitude, ExtendedState, Heartbeat, ImuSample, LandedState, PositionTarget
 from companion.motion.rotation import body_to_ned
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
@@ -37,7 +37,6 @@ FORMATS = {
     "XKF4": ("QBIb", "TimeUS,C,SS,PI"),
     "EV": ("QB", "TimeUS,Id"),
     "MODE": ("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
-    "VIBE": ("QBfffI", "TimeUS,IMU,VibeX,VibeY,VibeZ,Clip"),
     "PSCD": ("Qfff", "TimeUS,TPD,DVD,TVD"),
 }
 
@@ -151,6 +150,11 @@ def test_the_estimate_is_of_the_core_that_flies(tmp_path):
     assert (second.velocity_ned_m_s, second.position_ned_m) == ((2.0, 2.0, 3.0), (4.0, 5.0, -7.0))
 
 
+def test_a_number_that_looks_like_a_message_is_none(tmp_path):
+    (odd,) = struct.unpack("<f", HEAD + b"\x80\x02")
+    assert len(of(read(tmp_path, [COPTER, *IMU, ("PARM", 0, "ODD", odd, 0.0)]), ImuSample)) == len(IMU)
+
+
 def test_events_arm_and_land(tmp_path):
     # Given a flight: armed 10, not landed 28, land complete 18, disarmed 11
     events = [("EV", 1_100_000 + 100_000 * number, event) for number, event in enumerate((10, 28, 18, 11))]
@@ -175,12 +179,11 @@ def test_modes_are_those_of_px4_that_do_the_same(tmp_path):
     assert [PX4.mode_name(beat.custom_mode) for beat in beats] == ["STABILIZED", "POSCTL", "AUTO.LOITER"]
 
 
-def test_the_climb_rate_the_clipped_samples_and_the_frame_are_those_of_the_first_sensor(tmp_path):
-    second = [*imu([1_000_000], force=(5.0, 0.0, 0.0), instance=1), ("VIBE", 1_000_000, 1, 0.0, 0.0, 0.0, 2)]
-    rows = [("PSCD", 1_000_000, -3.0, 0.25, 9.0), ("VIBE", 1_000_000, 0, 3.0, 0.0, 4.0, 17), *second]
+def test_the_climb_rate_the_samples_and_the_frame_are_those_of_the_first_sensor(tmp_path):
+    rows = [("PSCD", 1_000_000, -3.0, 0.25, 9.0), *imu([1_000_000], force=(5.0, 0.0, 0.0), instance=1)]
     log = read(tmp_path, [COPTER, *IMU, *rows, ("PARM", 0, "FRAME_CLASS", 4.0, 0.0)])
     assert of(log, PositionTarget) == [PositionTarget(None, 0.25)]
-    assert of(log, Vibration) == [Vibration(1_000_000, (17, 0, 0))] and len(of(log, ImuSample)) == 2
+    assert len(of(log, ImuSample)) == 2
     assert log.vehicle == "ArduCopter V4.5.7 (2a3dc4b7), octorotor"
 
 
@@ -217,6 +220,7 @@ def test_what_is_missing_is_said_with_its_cost(tmp_path):
     for number in range(4):
         time_us = 1_000_000 + 50_000 * number
         rows += [("XKF1", time_us, 0, *[0.0] * 9), ("XKF4", time_us, 0, 0xFD if number else 0xFF, 0)]
+        rows.append(("XKF4", time_us, 1, 0, 0))  # of a core that is not the primary one
     losses = read(tmp_path, rows).losses
     assert any("horizontal velocity is invalid" in loss and "75 %" in loss for loss in losses)
     assert not any("vertical velocity" in loss for loss in losses)

@@ -6,7 +6,7 @@ import pytest
 
 from companion import messages
 from companion.autopilot.px4.modes import AUTO_LAND, OFFBOARD
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, PositionTarget, Vibration
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, PositionTarget
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 
@@ -123,21 +123,18 @@ def test_a_position_is_both_messages_of_the_wire_with_the_jumps_counted(tmp_path
     assert (odometry.time_boot_us, odometry.reset_counter) == (START + 123_456, (1 + 2 + 3 + 255) % 256)
 
 
-def test_attitude_thrust_and_vibration(tmp_path):
+def test_attitude_and_thrust(tmp_path):
     level, unknown = (1.0, 0.0, 0.0, 0.0), (float("nan"),) * 4
     asked = [(START + 20, level, (0.0, 0.0, -0.6)), (START + 30, unknown, (0.3, 0.0, -0.4))]
-    vibration = "accel_clipping gyro_vibration_metric accel_vibration_metric"
     log = read(
         tmp_path,
         vehicle_attitude=("q", [(START + 10, level)]),
         vehicle_attitude_setpoint=("q_d thrust_body", asked),
-        vehicle_imu_status=(vibration, [(START + 40, (1, 2, 3), 0.25, 4.5)]),
     )
     assert of(log, Attitude)[0].attitude_wxyz == level
     whole, without_attitude = of(log, messages.AttitudeTarget)
     assert (whole.thrust_fraction, without_attitude.thrust_fraction) == pytest.approx((0.6, 0.5))
     assert whole.attitude_wxyz is not None and without_attitude.attitude_wxyz is None
-    assert of(log, Vibration) == [Vibration(START + 40, (6, 0, 0))]
 
 
 def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
