@@ -141,6 +141,7 @@ def read_dataflash(path: Path) -> Log:
         started_at_us=int(imu.time_us[0]),
         heard=in_order(heard, float(np.median(imu.time_us))),
         losses=(),
+        is_filtered=True,
         low_pass_hz=low_pass_hz if low_pass_hz >= 1.0 else _LOW_PASS_HZ,
     )
     return replace(log, losses=tuple(_losses(topics, estimate, log.window_us)))

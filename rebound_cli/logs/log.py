@@ -50,7 +50,7 @@ class Log:
 
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
-    `low_pass_hz`: where samples are not means but points behind a low-pass filter of second order, its cut-off.
+    `is_filtered`: samples are not means but points behind a low-pass filter of second order; `low_pass_hz`: its cut-off.
     """
 
     path: Path
@@ -60,6 +60,7 @@ class Log:
     losses: tuple[str, ...]
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None
+    is_filtered: bool = False
     low_pass_hz: float | None = None
 
     @property

@@ -51,7 +51,7 @@ def read_telemetry(path: Path) -> Log:
             continue
         kinds.add(message_id_of(packet))
         heard.extend(LoggedSample(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
-    if MessageId.HIGHRES_IMU not in kinds:
+    if not kinds & {MessageId.HIGHRES_IMU, vehicle.autopilot.lesser_imu}:
         raise LogError(
             f"{path}: no HIGHRES_IMU from system {vehicle.system_id} in it; PX4 sends none to a ground station unless "
             "asked (MAV_x_MODE, or SET_MESSAGE_INTERVAL 105)."
@@ -60,7 +60,8 @@ def read_telemetry(path: Path) -> Log:
     if others:
         losses.append(f"more than one vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
     name = f"{vehicle.autopilot.name} {vehicle.vehicle_type}, system {vehicle.system_id}"
-    return Log(path, name, packets[0][0], tuple(heard), tuple(losses))
+    is_filtered = vehicle.autopilot.filters_imu
+    return Log(path, name, packets[0][0], tuple(heard), tuple(losses), is_filtered=is_filtered)
 
 
 def _going_on(packets: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes]]:
@@ -79,7 +80,7 @@ def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
     imu: Counter[int] = Counter()
     for _, packet in packets:
         number = message_id_of(packet)
-        if number == MessageId.HIGHRES_IMU:
+        if number in (MessageId.HIGHRES_IMU, MessageId.RAW_IMU):
             imu[source_of(packet)[0]] += 1
         elif number == 0:
             for _, sample in decoder.feed(packet):

@@ -189,7 +189,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in log.heard if isinstance(item.sample, messages.ImuSample))
     monitor = start_monitor(_sampled_as(log, config), start_us)
-    monitor.estimator.hides_clipping = log.low_pass_hz is not None
+    monitor.estimator.hides_clipping = log.is_filtered
     findings.listener.listen(monitor)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:

@@ -203,7 +203,7 @@ def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Momen
         ratios = _watched(stream.all(), others_boot_us)
         if np.any(np.isfinite(ratios)):
             nearest.append(stream.one(_loudest(ratios)))
-    if not nearest:
+    if not nearest or not len(flight.log.imu_at_us):
         return []
     loudest = max(nearest, key=lambda one: float(one.ratio))
     row = int(np.argmin(np.abs(flight.log.imu_time_boot_us - loudest.time_boot_us)))

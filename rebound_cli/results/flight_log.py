@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
+from companion.mavlink.readers import ARDUPILOT_READERS, READERS
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, MessageId, PositionTarget, Sample
 from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import position_target
@@ -22,7 +23,7 @@ _SET_ATTITUDE_TARGET = 82
 _SET_POSITION_TARGET_LOCAL_NED = 84
 _STATUSTEXT = 253
 _MEASURED = (
-    *(MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED),
+    *(MessageId.HIGHRES_IMU, MessageId.RAW_IMU, MessageId.LOCAL_POSITION_NED),
     *(MessageId.ATTITUDE_QUATERNION, MessageId.ATTITUDE_TARGET),
 )
 
@@ -64,7 +65,7 @@ def read_flight_log(path: Path) -> FlightLog:
 
 def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
     """The same of packets with their stamps: what the companion hears of them, what it asked for, and all texts."""
-    decoder = Decoder(is_packet=lambda *_: True)
+    decoder = Decoder(READERS | ARDUPILOT_READERS, is_packet=lambda *_: True)
     heard, texts, wanted = list[tuple[int, Sample]](), list[tuple[int, bytes]](), list[Any]()
     for at_us, packet in packets:
         message_id = message_id_of(packet)
