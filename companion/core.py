@@ -127,7 +127,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """
         flight = self.flight
         try:
-            samples, refusal = self._hear(samples, now_us)
+            samples, refusal = self._hear(self._in_one_frame(samples, now_us), now_us)
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
             acks: list[CommandAck] = []
@@ -146,9 +146,25 @@ class Core(ABC, Generic[FlightT, MachineT]):
             return self.machine.fail(error, now_us)
         return moved
 
+    def _in_one_frame(self, samples: Sequence[Sample], now_us: int) -> Sequence[Sample]:
+        """The samples in a local frame that does not jump when the estimator resets its position.
+
+        One that is still wrong from a hit only puts that right.
+        """
+        if PLACES.isdisjoint(map(type, samples)):
+            return samples
+        before, is_valid = self.resets.shift_ned_m, self.reflex.monitor.estimator.validity.is_valid
+        most_m = self.flight.mission.limits.max_step_m if is_valid else 0.0
+        samples = [self.resets.follow(sample, most_m) for sample in samples]
+        if self.resets.shift_ned_m != before:
+            jump_m = math.dist(self.resets.shift_ned_m, before)
+            text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
+            self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
+        return samples
+
     @abstractmethod
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
-        """The samples in the frame of this flight, and why the vehicle is refused."""
+        """The samples of this flight, and why the vehicle is refused."""
 
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
@@ -357,19 +373,6 @@ class FlightCore(Core[FlightContext, Machine]):
         return situation_of(self.flight, off_state, state is State.LANDING, is_held=True)
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
-        """The samples in a local frame that does not jump when the estimator resets its position.
-
-        One that is still wrong from a hit only puts that right.
-        """
-        before = self.resets.shift_ned_m
-        if not PLACES.isdisjoint(map(type, samples)):
-            is_valid = self.reflex.monitor.estimator.validity.is_valid
-            most_m = self.flight.mission.limits.max_step_m if is_valid else 0.0
-            samples = [self.resets.follow(sample, most_m) for sample in samples]
-        if self.resets.shift_ned_m != before:
-            jump_m = math.dist(self.resets.shift_ned_m, before)
-            text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
-            self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
         return samples, update_vehicle(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:

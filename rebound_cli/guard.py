@@ -64,7 +64,7 @@ def _recorded(
     run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
-    guard = Guard(config)
+    guard, kept_out = Guard(config), 0 if between is None else between.kept_out
     try:
         with (
             served(console.print, command="guard", folder=str(folder.resolve())) as server,
@@ -92,7 +92,7 @@ def _recorded(
             "collisions": hits,
             "left_alone": flight.left_alone,
             "crashed": flight.crashed or None,
-            "kept_out": 0 if between is None else between.kept_out,
+            "kept_out": 0 if between is None else between.kept_out - kept_out,
             "round_trip_ms": flight.round_trip.summary_ms(),
             **asdict(connection.counts),
             "refused_packets": refused_packets(connection),

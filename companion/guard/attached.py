@@ -67,10 +67,12 @@ class AttachedGuard(Guard):
                 pass
             return True
         asked = asked_by(packet) if is_for(packet, self._source[0]) else None
-        if asked is not None:
-            self.hear_setpoint(asked)
-            self.kept_out += self.core.machine.holds
-        return asked is None or not self.core.machine.holds
+        if asked is None:
+            return True
+        is_kept_out = self.core.machine.holds or self.core.flight.awaits_choice
+        self.hear_setpoint(asked)
+        self.kept_out += is_kept_out
+        return not is_kept_out
 
     def next_deadline_us(self) -> int:
         return super().next_deadline_us() if self._drained_us is None else self._drained_us

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from companion.autopilot.known import ASSUMED
 from companion.mavlink.decode import Decoder, checksum_holds
-from companion.mavlink.moves import SETPOINT_IDS, asked_by, fields_of, interval_asked, is_for, would_move
+from companion.mavlink.moves import SETPOINT_IDS, STICKS_IDS, asked_by, fields_of, interval_asked, is_for, would_move
 from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, message_id_of
 from companion.messages import Asked
 
@@ -46,7 +46,8 @@ class Between:
     def __init__(self, bytes_per_s: float) -> None:
         """`bytes_per_s`: what the link to the vehicle carries."""
         self.is_closed = True  # until the guard has met the vehicle
-        self.awaits_choice = False  # setpoints are kept out until somebody asks for a mode
+        self.awaits_choice = False  # setpoints are kept out until somebody chooses a mode
+        self.has_chosen = False  # a client has asked for one
         self.autopilot = ASSUMED  # whose modes are told apart
         self.system_id: int | None = None  # the vehicle's; what is for another passes
         self.kept_out = 0  # packets
@@ -122,12 +123,6 @@ class Between:
         setpoint, self._setpoint, self._told_us = self._setpoint, None, now_us
         return setpoint
 
-    def await_choice(self) -> None:
-        """The guard has begun in flight: a program that flew into something would do it again by itself."""
-        if not self.awaits_choice:
-            self.awaits_choice = True
-            self.note("begun in flight: a program's setpoints are kept out until somebody asks for a mode")
-
     def note(self, text: str) -> None:
         """Something that whoever has the sockets knows of a client."""
         self._news.append(text)
@@ -141,10 +136,10 @@ class Between:
             return True
         self._setpoint = asked_by(packet) or self._setpoint
         if (self.is_closed or self.awaits_choice) and would_move(packet, self.autopilot):
-            if self.is_closed or message_id_of(packet) in SETPOINT_IDS:
+            if self.is_closed or message_id_of(packet) in (*SETPOINT_IDS, *STICKS_IDS):
                 self.kept_out += 1
                 return False
-            self.awaits_choice = False
+            self.awaits_choice, self.has_chosen = False, True
         if (asked := interval_asked(packet)) is not None:
             self.intervals.append(asked)
         return True

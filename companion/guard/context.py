@@ -1,13 +1,14 @@
 """What the guard's parts share: a flight's context, and whose vehicle it was before."""
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import defaults
 from companion.flight.context import FlightContext
 from companion.guard.config import GuardConfig
-from companion.messages import Asked, Sticks, Vector3
-from companion.motion.vector import minus
+from companion.messages import Asked, LandedState, Sticks, Vector3
+from companion.motion.vector import ZERO, minus, plus
 
 # Setpoints are lost when there is none for so long.
 LONGEST_BETWEEN_S = defaults.LOSS_US * 1e-6
@@ -26,6 +27,8 @@ class GuardContext(FlightContext):
     previous_mode: int | None = None
     then_hold: str = ""
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
+    has_stood: bool = False  # on the ground, or disarmed, since the guard began
+    awaits_choice: bool = False  # a program's setpoints are kept out until somebody chooses a mode
     left_alone: int = 0  # hits told, and left to the program that flies
     others_setpoint_us: int | None = None  # when one was last seen on its way
     asked: Asked | None = None  # where it leads
@@ -45,8 +48,20 @@ class GuardContext(FlightContext):
             return
         since_s = (now_us - before_us) * 1e-6
         if asked.velocity_ned_m_s is None and 0.0 < since_s < LONGEST_BETWEEN_S:
-            north, east, down = (part / since_s for part in minus(asked.place_ned_m, before.place_ned_m))
-            self.asked = Asked(asked.place_ned_m, (north, east, down))
+            velocity = plus(ZERO, 1.0 / since_s, minus(asked.place_ned_m, before.place_ned_m))
+            # What goes faster than a vehicle is the next place, and no motion.
+            if math.hypot(*velocity) <= self.mission.limits.max_speed_m_s:
+                self.asked = Asked(asked.place_ned_m, velocity)
+
+    def await_choice(self, why: str, now_us: int) -> None:
+        """Keep a program's setpoints out until somebody chooses a mode."""
+        if not self.awaits_choice:
+            self.awaits_choice = True
+            self.report(now_us, "not_back", f"{why}: a program's setpoints are kept out until somebody chooses a mode")
+
+    @property
+    def is_landed_known(self) -> bool:
+        return self.vehicle.landed is not LandedState.UNDEFINED
 
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""

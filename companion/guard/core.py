@@ -50,8 +50,29 @@ class GuardCore(Core[GuardContext, GuardMachine]):
             guard.sticks = sticks[0]
         echoes = [sample for sample in samples if isinstance(sample, PositionTarget)]
         inputs = inputs._replace(echoes=echoes, sticks=sticks, is_enabled=self.is_enabled)
-        self.is_enabled = False
-        return self.machine.step(inputs, now_us)
+        self.is_enabled, held = False, self.machine.holds
+        moved = self.machine.step(inputs, now_us)
+        self._await_choice(held, now_us)
+        return moved
+
+    @property
+    def begins_in_flight(self) -> bool:
+        """Whether no vehicle was met before, and it may be that this one flies by a program's setpoints."""
+        handler = self.machine.handler
+        return isinstance(handler, GuardConnect) and handler.begins and not self.flight.has_stood
+
+    def _await_choice(self, held: bool, now_us: int) -> None:
+        """A program that flew into something would do it again by itself, and nobody would notice a hit: after a
+        restart of the guard, and where it has let go of a vehicle that flies setpoints on.
+        """
+        guard, vehicle = self.flight, self.flight.vehicle
+        lets_go = held and not self.machine.holds and self.machine.state is State.STOOD_DOWN
+        if vehicle.armed is False or vehicle.is_mode_chosen:
+            guard.awaits_choice = False
+        elif lets_go and guard.keeps_others_out and vehicle.flies_setpoints:
+            guard.await_choice("the guard has let go", now_us)
+        elif guard.config.between and self.begins_in_flight and vehicle.armed and guard.is_landed_known:
+            guard.await_choice("begun in flight", now_us)
 
     def _note_sent(self, target: Target, now_us: int) -> None:
         if target.lean is None:

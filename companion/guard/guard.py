@@ -1,16 +1,16 @@
 """The guard as a step function: bytes and the time in, bytes and events out."""
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from companion.companion import Stepped
 from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
-from companion.guard.watching import GuardConnect
 from companion.mavlink.readers import GUARD_READERS
-from companion.messages import Asked, LandedState, SendCommand
+from companion.messages import Asked, SendCommand
+from companion.motion.vector import minus
 
 
 class Guard(Stepped[GuardCore]):
@@ -21,18 +21,15 @@ class Guard(Stepped[GuardCore]):
 
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
-        between.is_closed = self.core.machine.holds
-        handler, vehicle = self.core.machine.handler, self.core.flight.vehicle
+        vehicle = self.core.flight.vehicle
+        between.is_closed = self.core.machine.holds or self.core.begins_in_flight
         between.autopilot = vehicle.autopilot
         between.system_id = None if vehicle.identity is None else vehicle.identity.system_id
-        begins = isinstance(handler, GuardConnect) and handler.begins
-        if vehicle.armed is False:
-            between.awaits_choice = False
-        elif begins and vehicle.landed is not LandedState.ON_GROUND:
-            # Whoever was behind a guard before a restart goes on, and nobody would notice a hit.
-            between.is_closed = True
-            if vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
-                between.await_choice()
+        if between.has_chosen:
+            between.has_chosen = False
+            self.hear_choice()
+            yield "choice", {}
+        between.awaits_choice = self.core.flight.awaits_choice
         if (setpoint := between.new_setpoint(now_us)) is not None:
             self.hear_setpoint(setpoint)
             yield "setpoint", asdict(setpoint)
@@ -42,8 +39,14 @@ class Guard(Stepped[GuardCore]):
         between.intervals.clear()
 
     def hear_setpoint(self, asked: Asked) -> None:
-        """A client's has been on its way since the last step."""
+        """A client's, in the vehicle's own frame, has been on its way since the last step."""
+        if asked.place_ned_m is not None:
+            asked = replace(asked, place_ned_m=minus(asked.place_ned_m, self.core.resets.shift_ned_m))
         self.core.flight.hear_setpoint(asked, self.core.now_us)
+
+    def hear_choice(self) -> None:
+        """A client has asked for a mode."""
+        self.core.flight.awaits_choice = False
 
     def hear_interval(self, message_id: int | None, interval_us: int) -> None:
         """A client has asked the vehicle for a stream, or for a group: None. What the guard needs more often it asks

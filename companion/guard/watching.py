@@ -48,6 +48,7 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
     latest = guard.vehicle.history.latest
     if guard.vehicle.armed is False:
         guard.program_elsewhere = guard.is_wreck = False
+    guard.has_stood |= guard.vehicle.armed is False or guard.vehicle.landed is LandedState.ON_GROUND
     # Not while the guard has the vehicle: one forged report would move the fence.
     stands = guard.vehicle.stands and guard.expected_mode is None
     if guard.vehicle.armed is False or stands:
@@ -108,7 +109,7 @@ class GuardConnect(Meet):
     @property
     def begins(self) -> bool:
         """Whether no vehicle was met before, and it may yet be that this one can be guarded."""
-        return self.is_first and not self._is_told
+        return self.is_first and (self._requests is None or not self._is_told)
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
         echoes = set_message_interval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ))
@@ -155,7 +156,8 @@ class Watching:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         vehicle, seen_us = guard.vehicle, guard.others_setpoint_us
         latest = vehicle.history.latest
-        streams_elsewhere = guard.program_elsewhere or (seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US)
+        is_seen = not guard.awaits_choice and seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US
+        streams_elsewhere = guard.program_elsewhere or is_seen
         is_wanted = vehicle.autopilot.wants_setpoints_first and not vehicle.flies_setpoints
         if latest is None or not is_wanted or streams_elsewhere:
             return None

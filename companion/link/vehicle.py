@@ -191,6 +191,13 @@ class Vehicle:
     def flies_setpoints(self) -> bool:
         return self.custom_mode == self.autopilot.setpoints
 
+    @property
+    def is_mode_chosen(self) -> bool:
+        """Whether somebody has chosen another mode than that for setpoints: no failsafe for want of them has."""
+        if self.mode is None or self.mode.failsafe:
+            return False
+        return (self.mode.intended_custom_mode or self.mode.custom_mode) != self.autopilot.setpoints
+
     def version_complaint(self) -> str | None:
         """Why this version cannot be flown; None where it can, or has not said which it is."""
         least = self.autopilot.least_version

@@ -34,7 +34,7 @@ SETPOINT_IDS = frozenset(
 )
 # The same by name, for MAVSDK.
 SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
-_STICKS = (dialect.MAVLINK_MSG_ID_MANUAL_CONTROL, dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
+STICKS_IDS = (dialect.MAVLINK_MSG_ID_MANUAL_CONTROL, dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 _COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
@@ -55,7 +55,7 @@ def would_move(packet: bytes, autopilot: Autopilot) -> bool:
     message_id = message_id_of(packet)
     if message_id in SETPOINT_IDS:
         return True
-    if message_id in _STICKS:
+    if message_id in STICKS_IDS:
         # A program's look like a pilot's, for whom the guard stands down.
         return source_of(packet)[1] in _ON_BOARD
     if message_id == dialect.MAVLINK_MSG_ID_SET_MODE:

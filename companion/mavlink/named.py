@@ -26,7 +26,7 @@ def packet_from(name: str, source: tuple[int, int], fields_json: bytes) -> bytes
         fields = json.loads(fields_json)
         values = {field: _packed(fields[field]) for field in kind.fieldnames if field in fields}
         if name == "COMMAND_ACK":
-            values["target_component"] = 0
+            values["target_system"] = values["target_component"] = 0
         return bytes(kind(**values).pack(dialect.MAVLink(None, *source)))
     except (struct.error, OverflowError, TypeError, ValueError):
         return b""

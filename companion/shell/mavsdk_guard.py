@@ -68,7 +68,9 @@ class CollisionGuard:
         self._thread = threading.Thread(target=self._run, name="rebound-guard", daemon=True)
 
     def start(self) -> None:
-        """Attach; return when the streams are fast enough, some 3 s later. Raises GuardError if they are not."""
+        """Attach, once; return when the streams are fast enough, some 3 s later. Raises GuardError if they are not."""
+        if self._is_over:
+            raise GuardError("This guard has ended: make a new CollisionGuard.")
         self._link.intercept(self._incoming, self._outgoing)
         self._switch_interval_s = sys.getswitchinterval()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, self._switch_interval_s))

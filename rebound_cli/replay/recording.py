@@ -216,6 +216,8 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
             stepped.note(str(event), str(text))
         case {"kind": "setpoint"}, Guard():
             stepped.hear_setpoint(Asked(_vector(record["place_ned_m"]), _vector(record["velocity_ned_m_s"])))
+        case {"kind": "choice"}, Guard():
+            stepped.hear_choice()
         case {"kind": "interval", "message_id": int() | None as message_id, "interval_us": int(interval_us)}, Guard():
             stepped.hear_interval(message_id, interval_us)
         case {"kind": "computer"}, _:

@@ -101,7 +101,7 @@ def test_after_a_restart_of_the_guard_in_flight_a_program_flies_when_it_asks_for
     air.run_for(2.0)
     # Then PX4's failsafe holds the vehicle, and the program's setpoints do not end that
     assert air.sent_by("program", "SET_", again_s) == [] and len(air.vehicle.truth.hits) == 1
-    assert str(air.between.news()).startswith("begun in flight")
+    assert air.told("not_back")[0].startswith("begun in flight")
     # Until it asks for OFFBOARD
     air.set_mode(OFFBOARD)
     air.run_until(lambda: air.mode == "OFFBOARD", 1.0)
@@ -181,7 +181,7 @@ def test_far_beside_the_touch_a_surface_may_be_nearer_than_its_likely_direction_
     air.run_for(2.0)
     # Then it has the vehicle back when it is well in front, and not before
     assert air.state is State.GIVING_BACK
-    north[0] -= 4.0
+    north[0] -= 5.0
     air.run_to(State.WATCHING, 1.0)
     air.run_for(5.0)
     assert len(air.vehicle.truth.hits) == 1

@@ -15,6 +15,7 @@ MAIN = 0xFF << 16
 # the stick is the only brake, and it is not to be taken away unasked.
 MODES = {
     POSCTL: Mode("POSCTL", Pilot.STICKS, is_guarded=True),
+    3 << 16 | 1 << 24: Mode("ORBIT", Pilot.AUTOPILOT, is_guarded=True),
     2 << 16: Mode("ALTCTL", Pilot.STICKS, is_guarded=True),
     OFFBOARD: Mode("OFFBOARD", Pilot.SETPOINTS, is_guarded=True),
     4 << 16 | 2 << 24: Mode("AUTO.TAKEOFF", Pilot.AUTOPILOT, is_guarded=True),
