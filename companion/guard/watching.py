@@ -156,8 +156,7 @@ class Watching:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         vehicle, seen_us = guard.vehicle, guard.others_setpoint_us
         latest = vehicle.history.latest
-        is_seen = not guard.awaits_choice and seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US
-        streams_elsewhere = guard.program_elsewhere or is_seen
+        streams_elsewhere = guard.program_elsewhere or (seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US)
         is_wanted = vehicle.autopilot.wants_setpoints_first and not vehicle.flies_setpoints
         if latest is None or not is_wanted or streams_elsewhere:
             return None

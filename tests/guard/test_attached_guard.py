@@ -114,6 +114,18 @@ def test_the_gate_keeps_out_a_programs_setpoints_for_this_vehicle_and_nothing_el
     assert air.mode == AUTO_LOITER
 
 
+def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebody_chooses():
+    air = AttachedFlight()
+    air.fly_into_the_wall()
+    air.run_for(0.3)
+    step = air.vehicle.step
+    air.vehicle.step = lambda packets: (step(b""), ())[1]
+    air.run_for(1.8)
+    air.vehicle.step = step
+    air.run_for(4.0)
+    assert "the guard has let go" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
+
+
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
     guard = AttachedFlight().guard.core.flight
     there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))

@@ -2,14 +2,25 @@
 
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 
 import pytest
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly import commanded
-from bench.fly.commanded import ARM, FACE_NORTH_M, LAND, OFFBOARD, REPEATED_EVERY_S, by_places, fly_a_mission, sticks
+from bench.fly.commanded import (
+    ARM,
+    FACE_NORTH_M,
+    LAND,
+    MANUAL_POSITION,
+    OFFBOARD,
+    REPEATED_EVERY_S,
+    by_places,
+    fly_a_mission,
+    sticks,
+)
 from companion.autopilot.px4.firmware import PX4
 from companion.guard.between import BURST_S, Between
 from companion.guard.config import GuardConfig
@@ -89,13 +100,24 @@ def test_a_late_thread_lets_go_of_no_recovery(flies, loss_s, late_s):
     assert not air.guard.core.flight.program_elsewhere
 
 
-@pytest.mark.parametrize("loss_s", [0.3, 1.0])
-def test_after_a_restart_of_the_guard_in_flight_a_program_flies_when_it_asks_for_it_and_is_watched(loss_s):
+@contextmanager
+def silent(air: BetweenFlight) -> Iterator[None]:
+    """Nothing passes, either way."""
+    take, push = air.link.take, air.link.push
+    air.link.take, air.link.push = lambda: (take(), ())[1], lambda packet: None
+    yield
+    air.link.take, air.link.push = take, push
+
+
+@pytest.mark.parametrize(("loss_s", "silent_s"), [(0.3, 0.0), (1.0, 0.0), (0.3, 11.0)])
+def test_after_a_restart_of_the_guard_in_flight_a_program_flies_when_it_asks_for_it_and_is_watched(loss_s, silent_s):
     # Given a recovery, and a guard that dies in it
-    air = hit(by_places, {"COM_OF_LOSS_T": loss_s})
+    air = hit(by_places, {"COM_OF_LOSS_T": loss_s, "COM_OBL_RC_ACT": 5.0}, companion={"link": {"wait": True}})
     air.run_for(0.3)
-    # When its service manager has begun another one
-    air.be_restarted(1.0)
+    # When its service manager has begun another one, which hears nothing for a while
+    with silent(air) if silent_s else nullcontext():
+        air.be_restarted(1.0)
+        air.run_for(silent_s)
     again_s = air.time_s
     air.run_to(State.STANDING_BY, 10.0)
     air.run_for(2.0)
@@ -106,6 +128,67 @@ def test_after_a_restart_of_the_guard_in_flight_a_program_flies_when_it_asks_for
     air.set_mode(OFFBOARD)
     air.run_until(lambda: air.mode == "OFFBOARD", 1.0)
     assert air.sent_by("program", "SET_", again_s) != []
+
+
+def test_after_a_restart_in_flight_a_pilots_switch_chooses_and_an_onboard_computers_sticks_do_not():
+    air = hit(by_places)
+    air.be_restarted(1.0)
+    air.run_to(State.STANDING_BY, 10.0)
+    air.send(dialect.MAVLink_manual_control_message(1, 300, 0, 500, 0, 0), "computer", (1, 191))
+    sticks(air, 0.0)
+    air.run_for(0.5)
+    assert air.between.awaits_choice
+    # When the transmitter's switch, which is on no link of the guard's, asks for POSCTL, then for OFFBOARD
+    for mode, name in ((MANUAL_POSITION, "POSCTL"), (OFFBOARD, "OFFBOARD")):
+        switch = dialect.MAVLink_command_long_message(1, 1, 176, 0, 1, *mode, 0, 0, 0, 0)
+        air.link.push(switch.pack(dialect.MAVLink(None, 254, 190)))
+        air.run_until(lambda name=name: air.mode == name, 2.0)
+        air.run_for(1.0)
+    assert not air.between.awaits_choice
+
+
+@pytest.mark.parametrize("lost", ["link", "requests"])
+def test_a_vehicle_that_the_guard_has_let_go_of_is_flown_by_no_program_until_somebody_chooses(lost):
+    # Given a recovery whose link is silent, or a pilot's stick and no mode that he is given
+    air = hit(by_places)
+    air.run_for(0.3)
+    if lost == "link":
+        with silent(air):
+            air.run_for(1.8)
+    else:
+        pilot, push = sticks(air, 0.0), air.link.push
+        air.run_for(0.3)
+        air.link.push = lambda packet: None if message_id_of(packet) == 76 else push(packet)
+        pilot()
+        sticks(air, -0.6)
+        air.run_for(1.0)
+    # Then its setpoints lead to no second hit
+    air.run_for(6.0)
+    assert "the guard has let go" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
+
+
+def test_a_reset_of_the_position_moves_what_the_guard_holds():
+    jump = {"kind": "estimator_reset", "at_s": 15.7, "position_jump_ned_m": [-1.0, 0.0, 0.0]}
+    air = BetweenFlight(GuardConfig(), faults=[jump])
+    air.take_off()
+    by_places(air)
+    air.run_until(lambda: air.guard.core.machine.holds, 20.0)
+    assert 14.5 < air.time_s < 15.7, "the estimate jumps while the guard holds"
+    air.run_for(8.0)
+    assert any("reset by 1.00 m" in text for text in air.told("estimate")) and len(air.vehicle.truth.hits) == 1
+
+
+def test_a_program_that_steps_from_place_to_place_before_the_wall_is_left_alone():
+    air = hit(by_places, then="previous")
+    air.stop_all()
+    north = [-3.0]
+    air.every(REPEATED_EVERY_S, lambda: air.place(north[0]))
+    air.run_to(State.WATCHING, 10.0)
+    air.run_for(8.0)
+    taken = len(air.told("take_over"))
+    north[0] = 1.5
+    air.run_for(6.0)
+    assert len(air.told("take_over")) == taken
 
 
 @pytest.mark.parametrize("is_armed", [False, True])

@@ -96,6 +96,8 @@ NOT_TAKEN = [
     mav.MAVLink_odometry_message(5, 1, 12, 1, 2, 3, [1, 0, 0, 0], 1, 1, 1, 0, 0, 0, [0] * 21, [0] * 21, 7),
     mav.MAVLink_attitude_target_message(5000, 64, (1, 0, 0, 0), 0, 0, 0, 0.75),
     mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190),
+    mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 191),
+    mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 0),
     mav.MAVLink_highres_imu_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x38),
     mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 101, 0, 0, 0, 0, 0, 0),
     mav.MAVLink_statustext_message(6, b"Takeoff detected"),
