@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from companion.flight.context import BeforeHit, FlightContext, Target, Transition
 from companion.flight.states import State, Trigger
-from companion.mission.items import GoToItem, OrbitItem, PathItem
+from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, WaitForItem
 from companion.mission.policy import OnCollision
 from companion.reflex.recovery.collision import recoveries_from
 
@@ -21,25 +21,29 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     A hit during a recovery, or during the hold after it, belongs to the step in which the first one happened.
     """
     flight.tally.hits += 1
-    step, policy = flight.steps[flight.tally.index], flight.on_collision
-    own = step.item.on_collision
+    step = flight.steps[flight.tally.index]
+    # An item's own policy ends with it.
+    is_over = (flight.going_home or flight.is_landing) and not isinstance(step.action, ReturnItem)
+    own = None if is_over else step.item.on_collision
+    policy = own or flight.mission.on_collision
     hits = recoveries_from(flight.collisions[-flight.tally.hits :] if own else flight.collisions)
-    then, reason = _verdict(flight, policy, hits)
+    then, reason = _verdict(flight, policy, hits, own)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
     flight.after_recovery = Transition(Trigger(f"settled, then: {then}"), reason, hand_over=then == "abort")
     # What an interrupted flight resumes with.
-    is_left = then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))
+    is_met = isinstance(step.action, WaitForItem) and step.action.hit is True
+    is_left = is_met or then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))
     flight.step_index = flight.tally.index + (1 if is_left else 0)
     if reason:
         flight.report(now_us, "policy", f"{reason}; after the recovery: {then}", then=then)
 
 
-def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str, str]:
-    """What follows, and the reason where that is not the policy's `then`."""
+def _verdict(flight: FlightContext, policy: OnCollision, hits: int, own: OnCollision | None) -> tuple[str, str]:
+    """What follows, and the reason where that is not the policy's `then`; `own`: the step's, where it has one."""
     limit_m_s = flight.mission.abort_when.hit_above_m_s
     speed_m_s = math.hypot(*flight.collisions[-1].contact.velocity_ned_m_s)
-    if limit_m_s is not None and speed_m_s > limit_m_s:
+    if limit_m_s is not None and speed_m_s > limit_m_s and not flight.is_landing:
         return "abort", f"hit at {speed_m_s:.2f} m/s, above abort_when.hit_above_m_s = {limit_m_s:g}"
     if hits >= policy.max_hits:
         # With obstacles on the way home the vehicle lands.
@@ -47,7 +51,8 @@ def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str
         return then, f"recovery {hits} of at most {policy.max_hits}"
     if flight.is_landing:
         return "land", ""
-    return "return" if flight.going_home else policy.then, ""
+    goes_on = flight.going_home and (own is None or own.then != "land")
+    return "return" if goes_on else policy.then, ""
 
 
 def lands_anyway(flight: FlightContext) -> bool:

@@ -219,7 +219,7 @@ def _current_mode(custom_mode: int, intended_custom_mode: int) -> Sample:
 def _command_ack(
     source: tuple[int, int], command: int, result: int, target_system: int, target_component: int
 ) -> Sample | None:
-    # PX4 names whom it answers; others' conversations pass over the same link. The companion is of the vehicle's system.
+    # PX4 names whom it answers, as others ask on the same link. The companion is of the vehicle's system.
     ours = target_system in (0, source[0]) and target_component in (0, COMPONENT_ID)
     known = result in messages.CommandResult.__members__.values()
     return messages.CommandAck(command, messages.CommandResult(result)) if ours and known else None

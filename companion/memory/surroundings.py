@@ -56,12 +56,16 @@ class Walls:
 
 @dataclass(frozen=True, slots=True)
 class ObstacleMap:
-    """All patches for one vehicle: `reach_m` from its centre to the guards' rim, `margin_m` from there to surfaces."""
+    """All patches for one vehicle: `reach_m` from its centre to the guards' rim, `margin_m` from there to surfaces.
+
+    `keeps_in`: a way that leaves the fence is blocked, too; where a mission is planned it is refused.
+    """
 
     patches: tuple[Patch, ...]
     fence: Fence
     reach_m: float
     margin_m: float
+    keeps_in: bool = False
 
     @property
     def clearance_m(self) -> float:

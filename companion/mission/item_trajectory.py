@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeAlias
 
+from companion.fence import Fence
 from companion.memory.route import route
-from companion.memory.surroundings import ObstacleMap
+from companion.memory.surroundings import ROUNDING_M, ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig
@@ -65,10 +66,10 @@ class SpeedLimits:
         return max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
 
 
-def climb(start_m: Vector3, height_m: float, config: FlightConfig) -> LineProfile:
-    """Straight up."""
-    top = (start_m[0], start_m[1], -height_m)
-    return LineProfile(start_m, top, config.takeoff_speed_m_s, config.takeoff_acceleration_m_s2)
+def climb(start_m: Vector3, height_m: float, config: FlightConfig, most_m_s: float) -> LineProfile:
+    """Straight up, no faster than `most_m_s`."""
+    top, speed_m_s = (start_m[0], start_m[1], -height_m), min(config.takeoff_speed_m_s, most_m_s)
+    return LineProfile(start_m, top, speed_m_s, config.takeoff_acceleration_m_s2)
 
 
 def stay(place_m: Vector3) -> LineProfile:
@@ -233,15 +234,27 @@ def looks(trajectory: Trajectory) -> list[Vector3]:
 
 
 def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
-    if not known.patches:
-        return False
     if isinstance(trajectory, Chain):
         return any(_is_blocked(part, known) for part in trajectory.parts)
+    if known.keeps_in and _leaves(trajectory, known.fence):
+        return True
+    if not known.patches:
+        return False
     if isinstance(trajectory, LineProfile):
         return known.block((trajectory.start_m, trajectory.target_m))
     if isinstance(trajectory, CircleProfile):
         trajectory = replace(trajectory, angle_rad=max(-math.tau, min(math.tau, trajectory.angle_rad)))
     return known.block(looks(trajectory))
+
+
+def _leaves(trajectory: Trajectory, fence: Fence) -> bool:
+    """Whether it leaves a polygon, between two places in it."""
+    if fence.polygon_ne_m is None:
+        return False
+    if isinstance(trajectory, LineProfile):
+        end = trajectory.target_m[:2]
+        return math.dist(fence.shortened(trajectory.start_m[:2], end), end) > ROUNDING_M
+    return not all(fence.contains(*place[:2]) for place in looks(trajectory))
 
 
 def _points_of(item: items.GoToItem | items.PathItem | items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:

@@ -61,9 +61,9 @@ class Mission(StrictModel):
     sim: dict[str, object] | None = None
     """The simulated world (see `sim_vehicle.scene.Scene`)."""
 
-    def known(self, patches: tuple[Patch, ...]) -> ObstacleMap:
+    def known(self, patches: tuple[Patch, ...], keeps_in: bool = False) -> ObstacleMap:
         """The map of these."""
-        return ObstacleMap(patches, self.fence, self.companion.estimate.reach_m, self.obstacles.margin_m)
+        return ObstacleMap(patches, self.fence, self.companion.estimate.reach_m, self.obstacles.margin_m, keeps_in)
 
     @model_validator(mode="after")
     def _takeoff_first_land_last(self) -> Self:
@@ -167,11 +167,12 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
         planned = Planned(stay(place))
         match action:
             case items.TakeoffItem():
-                planned = Planned(climb(place, action.height_m, flight))
+                planned = Planned(climb(place, action.height_m, flight, mission.limits.max_speed_m_s))
             case items.HoldItem():
                 lasts_s = action.duration_s
             case items.WaitForItem():
-                lasts_s = step.item.timeout_s
+                known_s = [until_s for until_s in (action.flight_time_s, step.item.timeout_s) if until_s is not None]
+                lasts_s = min(known_s, default=None)
             case items.SetSpeedItem():
                 speeds = speeds.changed_to(action)
             case items.SetYawItem():
@@ -183,6 +184,7 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
                 lasts_s = _landing_s(place)
             case items.GoToItem() | items.VelocityItem() | items.PathItem() | items.OrbitItem():
                 planned = trajectory_around(action, place, speeds, known)
+                lasts_s = 180.0 / defaults.TURNING_DEG_S if isinstance(action.yaw_deg, float | int) else 0.0
         if lasts_s is not None and planned.trajectory is not None:
             lasts_s += planned.trajectory.duration_s
         leg = Leg(step, place, planned.trajectory, lasts_s, planned.is_detour)
@@ -202,7 +204,8 @@ def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:
         start, end = trajectory.start_m[:2], trajectory.target_m[:2]
         leaves = fence.shortened(start, end)
         is_out = math.dist(leaves, end) > _ROUNDING_M
-        return f"leaves fence.polygon_ne_m at [{leaves[0]:.2f}, {leaves[1]:.2f}]" if is_out else None
+        name = "radius_m" if fence.polygon_ne_m is None else "polygon_ne_m"
+        return f"leaves fence.{name} at [{leaves[0]:.2f}, {leaves[1]:.2f}]" if is_out else None
     looks = min(_MOST_LOOKS, math.ceil(trajectory.duration_s / _LOOK_EVERY_S))
     for look in range(looks):
         position = trajectory.at(trajectory.duration_s * look / looks)[0]

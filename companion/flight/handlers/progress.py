@@ -21,10 +21,8 @@ from companion.mission.item_trajectory import (
 )
 from companion.mission.trajectory import LineProfile, Motion, Trajectory
 from companion.motion.settling import Lasting
-from companion.motion.vector import ZERO, minus, plus
+from companion.motion.vector import ZERO, minus
 
-# A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
-BRAKES_S = 1.0
 # Of a time-out, a goal out of reach, damage, and of the last item; "continue" is no move.
 _TRIGGERS = {
     "abort": Trigger.INTERRUPTED,
@@ -38,7 +36,6 @@ class _OnTrajectory:
 
     _trajectory: Trajectory
     _trajectory_began_us: int
-    _steady: Lasting
 
     def _elapsed_s(self, flight: FlightContext) -> float:
         return (flight.trajectory_us - self._trajectory_began_us) * 1e-6
@@ -55,19 +52,11 @@ class _OnTrajectory:
         target = Target(flight.local_ned_m(place), yaw_rad, velocity, acceleration)
         return target if flight.has_position and elapsed_s < self._trajectory.duration_s else target.at_rest()
 
-    def _off_m(self, flight: FlightContext, later_s: float = 0.0) -> float:
-        """Distance from its goal, now or with its speed so much later, m."""
+    def _is_there(self, flight: FlightContext) -> bool:
+        """Whether it has arrived at its goal."""
         latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
         assert latest is not None, "the flight is in the air"
-        return math.dist(plus(latest.position_ned_m, later_s, latest.velocity_ned_m_s), goal)
-
-    def _rests(self, flight: FlightContext) -> bool:
-        """Whether it stays at its goal: one that turns round is slow for a moment, too."""
-        config, latest = flight.mission.companion, flight.vehicle.history.latest
-        assert latest is not None, "the flight is in the air"
-        is_there = max(self._off_m(flight), self._off_m(flight, BRAKES_S)) <= config.flight.acceptance_radius_m
-        self._steady.update(is_there, latest.time_boot_us)
-        return self._steady.lasts_us >= config.settled.duration_s * 1e6
+        return math.dist(latest.position_ned_m, goal) <= flight.mission.companion.flight.acceptance_radius_m
 
 
 class FlyItems(_OnTrajectory):
@@ -94,7 +83,8 @@ class FlyItems(_OnTrajectory):
         match self._action:
             case items.TakeoffItem():
                 # tried again after a hit in the climb
-                self._trajectory = climb(start, self._action.height_m, flight.mission.companion.flight)
+                config, most_m_s = flight.mission.companion.flight, flight.mission.limits.max_speed_m_s
+                self._trajectory = climb(start, self._action.height_m, config, most_m_s)
             case items.WaitForItem(file=file):
                 flight.file_awaited = file
             case items.SetSpeedItem():
@@ -162,13 +152,16 @@ class FlyItems(_OnTrajectory):
         while True:
             if isinstance(self._action, items.ReturnItem | items.LandItem):
                 return Transition(_TRIGGERS[flight.step.name])
-            if self._out_of_reach:
+            is_cut_off = bool(self._out_of_reach)
+            if is_cut_off:
                 trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
                 if trigger is not None:
                     return Transition(trigger, self._out_of_reach, hand_over=trigger is Trigger.INTERRUPTED)
             elif not self._is_done(flight, now_us):
                 return self._overdue(flight, now_us)
             self._leave(flight, now_us)
+            if is_cut_off:
+                return None  # to look for a way takes time, in which no setpoint is sent
 
     def _leave(self, flight: FlightContext, now_us: int) -> None:
         """On to the next step, from the setpoint as it was sent: one that is held back does not go on behind a wall."""
@@ -192,10 +185,7 @@ class FlyItems(_OnTrajectory):
                     return False
                 if self._over_since_us is None:
                     self._over_since_us = now_us
-                ahead = (flight.steps[number].action for number in range(flight.step_index + 1, len(flight.steps)))
-                lands = isinstance(next(one for one in ahead if not isinstance(one, items.ExpectItem)), items.LandItem)
-                is_there = self._off_m(flight) <= flight.mission.companion.flight.acceptance_radius_m
-                return self._rests(flight) if lands else is_there
+                return self._is_there(flight)
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
@@ -287,7 +277,7 @@ class FlyHome(_OnTrajectory):
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         assert flight.target is not None, "the flight is in the air"
-        self._trajectory_began_us, self._steady = flight.trajectory_us, Lasting()
+        self._trajectory_began_us = flight.trajectory_us
         flight.going_home = True
         start = flight.mission_ned_m(flight.target.position_ned_m)
         speeds = flight.speeds.against(flight.reflex.sustained_force.wind_m_s2, (-start[0], -start[1], 0.0))
@@ -310,7 +300,7 @@ class FlyHome(_OnTrajectory):
         overdue_s = self._elapsed_s(flight) - self._trajectory.duration_s
         if overdue_s < 0.0:
             return None
-        if self._rests(flight):
+        if self._is_there(flight):
             return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)

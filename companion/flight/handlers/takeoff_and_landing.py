@@ -10,6 +10,8 @@ from companion.messages import ARM, Vector3, take_off
 from companion.mission.item_trajectory import climb
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
+from companion.motion.settling import Lasting
+from companion.motion.vector import plus
 
 # The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.
 ORIGIN_MEAN_US = 1_000_000
@@ -92,7 +94,8 @@ class TakeOff:
         assert latest is not None, "a flight begins only with positions arriving"
         flight.origin_ned_m = origin_of(flight, self._ground_ned_m, latest.time_boot_us, now_us)
         top_m = self._item.height_m - self._ground_ned_m[2]
-        self._profile = climb(self._ground_ned_m, top_m, flight.mission.companion.flight)
+        config, most_m_s = flight.mission.companion.flight, flight.mission.limits.max_speed_m_s
+        self._profile = climb(self._ground_ned_m, top_m, config, most_m_s)
         text = f"armed at {as_text(self._ground_ned_m)}, climbing to {self._item.height_m:g} m"
         flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
@@ -154,20 +157,44 @@ def mean_position(flight: FlightContext) -> Vector3:
 LANDING_TIMEOUT_US = 120_000_000
 
 
+# A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
+BRAKES_S = 1.0
+# PX4 brakes from its 12 m/s with 3 m/s^2, and comes back; one that does not rest lands all the same.
+RESTS_WITHIN_US = 6_000_000
+
+
 class Land(FixedSetpoint):
-    """Ask for the mode, keep the setpoints going until the vehicle has taken it, then wait."""
+    """Rest at the last setpoint, ask for the mode, keep the setpoints going until the vehicle has it, then wait.
+
+    One that is asked to land in motion lands where it comes to rest, be it outside the fence.
+    """
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._started_us = now_us
-        self._target = flight.target
-        self._landing = False
+        self._target = flight.target and flight.target.at_rest()
+        self._is_asked = self._landing = False
+        self._steady = Lasting()
         flight.is_landing = True
-        flight.count_asked_mode()
-        flight.ask_for_mode(flight.vehicle.autopilot.land)
+
+    def _rests(self, flight: FlightContext) -> bool:
+        """Whether it stays there: one that turns round is slow for a moment, too."""
+        config, latest = flight.mission.companion, flight.vehicle.history.latest
+        if self._target is None or latest is None:
+            return True
+        place, goal = flight.reflex.place_ned_m(latest), self._target.position_ned_m
+        off_m = max(math.dist(place, goal), math.dist(plus(place, BRAKES_S, latest.velocity_ned_m_s), goal))
+        self._steady.update(off_m <= config.flight.acceptance_radius_m, latest.time_boot_us)
+        return self._steady.lasts_us >= config.settled.duration_s * 1e6
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if flight.vehicle.armed is False:
             return Transition(Trigger.DISARMED)
+        if not self._is_asked:
+            if not self._rests(flight) and now_us - self._started_us < RESTS_WITHIN_US:
+                return None
+            self._is_asked = True
+            flight.count_asked_mode()
+            flight.ask_for_mode(flight.vehicle.autopilot.land)
         if not self._landing:
             vehicle = flight.vehicle
             outcome = flight.command_outcome(inputs, vehicle.custom_mode == vehicle.autopilot.land, now_us)
