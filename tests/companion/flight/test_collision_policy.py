@@ -63,7 +63,8 @@ def test_what_is_touched_again_while_it_recovers_is_the_same_hit_and_makes_the_n
 
 
 def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
-    f = at_wall(INTO_WALL | {"on_collision": {"then": "retry"}, "timeout_s": 4, "on_timeout": "return"})
+    # Whatever the item had to say
+    f = at_wall(INTO_WALL | {"on_collision": {"max_hits": 1, "after_max_hits": "return"}})
     f.run_to("returning")
     assert surroundings(f.companion.core.flight).patches == f.report.obstacles != ()
     f.run_for(0.3)
@@ -72,6 +73,21 @@ def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
     f.run_to("returning")
     f.run_to("landing")
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.6)
+    assert f.run_to_end().outcome == "completed"
+
+
+def test_the_way_home_may_say_that_a_hit_ends_it():
+    f = flight(FakeVehicle(), items=[TAKEOFF, ASIDE, {"return": {}, "on_collision": {"then": "land"}}])
+    f.run_to("returning")
+    strike(f)
+    f.run_to("landing")
+    assert f.vehicle.position[1] > 1.0
+
+
+def test_a_hit_that_is_waited_for_ends_the_waiting_however_items_are_tried_again():
+    f = flight(FakeVehicle(), items=[TAKEOFF, {"wait_for": {"hit": True}}, LANDING], on_collision={"then": "retry"})
+    f.run_to("mission")
+    strike(f)
     assert f.run_to_end().outcome == "completed"
 
 
@@ -93,7 +109,8 @@ def test_giving_up_hands_the_vehicle_over_once_it_has_settled(changes, words):
 
 @pytest.mark.parametrize("after_s", [0.0, 0.5], ids=["the land mode is asked for", "it is flown"])
 def test_a_landing_is_not_put_off_for_more_hits_than_the_limit(after_s):
-    f = flight(FakeVehicle(), items=[{"takeoff": {"height_m": 4}}, LANDING], on_collision={"max_hits": 2})
+    limits = {"on_collision": {"max_hits": 2}, "abort_when": {"hit_above_m_s": 0.01}}
+    f = flight(FakeVehicle(), items=[{"takeoff": {"height_m": 4}}, LANDING], **limits)
     f.run_to("landing")
     f.run_for(after_s)
     strike(f)
@@ -163,6 +180,34 @@ def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
     assert (3 in items_flown(f)) is (then == "continue")
     if then == "abort":
         assert "no way round what is known" in report.reason and f.vehicle.mode == LOITER
+
+
+def test_ways_are_looked_for_one_a_step_with_a_setpoint_between():
+    known = {"touches_ned_m": [[3, -1, -1.5], [3, 1, -1.5]], "normal_ned": [-1, 0, 0]}
+    cut_off = {"go_to": {"position_ned_m": [3.05, 0, -1.5]}}
+    obstacles = {"known": [known], "on_unreachable": "continue"}
+    f = flight(FakeVehicle(), items=[TAKEOFF, *[cut_off] * 6, LANDING], obstacles=obstacles)
+    f.run_to("landing")
+    assert len({event.time_us for event in f.events if event.kind == "unreachable"}) == 5
+
+
+@pytest.mark.parametrize("is_hit", [False, True])
+def test_a_way_home_that_nobody_planned_keeps_in_a_fence_that_bends(is_hit):
+    # Given two arms that are joined in the south, home in one of them and the vehicle in the other
+    arms = [[-8, -2], [6, -2], [6, 2], [-4, 2], [-4, 5], [6, 5], [6, 9], [-8, 9]]
+    there = [{"go_to": {"position_ned_m": [n, e, -1.5], "speed_m_s": 3}} for n, e in ((-6, 0), (-6, 7), (0, 7))]
+    waits = {"wait_for": {"file": "x"}, "timeout_s": 1, "on_timeout": "return"}
+    f = flight(
+        FakeVehicle(),
+        items=[TAKEOFF, *there, waits, LANDING],
+        fence={"polygon_ne_m": arms},
+        on_collision={"then": "return"},
+    )
+    f.run_until(lambda: f.companion.core.flight.step_index == 4, 60.0)
+    if is_hit:
+        strike(f)
+    f.run_to_end(120)
+    assert f.report.outcome == "completed" and f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.6)
 
 
 def test_a_way_home_that_is_cut_off_ends_where_it_is():

@@ -1,6 +1,7 @@
 """A flight's room: its fence, the patches that touches leave, and ways round them: the shortest, or none."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -14,8 +15,8 @@ from companion.memory.patch import REACHES_M, Patch, is_same, remembered, touch_
 from companion.memory.route import route
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
 from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
-from companion.mission.item_trajectory import SpeedLimits, left_of, trajectory_around
-from companion.mission.items import GoToItem, OrbitItem, PathItem
+from companion.mission.item_trajectory import SpeedLimits, home_around, left_of, looks, trajectory_around
+from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem
 from companion.mission.trajectory import CurveProfile
 from companion.reflex.surface import Normal
 
@@ -243,6 +244,18 @@ def test_of_a_path_round_a_wall_its_own_points_are_left():
     path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5), (6.0, 0.0, -1.5), (6.0, 3.0, -1.5)))
     round_it = trajectory_around(path, START, PACE, around(wall(0.0))).trajectory
     assert left_of(path, round_it, 0.5 * round_it.duration_s).points_ned_m == path.points_ned_m[2:]
+
+
+def test_a_flight_keeps_in_a_polygon_that_bends():
+    # Given two arms that are joined in the south, and a way from one into the other
+    arms = Fence(polygon_ne_m=[[-8, -2], [6, -2], [6, 2], [-4, 2], [-4, 5], [6, 5], [6, 9], [-8, 9]])
+    start, known = (0.0, 7.0, -1.5), replace(around(fence=arms), keeps_in=True)
+    for planned in (
+        home_around(start, ReturnItem(), PACE, known),
+        trajectory_around(GoToItem(position_ned_m=(2.0, 0.0, -1.5)), start, PACE, known),
+        trajectory_around(PathItem(points_ned_m=((2.0, 0.0, -1.5), (3.0, 0.0, -1.5))), start, PACE, known),
+    ):
+        assert planned.is_detour and all(arms.outside_by_m(place) < 0.05 for place in looks(planned.trajectory))
 
 
 # --- touch after touch

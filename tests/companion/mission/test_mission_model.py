@@ -74,6 +74,16 @@ def test_one_part_replaced_by_anything(path, value):
     assert longest_s(mission, 60.0) >= 0.0
 
 
+def test_the_time_of_a_wait_with_an_end_and_of_a_turn_is_known():
+    there = {"go_to": {"position_ned_m": [0, 0, -1.5], "yaw_deg": 180}}
+    wait = {"wait_for": {"flight_time_s": 900}, "timeout_s": 950}
+    mission = Mission.model_validate(
+        {"name": "t", "items": [{"takeoff": {"height_m": 1.5}}, wait, there, {"land": {}}]}
+    )
+    still = mission.model_copy(update={"items": (mission.items[0], mission.items[1], mission.items[3])})
+    assert 900.0 < longest_s(still, 0.0) < 940.0 and longest_s(mission, 0.0) >= longest_s(still, 0.0) + 4.0
+
+
 ZIGZAG = [(0.0, 0.0, -2.0), (2.0, 1.0, -2.0), (4.0, -1.0, -2.5), (6.0, 0.0, -3.0)]
 CIRCLE = CircleProfile((3.0, 0.0, -2.0), 2.0, math.pi, 1.5 * math.tau, 2.0, 2.0)
 WAYS = {
