@@ -116,9 +116,11 @@ def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[mess
 
 
 def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> None:
-    now_us, listens = survey.now_us, survey.streams.started_us is not None
+    # What is set afterwards, and the time in which a person reads, changes nothing of what was listened to.
+    now_us, listens = survey.now_us, survey.streams.started_us is not None and not survey.finished
     survey.vehicle.update(sample, now_us)
-    survey.streams.count(type(sample), now_us)
+    if listens:
+        survey.streams.count(type(sample), now_us)
     match sample:
         case messages.Heartbeat() if is_autopilot(sample) and survey.heard_since_us is None and survey.refusal is None:
             identity = identify(sample)
@@ -159,6 +161,11 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
     if survey.streams.started_us is None:
         commands += [stream.request() for stream in survey.streams.streams]
         commands += autopilot.streams
+        if autopilot.lesser_imu is not None:
+            # Of a board that has no other. Where both come, the finer one counts.
+            commands.append(
+                messages.set_message_interval(autopilot.lesser_imu, round(1e6 / survey.config.streams.highres_imu_hz))
+            )
         commands.append(messages.set_message_interval(autopilot.estimator_message, 1_000_000))
     outgoing += [SendCommand(command, 0) for command in commands]
 
@@ -301,7 +308,7 @@ class Preflight:
         frames = self._decoder.feed(received)
         samples = [sample for _, sample in frames if sample is not None]
         known = survey.vehicle.identity
-        if known is not None and survey.streams.started_us is not None:
+        if known is not None and survey.streams.started_us is not None and not survey.finished:
             for frame, _ in frames:
                 survey.delivery.take(frame, (known.system_id, known.component_id))
         outgoing = advance(survey, samples, now_us)

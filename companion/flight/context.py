@@ -184,7 +184,7 @@ class FlightContext:
         self.streams = StreamMonitor(config.streams, tuple(self.reflex.monitor.detector.losses))
         self.speeds = SpeedLimits.of(config.flight, self.mission.limits.max_speed_m_s)
         self.steps = steps_to_fly(self.mission)
-        self.known = self.mission.known(self.mission.obstacles.patches(), True)
+        self.known = self.mission.known(self.mission.obstacles.patches())
 
     @property
     def step(self) -> Step:

@@ -94,7 +94,7 @@ def _touching_ned_m(flight: FlightContext, patch: Patch) -> Vector3:
 
 def _with_hits(flight: FlightContext, hits: int) -> ObstacleMap:
     mission = flight.mission
-    return mission.known(mission.obstacles.patches(), True).joined(_touches(flight, flight.collisions[:hits]))
+    return mission.known(mission.obstacles.patches()).joined(_touches(flight, flight.collisions[:hits]))
 
 
 def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Patch]:

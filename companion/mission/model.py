@@ -61,7 +61,7 @@ class Mission(StrictModel):
     sim: dict[str, object] | None = None
     """The simulated world (see `sim_vehicle.scene.Scene`)."""
 
-    def known(self, patches: tuple[Patch, ...], keeps_in: bool = False) -> ObstacleMap:
+    def known(self, patches: tuple[Patch, ...], keeps_in: bool = True) -> ObstacleMap:
         """The map of these."""
         return ObstacleMap(patches, self.fence, self.companion.estimate.reach_m, self.obstacles.margin_m, keeps_in)
 
@@ -158,7 +158,7 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
 
 def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
-    known = mission.known(patches)
+    known = mission.known(patches, keeps_in=False)
     flight = mission.companion.flight
     speeds = SpeedLimits.of(flight, mission.limits.max_speed_m_s)
     for step in items.program(mission.items):
@@ -184,7 +184,9 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
                 lasts_s = _landing_s(place)
             case items.GoToItem() | items.VelocityItem() | items.PathItem() | items.OrbitItem():
                 planned = trajectory_around(action, place, speeds, known)
-                lasts_s = 180.0 / defaults.TURNING_DEG_S if isinstance(action.yaw_deg, float | int) else 0.0
+                if isinstance(action.yaw_deg, float | int) and planned.trajectory is not None:
+                    # It turns on its way, and after it.
+                    lasts_s = max(0.0, 180.0 / defaults.TURNING_DEG_S - planned.trajectory.duration_s)
         if lasts_s is not None and planned.trajectory is not None:
             lasts_s += planned.trajectory.duration_s
         leg = Leg(step, place, planned.trajectory, lasts_s, planned.is_detour)

@@ -100,6 +100,8 @@ class _Formats(dict[int, Any]):
 
 
 class _Reader(DFReader_binary):  # type: ignore[misc]  # pymavlink has no types
+    formats: dict[int, Any]
+
     def init_clock(self) -> None:
         """Stamps are taken as they stand: no search through the whole log for the time of day."""
 

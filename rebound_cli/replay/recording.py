@@ -17,13 +17,13 @@ from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
-from companion.messages import Asked, ComputerStatus, Vector3
+from companion.messages import Asked, ComputerStatus
 from companion.mission.model import Mission
 from companion.reflex.detection.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
 from rebound_cli.inputs.documents import load_document, validated
 from rebound_cli.inputs.inputs import mission_from
-from rebound_cli.logs.log import LogError
+from rebound_cli.logs.log import LogError, vector
 from rebound_cli.replay.watching import Findings
 from rebound_cli.results import run_folder
 
@@ -197,13 +197,6 @@ def reproduce(recording: Recording) -> Reproduction:
     return Reproduction(followed.findings, extent, recording.is_cut, differences[0] if differences else None)
 
 
-def _vector(values: Sequence[float] | None) -> Vector3 | None:
-    if values is None:
-        return None
-    north, east, down = values
-    return (north, east, down)
-
-
 def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
     match record, stepped:
         case {"kind": "confirm"}, Companion():
@@ -215,7 +208,8 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
         case {"kind": "note", "event": event, "text": text}, _:
             stepped.note(str(event), str(text))
         case {"kind": "setpoint"}, Guard():
-            stepped.hear_setpoint(Asked(_vector(record["place_ned_m"]), _vector(record["velocity_ned_m_s"])))
+            told = (record[name] for name in ("place_ned_m", "velocity_ned_m_s"))
+            stepped.hear_setpoint(Asked(*(None if values is None else vector(values) for values in told)))
         case {"kind": "choice"}, Guard():
             stepped.hear_choice()
         case {"kind": "interval", "message_id": int() | None as message_id, "interval_us": int(interval_us)}, Guard():

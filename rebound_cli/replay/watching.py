@@ -188,7 +188,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
     circumstances, findings = Circumstances(config, modes), Findings()
     # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in log.heard if isinstance(item.sample, messages.ImuSample))
-    monitor = start_monitor(_sampled_as(log, config), start_us)
+    monitor = start_monitor(sampled_as(log, config), start_us)
     monitor.estimator.hides_clipping = log.is_filtered
     findings.listener.listen(monitor)
 
@@ -216,7 +216,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
     return findings
 
 
-def _sampled_as(log: Log, config: CompanionConfig) -> CompanionConfig:
+def sampled_as(log: Log, config: CompanionConfig) -> CompanionConfig:
     """With the time that a sample of this log's source looks back over."""
     if log.low_pass_hz is None or log.window_us is None:
         return config

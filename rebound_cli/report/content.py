@@ -174,8 +174,13 @@ def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
 
 def heard_at_us(flight: ShownFlight, boot_us: Numbers) -> Floats:
     """When what has these times on the vehicle's clock was heard, by the IMU samples around it."""
-    boot_us = np.asarray(boot_us)
-    return np.interp(boot_us, flight.log.imu_time_boot_us, flight.log.imu_at_us) if len(boot_us) else boot_us
+    boot_us, log = np.asarray(boot_us), flight.log
+    return np.interp(_going_on(boot_us), _going_on(log.imu_time_boot_us), log.imu_at_us) if len(boot_us) else boot_us
+
+
+def _going_on(boot_us: Floats) -> Floats:
+    """Times of a clock that may begin anew, as of one that goes on: with three years for each time."""
+    return boot_us + 1e14 * np.cumsum(np.diff(boot_us, prepend=boot_us[:1]) < -1e6)
 
 
 def _packed(columns: Columns, loudness: Floats | None, near_s: Floats, most: int) -> dict[str, Any]:

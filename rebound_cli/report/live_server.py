@@ -3,6 +3,7 @@
 A browser may be slow or vanish: each has a thread here, and none in the program that flies.
 """
 
+import re
 import sys
 import threading
 from argparse import Namespace
@@ -24,6 +25,7 @@ LOOK_S = 0.1
 # A browser that takes nothing for so long has gone, or sleeps: it asks again when it wakes.
 PATIENCE_S = 10.0
 _LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+_PORT = re.compile(r":\d+$")  # of a Host; a browser leaves 80 out
 
 
 class WatchServer(ThreadingHTTPServer):
@@ -71,7 +73,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         # A name that leads here by somebody else's server of names is another site's, and gets nothing.
-        host = (self.headers.get("Host") or "").rpartition(":")[0]
+        host = _PORT.sub("", self.headers.get("Host") or "")
         if self.server.names and host not in self.server.names:
             self.send_error(403)
         elif self.path == "/":

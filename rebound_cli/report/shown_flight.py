@@ -23,7 +23,7 @@ from rebound_cli.replay.recording import (
     settings_file,
 )
 from rebound_cli.replay.report import Replay
-from rebound_cli.replay.watching import Finding, Findings
+from rebound_cli.replay.watching import Finding, Findings, sampled_as
 from rebound_cli.results import run_folder
 from rebound_cli.results.flight_log import FlightLog, flight_log_of, read_flight_log
 from rebound_cli.results.truth_match import FlightTruth, Time, read_truth
@@ -152,7 +152,7 @@ def replayed_flight(replay: Replay, config: CompanionConfig) -> ShownFlight:
         name=log.path.name,
         started_at_us=log.started_at_us,
         log=flight_log_of((heard.at_us, heard.sample) for heard in log.heard),
-        config=config,
+        config=sampled_as(log, config),
         findings=replay.findings,
         events=[{"time_us": at_us, "kind": _kind(text), "text": text, "data": {}} for at_us, text in told],
     )

@@ -40,6 +40,7 @@ class Tail:
         self._tlog_at = self._events_at = 0
         self._started_us: int | None = None
         self._row_s = dict.fromkeys(COLUMNS, -math.inf)
+        self._peaks: list[float] = []  # since the last row of them
 
     def read(self) -> Mapping[str, Any] | None:
         """What has come since; None where nothing has."""
@@ -88,13 +89,15 @@ class Tail:
     def _thinned(self, name: str, table: Floats, peaks: bool = False) -> list[list[float | None]]:
         """A row each tenth of a second; of `peaks` the largest since the row before."""
         rows: list[list[float | None]] = []
-        since = 0
-        for index, (exactly_s, *values) in enumerate(table.tolist()):
+        for exactly_s, *values in table.tolist():
             seconds = round(exactly_s, 6)
+            if peaks:
+                values = self._peaks = [*map(max, values, self._peaks or values)]
             if seconds - self._row_s[name] < ROW_S:
                 continue
-            shown = table[since : index + 1, 1:].max(axis=0).tolist() if peaks else values
-            self._row_s[name], since = seconds, index + 1
+            shown, self._row_s[name] = values, seconds
+            if peaks:
+                self._peaks = []
             rows.append([seconds, *(round(one, _DIGITS) if math.isfinite(one) else None for one in shown)])
         return rows
 

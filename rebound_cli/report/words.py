@@ -91,7 +91,7 @@ def _imu_rows(flight: ShownFlight) -> Sequence[tuple[str, str]]:
     p50, p99, most = np.percentile(delays_ms, 50), np.percentile(delays_ms, 99), delays_ms.max()
     averaging_ms = flight.config.estimate.imu_averaging_interval_s * 1e3
     return [
-        ("IMU samples", f"{len(boot_us)}, one every {usual_us / 1e3:.1f} ms, each the mean over {averaging_ms:.1f} ms"),
+        ("IMU samples", f"{len(boot_us)}, one every {usual_us / 1e3:.1f} ms, each of the last {averaging_ms:.1f} ms"),
         ("Lost, or not sent", f"{lost} of {lost + len(boot_us)}"),
         ("Later than the quickest", f"{p50:.1f} ms (median), {p99:.1f} ms (99 %), {most:.1f} ms (most)"),
     ]

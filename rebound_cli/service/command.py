@@ -125,7 +125,9 @@ def _check_run(kind: str, text: str, name: str) -> bool:
     if isinstance(file, str) and not Path(file).is_absolute():
         place = document.place_of(("obstacles", "file"))
         raise DocumentError(f"{place}: obstacles.file: the mission is copied to /{FOLDER}; give the file's whole path.")
-    mission_from(document)
+    if mission_from(document).companion.link.wait:
+        place = document.place_of(("companion", "link", "wait"))
+        raise DocumentError(f"{place}: companion.link.wait: a service would arm a vehicle whenever it appears.")
     return False
 
 

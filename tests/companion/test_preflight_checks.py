@@ -217,6 +217,19 @@ def test_what_is_measured_is_judged(wrong, item, verdict):
     assert verdicts(surveyed(**wrong))[item] is verdict
 
 
+def test_the_time_in_which_a_person_reads_changes_nothing():
+    survey = surveyed()
+    before = verdicts(survey)
+    advance(survey, [messages.ImuSample(80_000_000, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))], 80_000_000)
+    assert verdicts(survey) == before
+
+
+def test_of_a_copter_the_lesser_imu_is_asked_for_too():
+    survey = Preflight(CompanionConfig(), 0).survey
+    sent = advance(survey, [replace(PX4, autopilot=3)], 1_000_000)
+    assert (27, 4000) in [message.command.parameters for message in sent if isinstance(message, messages.SendCommand)]
+
+
 def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
     known = {name: value for name, value in HEALTHY.items() if name != "COM_OF_LOSS_T"}
     survey = surveyed(known)

@@ -35,7 +35,7 @@ LEAST_LEAN_DEG, LEAN_DEG = 20.0, 30.0
 # motor. So much leaves a vehicle that a hit has turned as much lift as PX4's mixer does.
 YAW, MOST_YAW = "ATC_RAT_YAW_PDMX", 0.3
 # Names that changed with 4.7, newer before older.
-JERKS, LEANS = ("PSC_JERK_NE", "PSC_JERK_XY"), ("ATC_ANGLE_MAX", "ANGLE_MAX")
+JERKS, LEANS = ("PSC_NE_JERK", "PSC_JERK_NE", "PSC_JERK_XY"), ("ATC_ANGLE_MAX", "ANGLE_MAX")
 CHECKS = ("ARMING_SKIPCHK", "ARMING_CHECK")
 SERIALS, COMPANION_BAUD = range(1, 6), 921_600
 # SERIALn_PROTOCOL: MAVLink 1 and 2. SERIALn_BAUD has thousands, by ArduPilot's own rounding.

@@ -348,7 +348,7 @@ HEALTHY |= {
     "FS_CRASH_CHECK": 1,
     "ATC_RATE_FF_ENAB": 0,
     "ATC_RAT_YAW_PDMX": 0.3,
-    "PSC_JERK_NE": 5,
+    "PSC_NE_JERK": 5,
     "ATC_ANGLE_MAX": 30,
     "ARMING_SKIPCHK": 0,
 }
@@ -383,7 +383,7 @@ def test_a_healthy_copter_has_nothing_to_mend():
         ({"ATC_RATE_FF_ENAB": 1}, None, "ATC_RATE_FF_ENAB", "ATC_RATE_FF_ENAB = 0"),
         ({"ATC_RAT_YAW_PDMX": 0.0}, None, "ATC_RAT_YAW_PDMX", "ATC_RAT_YAW_PDMX = 0.3"),
         ({"ATC_RAT_YAW_PDMX": 0.5}, None, "ATC_RAT_YAW_PDMX", "ATC_RAT_YAW_PDMX = 0.3"),
-        ({"PSC_JERK_NE": 2}, None, "PSC_JERK_NE", "PSC_JERK_NE = 5"),
+        ({"PSC_NE_JERK": 2}, None, "PSC_NE_JERK", "PSC_NE_JERK = 5"),
         ({"ATC_ANGLE_MAX": 10}, None, "ATC_ANGLE_MAX", "ATC_ANGLE_MAX = 30"),
         ({"ARMING_SKIPCHK": 8}, None, "ARMING_SKIPCHK", "ARMING_SKIPCHK = 0"),
         ({"FRAME_CLASS": 2}, None, "FRAME_CLASS", "Mission Planner"),
@@ -399,7 +399,7 @@ def test_what_is_not_as_it_should_be_has_its_remedy(changed, line, item, remedy)
 
 def test_older_firmware_has_other_names_and_hundredths_of_a_degree():
     older = {"PSC_JERK_XY": 5, "ANGLE_MAX": 1000, "ARMING_CHECK": 0}
-    newer = {"PSC_JERK_NE", "ATC_ANGLE_MAX", "ARMING_SKIPCHK"}
+    newer = {"PSC_NE_JERK", "ATC_ANGLE_MAX", "ARMING_SKIPCHK"}
     found = judged({**{name: value for name, value in HEALTHY.items() if name not in newer}, **older})
     assert found["PSC_JERK_XY"].verdict is Verdict.GOOD
     assert "10 degrees" in found["ANGLE_MAX"].found and found["ANGLE_MAX"].remedy == "ANGLE_MAX = 3000"
@@ -409,7 +409,7 @@ def test_older_firmware_has_other_names_and_hundredths_of_a_degree():
 def test_what_was_not_told_is_doubtful_and_what_is_asked_is_judged():
     found = judged({})
     assert {item.verdict for item in found.values()} == {Verdict.DOUBTFUL}
-    older = {"PSC_JERK_XY", "ANGLE_MAX", "ARMING_CHECK"}
+    older = {"PSC_JERK_NE", "PSC_JERK_XY", "ANGLE_MAX", "ARMING_CHECK"}
     assert {*setup.asked(None)} == {*HEALTHY} | older and {*ON_SERIAL2} <= {*setup.asked(UART)}
 
 

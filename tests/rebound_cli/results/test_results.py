@@ -5,6 +5,7 @@ import math
 import os
 from dataclasses import replace
 from io import BytesIO
+from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
@@ -16,6 +17,7 @@ from rebound_cli.export.foxglove import write_mcap
 from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.reader import read_telemetry
 from rebound_cli.main import main
+from rebound_cli.report.content import heard_at_us
 from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import TLOG_NAME, RunFolderError, check_place
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
@@ -247,6 +249,11 @@ def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(topics
     assert len(truth.keys() & {at_ns for _, at_ns, _ in topics["/pose"]}) > 0.9 * len(topics["/pose"])
     levels = {data["message"][:9]: data["level"] for _, _, data in topics["/log"]}
     assert levels["detection"] == 3 and levels["takeoff: "] == 2
+
+
+def test_what_is_heard_after_a_reboot_stands_at_its_own_time():
+    log = SimpleNamespace(imu_time_boot_us=np.array([0, 2e6, 0, 2e6]), imu_at_us=np.array([10e6, 12e6, 20e6, 22e6]))
+    assert heard_at_us(SimpleNamespace(log=log), [1e6, 2e6, 0.5e6]).tolist() == [11e6, 12e6, 20.5e6]
 
 
 @pytest.mark.parametrize(

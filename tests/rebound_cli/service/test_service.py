@@ -162,6 +162,9 @@ def test_what_is_wrong_in_a_persons_files_is_named_with_its_place(system, tmp_pa
     mission.write_text((ROOT / "missions" / "square.yaml").read_text() + "\nobstacles:\n  file: hall.json\n")
     with pytest.raises(Exception, match=r"obstacles\.file: the mission is copied to /etc/rebound"):
         service(system, "install", mission=mission)
+    mission.write_text((ROOT / "missions" / "square.yaml").read_text() + "\ncompanion:\n  link:\n    wait: true\n")
+    with pytest.raises(Exception, match="a service would arm a vehicle whenever it appears"):
+        service(system, "install", mission=mission)
     service(system, "install")
     (system.root / "etc/rebound/service.yaml").write_text("run: guard\nconect: udpin://:1\n")
     with pytest.raises(Exception, match=r"service.yaml:2: conect: unknown key 'conect'; did you mean 'connect'"):
