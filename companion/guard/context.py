@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from companion.autopilot.known import defaults
 from companion.flight.context import FlightContext
 from companion.guard.config import GuardConfig
-from companion.messages import Asked, LandedState, Sticks, Vector3
+from companion.messages import Asked, Sticks, Vector3
 from companion.motion.vector import ZERO, minus, plus
 
 # Setpoints are lost when there is none for so long.
@@ -58,10 +58,6 @@ class GuardContext(FlightContext):
         if not self.awaits_choice:
             self.awaits_choice = True
             self.report(now_us, "not_back", f"{why}: a program's setpoints are kept out until somebody chooses a mode")
-
-    @property
-    def is_landed_known(self) -> bool:
-        return self.vehicle.landed is not LandedState.UNDEFINED
 
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""

@@ -10,7 +10,7 @@ from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
 from companion.guard.watching import GuardConnect, goes_down, observe, why_not
-from companion.messages import PositionTarget, Sample, Sticks, TimeSync
+from companion.messages import LandedState, PositionTarget, Sample, Sticks, TimeSync
 from companion.reflex.detection.detector import Situation
 
 
@@ -57,9 +57,10 @@ class GuardCore(Core[GuardContext, GuardMachine]):
 
     @property
     def begins_in_flight(self) -> bool:
-        """Whether no vehicle was met before, and it may be that this one flies by a program's setpoints."""
-        handler = self.machine.handler
-        return isinstance(handler, GuardConnect) and handler.begins and not self.flight.has_stood
+        """Whether a guard in between has met no vehicle before, and this one may fly by a program's setpoints."""
+        guard, handler = self.flight, self.machine.handler
+        is_first = isinstance(handler, GuardConnect) and handler.begins
+        return is_first and bool(guard.config.between) and not guard.has_stood
 
     def _await_choice(self, held: bool, now_us: int) -> None:
         """A program that flew into something would do it again by itself, and nobody would notice a hit: after a
@@ -71,7 +72,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
             guard.awaits_choice = False
         elif lets_go and guard.keeps_others_out and vehicle.flies_setpoints:
             guard.await_choice("the guard has let go", now_us)
-        elif guard.config.between and self.begins_in_flight and vehicle.armed and guard.is_landed_known:
+        elif self.begins_in_flight and vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
             guard.await_choice("begun in flight", now_us)
 
     def _note_sent(self, target: Target, now_us: int) -> None:

@@ -60,8 +60,7 @@ def read_telemetry(path: Path) -> Log:
     if others:
         losses.append(f"more than one vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
     name = f"{vehicle.autopilot.name} {vehicle.vehicle_type}, system {vehicle.system_id}"
-    is_filtered = vehicle.autopilot.filters_imu
-    return Log(path, name, packets[0][0], tuple(heard), tuple(losses), is_filtered=is_filtered)
+    return Log(path, name, packets[0][0], tuple(heard), tuple(losses), is_filtered=vehicle.autopilot.filters_imu)
 
 
 def _going_on(packets: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes]]:

@@ -146,8 +146,7 @@ def _in_folder(folder: Path, settings: Mission | GuardConfig, findings: Findings
 
 def replayed_flight(replay: Replay, config: CompanionConfig) -> ShownFlight:
     """Of any log: what it holds and what was found in it."""
-    log = replay.log
-    told = replay.findings.happenings
+    log, told = replay.log, replay.findings.happenings
     return ShownFlight(
         name=log.path.name,
         started_at_us=log.started_at_us,
