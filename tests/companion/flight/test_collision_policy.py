@@ -109,8 +109,8 @@ def test_giving_up_hands_the_vehicle_over_once_it_has_settled(changes, words):
 
 @pytest.mark.parametrize("after_s", [0.0, 0.5], ids=["the land mode is asked for", "it is flown"])
 def test_a_landing_is_not_put_off_for_more_hits_than_the_limit(after_s):
-    limits = {"on_collision": {"max_hits": 2}, "abort_when": {"hit_above_m_s": 0.01}}
-    f = flight(FakeVehicle(), items=[{"takeoff": {"height_m": 4}}, LANDING], **limits)
+    items, abort_when = [{"takeoff": {"height_m": 4}}, LANDING], {"hit_above_m_s": 0.01}
+    f = flight(FakeVehicle(), items=items, on_collision={"max_hits": 2}, abort_when=abort_when)
     f.run_to("landing")
     f.run_for(after_s)
     strike(f)

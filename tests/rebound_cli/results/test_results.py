@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 from io import BytesIO
 from types import SimpleNamespace
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -252,8 +253,9 @@ def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(topics
 
 
 def test_what_is_heard_after_a_reboot_stands_at_its_own_time():
-    log = SimpleNamespace(imu_time_boot_us=np.array([0, 2e6, 0, 2e6]), imu_at_us=np.array([10e6, 12e6, 20e6, 22e6]))
-    assert heard_at_us(SimpleNamespace(log=log), [1e6, 2e6, 0.5e6]).tolist() == [11e6, 12e6, 20.5e6]
+    flight: Any = SimpleNamespace(log=SimpleNamespace())
+    flight.log.imu_time_boot_us, flight.log.imu_at_us = np.array([0, 2e6, 0, 2e6]), np.array([10e6, 12e6, 20e6, 22e6])
+    assert heard_at_us(flight, np.array([1e6, 2e6, 0.5e6])).tolist() == [11e6, 12e6, 20.5e6]
 
 
 @pytest.mark.parametrize(
