@@ -258,8 +258,8 @@ class FusedDetector:
         elapsed_us = s.last_sample_boot_us - before_us
         # A sample after a gap or a reboot has the weight of the longest interval.
         elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
-        free_m_s2 = s.thrust.expected_m_s2(s.last_sample_boot_us, s.floor.mean_frd_m_s2[2])
-        s.floor.learn(f, elapsed_s, max(1.0, -free_m_s2 / GRAVITY_M_S2))
+        lifts_m_s2 = -s.thrust.expected_m_s2(s.last_sample_boot_us, s.floor.mean_frd_m_s2[2])
+        s.floor.learn(f, elapsed_s, lifts_m_s2 / GRAVITY_M_S2 if lifts_m_s2 > GRAVITY_M_S2 else 1.0)
         config, s.before_threshold_m_s2 = self._config, s.threshold_m_s2
         s.threshold_m_s2 = max(config.side_threshold_m_s2, config.noise_factor * s.floor.side_m_s2)
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
