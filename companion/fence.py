@@ -116,13 +116,15 @@ class Fence(StrictModel):
         """Where the straight way from `start`, which is inside, to `end` leaves the fence; `end` if it does not."""
         leaves_at = 1.0
         step = (end[0] - start[0], end[1] - start[1])
+        if math.hypot(*step) <= _LEAST_M:
+            return end
         if self.radius_m is not None and math.hypot(*end) > self.radius_m:
             # |start + s * step| = radius, for the s in [0, 1] that leaves the circle
             a = step[0] ** 2 + step[1] ** 2
             b = start[0] * step[0] + start[1] * step[1]
             c = start[0] ** 2 + start[1] ** 2 - self.radius_m**2
             leaves_at = (-b + math.sqrt(max(0.0, b * b - a * c))) / a
-        if self._polygon is not None and math.hypot(*step) > _LEAST_M:
+        if self._polygon is not None:
             line = LineString((start, end))
             for outside in shapely.get_coordinates(line.difference(self._polygon)):
                 leaves_at = min(leaves_at, line.project(Point(outside), normalized=True))

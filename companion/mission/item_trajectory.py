@@ -248,13 +248,13 @@ def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
 
 
 def _leaves(trajectory: Trajectory, fence: Fence) -> bool:
-    """Whether it leaves a polygon, between two places in it."""
-    if fence.polygon_ne_m is None:
+    """Whether it leaves a polygon in which it begins. What has come out of it flies in."""
+    if fence.polygon_ne_m is None or fence.outside_by_m(trajectory.at(0.0)[0]) > 0.0:
         return False
     if isinstance(trajectory, LineProfile):
         end = trajectory.target_m[:2]
         return math.dist(fence.shortened(trajectory.start_m[:2], end), end) > ROUNDING_M
-    return not all(fence.contains(*place[:2]) for place in looks(trajectory))
+    return any(fence.outside_by_m(place) > ROUNDING_M for place in looks(trajectory))
 
 
 def _points_of(item: items.GoToItem | items.PathItem | items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:

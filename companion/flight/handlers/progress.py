@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from companion.flight import expectations
 from companion.flight.context import TURNING_RAD_S, FlightContext, Inputs, StepTally, Target, Transition
+from companion.flight.handlers.takeoff_and_landing import Rest
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
@@ -54,9 +55,12 @@ class _OnTrajectory:
 
     def _is_there(self, flight: FlightContext) -> bool:
         """Whether it has arrived at its goal."""
-        latest, goal = flight.vehicle.history.latest, flight.local_ned_m(self._trajectory.target_m)
+        latest, most_m = flight.vehicle.history.latest, flight.mission.companion.flight.acceptance_radius_m
         assert latest is not None, "the flight is in the air"
-        return math.dist(latest.position_ned_m, goal) <= flight.mission.companion.flight.acceptance_radius_m
+        return math.dist(latest.position_ned_m, self._goal(flight)) <= most_m
+
+    def _goal(self, flight: FlightContext) -> Vector3:
+        return flight.local_ned_m(self._trajectory.target_m)
 
 
 class FlyItems(_OnTrajectory):
@@ -75,7 +79,7 @@ class FlyItems(_OnTrajectory):
         self._trajectory_began_us = flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading(step.action, flight.yaw_rad, now_us)
-        self._steady = Lasting()
+        self._steady, self._rest = Lasting(), Rest()
         self._trajectory: Trajectory = stay(start)
         self._is_held, self._wanted_ned_m = False, flight.target.position_ned_m
         self._motion: items.Motion | None = None
@@ -185,7 +189,15 @@ class FlyItems(_OnTrajectory):
                     return False
                 if self._over_since_us is None:
                     self._over_since_us = now_us
-                return self._is_there(flight)
+                return self._is_there(flight) and (
+                    not self._is_judged(flight) or self._rest.at(flight, self._goal(flight))
+                )
+
+    def _is_judged(self, flight: FlightContext) -> bool:
+        """Whether what is expected follows, and then the landing: its rest belongs to the item."""
+        after = [step.action for step in flight.steps[flight.step_index + 1 :]]
+        lands = isinstance(next(one for one in after if not isinstance(one, items.ExpectItem)), items.LandItem)
+        return lands and isinstance(after[0], items.ExpectItem)
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""

@@ -163,34 +163,50 @@ BRAKES_S = 1.0
 RESTS_WITHIN_US = 6_000_000
 
 
+class Rest:
+    """Whether a vehicle stays at a place: one that turns round is slow for a moment, too."""
+
+    def __init__(self) -> None:
+        self._steady = Lasting()
+
+    def at(self, flight: FlightContext, goal_ned_m: Vector3) -> bool:
+        """Call with each position."""
+        config, latest = flight.mission.companion, flight.vehicle.history.latest
+        assert latest is not None, "the flight is in the air"
+        place = flight.reflex.place_ned_m(latest)
+        off_m = max(math.dist(each, goal_ned_m) for each in (place, plus(place, BRAKES_S, latest.velocity_ned_m_s)))
+        self._steady.update(off_m <= config.flight.acceptance_radius_m, latest.time_boot_us)
+        return self._steady.lasts_us >= config.settled.duration_s * 1e6
+
+
 class Land(FixedSetpoint):
     """Rest at the last setpoint, ask for the mode, keep the setpoints going until the vehicle has it, then wait.
 
-    One that is asked to land in motion lands where it comes to rest, be it outside the fence.
+    One that is asked to land in motion lands where it comes to rest, be it outside the fence. One that is hurt, or near
+    the ground, or does not know where it is, is asked at once.
     """
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._started_us = now_us
         self._target = flight.target and flight.target.at_rest()
         self._is_asked = self._landing = False
-        self._steady = Lasting()
+        self._rest = Rest()
         flight.is_landing = True
 
-    def _rests(self, flight: FlightContext) -> bool:
-        """Whether it stays there: one that turns round is slow for a moment, too."""
-        config, latest = flight.mission.companion, flight.vehicle.history.latest
-        if self._target is None or latest is None:
-            return True
-        place, goal = flight.reflex.place_ned_m(latest), self._target.position_ned_m
-        off_m = max(math.dist(place, goal), math.dist(plus(place, BRAKES_S, latest.velocity_ned_m_s), goal))
-        self._steady.update(off_m <= config.flight.acceptance_radius_m, latest.time_boot_us)
-        return self._steady.lasts_us >= config.settled.duration_s * 1e6
+    def _waits(self, flight: FlightContext, now_us: int) -> bool:
+        hits, height_m = flight.hits, flight.height_m
+        is_hurt = flight.motors.damage is not None or (bool(hits) and hits[-1].settled_after_s is None)
+        is_high = height_m is not None and height_m >= flight.mission.companion.min_detection_height_m
+        if self._target is None or is_hurt or not is_high or not flight.has_position:
+            return False
+        rests = self._rest.at(flight, self._target.position_ned_m)
+        return not rests and now_us - self._started_us < RESTS_WITHIN_US
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if flight.vehicle.armed is False:
             return Transition(Trigger.DISARMED)
         if not self._is_asked:
-            if not self._rests(flight) and now_us - self._started_us < RESTS_WITHIN_US:
+            if self._waits(flight, now_us):
                 return None
             self._is_asked = True
             flight.count_asked_mode()
