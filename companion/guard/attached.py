@@ -8,7 +8,7 @@ from companion.core import POLL_INTERVAL_US
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
-from companion.mavlink.moves import SETPOINT_IDS, asked_by, is_for
+from companion.mavlink.moves import SETPOINT_IDS, asked_by, is_for, would_move
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 
 # Own setpoints that are remembered until they pass the gate: one for each IMU sample of a second, in which PX4 holds
@@ -68,6 +68,8 @@ class AttachedGuard(Guard):
             return True
         asked = asked_by(packet) if is_for(packet, self._source[0]) else None
         if asked is None:
+            if is_for(packet, self._source[0]) and would_move(packet, self.core.flight.vehicle.autopilot):
+                self.hear_choice()
             return True
         is_kept_out = self.core.machine.holds or self.core.flight.awaits_choice
         self.hear_setpoint(asked)

@@ -1,6 +1,7 @@
 """The guard's core: what of a step is the guard's own (see companion.core)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from companion.core import Core
 from companion.flight.context import Inputs, Target
@@ -11,7 +12,10 @@ from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
 from companion.guard.watching import GuardConnect, goes_down, observe, why_not
 from companion.messages import LandedState, PositionTarget, Sample, Sticks, TimeSync
+from companion.motion.resets import Resets
+from companion.motion.vector import plus
 from companion.reflex.detection.detector import Situation
+from companion.reflex.recovery.collision import CollisionReport
 
 
 class GuardCore(Core[GuardContext, GuardMachine]):
@@ -48,12 +52,28 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         elif sticks and guard.sticks is None:
             # Nobody had a stick in hand before the hit.
             guard.sticks = sticks[0]
+        if guard.vehicle.armed is False and self.resets.has_shifted:
+            # It may restart, and count its resets from zero.
+            self.resets = Resets()
         echoes = [sample for sample in samples if isinstance(sample, PositionTarget)]
         inputs = inputs._replace(echoes=echoes, sticks=sticks, is_enabled=self.is_enabled)
+        guard.awaits_choice &= not self.is_enabled
         self.is_enabled, held = False, self.machine.holds
         moved = self.machine.step(inputs, now_us)
         self._await_choice(held, now_us)
         return moved
+
+    def collisions(self) -> tuple[CollisionReport, ...]:
+        """All so far, in the vehicle's present local frame."""
+        shift = self.resets.shift_ned_m
+        return tuple(
+            replace(
+                hit,
+                position_ned_m=plus(hit.position_ned_m, 1.0, shift),
+                recovery_setpoint_ned_m=plus(hit.recovery_setpoint_ned_m, 1.0, shift),
+            )
+            for hit in super().collisions()
+        )
 
     @property
     def begins_in_flight(self) -> bool:

@@ -10,7 +10,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, SendCommand
-from companion.motion.vector import minus
+from companion.motion.vector import ZERO, minus
 
 
 class Guard(Stepped[GuardCore]):
@@ -18,6 +18,7 @@ class Guard(Stepped[GuardCore]):
 
     def __init__(self, config: GuardConfig) -> None:
         super().__init__(GuardCore(config), GUARD_READERS)
+        self._shift_ned_m = ZERO  # of the local frame, when the last setpoint came
 
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
@@ -40,8 +41,12 @@ class Guard(Stepped[GuardCore]):
 
     def hear_setpoint(self, asked: Asked) -> None:
         """A client's, in the vehicle's own frame, has been on its way since the last step."""
+        shift = self.core.resets.shift_ned_m
+        if shift != self._shift_ned_m:
+            # The frame has moved since the one before, and not the place.
+            self._shift_ned_m, self.core.flight.others_setpoint_us = shift, None
         if asked.place_ned_m is not None:
-            asked = replace(asked, place_ned_m=minus(asked.place_ned_m, self.core.resets.shift_ned_m))
+            asked = replace(asked, place_ned_m=minus(asked.place_ned_m, shift))
         self.core.flight.hear_setpoint(asked, self.core.now_us)
 
     def hear_choice(self) -> None:

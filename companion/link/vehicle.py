@@ -86,6 +86,8 @@ class Vehicle:
     attitude_parameters: dict[str, int | float] = field(default_factory=dict)  # see interface.Autopilot
     armed: bool | None = None
     mode: ModeReport | None = None
+    chosen_mode: int | None = None  # by whoever flies
+    tells_chosen: bool = False  # in a message of its own
     pilot: Pilot | None = None  # who moves it, where that mode says so
     failsafe: bool = False
     landed: messages.LandedState = messages.LandedState.UNDEFINED
@@ -124,10 +126,16 @@ class Vehicle:
             case messages.Heartbeat():
                 self._update_armed(sample.armed)
                 self.failsafe = sample.system_status >= FAILSAFE_STATUS
+                # A failsafe's own mode is nobody's choice where the vehicle leaves it by itself.
+                is_choice = not self.failsafe or not self.autopilot.wants_setpoints_first
+                if is_choice and not self.tells_chosen:
+                    self.chosen_mode = sample.custom_mode
                 self._update_mode(ModeReport(sample.custom_mode, None, self.failsafe), own_modes, now_us)
             case messages.CurrentMode():
                 # The intended mode is newer than the last HEARTBEAT's status, where it is given.
                 failsafe = self.failsafe and sample.intended_custom_mode is None
+                if sample.intended_custom_mode is not None:
+                    self.chosen_mode, self.tells_chosen = sample.intended_custom_mode, True
                 report = ModeReport(sample.custom_mode, sample.intended_custom_mode, failsafe)
                 self._update_mode(report, own_modes, now_us)
             case messages.ExtendedState():
@@ -194,9 +202,7 @@ class Vehicle:
     @property
     def is_mode_chosen(self) -> bool:
         """Whether somebody has chosen another mode than that for setpoints: no failsafe for want of them has."""
-        if self.mode is None or self.mode.failsafe:
-            return False
-        return (self.mode.intended_custom_mode or self.mode.custom_mode) != self.autopilot.setpoints
+        return self.chosen_mode is not None and self.chosen_mode != self.autopilot.setpoints
 
     def version_complaint(self) -> str | None:
         """Why this version cannot be flown; None where it can, or has not said which it is."""

@@ -32,8 +32,9 @@ SETPOINT_IDS = frozenset(
         dialect.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET,
     }
 )
-# The same by name, for MAVSDK.
+# The same by name, for MAVSDK, and what else asks for a mode.
 SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
+REQUESTS = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
 STICKS_IDS = (dialect.MAVLINK_MSG_ID_MANUAL_CONTROL, dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 _COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)

@@ -40,6 +40,10 @@ class Resets:
     _place: LocalPosition | None = None
     """The latest one accepted; None after a reset."""
 
+    @property
+    def has_shifted(self) -> bool:
+        return bool(self._shifts)
+
     def follow(self, sample: Sample, most_m: float) -> Sample:
         """The sample in this frame. A jump of more than `most_m` does not shift it."""
         if type(sample) is Odometry:

@@ -15,7 +15,7 @@ from companion.companion import StepResult
 from companion.guard.attached import AttachedGuard
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
-from companion.mavlink.moves import SETPOINTS
+from companion.mavlink.moves import REQUESTS, SETPOINTS
 from companion.mavlink.named import packet_from
 from companion.reflex.recovery.collision import CollisionReport
 from companion.report import Event
@@ -69,8 +69,8 @@ class CollisionGuard:
 
     def start(self) -> None:
         """Attach, once; return when the streams are fast enough, some 3 s later. Raises GuardError if they are not."""
-        if self._is_over:
-            raise GuardError("This guard has ended: make a new CollisionGuard.")
+        if self._is_over or self._thread.ident is not None:
+            raise GuardError("This guard was started before: make a new CollisionGuard.")
         self._link.intercept(self._incoming, self._outgoing)
         self._switch_interval_s = sys.getswitchinterval()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, self._switch_interval_s))
@@ -184,11 +184,11 @@ class CollisionGuard:
 
     def _outgoing(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
         """On MAVSDK's thread, the last before the socket."""
-        if name not in SETPOINTS:
+        if name not in SETPOINTS and name not in REQUESTS:
             return True
         with self._changed:
             # Also of one that cannot be read
-            passes = self._is_over or not self.holds
+            passes = self._is_over or not self.holds or name in REQUESTS
             if not self._is_over and (packet := packet_from(name, source, fields_json)):
                 with self._guarded():
                     passes = self._guard.lets_pass(packet)

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from bench.fly import commanded
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.core import POLL_INTERVAL_US
@@ -19,6 +20,7 @@ from companion.mavlink.packet import message_id_of
 from companion.messages import LocalPosition, PositionTarget
 from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
+from companion.shell.mavsdk_link import GuardError
 from tests.guard.flying import PROGRAM, AttachedFlight, by_name
 
 RUN_CHECKS, STALL_S = 401, 1.6  # more than the silence after which the guard lets go (link.silence_s)
@@ -124,6 +126,9 @@ def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebo
     air.vehicle.step = step
     air.run_for(4.0)
     assert "the guard has let go" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
+    air.set_mode(commanded.OFFBOARD)
+    air.run_for(0.5)
+    assert not air.guard.core.flight.awaits_choice and air.setpoints("program", air.time_s - 0.2) != []
 
 
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
@@ -265,3 +270,10 @@ def test_a_fault_that_stays_ends_the_guard_in_time(monkeypatch):
     joined = Joined(monkeypatch)
     monkeypatch.setattr(joined.air.guard, "step", fails)
     assert joined.until_over(1_100_000) >= 1_000_000
+
+
+def test_a_guard_is_started_once(monkeypatch):
+    joined = Joined(monkeypatch)
+    joined.guard._thread = SimpleNamespace(ident=1)
+    with pytest.raises(GuardError, match="started before"):
+        joined.guard.start()

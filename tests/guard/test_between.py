@@ -27,6 +27,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS, would_move
 from companion.mavlink.packet import message_id_of, packet_length
+from companion.messages import Asked
 from tests.guard.flying import BetweenFlight
 
 TOO_LATE_S = 0.15
@@ -174,8 +175,26 @@ def test_a_reset_of_the_position_moves_what_the_guard_holds():
     by_places(air)
     air.run_until(lambda: air.guard.core.machine.holds, 20.0)
     assert 14.5 < air.time_s < 15.7, "the estimate jumps while the guard holds"
+    hit_ned_m = air.guard.core.collisions()[0].position_ned_m
     air.run_for(8.0)
     assert any("reset by 1.00 m" in text for text in air.told("estimate")) and len(air.vehicle.truth.hits) == 1
+    # What it says of the hit is in the vehicle's present frame
+    assert air.guard.core.collisions()[0].position_ned_m[0] == pytest.approx(hit_ned_m[0] - 1.0, abs=0.01)
+    # When the vehicle has landed, then its next start has a frame of its own
+    air.set_mode(LAND)
+    air.run_until(lambda: air.guard.core.flight.vehicle.armed is False, 20.0)
+    air.run_for(0.1)
+    assert air.guard.core.resets.shift_ned_m == (0.0, 0.0, 0.0)
+
+
+def test_places_of_a_program_before_and_after_a_reset_of_the_position_have_no_velocity_between_them():
+    air = hit(by_places)
+    guard, there = air.guard, Asked((4.0, 0.0, -2.0))
+    guard.hear_setpoint(there)
+    air.run_for(0.04)
+    guard.core.resets.shift_ned_m = (-0.05, 0.0, 0.0)
+    guard.hear_setpoint(there)
+    assert guard.core.flight.asked == Asked((4.05, 0.0, -2.0))
 
 
 def test_a_program_that_steps_from_place_to_place_before_the_wall_is_left_alone():

@@ -197,7 +197,7 @@ class Land(FixedSetpoint):
         hits, height_m = flight.hits, flight.height_m
         is_hurt = flight.motors.damage is not None or (bool(hits) and hits[-1].settled_after_s is None)
         is_high = height_m is not None and height_m >= flight.mission.companion.min_detection_height_m
-        if self._target is None or is_hurt or not is_high or not flight.has_position:
+        if self._target is None or is_hurt or not is_high:
             return False
         rests = self._rest.at(flight, self._target.position_ned_m)
         return not rests and now_us - self._started_us < RESTS_WITHIN_US

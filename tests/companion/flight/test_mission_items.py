@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from bench.fly.virtual_time import EPOCH_US
 from companion.mission.model import Mission, steps_to_fly
+from companion.motion.motors import Damage
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, LOITER, TAKEOFF, FakeVehicle, at_wall, flight, mission
 from tests.flying import Flight
 
@@ -167,6 +168,22 @@ def test_a_vehicle_that_comes_past_its_goal_does_not_land_before_it_stays_slow_o
     wanted_m_s = 0.2 if slows else 0.6
     f.run_until(is_asked_to_land, 2.0 if slows else 4.0)
     assert vehicle.velocity[0] == pytest.approx(0.26 if slows else 0.6, abs=0.05)
+
+
+@pytest.mark.parametrize("state", ["well", "hurt", "lost"])
+def test_who_is_hurt_or_does_not_know_where_it_is_is_asked_to_land_at_once(state):
+    # Given one that does not rest at its goal
+    f = flight(items=[TAKEOFF, {"go_to": GO_TO}, {"land": {}}])
+    f.run_until(lambda: f.companion.core.flight.is_landing)
+    velocity = f.vehicle.velocity
+    f.vehicle.move = lambda: velocity.__setitem__(0, velocity[0] + 0.02 * (0.6 - velocity[0]))
+    if state == "hurt":
+        f.companion.core.flight.motors.damage = Damage(1, 0.2, 0.99, False)
+    elif state == "lost":
+        f.vehicle.no_positions = True
+        f.run_for(1.0)
+    f.run_for(0.1)
+    assert any(command.param3 == 6 for _, command in f.vehicle.commands if command.command == 176) is (state != "well")
 
 
 GO_TO = {"position_ned_m": [2, 0, -1.5]}

@@ -6,10 +6,13 @@ import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.virtual_time import EPOCH_US, INTERVAL_US
+from companion.autopilot.ardupilot.firmware import ARDUPILOT
+from companion.autopilot.px4.firmware import PX4
 from companion.link.round_trip import RoundTrip
-from companion.messages import TimeSync
+from companion.link.vehicle import Vehicle
+from companion.messages import CurrentMode, Heartbeat, TimeSync
 from rebound_cli.live.console import state_fields
-from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
+from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, FakeVehicle, flight
 from tests.companion.flight.test_companion_authority import heartbeat
 
 
@@ -325,3 +328,16 @@ def test_a_round_trip_that_grows_in_flight_is_told_once_and_the_flight_goes_on()
     texts = [message.text for _, message in f.messages("STATUSTEXT")]
     assert texts.count("Round trip 400 ms: hits are answered late") == 1
     assert f.report.round_trip_ms["worst"] == 400.0
+
+
+FAILSAFE = Heartbeat(1, 1, 2, 12, True, LOITER, 5)
+
+
+@pytest.mark.parametrize(("autopilot", "chosen"), [(PX4, None), (ARDUPILOT, LOITER)])
+def test_a_failsafes_mode_is_chosen_where_a_vehicle_stays_in_it_and_never_where_one_is_intended(autopilot, chosen):
+    vehicle = Vehicle(autopilot=autopilot)
+    vehicle.update(FAILSAFE, 0)
+    assert vehicle.chosen_mode == chosen
+    for sample in (CurrentMode(LOITER, OFFBOARD), FAILSAFE):
+        vehicle.update(sample, 0)
+    assert vehicle.chosen_mode == OFFBOARD

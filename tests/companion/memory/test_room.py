@@ -55,6 +55,11 @@ def test_ways_from_home_end_inside(north_m, east_m, fence):
     assert fence.contains(*towards) or fence.outside_by_m((*nearest, -1.0)) < 1e-6
 
 
+def test_a_way_of_no_length_has_its_end_also_on_the_edge_of_a_circle():
+    on_it = (ROUND.radius_m * (1.0 + 1e-12), 0.0)
+    assert ROUND.shortened(on_it, on_it) == on_it
+
+
 CLEARANCE_M = 0.55
 SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 
@@ -256,6 +261,10 @@ def test_a_flight_keeps_in_a_polygon_that_bends():
         trajectory_around(PathItem(points_ned_m=((2.0, 0.0, -1.5), (3.0, 0.0, -1.5))), start, PACE, known),
     ):
         assert planned.is_detour and all(arms.outside_by_m(place) < 0.05 for place in looks(planned.trajectory))
+    # But from outside it goes straight in, and along its edge as the item says
+    into = trajectory_around(GoToItem(position_ned_m=(2.0, 0.0, -1.5)), (8.0, 0.0, -1.5), PACE, known)
+    edge = PathItem(points_ned_m=((0.0, 9.0, -1.5), (6.0, 9.0, -1.5)))
+    assert not into.is_detour and not trajectory_around(edge, (-4.0, 9.0, -1.5), PACE, known).is_detour
 
 
 # --- touch after touch
