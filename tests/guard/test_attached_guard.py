@@ -116,7 +116,8 @@ def test_the_gate_keeps_out_a_programs_setpoints_for_this_vehicle_and_nothing_el
     assert air.mode == AUTO_LOITER
 
 
-def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebody_chooses():
+@pytest.mark.parametrize("chooses", ["mode", "enable"])
+def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebody_chooses(chooses):
     air = AttachedFlight()
     air.fly_into_the_wall()
     air.run_for(0.3)
@@ -126,7 +127,10 @@ def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebo
     air.vehicle.step = step
     air.run_for(4.0)
     assert "the guard has let go" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
-    air.set_mode(commanded.OFFBOARD)
+    if chooses == "enable":
+        air.guard.core.is_enabled = True
+    else:
+        air.set_mode(commanded.OFFBOARD)
     air.run_for(0.5)
     assert not air.guard.core.flight.awaits_choice and air.setpoints("program", air.time_s - 0.2) != []
 
@@ -270,6 +274,15 @@ def test_a_fault_that_stays_ends_the_guard_in_time(monkeypatch):
     joined = Joined(monkeypatch)
     monkeypatch.setattr(joined.air.guard, "step", fails)
     assert joined.until_over(1_100_000) >= 1_000_000
+
+
+def test_a_mode_that_mavsdk_asks_for_is_a_choice_also_while_the_guard_holds_and_passes(monkeypatch):
+    joined = Joined(monkeypatch)
+    joined.air.guard.core.flight.awaits_choice = True
+    asks = dialect.MAVLink_command_long_message(1, 1, SET_MODE, 0, 1, *commanded.OFFBOARD, 0, 0, 0, 0)
+    name, fields_json = named(asks.pack(dialect.MAVLink(None, *PROGRAM)))
+    assert joined.guard._outgoing(name, PROGRAM, fields_json.encode())
+    assert not joined.air.guard.core.flight.awaits_choice
 
 
 def test_a_guard_is_started_once(monkeypatch):
