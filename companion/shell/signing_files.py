@@ -28,15 +28,15 @@ def read_key(path: Path) -> bytes:
         with path.open("rb") as file:
             mode, content = os.fstat(file.fileno()).st_mode, file.read(_MOST_BYTES)
     except OSError as error:
-        text = f"--signing-key {path}: cannot be read: {error.strerror}; `rebound key new {path}` makes one."
+        text = f"key {path}: cannot be read: {error.strerror}; `rebound key new {path}` makes one."
         raise SigningFileError(text) from None
     if mode & _FOR_OTHERS:
-        text = f"--signing-key {path}: not only its owner may use it (mode {mode & 0o777:03o}): chmod 600 {path}"
+        text = f"key {path}: not only its owner may use it (mode {mode & 0o777:03o}): chmod 600 {path}"
         raise SigningFileError(f"{text}, or make a new key if others could have read it.")
     digits = _DIGITS.fullmatch(content)
     key = bytes.fromhex(digits[1].decode()) if digits is not None else b""
     if not any(key):
-        text = f"--signing-key {path}: not a key, which is {2 * KEY_LENGTH} hexadecimal digits and not all 0"
+        text = f"key {path}: not a key, which is {2 * KEY_LENGTH} hexadecimal digits and not all 0"
         raise SigningFileError(f"{text}; `rebound key new FILE` makes one.")
     return key
 
