@@ -84,14 +84,14 @@ class GuardCore(Core[GuardContext, GuardMachine]):
 
     def _await_choice(self, held: bool, now_us: int) -> None:
         """A program that flew into something would do it again by itself, and nobody would notice a hit: after a
-        restart of the guard, and where it has let go of a vehicle that flies setpoints on.
+        restart of the guard, and where it has released a vehicle that flies setpoints on.
         """
         guard, vehicle = self.flight, self.flight.vehicle
-        lets_go = held and not self.machine.holds and self.machine.state is State.STOOD_DOWN
+        releases = held and not self.machine.holds and self.machine.state is State.STOOD_DOWN
         if vehicle.armed is False or vehicle.is_mode_chosen:
             guard.awaits_choice = False
-        elif lets_go and guard.keeps_others_out and vehicle.flies_setpoints:
-            guard.await_choice("the guard has let go", now_us)
+        elif releases and guard.keeps_others_out and vehicle.flies_setpoints:
+            guard.await_choice("the guard has released the vehicle", now_us)
         elif self.begins_in_flight and vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
             guard.await_choice("begun in flight", now_us)
 

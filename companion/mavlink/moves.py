@@ -32,12 +32,15 @@ SETPOINT_IDS = frozenset(
         dialect.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET,
     }
 )
-# The same by name, for MAVSDK, and what else asks for a mode.
-SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
-REQUESTS = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
+_COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
+# What may ask for a mode.
+REQUEST_IDS = frozenset({*_COMMANDS, dialect.MAVLINK_MSG_ID_SET_MODE})
+# The same by name, for MAVSDK.
+SETPOINTS, REQUESTS = (
+    frozenset(dialect.mavlink_map[number].msgname for number in ids) for ids in (SETPOINT_IDS, REQUEST_IDS)
+)
 STICKS_IDS = (dialect.MAVLINK_MSG_ID_MANUAL_CONTROL, dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
-_COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
 
 def fields_of(packet: bytes) -> dict[str, Any]:

@@ -7,12 +7,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.mavlink.moves import REQUESTS, SETPOINT_IDS
+from companion.mavlink.moves import REQUEST_IDS, SETPOINT_IDS
 from companion.mavlink.readers import GUARD_READERS
 
 # Of these a guard looks at something; all others cost nothing.
-_HEARD = map(dialect.mavlink_map.__getitem__, {*GUARD_READERS, *SETPOINT_IDS})
-_KINDS = {kind.msgname: kind for kind in (*_HEARD, *(k for k in dialect.mavlink_map.values() if k.msgname in REQUESTS))}
+_LOOKED_AT = map(dialect.mavlink_map.__getitem__, {*GUARD_READERS, *SETPOINT_IDS, *REQUEST_IDS})
+_KINDS = {kind.msgname: kind for kind in _LOOKED_AT}
 
 
 def packet_from(name: str, source: tuple[int, int], fields_json: bytes) -> bytes:

@@ -51,7 +51,7 @@ class Log:
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
     `is_filtered`: samples are not means but points behind a low-pass filter of second order.
-    `low_pass_hz`: its cut-off, where it is told.
+    `low_pass_hz`: its cut-off, where it is known.
     """
 
     path: Path

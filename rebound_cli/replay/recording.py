@@ -208,8 +208,8 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
         case {"kind": "note", "event": event, "text": text}, _:
             stepped.note(str(event), str(text))
         case {"kind": "setpoint"}, Guard():
-            told = (record[name] for name in ("place_ned_m", "velocity_ned_m_s"))
-            stepped.hear_setpoint(Asked(*(None if values is None else vector(values) for values in told)))
+            asked = (record[name] for name in ("place_ned_m", "velocity_ned_m_s"))
+            stepped.hear_setpoint(Asked(*(None if values is None else vector(values) for values in asked)))
         case {"kind": "choice"}, Guard():
             stepped.hear_choice()
         case {"kind": "interval", "message_id": int() | None as message_id, "interval_us": int(interval_us)}, Guard():

@@ -126,7 +126,7 @@ def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebo
     air.run_for(1.8)
     air.vehicle.step = step
     air.run_for(4.0)
-    assert "the guard has let go" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
+    assert "the guard has released the vehicle" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
     if chooses == "enable":
         air.guard.core.is_enabled = True
     else:

@@ -165,7 +165,7 @@ def test_a_vehicle_that_the_guard_has_let_go_of_is_flown_by_no_program_until_som
         air.run_for(1.0)
     # Then its setpoints lead to no second hit
     air.run_for(6.0)
-    assert "the guard has let go" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
+    assert "the guard has released the vehicle" in air.told("not_back")[0] and len(air.vehicle.truth.hits) == 1
 
 
 def test_a_reset_of_the_position_moves_what_the_guard_holds():

@@ -159,7 +159,7 @@ LANDING_TIMEOUT_US = 120_000_000
 
 # A Copter that was asked to land at 0.8 m/s stood up to 0.9 m beside its goal: about a second of its speed.
 BRAKES_S = 1.0
-# PX4 brakes from its 12 m/s with 3 m/s^2, and comes back; one that does not rest lands all the same.
+# PX4 brakes from 12 m/s with 3 m/s^2, both its defaults, and comes back; what never rests lands all the same.
 RESTS_WITHIN_US = 6_000_000
 
 

@@ -162,12 +162,9 @@ class ImpactEstimator(Motion):
             free = minus(imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
         if imu is None or free is None:
             return None
-        averaging_us, is_clipped = (
-            round(self.config.imu_averaging_interval_s * 1e6),
-            self.hides_clipping or not is_shown,
-        )
-        range_m_s2 = self.config.accelerometer_range_m_s2
-        contact = ContactForce(free, averaging_us, range_m_s2, came_ned_m_s, is_clipped=is_clipped)
+        averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
+        contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2, came_ned_m_s)
+        contact.is_clipped = self.hides_clipping or not is_shown
         if is_shown:
             contact.add(imu, imu.time_boot_us - impact.contact_free_until_boot_us, self.strapdown.valid_wxyz)
         return contact
