@@ -140,14 +140,15 @@ class Reflex:
     def begin(self, estimate: ImpactEstimate, room: Room, now_us: int) -> CollisionRecord:
         """Record a collision, and begin to recover from it: the motion just before it, and the goal by that."""
         impact, normal, earlier = estimate.impact, level(estimate.normal), self.in_one_recovery()
-        place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
+        place, velocity, error_m_s = estimate.position_ned_m, estimate.velocity_ned_m_s, estimate.velocity_error_m_s
         before, law = next(iter(earlier), None), self.law
         is_second = law.follows and before is not None and not before.estimator.is_reported
         if before is not None and is_second:
             # The vehicle's estimate is still wrong from the hit before.
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
+            error_m_s = before.estimator.spread_m_s
         fits_models = not self.monitor.estimator.hides_clipping
-        contact = Contact(place, velocity, normal.direction_ned, normal.error_rad)
+        contact = Contact(place, velocity, normal.direction_ned, normal.error_rad, error_m_s)
         expected, first_us = contact.rebound(self.law_config.restitution), impact.sample_time_boot_us
         record = CollisionRecord(
             detected_at_us=now_us,

@@ -67,7 +67,8 @@ class CollisionRecord:
         before_m_s, estimator = self.contact.velocity_ned_m_s, self.estimator
         normal, after_m_s = estimator.normal, estimator.after_ned_m_s
         if after_m_s is not None:
-            normal = with_change(normal, before_m_s, after_m_s, estimator.after_error_m_s)
+            error_m_s = math.hypot(self.contact.velocity_error_m_s, estimator.after_error_m_s)
+            normal = with_change(normal, before_m_s, after_m_s, error_m_s)
         return level(normal)
 
     def follow(self, state: DetectorState, positions: Sequence[LocalPosition]) -> None:

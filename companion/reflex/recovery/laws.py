@@ -40,6 +40,7 @@ class Contact:
     velocity_ned_m_s: Vector3
     normal_ned: Vector3
     normal_error_rad: float = 0.0
+    velocity_error_m_s: float = 0.0  # standard deviation on an axis
 
     def rebound(self, restitution: float) -> MotionState:
         """The motion after it, as far as that can be known before it has been measured."""
