@@ -140,13 +140,26 @@ class MotionEstimator:
 
         What was there before the hit is none.
         """
-        most_m_s2 = 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2
-        return limited(minus(self.external_m_s2, self.known_wind_m_s2), most_m_s2)
+        return limited(self._new_m_s2, 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2)
+
+    @property
+    def _new_m_s2(self) -> Vector3:
+        """External force per mass across the thrust that was not there before the hit."""
+        return minus(self.external_m_s2, self.known_wind_m_s2)
+
+    @property
+    def pushed_m_s2(self) -> Vector3:
+        """External force per mass across the thrust, horizontal, by what is touched; zero where it may be wind.
+
+        One that ends is no push the other way.
+        """
+        least_m_s2 = min(math.hypot(*self._new_m_s2), math.hypot(*self.external_m_s2))
+        return self._new_m_s2 if least_m_s2 > reflex.HELD_M_S2 else ZERO
 
     @property
     def wind_m_s2(self) -> Vector3:
         """External force per mass across the thrust, horizontal: wind and drag."""
-        return minus(self.external_m_s2, self._bias_m_s2)
+        return self.known_wind_m_s2 if self.pushed_m_s2 != ZERO else minus(self.external_m_s2, self._bias_m_s2)
 
     def belief(self, strapdown: Strapdown) -> Belief:
         """What the attitude law goes by."""

@@ -11,13 +11,13 @@ from typing import NamedTuple, Protocol
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import SettledConfig
 from companion.motion.settling import Lasting, SettlingMonitor
-from companion.motion.vector import along, minus, plus, split
+from companion.motion.vector import ZERO, along, minus, plus, split, unit
 from companion.reflex import config as reflex
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.recovery.attitude_law import brakable_m_s
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import Contact, Law, MotionState
-from companion.reflex.surface import Surface, projected
+from companion.reflex.surface import Normal, Surface, projected
 
 
 class Room(Protocol):
@@ -149,8 +149,13 @@ class Recovery:
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. While it is touched it is where the vehicle is: frames and arms fold, obstacles move."""
         estimator, normal = self.record.estimator, self.record.normal
-        is_touched = sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S
-        is_touched = is_touched or along(estimator.external_m_s2, normal.direction_ned) > reflex.HELD_M_S2
+        is_touched, pushes = (
+            sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S,
+            estimator.pushed_m_s2,
+        )
+        if pushes != ZERO:
+            # A vehicle that slides round a pole touches it on another side.
+            is_touched, normal = True, Normal(unit(pushes), reflex.IMPULSE_RAD)
         off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)
         self._has_left = (self._has_left or off_m_s > 0.0) and not is_touched
         here, place = estimator.motion.position_ned_m, self._contact.position_ned_m

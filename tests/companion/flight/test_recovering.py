@@ -1,6 +1,7 @@
 """A recovery: by attitude until the vehicle rests and the errors of its own estimate are known, then by a position."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -168,6 +169,9 @@ def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(
     assert record.normal.direction_ned == (-half, -half, 0.0)
     record.estimator.after_ned_m_s, record.estimator.after_error_m_s = after_ned_m_s, 0.05
     assert record.normal.direction_ned == pytest.approx(direction_ned, abs=0.02)
+    # And where the velocity before it is not known, nothing is changed by it
+    record.contact = replace(record.contact, velocity_error_m_s=50.0)
+    assert record.normal.direction_ned == pytest.approx((-half, -half, 0.0), abs=0.02)
 
 
 def test_the_way_off_follows_the_normal_as_it_becomes_known():
@@ -228,6 +232,18 @@ def test_a_surface_goes_along_while_it_pushes():
         hears(flight, recover, since_us, 3.0 - 0.8e-6 * since_us, -0.8)
     # Then its goal stays ahead of it
     assert flight.collisions[0].setpoint_ned_m[0] < 3.0 - 0.8 * 0.58 - 0.3
+
+
+def test_what_slides_round_a_pole_leads_off_the_side_that_pushes_and_does_not_lean_against_it():
+    # Given a vehicle that hit the pole's south side, and is pushed to the east by what it lies on
+    flight = flight_with()
+    recover, record = recover_in(flight), flight.collisions[0]
+    record.estimator.external_m_s2 = (0.0, 2.5, 0.0)
+    hears(flight, recover, 100_000, 3.0, 0.0)
+    # Then the way leads to the east, and the push is no wind
+    assert record.setpoint_ned_m[1] == pytest.approx(0.35, abs=0.02)
+    acceleration, lean = flight.reflex.lean()
+    assert acceleration[1] > 2.0 and lean.belief.external_m_s2 == ZERO
 
 
 @pytest.mark.parametrize(("keeps_trim", "wind_m_s2"), [(False, 1.0), (True, 0.0)])

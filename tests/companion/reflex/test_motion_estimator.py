@@ -225,7 +225,9 @@ def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_a
     [
         (True, 0.0, -0.35, -0.35),
         (False, 0.0, -0.35, 0.0),
-        (False, 0.0, 2.4, 2.0),
+        (False, 0.0, 1.9, 1.5),
+        (False, 0.0, 2.4, 0.0),  # more is no wind, but what it lies on
+        (False, 2.3, 0.2, 0.6),  # and where that ends nothing pushes
         (True, 1.2, 0.9, 0.9),
         (False, 1.2, 0.9, 1.2),
         (False, 1.2, 2.4, 2.0),
