@@ -72,6 +72,7 @@ class MotionEstimator:
     _moved_m_s: Vector3 = ZERO  # the integral up to that time
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
     _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
+    _swings_m_s: float = 0.0  # standard deviation of its further swing, by the bank
     _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
@@ -96,6 +97,7 @@ class MotionEstimator:
         moved_m_s = self._impulse_m_s if self._impulse_m_s > 2.0 * came_m_s else 0.0
         self.spread_m_s = SAME_M_S + reflex.SPREAD * came_m_s + moved_m_s
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
+        self._swings_m_s = 0.0
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal, impulse_m_s: float) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
@@ -222,7 +224,9 @@ class MotionEstimator:
     @property
     def left_m_s(self) -> float:
         """By how much the reported velocity may be wrong; infinite until that is known."""
-        return SAME_M_S + math.hypot(*self.velocity_error_m_s) if self.has_converged else math.inf
+        if not self.has_converged:
+            return math.inf
+        return SAME_M_S + math.hypot(*self.velocity_error_m_s) + reflex.SURE * self._swings_m_s
 
     @property
     def is_reported(self) -> bool:
@@ -292,12 +296,12 @@ class MotionEstimator:
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
         normal = level(self.normal).direction_ned
         bank.leave(normal, along(self._summed_m_s, normal), self.normal.error_rad)
-        motion, spread_m_s, left_m_s = bank.estimate(left)
+        motion, spread_m_s, self._swings_m_s = bank.estimate(left)
         # Of the height the report is right sooner than any model: a barometer shows no hit.
         is_led = self.has_converged or self._measured is not None
         n, e, _ = self.motion.position_ned_m if is_led else motion.position_ned_m
         estimate = MotionState((n, e, place[2]), motion.velocity_ned_m_s)
-        is_known, error_m_s = left_m_s <= SAME_M_S, bank.mean_error(1, g)
+        is_known, error_m_s = self._swings_m_s <= SAME_M_S, bank.mean_error(1, g)
         if not self.fits_models:
             # By then a receiver's velocity has come, where there is one.
             is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US

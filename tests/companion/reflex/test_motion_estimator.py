@@ -85,6 +85,15 @@ def test_the_motion_is_found_long_before_the_estimate_is_right_again(way, speed_
         assert abs(velocity_error_m_s) < 0.01 + (0.5 if since_s < 1.0 else 0.1) * hidden_m_s
 
 
+@pytest.mark.parametrize("late_s", [0.18, 0.22, 0.26])
+def test_a_report_that_looks_as_expected_until_its_correction_begins_may_be_wrong_by_that(late_s):
+    # Given a seventh of a hit hidden, so that the report is the expected rebound at first
+    for _, true_m_s, told_m_s, found in followed((late_s, 4.65, 0.665), 1.3, 0.85, until_s=1.6, hides=0.15):
+        assert abs(told_m_s - true_m_s) < found.left_m_s
+    # Then that is bounded as long as it lasts, and a jump by more counts when it is over
+    assert found.left_m_s < 2.0 * SAME_M_S
+
+
 @pytest.mark.parametrize("way", WAYS)
 def test_what_strikes_a_hovering_vehicle_may_have_hidden_more_than_its_own_speed(way):
     # Given a vehicle that hovers, and a strike that leaves it with 2 m/s, of which 0.7 m/s were measured
