@@ -171,11 +171,3 @@ def sight(setup: Setup) -> PreflightItem:
 
 def attitude_held_s(told: Mapping[str, int | float]) -> float:
     return float(told[LOSS]) if int(told[OPTIONS]) & THRUST_IS_THRUST else math.inf
-
-
-def loss_text(parameters: Mapping[str, int | float]) -> str:
-    """What Copter does when setpoints stop, for people."""
-    loss_s = parameters.get(LOSS)
-    if loss_s is None:
-        return f"Unknown: read {LOSS} before you fly."
-    return f"A place is kept for ever; after {loss_s:g} s ({LOSS}) a velocity ends, and an attitude is levelled out."
