@@ -15,14 +15,12 @@ from typing import Any
 from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
-from companion.mavlink.encode import COMPONENT_ID
+from companion.mavlink.encode import COMPONENT_ID, IGNORE_POSITION
 from companion.messages import Refused, Sample, is_rotation
 
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7
-# POSITION_TARGET_TYPEMASK: x, y or z.
-POSITION_IGNORED = 0x7
-# The same of the vertical velocity.
+# POSITION_TARGET_TYPEMASK: the vertical velocity.
 DESCENT_IGNORED = 0x20
 
 
@@ -300,7 +298,7 @@ def _autopilot_version(flight_sw_version: int) -> Sample:
 
 
 def _position_target(type_mask: int, x: float, y: float, z: float, vz: float) -> Sample:
-    known = not type_mask & POSITION_IGNORED and hypot(x, y, z) <= messages.POSITION_M
+    known = not type_mask & IGNORE_POSITION and hypot(x, y, z) <= messages.POSITION_M
     is_speed = not type_mask & DESCENT_IGNORED and abs(vz) <= messages.VELOCITY_M_S
     return messages.PositionTarget((x, y, z) if known else None, vz if is_speed else None)
 
