@@ -160,11 +160,9 @@ def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket
 
 
 def send_datagram(sender: socket.socket, frame: bytes, remote: Any) -> None:
-    try:
+    # A full buffer or an unreachable host loses the packet, as a radio would.
+    with suppress(OSError):
         sender.sendto(frame, remote)
-    except OSError:
-        # A full buffer or an unreachable host loses the packet, as a radio would.
-        return
 
 
 def readable(source: socket.socket | int, timeout_s: float) -> bool:
