@@ -80,10 +80,9 @@ def _timeout(name: str, timeout_s: float, setup: Setup) -> PreflightItem:
 
 def _options(name: str, bits: float, setup: Setup) -> PreflightItem:
     value = int(bits) | THRUST_IS_THRUST
-    if int(bits) == value:
-        return judged(name, f"{int(bits)}: an attitude's thrust is thrust")
+    found = f"{int(bits)}: an attitude's thrust is " + ("thrust" if int(bits) == value else "a climb rate")
     remedy = f"{name} = {value}, or recoveries are flown by position alone"
-    return PreflightItem(name, DOUBTFUL, f"{int(bits)}: an attitude's thrust is a climb rate", remedy, (name, value))
+    return judged(name, found, (int(bits) != value, DOUBTFUL, remedy), mended=value)
 
 
 def _filter(name: str, edge_hz: float, setup: Setup) -> PreflightItem:
