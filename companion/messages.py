@@ -195,10 +195,9 @@ class MotorOutputs(Sample):
 
 @dataclass(frozen=True, slots=True)
 class Vibration(Sample):
-    """VIBRATION: clipped samples since boot, one count for each accelerometer, its three axes together."""
+    """VIBRATION: clipped samples since boot, of all accelerometers and axes together."""
 
-    time_boot_us: int
-    clipping_counts: tuple[int, int, int]
+    clipped: int
 
 
 @dataclass(frozen=True, slots=True)

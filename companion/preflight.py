@@ -256,7 +256,7 @@ def _estimate(survey: Survey) -> Iterator[PreflightItem]:
 def _vibration(survey: Survey) -> Iterator[PreflightItem]:
     doing = "hovering" if survey.flies else "standing"
     if survey.vibration:
-        clipped = sum(survey.vibration[-1].clipping_counts) - sum(survey.vibration[0].clipping_counts)
+        clipped = survey.vibration[-1].clipped - survey.vibration[0].clipped
         remedy = "fasten the flight controller; check the accelerometer"
         yield judged("clipping", f"{clipped} clipped samples while {doing}", (clipped != 0, BAD, remedy))
     forces = [sample.specific_force_frd_m_s2 for sample in survey.imu]

@@ -110,8 +110,6 @@ class Autopilot:
     judge_vehicle: tuple[Callable[[Setup], Iterable[PreflightItem]], ...]
     judge_parameters: Callable[[Setup], Iterable[PreflightItem]]
     remedies: Remedies
-    loss_text: Callable[[Mapping[str, int | float]], str]
-    """What the vehicle does when setpoints stop, for people."""
     stick_deadzone: float
     """Deflection around the middle that asks for no climb, by default."""
     stick_override: float

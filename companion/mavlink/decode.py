@@ -12,11 +12,12 @@ from pymavlink.dialects.v20 import development as dialect
 from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED
 from companion.mavlink.packet import (
-    HEADER_V1,
-    HEADER_V2,
+    CHECKSUM,
     MAGIC_V1,
     MAGIC_V2,
+    SIGNATURE,
     Stray,
+    has_signature,
     message_id_of,
     packet_length,
     payload_of,
@@ -110,15 +111,13 @@ class Decoder:
 
 
 def checksum_holds(data: bytes, start: int, length: int) -> bool:
-    """Whether the packet's own checksum holds; for messages that are not in the dialect, always."""
-    if data[start] == MAGIC_V2:
-        message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
-        end = start + HEADER_V2 + data[start + 1]
-    else:
-        message_id = data[start + 5]
-        end = start + HEADER_V1 + data[start + 1]
-    crc_extra = _CRC_EXTRA.get(message_id)
+    """Whether the packet's own checksum holds; of a message that is not in the dialect, whether it ends where another
+    packet begins.
+    """
+    packet, end = data[start : start + length], start + length
+    crc_extra = _CRC_EXTRA.get(message_id_of(packet))
     if crc_extra is None:
-        return start + length == len(data) or data[start + length] in (MAGIC_V1, MAGIC_V2)
-    expected: int = mcrf4xx(data[start + 1 : end] + crc_extra)
-    return expected == data[end] | data[end + 1] << 8
+        return end == len(data) or data[end] in (MAGIC_V1, MAGIC_V2)
+    checked = length - CHECKSUM - (SIGNATURE if has_signature(packet) else 0)
+    checksum: int = mcrf4xx(packet[1:checked] + crc_extra)
+    return packet[checked : checked + CHECKSUM] == checksum.to_bytes(CHECKSUM, "little")

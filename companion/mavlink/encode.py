@@ -16,6 +16,7 @@ COMPONENT_ID = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
 DEFAULT_SYSTEM_ID = 1
 
 # POSITION_TARGET_TYPEMASK: a set bit tells the vehicle to ignore the part.
+IGNORE_POSITION = 0x007
 IGNORE_VELOCITY = 0x038
 IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
@@ -97,7 +98,7 @@ class Encoder:
                     dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, status, 3
                 )
             case messages.NamedValue(time_us, name, value):
-                return dialect.MAVLink_named_value_float_message(time_us // 1000 & 0xFFFFFFFF, name.encode(), value)
+                return dialect.MAVLink_named_value_float_message(_time_ms(time_us), name.encode(), value)
             case messages.DebugVector(time_us, name, vector):
                 return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
             case ComputerStatus():

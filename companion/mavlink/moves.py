@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.autopilot.interface import Autopilot, Pilot
+from companion.mavlink.encode import IGNORE_POSITION, IGNORE_VELOCITY
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Asked, Vector3
 
@@ -18,8 +19,6 @@ Fields: TypeAlias = Mapping[str, Any]
 
 # COMMAND_INT: a place of whole numbers that is not given.
 _NO_PLACE_INT = 0x7FFF_FFFF
-# POSITION_TARGET_TYPEMASK: any of the three that is to be ignored.
-_NO_PLACE, _NO_VELOCITY = 0x007, 0x038
 # Companion computers, planners and cameras that fly (MAV_COMP_ID_ONBOARD_COMPUTER to VISUAL_INERTIAL_ODOMETRY). A hand
 # has its sticks on a ground station, which has any other number.
 _ON_BOARD = range(dialect.MAV_COMP_ID_ONBOARD_COMPUTER, dialect.MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY + 1)
@@ -103,7 +102,8 @@ def asked_by(packet: bytes) -> Asked | None:
     if fields.get("coordinate_frame") != dialect.MAV_FRAME_LOCAL_NED:
         return Asked() if message_id in SETPOINT_IDS else None
     place, velocity = (fields["x"], fields["y"], fields["z"]), (fields["vx"], fields["vy"], fields["vz"])
-    return Asked(_unless(fields["type_mask"] & _NO_PLACE, place), _unless(fields["type_mask"] & _NO_VELOCITY, velocity))
+    mask = fields["type_mask"]
+    return Asked(_unless(mask & IGNORE_POSITION, place), _unless(mask & IGNORE_VELOCITY, velocity))
 
 
 def _unless(ignored: int, vector: Vector3) -> Vector3 | None:

@@ -5,25 +5,22 @@ infinity in it has a length that is within no limit.
 """
 
 import math
-import re
 import struct
 from collections.abc import Callable, Mapping
 from inspect import signature
+from itertools import accumulate
 from math import hypot
-from operator import itemgetter
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
-from companion.mavlink.encode import COMPONENT_ID
+from companion.mavlink.encode import COMPONENT_ID, IGNORE_POSITION
 from companion.messages import Refused, Sample, is_rotation
 
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7
-# POSITION_TARGET_TYPEMASK: x, y or z.
-POSITION_IGNORED = 0x7
-# The same of the vertical velocity.
+# POSITION_TARGET_TYPEMASK: the vertical velocity.
 DESCENT_IGNORED = 0x20
 
 
@@ -34,26 +31,20 @@ class Reader:
         names = list(signature(make).parameters)
         self._takes_source = names[0] == "source"
         self._names = names[self._takes_source :]
-        # The fields that are not named are passed over. One name may stand for several values: q[4].
-        places, count, layout = dict[str, int | slice](), 0, "<"
-        parts = re.findall(r"\d*[a-zA-Z]", message.unpacker.format)
-        for name, length, part in zip(message.ordered_fieldnames, message.lengths, parts, strict=True):
-            if name not in self._names:
-                layout += f"{struct.calcsize('<' + part)}x"
-                continue
-            layout += part
-            places[name] = count if length == 1 else slice(count, count + length)
-            count += length
-        picked = [places[name] for name in self._names]
-        self._pick = None if picked == list(range(count)) else itemgetter(*picked)
-        self._unpacker, self._make, self.name = struct.Struct(layout), make, str(message.msgname)
+        # One name may stand for several values: q[4].
+        begins = accumulate(message.lengths, initial=0)
+        places: dict[str, int | slice] = {
+            name: begin if length == 1 else slice(begin, begin + length)
+            for name, length, begin in zip(message.ordered_fieldnames, message.lengths, begins, strict=False)
+        }
+        self._places = [places[name] for name in self._names]
+        self._unpacker, self._make, self.name = message.unpacker, make, str(message.msgname)
 
     def from_payload(self, payload: bytes, source: tuple[int, int]) -> Sample | None:
         """MAVLink 2 leaves out the zeros at a payload's end."""
         unpacker = self._unpacker
-        fields = unpacker.unpack(payload.ljust(unpacker.size, b"\0")[: unpacker.size])
-        if self._pick is not None:
-            fields = self._pick(fields)
+        values = unpacker.unpack(payload.ljust(unpacker.size, b"\0")[: unpacker.size])
+        fields = [values[place] for place in self._places]
         return self._make(source, *fields) if self._takes_source else self._make(*fields)
 
 
@@ -169,15 +160,8 @@ def _attitude_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], th
     return messages.AttitudeTarget(time_boot_ms * 1000, thrust, (w, x, y, z) if given else None)
 
 
-def _vibration(
-    time_usec: int, vibration_y: float, vibration_z: float, clipping_0: int, clipping_1: int, clipping_2: int
-) -> Sample:
-    # As PX4 fills it, the mean change from sample to sample: no more than the ranges.
-    turns = abs(vibration_y) <= 2.0 * messages.ANGULAR_VELOCITY_RAD_S
-    shakes = abs(vibration_z) <= 2.0 * messages.SPECIFIC_FORCE_M_S2
-    if not (turns and shakes) or time_usec >= messages.TIME_US:
-        return Refused("VIBRATION", f"{vibration_y:g} rad/s, {vibration_z:g} m/s^2")
-    return messages.Vibration(time_usec, (clipping_0, clipping_1, clipping_2))
+def _vibration(clipping_0: int, clipping_1: int, clipping_2: int) -> Sample:
+    return messages.Vibration(clipping_0 + clipping_1 + clipping_2)
 
 
 # What PX4 shows of an output that drives nothing: no value, or that of a disarmed PWM output.
@@ -314,7 +298,7 @@ def _autopilot_version(flight_sw_version: int) -> Sample:
 
 
 def _position_target(type_mask: int, x: float, y: float, z: float, vz: float) -> Sample:
-    known = not type_mask & POSITION_IGNORED and hypot(x, y, z) <= messages.POSITION_M
+    known = not type_mask & IGNORE_POSITION and hypot(x, y, z) <= messages.POSITION_M
     is_speed = not type_mask & DESCENT_IGNORED and abs(vz) <= messages.VELOCITY_M_S
     return messages.PositionTarget((x, y, z) if known else None, vz if is_speed else None)
 

@@ -24,7 +24,12 @@ class MavsdkLink:
     """Of a `Mavsdk` and a `System` of it, synchronous or asyncio. Raises GuardError where MAVSDK 4 is not there."""
 
     def __init__(self, mavsdk: Any, system: Any) -> None:
-        direct = _mavlink_direct()
+        # Only here: MAVSDK is no part of what the rest needs.
+        try:
+            from mavsdk.plugins.mavlink_direct import mavlink_direct as direct
+        except ImportError as error:
+            text = "CollisionGuard needs MAVSDK 4 for Python: pip install 'mavsdk>=4.1,<5'."
+            raise GuardError(text) from error
         # The asyncio wrappers hold the synchronous objects.
         self._mavsdk = getattr(mavsdk, "_mavsdk", mavsdk)
         system = getattr(system, "_system", system)
@@ -78,13 +83,3 @@ def _as_c(interceptor: Interceptor) -> Callable[[Any, Any], int]:
         return int(interceptor(message.message_name.decode(), source, message.fields_json))
 
     return call
-
-
-def _mavlink_direct() -> Any:
-    """The plugin's module; imported only here, because MAVSDK is no part of what the rest needs."""
-    try:
-        from mavsdk.plugins.mavlink_direct import mavlink_direct
-    except ImportError as error:
-        text = "CollisionGuard needs MAVSDK 4 for Python: pip install 'mavsdk>=4.1,<5'."
-        raise GuardError(text) from error
-    return mavlink_direct

@@ -4,6 +4,7 @@ The watchdog is fed by the step that decides and by nothing else. A thread of it
 loop that hangs.
 """
 
+import math
 import os
 import socket
 import threading
@@ -29,8 +30,8 @@ class ServiceManager:
         self._socket.setblocking(False)
         self._watchdog_us = watchdog_us
         self._told: dict[str, str] = {}
-        self._fed_us: int | None = None
-        self._looked_us: int | None = None  # at the status
+        self._fed_us = -math.inf
+        self._looked_us = -math.inf  # at the status
         self._error: OSError | None = None
         self._news = deque[str]()
 
@@ -47,11 +48,11 @@ class ServiceManager:
         due = {"READY": "1"} if is_heard else {}
         if is_ending:
             due["STOPPING"] = "1"
-        if _has_passed(self._looked_us, STATUS_EVERY_US, now_us):
+        if now_us - self._looked_us >= STATUS_EVERY_US:
             self._looked_us, due["STATUS"] = now_us, status()
         due = {name: value for name, value in due.items() if self._told.get(name, "") != value}
         # Half of the time that systemd waits, as sd_watchdog_enabled(3) asks.
-        is_hungry = self._watchdog_us is not None and _has_passed(self._fed_us, self._watchdog_us // 2, now_us)
+        is_hungry = self._watchdog_us is not None and now_us - self._fed_us >= self._watchdog_us // 2
         if is_hungry:
             due["WATCHDOG"] = "1"
         if not due:
@@ -72,10 +73,6 @@ class ServiceManager:
     def news(self) -> str | None:
         """Why systemd is not told, or gives no priority; once."""
         return self._news.popleft() if self._news else None
-
-
-def _has_passed(since_us: int | None, interval_us: int, now_us: int) -> bool:
-    return since_us is None or now_us - since_us >= interval_us
 
 
 def service_manager(environment: Mapping[str, str] = os.environ) -> ServiceManager | None:

@@ -5,6 +5,7 @@ A key is 32 bytes, written as 64 hexadecimal digits; only its owner may read the
 
 import os
 import re
+from functools import partial
 from pathlib import Path
 
 from companion.errors import ConfigurationError
@@ -44,8 +45,7 @@ def read_key(path: Path) -> bytes:
 def write_new(path: Path, content: bytes) -> None:
     """A file for its owner alone, where there is none yet. Raises SigningFileError."""
     try:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with open(descriptor, "wb") as file:
+        with open(path, "xb", opener=partial(os.open, mode=0o600)) as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())

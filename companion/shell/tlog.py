@@ -5,11 +5,11 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from companion.mavlink.packet import MAGIC_V2, Stray, packet_length
+from companion.mavlink.packet import Stray, message_id_of, packet_length
 
 _STAMP = struct.Struct(">Q")
 # It carries the secret key: MAVLink asks to leave it out of logs (mavlink.io, "Message Signing", "Logging").
-SETUP_SIGNING = (256).to_bytes(3, "little")
+SETUP_SIGNING = 256
 
 # A killed process must leave a log complete to its last second; half of that leaves room for a slow disk.
 FLUSH_INTERVAL_US = 500_000
@@ -93,7 +93,7 @@ def may_be_logged(frame: bytes) -> bool:
 
     One that carries a key is in no log.
     """
-    return not isinstance(frame, Stray) and (frame[0] != MAGIC_V2 or frame[7:10] != SETUP_SIGNING)
+    return not isinstance(frame, Stray) and message_id_of(frame) != SETUP_SIGNING
 
 
 def _plausible(stamp_us: int, last_us: int | None) -> bool:

@@ -76,7 +76,7 @@ def surveyed(
             samples += [LocalPosition(now_us, (north_m, 0.0, 0.0), (0.0, 0.0, 0.0)), Attitude(now_us, (1.0, 0, 0, 0))]
         if number % 250 == 0:
             samples += [messages.EstimatorStatus((ratio, ratio, ratio), velocity, False), messages.Battery(battery)]
-            samples += [messages.Vibration(now_us, (clipped * number, 0, 0))]
+            samples += [messages.Vibration(clipped * number)]
             samples += [Parameter(name, value) for name, value in parameters.items()]
             samples += [replace(PX4, armed=flies), messages.ExtendedState(messages.LandedState(2 if flies else 1))]
         if asked and now_us - asked[0] // 1000 >= trip_us:

@@ -68,7 +68,6 @@ ARDUPILOT = Autopilot(
         no_estimator="look at EKF in Mission Planner",
         not_armed="its messages in Mission Planner say why",
     ),
-    loss_text=setup.loss_text,
     stick_deadzone=0.2,  # THR_DZ, of 500 from the middle
     stick_override=math.inf,  # sticks end no mode
 )

@@ -80,10 +80,9 @@ def _timeout(name: str, timeout_s: float, setup: Setup) -> PreflightItem:
 
 def _options(name: str, bits: float, setup: Setup) -> PreflightItem:
     value = int(bits) | THRUST_IS_THRUST
-    if int(bits) == value:
-        return judged(name, f"{int(bits)}: an attitude's thrust is thrust")
+    found = f"{int(bits)}: an attitude's thrust is " + ("thrust" if int(bits) == value else "a climb rate")
     remedy = f"{name} = {value}, or recoveries are flown by position alone"
-    return PreflightItem(name, DOUBTFUL, f"{int(bits)}: an attitude's thrust is a climb rate", remedy, (name, value))
+    return judged(name, found, (int(bits) != value, DOUBTFUL, remedy), mended=value)
 
 
 def _filter(name: str, edge_hz: float, setup: Setup) -> PreflightItem:
@@ -171,11 +170,3 @@ def sight(setup: Setup) -> PreflightItem:
 
 def attitude_held_s(told: Mapping[str, int | float]) -> float:
     return float(told[LOSS]) if int(told[OPTIONS]) & THRUST_IS_THRUST else math.inf
-
-
-def loss_text(parameters: Mapping[str, int | float]) -> str:
-    """What Copter does when setpoints stop, for people."""
-    loss_s = parameters.get(LOSS)
-    if loss_s is None:
-        return f"Unknown: read {LOSS} before you fly."
-    return f"A place is kept for ever; after {loss_s:g} s ({LOSS}) a velocity ends, and an attitude is levelled out."

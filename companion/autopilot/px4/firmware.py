@@ -50,7 +50,6 @@ PX4 = Autopilot(
         no_estimator="look at EKF2 in QGroundControl",
         not_armed="`commander check` in PX4's console says why",
     ),
-    loss_text=setup.loss_text,
     stick_deadzone=0.1,  # MPC_HOLD_DZ
     stick_override=0.3,  # COM_RC_STICK_OV
 )

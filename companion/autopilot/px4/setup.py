@@ -1,7 +1,7 @@
 """How PX4's parameters have to be for collisions to be survived; each bound with its reason."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 
 from companion.autopilot.setup import (
     BAD,
@@ -17,7 +17,6 @@ from companion.motion.config import GRAVITY_M_S2
 
 # For so long PX4 flies the last setpoint on.
 LOSS = "COM_OF_LOSS_T"
-LOSS_ACTION = "COM_OBL_RC_ACT"
 INTEGRATION = "IMU_INTEG_RATE"
 # PX4's parameters in bits and values (their descriptions in PX4's commander module).
 RCL_EXCEPT_OFFBOARD = 4
@@ -184,7 +183,7 @@ def _captured(name: str, value: float, setup: Setup) -> PreflightItem:
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     INTEGRATION: _integration,
     LOSS: _offboard_loss_time,
-    LOSS_ACTION: _offboard_loss,
+    "COM_OBL_RC_ACT": _offboard_loss,
     "COM_RCL_EXCEPT": _radio,
     "CBRK_FLIGHTTERM": _termination,
     "MPC_ACC_HOR": _speeding_up,
@@ -213,11 +212,3 @@ def sight(setup: Setup) -> PreflightItem:
     stiff = f"stiff frames: {100 * share:.0f} % of 1 ms contacts fall into a sample"
     remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
     return judged("smallest hit", f"{folding}; {stiff}; {setup.false_alarms}", (share <= 0.9, DOUBTFUL, remedy))
-
-
-def loss_text(parameters: Mapping[str, int | float]) -> str:
-    """What PX4 does when setpoints stop, for people."""
-    loss_s, action = parameters.get(LOSS), parameters.get(LOSS_ACTION)
-    if loss_s is None or action is None or not 0 <= int(action) < len(LOSS_NAMES):
-        return f"Unknown: read {LOSS} and {LOSS_ACTION} before you fly."
-    return f"PX4 acts {loss_s:g} s later ({LOSS}): {LOSS_NAMES[int(action)]} ({LOSS_ACTION})."

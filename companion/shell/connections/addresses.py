@@ -96,7 +96,7 @@ def check_one_host(url: str, scheme: str, host: str, port: int) -> None:
     """Only who answers from the address that was sent to is ever heard."""
     if not host or port == 0:
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
-    _, address = resolve(socket.SOCK_DGRAM, host, port)
+    _, address = resolve(host, port)
     number = ipaddress.ip_address(address[0])
     if number.is_unspecified:
         listening = f"{scheme.removesuffix('out')}in://{host}:{port}"
@@ -108,9 +108,9 @@ def check_one_host(url: str, scheme: str, host: str, port: int) -> None:
 def _peer(text: str, listening: str) -> tuple[str, int | None]:
     """The number of a host, as the socket that listens there sees it, and its port where one is given."""
     host, _, port = text.rpartition(":") if _HOST_PORT.match(text) else (text, "", "")
-    family, _ = resolve(socket.SOCK_DGRAM, listening or ANY_HOST, 0)
+    family, _ = resolve(listening or ANY_HOST, 0)
     try:
-        _, address = resolve(socket.SOCK_DGRAM, host, 0, family)
+        _, address = resolve(host, 0, family)
     except ConnectionSetupError as error:
         version = "IPv6" if family == socket.AF_INET6 else "IPv4"
         raise ConnectionSetupError(

@@ -210,7 +210,7 @@ def _open(url: str, between: Between) -> UdpPort | TcpPort:
     if scheme == "udpin":
         return UdpPort(bound_socket(socket.SOCK_DGRAM, host, port), None, between)
     check_one_host(url, scheme, host, port)
-    family, remote = resolve(socket.SOCK_DGRAM, host, port)
+    family, remote = resolve(host, port)
     return UdpPort(socket.socket(family, socket.SOCK_DGRAM), remote, between)
 
 

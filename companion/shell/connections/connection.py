@@ -124,17 +124,15 @@ def udp_out(host: str, port: int) -> UdpConnection:
 
     Whoever listens there with one socket, as PX4, mavlink-router, MAVSDK and mavutil do, answers from that port.
     """
-    family, address = resolve(socket.SOCK_DGRAM, host, port)
+    family, address = resolve(host, port)
     return UdpConnection(socket.socket(family, socket.SOCK_DGRAM), Peer(address[:2]), address)
 
 
-def resolve(
-    kind: socket.SocketKind, host: str, port: int, family: socket.AddressFamily = socket.AF_UNSPEC
-) -> tuple[socket.AddressFamily, Any]:
+def resolve(host: str, port: int, family: socket.AddressFamily = socket.AF_UNSPEC) -> tuple[socket.AddressFamily, Any]:
     """Family and address of a host. On a socket of IPv6 one that has only IPv4 is seen by its mapped address."""
     mapped = socket.AI_V4MAPPED if family == socket.AF_INET6 else 0
     try:
-        found = socket.getaddrinfo(host.strip("[]"), port, family, kind, flags=mapped)
+        found = socket.getaddrinfo(host.strip("[]"), port, family, flags=mapped)
     except (OSError, UnicodeError) as error:
         # Python turns a name into bytes first, which one with an empty part, or a part of more than 63 letters, fails.
         raise ConnectionSetupError(f"Host {host!r} is unknown: {plain(error)}.") from error
@@ -143,7 +141,7 @@ def resolve(
 
 
 def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket:
-    family, address = resolve(kind, host or ANY_HOST, port)
+    family, address = resolve(host or ANY_HOST, port)
     bound = socket.socket(family, kind)
     if kind == socket.SOCK_STREAM:
         # A server restarted at once must not wait for the old connection's TIME_WAIT.
@@ -162,11 +160,9 @@ def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket
 
 
 def send_datagram(sender: socket.socket, frame: bytes, remote: Any) -> None:
-    try:
+    # A full buffer or an unreachable host loses the packet, as a radio would.
+    with suppress(OSError):
         sender.sendto(frame, remote)
-    except OSError:
-        # A full buffer or an unreachable host loses the packet, as a radio would.
-        return
 
 
 def readable(source: socket.socket | int, timeout_s: float) -> bool:

@@ -20,13 +20,13 @@ from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.decode import KNOWN_IDS, checksum_holds
 from companion.mavlink.packet import message_id_of, packet_length, source_of
 from companion.mavlink.signing import Signing
+from companion.messages import MessageId
 
 Address: TypeAlias = tuple[str, int]
 
 # Half of the time for which the last setpoint is flown on, for the silence: a vehicle that has moved is answered within
 # the other half, and streams that fly one come twenty times as often.
 RELEASED_US = defaults.LOSS_US // 2
-HEARTBEAT = 0
 
 
 class Peer:
@@ -80,7 +80,7 @@ class Peer:
             if self._vehicle is None and (self._signing is None or self._signing.is_signed(packet)):
                 self.answered = sender
             is_vehicle = source[1] == AUTOPILOT_COMPONENT_ID and self._vehicle in (None, source)
-            if message_id_of(packet) == HEARTBEAT and is_vehicle and self._is_genuine(packet):
+            if message_id_of(packet) == MessageId.HEARTBEAT and is_vehicle and self._is_genuine(packet):
                 self._vehicle, self._moved = source, sender
         if is_released and sender == self._moved:
             self._pin(sender, now_us)

@@ -271,8 +271,7 @@ class SerialDevice:
         # 8 data bits, no parity, one stop bit, without flow control, as PX4's TELEM ports.
         stream = Stream(serial.Serial(path, self._baud), path, BITS_A_BYTE / self._baud)
         device = Path(path).resolve()
-        by_id = SERIAL_BY_ID.iterdir() if SERIAL_BY_ID.is_dir() else ()
-        self._links = sorted(link for link in by_id if link.resolve() == device)
+        self._links = sorted(link for link in SERIAL_BY_ID.glob("*") if link.resolve() == device)
         return stream
 
 

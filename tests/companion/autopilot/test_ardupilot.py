@@ -417,8 +417,3 @@ def test_the_slowest_hit_that_shows_follows_from_the_filter():
     # A jump of 1 m/s is a pulse of 2.86 m/s² for each Hz; a filter that was not told is the default
     for told, found in (({setup.FILTER: 40}, "0.05 m/s on through a filter of 40 Hz"), ({}, "0.10 m/s")):
         assert found in setup.sight(setup_of(told)).found
-
-
-def test_what_happens_in_a_silence_is_told():
-    assert "after 0.3 s (GUID_TIMEOUT) a velocity ends" in setup.loss_text({"GUID_TIMEOUT": 0.3})
-    assert setup.loss_text({}).startswith("Unknown")
