@@ -98,9 +98,7 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition
 
 def silent_link(flight: FlightContext, now_us: int) -> str | None:
     """What is wrong with a link on which nothing comes any more; None where something does."""
-    silent_s = flight.silent_s(now_us)
-    is_silent = silent_s > flight.mission.companion.link.silence_s
-    return f"the link has been silent for {silent_s:.1f} s" if is_silent else None
+    return f"the link has been silent for {flight.silent_s(now_us):.1f} s" if flight.is_silent(now_us) else None
 
 
 def silent_position(flight: FlightContext) -> str | None:
