@@ -28,7 +28,6 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, Step
 from companion.mission.items import Motion as MotionItem
 from companion.mission.model import Mission, steps_to_fly
-from companion.mission.policy import OnCollision
 from companion.motion.motors import MotorWatch
 from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus, plus
@@ -188,11 +187,6 @@ class FlightContext:
     @property
     def step(self) -> Step:
         return self.steps[self.step_index]
-
-    @property
-    def on_collision(self) -> OnCollision:
-        """The policy for a hit in the present step: its own, or the mission's."""
-        return self.steps[self.tally.index].item.on_collision or self.mission.on_collision
 
     @property
     def is_retry(self) -> bool:
