@@ -160,7 +160,6 @@ class FlightContext:
     round_trip: RoundTrip = field(default_factory=RoundTrip)
     told_by_position: bool = False  # that recoveries are not flown by attitude
     known: ObstacleMap = field(init=False)  # of the surroundings, mission coordinates
-    hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
     crashed: str = ""  # how, once it has
     is_wreck: bool = False  # since then, until it is disarmed or flies again
