@@ -45,7 +45,7 @@ class _OnTrajectory:
         """The heading at this motion."""
         return flight.heading_towards(flight.yaw_rad)
 
-    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target:
         elapsed_s = self._elapsed_s(flight)
         place, velocity, acceleration = motion = self._trajectory.at(elapsed_s)
         yaw_rad = self._turned(flight, motion, now_us)
@@ -129,7 +129,7 @@ class FlyItems(_OnTrajectory):
         if self._motion is not None:
             flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight))
 
-    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target:
         """A velocity that is held back goes on from there, and from rest. It does not catch up."""
         line = self._trajectory
         if isinstance(self._motion, items.VelocityItem) and isinstance(line, LineProfile) and flight.target is not None:
@@ -141,8 +141,7 @@ class FlyItems(_OnTrajectory):
                 left = left_of(self._motion, line, self._elapsed_s(flight))
                 self._plan(flight, left, flight.mission_ned_m(sent), now_us)
         target = super().target(flight, now_us)
-        if target is not None:
-            self._wanted_ned_m = target.position_ned_m
+        self._wanted_ned_m = target.position_ned_m
         return target
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
