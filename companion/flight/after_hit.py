@@ -30,7 +30,7 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     then, reason = _verdict(flight, policy, hits, own)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
-    flight.after_recovery = Transition(Trigger(f"settled, then: {then}"), reason, hand_over=then == "abort")
+    flight.after_recovery = Transition(Trigger(f"settled, then: {then}"), reason)
     # What an interrupted flight resumes with.
     is_met = isinstance(step.action, WaitForItem) and step.action.hit is True
     is_left = is_met or then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))

@@ -70,12 +70,12 @@ class Target:
 class Transition:
     """A trigger, of the flight's table or the guard's, and its reason; "" where the state reports its own events.
 
-    `hand_over`: hand the vehicle to hold or land before the transition.
+    `is_left`: a flight that ends by it in the air does not hand the vehicle over: another has it, or it lands.
     """
 
     trigger: Enum
     text: str = ""
-    hand_over: bool = False
+    is_left: bool = False
 
 
 class Inputs(NamedTuple):

@@ -150,7 +150,7 @@ class Machine(StateMachine):
         self.handler = self._begin(self.state, Transition(Trigger.LINK_RESTORED), now_us)
 
     def _give_away(self, text: str, now_us: int) -> None:
-        self._take(Transition(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
+        self._take(Transition(Trigger.INTERRUPTED, text), now_us)
 
     def _release(self, text: str) -> None:
         self.handler = Released()
@@ -217,5 +217,5 @@ class Machine(StateMachine):
         flight.report(
             now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index
         )
-        is_held = transition.hand_over and previous is not State.CRASHED
-        return HandOver(flight, now_us) if is_held else Released()
+        is_left = transition.is_left or previous in (*ON_THE_GROUND, State.CRASHED)
+        return Released() if is_left else HandOver(flight, now_us)

@@ -157,9 +157,9 @@ class FlyItems(_OnTrajectory):
                 return Transition(_TRIGGERS[flight.step.name])
             is_cut_off = bool(self._out_of_reach)
             if is_cut_off:
-                trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
-                if trigger is not None:
-                    return Transition(trigger, self._out_of_reach, hand_over=trigger is Trigger.INTERRUPTED)
+                policy = flight.mission.obstacles.on_unreachable
+                if policy != "continue":
+                    return Transition(_TRIGGERS[policy], self._out_of_reach)
             elif not self._is_done(flight, now_us):
                 return self._overdue(flight, now_us)
             self._leave(flight, now_us)
@@ -228,11 +228,10 @@ class FlyItems(_OnTrajectory):
             if item.on_timeout == "continue":
                 self._leave(flight, now_us)
                 return self.step(flight, Inputs(), now_us)
-            trigger = _TRIGGERS[item.on_timeout]
-            return Transition(trigger, text, hand_over=trigger is Trigger.INTERRUPTED)
+            return Transition(_TRIGGERS[item.on_timeout], text)
         patience_s = flight.mission.companion.flight.arrival_timeout_s
         if self._over_since_us is not None and now_us - self._over_since_us > patience_s * 1e6:
-            return Transition(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}")
         return None
 
 
@@ -315,5 +314,5 @@ class FlyHome(_OnTrajectory):
         if self._is_there(flight):
             return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
-            return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, "not arrived at home")
         return None

@@ -69,7 +69,7 @@ class TakeOff:
         if outcome is None:
             return None
         if not outcome.succeeded:
-            return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}")
         flight.expected_mode = flight.vehicle.autopilot.setpoints
         self._now = self._arm
         flight.vehicle.said = ""  # what it warned of before may have another reason
@@ -82,7 +82,7 @@ class TakeOff:
             return None
         if not outcome.succeeded:
             why = flight.vehicle.said or flight.vehicle.autopilot.remedies.not_armed
-            return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}")
         self._now = self._climb
         if self._is_told:
             self._now, flight.target = self._leave_ground, None
@@ -104,7 +104,7 @@ class TakeOff:
         """Until the vehicle has agreed to take off by itself."""
         outcome = flight.command_outcome(inputs, False, now_us)
         if outcome is not None and not outcome.succeeded:
-            return Transition(Trigger.REFUSED, f"no take-off: {outcome.text}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"no take-off: {outcome.text}")
         if outcome is not None:
             self._now = self._climb
         return None
@@ -124,7 +124,7 @@ class TakeOff:
         if not self._is_told and is_up and self._climbing_s >= profile.duration_s:
             return Transition(Trigger.TAKEN_OFF)
         if (now_us - self._started_us) * 1e-6 > profile.duration_s + limits.arrival_timeout_s:
-            return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time")
         return None
 
 
@@ -217,13 +217,13 @@ class Land(FixedSetpoint):
             if outcome is None:
                 return None
             if not outcome.succeeded:
-                return Transition(Trigger.INTERRUPTED, f"no landing: {outcome.text}", hand_over=True)
+                return Transition(Trigger.INTERRUPTED, f"no landing: {outcome.text}")
             self._landing, self._target = True, None
             flight.expected_mode = flight.vehicle.autopilot.land
             flight.report(now_us, "landing", "landing here")
         if now_us - self._started_us > LANDING_TIMEOUT_US:
             seconds = LANDING_TIMEOUT_US // 1_000_000
-            return Transition(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land")
+            return Transition(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land", is_left=True)
         return None
 
 
@@ -254,7 +254,8 @@ class TakeBack(Recover):
                 flight.ask_for_mode(flight.vehicle.autopilot.setpoints)
             outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
             if outcome is not None and not outcome.succeeded:
-                return Transition(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
+                text = f"no recovery from a hit in the landing: {outcome.text}"
+                return Transition(Trigger.INTERRUPTED, text, is_left=True)
             if outcome is not None:
                 self._is_taken, flight.expected_mode = True, flight.vehicle.autopilot.setpoints
         return super().step(flight, inputs, now_us)
