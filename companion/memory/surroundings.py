@@ -140,9 +140,7 @@ def assumed_area(patch: Patch) -> BaseGeometry:
     """
     if patch.is_steep:
         return core(patch)
-    low_m, high_m = patch.assumed_along_m()
-    touched_low_m, touched_high_m = patch.touched_along_m()
-    beyond_m = max(touched_low_m - low_m, high_m - touched_high_m)
+    beyond_m = patch.touched_along_m()[0] - patch.assumed_along_m()[0]  # at either end
     return _wall(patch, beyond_m * math.sin(patch.normal_error_rad))
 
 
