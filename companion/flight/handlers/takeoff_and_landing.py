@@ -39,7 +39,6 @@ class TakeOff:
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
-        self._climbed_until_us = flight.trajectory_us  # on the clock of ways
         flight.yaw_rad = flight.vehicle.heading_rad
         self._ground_ned_m = mean_position(flight)
         flight.report(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
@@ -88,15 +87,13 @@ class TakeOff:
             self._now, flight.target = self._leave_ground, None
             flight.command_client.begin(take_off(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
-        self._climbed_until_us = flight.trajectory_us
-        self._ground_ned_m = mean_position(flight)
-        latest = flight.vehicle.history.latest
+        self._climbed_until_us = flight.trajectory_us  # on the clock of ways
+        ground, latest = mean_position(flight), flight.vehicle.history.latest
         assert latest is not None, "a flight begins only with positions arriving"
-        flight.origin_ned_m = origin_of(flight, self._ground_ned_m, latest.time_boot_us, now_us)
-        top_m = self._item.height_m - self._ground_ned_m[2]
+        flight.origin_ned_m = origin_of(flight, ground, latest.time_boot_us, now_us)
         config, most_m_s = flight.mission.companion.flight, flight.mission.limits.max_speed_m_s
-        self._profile = climb(self._ground_ned_m, top_m, config, most_m_s)
-        text = f"armed at {as_text(self._ground_ned_m)}, climbing to {self._item.height_m:g} m"
+        self._profile = climb(ground, self._item.height_m - ground[2], config, most_m_s)
+        text = f"armed at {as_text(ground)}, climbing to {self._item.height_m:g} m"
         flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
 
@@ -110,14 +107,13 @@ class TakeOff:
         return None
 
     def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        profile, latest = self._profile, flight.vehicle.history.latest
-        assert profile is not None
-        limits = flight.mission.companion.flight
-        if latest is not None and latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
+        profile, latest, limits = self._profile, flight.vehicle.history.latest, flight.mission.companion.flight
+        assert profile is not None and latest is not None, "it is armed, and positions arrive"
+        if latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
             self._climbing_s += (flight.trajectory_us - self._climbed_until_us) * 1e-6
         self._climbed_until_us = flight.trajectory_us
-        is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
-        if self._is_told and is_up and latest is not None and math.hypot(*latest.velocity_ned_m_s) < ARRIVES_M_S:
+        is_up = math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
+        if self._is_told and is_up and math.hypot(*latest.velocity_ned_m_s) < ARRIVES_M_S:
             # The mission's first way begins here.
             flight.target = Target(profile.target_m, flight.yaw_rad)
             return Transition(Trigger.TAKEN_OFF)
