@@ -269,18 +269,15 @@ class Heading:
 
     def turned(self, yaw_rad: float | None, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
         """The heading turned on until now, in the shorter direction."""
-        wanted = self._wanted(yaw_rad, position_m, velocity_m_s)
+        wanted = self.fixed_rad
+        if not self.is_fixed:
+            north, east, _ = velocity_m_s if self._centre_m is None else minus(self._centre_m, position_m)
+            wanted = math.atan2(east, north) if math.hypot(north, east) > _LEAST_LENGTH else yaw_rad
         step, self._at_us = self.rate_rad_s * ((now_us - self._at_us) * 1e-6), now_us
         if wanted is None or yaw_rad is None:
             return wanted
         turn = math.remainder(wanted - yaw_rad, math.tau)
         return wanted if abs(turn) <= step else yaw_rad + math.copysign(step, turn)
-
-    def _wanted(self, yaw_rad: float | None, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
-        if self.is_fixed:
-            return self.fixed_rad
-        north, east, _ = velocity_m_s if self._centre_m is None else minus(self._centre_m, position_m)
-        return math.atan2(east, north) if math.hypot(north, east) > _LEAST_LENGTH else yaw_rad
 
 
 class FlyHome(_OnTrajectory):
