@@ -138,9 +138,8 @@ def touch_of(
     """
     if normal.direction_ned == ZERO:
         return None
-    n, e, d = velocity_ned_m_s
-    is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
-    is_behind = along(normal.direction_ned, away_from((-n, -e, -d))) < FROM_BEHIND
+    is_fast = math.hypot(*velocity_ned_m_s) >= LEAST_SPEED_M_S
+    is_behind = along(normal.direction_ned, away_from(minus(ZERO, velocity_ned_m_s))) < FROM_BEHIND
     surface_ned_m = plus(centre_ned_m, -reach_m, normal.direction_ned)
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
     return Patch((surface_ned_m,), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
