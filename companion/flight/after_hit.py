@@ -78,8 +78,8 @@ def note_before(flight: FlightContext, state: State) -> None:
 
 def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     """Remove the rejected newest hit, and go on with what it interrupted; None within another hit's recovery."""
-    before, latest = flight.before_hit, flight.vehicle.history.latest
-    if before is None or latest is None:
+    before = flight.before_hit
+    if before is None:
         return None
     flight.reflex.take_back()
     flight.unconfirmed += 1
@@ -88,5 +88,5 @@ def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     flight.tally = before.tally
     flight.step_index = before.step_index
     flight.after_recovery = before.after_recovery
-    flight.target = Target(latest.position_ned_m, flight.yaw_rad)
+    flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
     return Transition(_GOES_ON[before.state])

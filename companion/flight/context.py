@@ -188,6 +188,13 @@ class FlightContext:
         return self.steps[self.step_index]
 
     @property
+    def latest(self) -> LocalPosition:
+        """The newest position and velocity."""
+        latest = self.vehicle.history.latest
+        assert latest is not None, "a flight begins only with positions arriving"
+        return latest
+
+    @property
     def is_retry(self) -> bool:
         """Whether the present item is tried again after a hit."""
         is_asked = self.after_recovery.trigger is Trigger.RECOVERED_TO_RETRY

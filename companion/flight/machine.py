@@ -142,11 +142,10 @@ class Machine(StateMachine):
 
     def _begin_here(self, now_us: int) -> None:
         """Go on from where the vehicle is: it has stopped, and would chase its setpoint."""
-        flight, latest = self.flight, self.flight.vehicle.history.latest
-        assert latest is not None, "it has a position"
+        flight = self.flight
         if isinstance(self.handler, FlyItems):
             self.handler.interrupt(flight)
-        flight.target = Target(latest.position_ned_m, flight.yaw_rad)
+        flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
         self.handler = self._begin(self.state, Transition(Trigger.LINK_RESTORED), now_us)
 
     def _give_away(self, text: str, now_us: int) -> None:

@@ -110,13 +110,11 @@ def silent_position(flight: FlightContext) -> str | None:
 
 
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
-    when, history = flight.mission.abort_when, flight.vehicle.history
-    latest = history.latest
-    earlier = None if latest is None else history.before(latest.time_boot_us)
+    when, earlier = flight.mission.abort_when, flight.vehicle.history.before(flight.latest.time_boot_us)
     # Two positions in a row have to say so: one forged or broken packet ends no flight.
-    if when.outside_fence_by_m is not None and latest is not None and earlier is not None:
+    if when.outside_fence_by_m is not None and earlier is not None:
         fence = flight.mission.fence
-        places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (latest, earlier)]
+        places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (flight.latest, earlier)]
         outside_m = min(map(fence.outside_by_m, places))
         if outside_m > when.outside_fence_by_m:
             return f"the vehicle is {outside_m:.2f} m outside the fence"

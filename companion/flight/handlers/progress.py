@@ -55,9 +55,8 @@ class _OnTrajectory:
 
     def _is_there(self, flight: FlightContext) -> bool:
         """Whether it has arrived at its goal."""
-        latest, most_m = flight.vehicle.history.latest, flight.mission.companion.flight.acceptance_radius_m
-        assert latest is not None, "the flight is in the air"
-        return math.dist(latest.position_ned_m, self._goal(flight)) <= most_m
+        most_m = flight.mission.companion.flight.acceptance_radius_m
+        return math.dist(flight.latest.position_ned_m, self._goal(flight)) <= most_m
 
     def _goal(self, flight: FlightContext) -> Vector3:
         return flight.local_ned_m(self._trajectory.target_m)
@@ -205,8 +204,8 @@ class FlyItems(_OnTrajectory):
             return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
         if item.steady is None:
             return item.file is not None and flight.file_awaited is None
-        latest, target = flight.vehicle.history.latest, flight.target
-        assert latest is not None and target is not None, "the flight is in the air"
+        latest, target = flight.latest, flight.target
+        assert target is not None, "the flight is in the air"
         is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
         is_steady = is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s
         self._steady.update(is_steady, latest.time_boot_us)

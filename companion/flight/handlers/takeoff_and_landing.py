@@ -88,13 +88,12 @@ class TakeOff:
             flight.command_client.begin(take_off(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us  # on the clock of ways
-        ground, latest = mean_position(flight), flight.vehicle.history.latest
-        assert latest is not None, "a flight begins only with positions arriving"
-        flight.origin_ned_m = origin_of(flight, ground, latest.time_boot_us, now_us)
+        ground, boot_us = mean_position(flight), flight.latest.time_boot_us
+        flight.origin_ned_m = origin_of(flight, ground, boot_us, now_us)
         config, most_m_s = flight.mission.companion.flight, flight.mission.limits.max_speed_m_s
         self._profile = climb(ground, self._item.height_m - ground[2], config, most_m_s)
         text = f"armed at {as_text(ground)}, climbing to {self._item.height_m:g} m"
-        flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
+        flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=boot_us)
         return None
 
     def _leave_ground(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
@@ -107,8 +106,8 @@ class TakeOff:
         return None
 
     def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        profile, latest, limits = self._profile, flight.vehicle.history.latest, flight.mission.companion.flight
-        assert profile is not None and latest is not None, "it is armed, and positions arrive"
+        profile, latest, limits = self._profile, flight.latest, flight.mission.companion.flight
+        assert profile is not None, "it is armed"
         if latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
             self._climbing_s += (flight.trajectory_us - self._climbed_until_us) * 1e-6
         self._climbed_until_us = flight.trajectory_us
@@ -142,9 +141,8 @@ def origin_of(flight: FlightContext, ground_ned_m: Vector3, boot_us: int, now_us
 
 def mean_position(flight: FlightContext) -> Vector3:
     """Mean of the last second's positions, local NED."""
-    latest = flight.vehicle.history.latest
-    assert latest is not None, "a flight begins only with positions arriving"
-    samples = flight.vehicle.history.between(latest.time_boot_us - ORIGIN_MEAN_US, latest.time_boot_us + 1)
+    boot_us = flight.latest.time_boot_us
+    samples = flight.vehicle.history.between(boot_us - ORIGIN_MEAN_US, boot_us + 1)
     return mean_of([sample.position_ned_m for sample in samples])
 
 
@@ -167,8 +165,7 @@ class Rest:
 
     def at(self, flight: FlightContext, goal_ned_m: Vector3) -> bool:
         """Call with each position."""
-        config, latest = flight.mission.companion, flight.vehicle.history.latest
-        assert latest is not None, "the flight is in the air"
+        config, latest = flight.mission.companion, flight.latest
         place = flight.reflex.place_ned_m(latest)
         off_m = max(math.dist(each, goal_ned_m) for each in (place, plus(place, BRAKES_S, latest.velocity_ned_m_s)))
         self._steady.update(off_m <= config.flight.acceptance_radius_m, latest.time_boot_us)
