@@ -391,11 +391,10 @@ class Limiter:
 
         Raises SetpointError for one that is not finite.
         """
-        latest = flight.vehicle.history.latest
         # Without a position setpoint there is no step to the next one.
         last = None if moved or self.last is None or self.last.lean is not None else self.last
         around = Surroundings(
-            vehicle_ned_m=None if latest is None else flight.reflex.place_ned_m(latest),
+            vehicle_ned_m=flight.reflex.place_ned_m(flight.latest),
             origin_ned_m=flight.origin_ned_m,
             has_floor=has_floor,
             last_ned_m=None if last is None else last.position_ned_m,
