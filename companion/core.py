@@ -98,8 +98,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
-        if self._law.pending is not None or not self._is_met:
-            self._repeat_law(samples, now_us)
+        self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
         if now_us >= self._heartbeat_due_us:
             self._beat(now_us)
@@ -109,8 +108,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
                 self._inform(now_us)
             except Exception as error:
                 self.fault(error, now_us)
-        if not flight.outbox and not flight.events:
-            return NOTHING
         outputs = Outputs(tuple(flight.outbox), tuple(flight.events))
         flight.outbox, flight.events = [], []
         return outputs
@@ -130,13 +127,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
             samples, refusal = self._hear(self._in_one_frame(samples, now_us), now_us)
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
-            acks: list[CommandAck] = []
-            positions: list[LocalPosition] = []
-            for sample in samples:
-                if isinstance(sample, LocalPosition):
-                    positions.append(sample)
-                elif isinstance(sample, CommandAck):
-                    acks.append(sample)
+            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
+            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
@@ -169,9 +161,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
         flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
-        is_blind = self.reflex.monitor.no_data_reason is not None
-        if is_blind or flight.blind.since_us is not None:
-            flight.blind.update(is_blind, now_us)
+        flight.blind.update(self.reflex.monitor.no_data_reason is not None, now_us)
         for notice in reaction.notices:
             flight.report(now_us, notice.kind, notice.text, **notice.data)
         if reaction.has_touched_down:
@@ -401,11 +391,10 @@ class Limiter:
 
         Raises SetpointError for one that is not finite.
         """
-        latest = flight.vehicle.history.latest
         # Without a position setpoint there is no step to the next one.
         last = None if moved or self.last is None or self.last.lean is not None else self.last
         around = Surroundings(
-            vehicle_ned_m=None if latest is None else flight.reflex.place_ned_m(latest),
+            vehicle_ned_m=flight.reflex.place_ned_m(flight.latest),
             origin_ned_m=flight.origin_ned_m,
             has_floor=has_floor,
             last_ned_m=None if last is None else last.position_ned_m,

@@ -30,7 +30,7 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     then, reason = _verdict(flight, policy, hits, own)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
-    flight.after_recovery = Transition(Trigger(f"settled, then: {then}"), reason, hand_over=then == "abort")
+    flight.after_recovery = Transition(Trigger(f"settled, then: {then}"), reason)
     # What an interrupted flight resumes with.
     is_met = isinstance(step.action, WaitForItem) and step.action.hit is True
     is_left = is_met or then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))
@@ -78,8 +78,8 @@ def note_before(flight: FlightContext, state: State) -> None:
 
 def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     """Remove the rejected newest hit, and go on with what it interrupted; None within another hit's recovery."""
-    before, latest = flight.before_hit, flight.vehicle.history.latest
-    if before is None or latest is None:
+    before = flight.before_hit
+    if before is None:
         return None
     flight.reflex.take_back()
     flight.unconfirmed += 1
@@ -88,5 +88,5 @@ def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     flight.tally = before.tally
     flight.step_index = before.step_index
     flight.after_recovery = before.after_recovery
-    flight.target = Target(latest.position_ned_m, flight.yaw_rad)
+    flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
     return Transition(_GOES_ON[before.state])

@@ -28,7 +28,6 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, Step
 from companion.mission.items import Motion as MotionItem
 from companion.mission.model import Mission, steps_to_fly
-from companion.mission.policy import OnCollision
 from companion.motion.motors import MotorWatch
 from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus, plus
@@ -71,12 +70,12 @@ class Target:
 class Transition:
     """A trigger, of the flight's table or the guard's, and its reason; "" where the state reports its own events.
 
-    `hand_over`: hand the vehicle to hold or land before the transition.
+    `is_left`: a flight that ends by it in the air does not hand the vehicle over: another has it, or it lands.
     """
 
     trigger: Enum
     text: str = ""
-    hand_over: bool = False
+    is_left: bool = False
 
 
 class Inputs(NamedTuple):
@@ -161,13 +160,11 @@ class FlightContext:
     round_trip: RoundTrip = field(default_factory=RoundTrip)
     told_by_position: bool = False  # that recoveries are not flown by attitude
     known: ObstacleMap = field(init=False)  # of the surroundings, mission coordinates
-    hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
     crashed: str = ""  # how, once it has
     is_wreck: bool = False  # since then, until it is disarmed or flies again
     motors: MotorWatch = field(default_factory=MotorWatch)
-    flies: bool = False  # armed, and off the ground or about to be
-    flew_us: int | None = None  # when it last did
+    flew_us: int | None = None  # when it was last armed, and off the ground or about to be
     may_crash: bool = False  # flies, or did a moment ago: whose motors stop in the air says at once that it has landed
     height_m: float | None = None  # above the arming position, where that and a place of late are known
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
@@ -191,9 +188,11 @@ class FlightContext:
         return self.steps[self.step_index]
 
     @property
-    def on_collision(self) -> OnCollision:
-        """The policy for a hit in the present step: its own, or the mission's."""
-        return self.steps[self.tally.index].item.on_collision or self.mission.on_collision
+    def latest(self) -> LocalPosition:
+        """The newest position and velocity."""
+        latest = self.vehicle.history.latest
+        assert latest is not None, "a flight begins only with positions arriving"
+        return latest
 
     @property
     def is_retry(self) -> bool:

@@ -33,7 +33,6 @@ def _is_free(flight: FlightContext) -> bool:
     """Whether it has rested since the hit, or flown off. A vehicle that has not may hang on the obstacle, or lie on the
     ground: that also loads a motor more. One that has lost a motor rests badly, and flies all the same.
     """
-    record, latest = flight.collisions[-1], flight.vehicle.history.latest
-    if record.settled_after_s is not None or latest is None or not record.is_over:
-        return record.settled_after_s is not None
-    return math.dist(latest.position_ned_m, record.contact.position_ned_m) > flight.mission.recovery.clearance_m
+    record = flight.collisions[-1]
+    away_m = math.dist(flight.latest.position_ned_m, record.contact.position_ned_m)
+    return record.settled_after_s is not None or (record.is_over and away_m > flight.mission.recovery.clearance_m)

@@ -16,7 +16,7 @@ from companion.memory.patch import Patch
 from companion.messages import Vector3
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
-from companion.motion.vector import ZERO, along, minus, plus, towards
+from companion.motion.vector import ZERO, along, limited, minus, plus, towards
 from companion.reflex.config import BEHIND_M, BRAKES_M_S2, HELD_S, NOTICED_S
 from companion.reflex.recovery.attitude_law import brakable_m_s, held_off
 from companion.reflex.surface import Surface, projected
@@ -152,9 +152,7 @@ def _with_velocity(target: Target, limits: SetpointLimits, reasons: list[str]) -
     if velocity is None or math.hypot(*velocity) <= most_m_s:
         return target
     reasons.append(f"velocity above {most_m_s:g} m/s")
-    scale = most_m_s / math.hypot(*velocity)
-    n, e, d = velocity
-    return replace(target, velocity_ned_m_s=(n * scale, e * scale, d * scale), acceleration_ned_m_s2=None)
+    return replace(target, velocity_ned_m_s=limited(velocity, most_m_s), acceleration_ned_m_s2=None)
 
 
 def _with_acceleration(target: Target, limits: SetpointLimits, reasons: list[str]) -> Target:

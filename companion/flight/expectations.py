@@ -36,9 +36,7 @@ def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int
     """Take up an expectation; what can be said at once is said."""
     expectation = Expectation(item, now_us, len(flight.collisions), ExpectationReport(label, describe(item)))
     flight.expectations.append(expectation)
-    latest = flight.vehicle.history.latest
-    assert latest is not None, "the flight is in the air"
-    place = flight.mission_ned_m(latest.position_ned_m)
+    place = flight.mission_ned_m(flight.latest.position_ned_m)
     match item.check:
         case items.ExpectHit() | items.ExpectNoHit():
             return

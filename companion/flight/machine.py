@@ -118,14 +118,14 @@ class Machine(StateMachine):
     def step(self, inputs: Inputs, now_us: int) -> bool:
         """Take all moves that are due; whether there were any."""
         flight, before = self.flight, self.handler
-        if self.state not in FINAL_STATES and (end := early_end(flight, self.state, inputs, now_us)) is not None:
-            self._take(end, now_us)
+        if self.state not in FINAL_STATES:
+            self._take(early_end(flight, self.state, inputs, now_us), now_us)
         if flight.foreign_mode_since_us != self.away_us and flight.has_position and self.state in FOLLOWING:
             self.away_us = flight.foreign_mode_since_us
             if self.away_us is not None:
                 self._begin_here(now_us)
-        if self.state in IN_THE_AIR and (crash := crashed(flight, self.state is State.LANDING, now_us)) is not None:
-            self._take(crash, now_us)
+        if self.state in IN_THE_AIR:
+            self._take(crashed(flight, self.state is State.LANDING, now_us), now_us)
         for estimate in inputs.impacts:
             if self.state in IN_THE_AIR and not lands_anyway(flight):
                 if isinstance(self.handler, FlyItems):
@@ -134,8 +134,7 @@ class Machine(StateMachine):
                 record_collision(flight, estimate, now_us)
                 decide(flight, self.state, now_us)
                 self._take(Transition(Trigger.COLLISION), now_us)
-        if (transition := self.handler.step(flight, inputs, now_us)) is not None:
-            self._take_all(transition, now_us)
+        self._take_all(self.handler.step(flight, inputs, now_us), now_us)
         # A hit may be taken back until its recovery is over.
         if flight.expectations and self.state is not State.RECOVERING:
             expectations.review(flight, now_us)
@@ -143,15 +142,14 @@ class Machine(StateMachine):
 
     def _begin_here(self, now_us: int) -> None:
         """Go on from where the vehicle is: it has stopped, and would chase its setpoint."""
-        flight, latest = self.flight, self.flight.vehicle.history.latest
-        assert latest is not None, "it has a position"
+        flight = self.flight
         if isinstance(self.handler, FlyItems):
             self.handler.interrupt(flight)
-        flight.target = Target(latest.position_ned_m, flight.yaw_rad)
+        flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
         self.handler = self._begin(self.state, Transition(Trigger.LINK_RESTORED), now_us)
 
     def _give_away(self, text: str, now_us: int) -> None:
-        self._take(Transition(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
+        self._take(Transition(Trigger.INTERRUPTED, text), now_us)
 
     def _release(self, text: str) -> None:
         self.handler = Released()
@@ -218,5 +216,5 @@ class Machine(StateMachine):
         flight.report(
             now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index
         )
-        is_held = transition.hand_over and previous is not State.CRASHED
-        return HandOver(flight, now_us) if is_held else Released()
+        is_left = transition.is_left or previous in (*ON_THE_GROUND, State.CRASHED)
+        return Released() if is_left else HandOver(flight, now_us)

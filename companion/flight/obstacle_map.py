@@ -9,14 +9,13 @@ from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import LEAST_FREE_M, ObstacleMap
 from companion.messages import Vector3
 from companion.motion.vector import minus, plus
-from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import Contact
 from companion.reflex.surface import Normal, Surface
 
 
 def remember(flight: FlightContext, hits: int, now_us: int) -> None:
     """Add the first `hits` hits, by their newest estimates; report new patches."""
-    before, flight.known, flight.hits_remembered = flight.known.patches, _with_hits(flight, hits), hits
+    before, flight.known = flight.known.patches, _with_hits(flight, hits)
     for patch in flight.known.patches:
         if patch not in before:
             flight.report(now_us, "obstacle", f"remembered: {describe(patch)}", **as_data(patch))
@@ -24,7 +23,7 @@ def remember(flight: FlightContext, hits: int, now_us: int) -> None:
 
 def all_known(flight: FlightContext) -> ObstacleMap:
     """With the hit of the present recovery: the map to keep if the program ends now."""
-    return flight.known.joined(_touches(flight, flight.collisions[flight.hits_remembered :]))
+    return _with_hits(flight, len(flight.collisions))
 
 
 def surroundings(flight: FlightContext) -> ObstacleMap:
@@ -47,8 +46,6 @@ class FlightRoom:
         Of each patch what counts is where the vehicle's centre would touch it, and that the margin is kept.
         """
         flight, known = self._flight, self._flight.known
-        if not known.patches:
-            return []
         place, clearance_m = flight.mission_ned_m(contact.position_ned_m), known.clearance_m
         normal = Normal(contact.normal_ned, contact.normal_error_rad)
         touch = touch_of(place, contact.velocity_ned_m_s, normal, known.reach_m, 0)
@@ -93,14 +90,9 @@ def _touching_ned_m(flight: FlightContext, patch: Patch) -> Vector3:
 
 
 def _with_hits(flight: FlightContext, hits: int) -> ObstacleMap:
-    mission = flight.mission
-    return mission.known(mission.obstacles.patches()).joined(_touches(flight, flight.collisions[:hits]))
-
-
-def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Patch]:
-    touches = []
-    for record in records:
+    mission, touches = flight.mission, []
+    for record in flight.collisions[:hits]:
         centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
         touch = touch_of(centre, velocity, record.normal, flight.known.reach_m, record.detected_at_us)
         touches += [] if touch is None else [touch]
-    return touches
+    return mission.known(mission.obstacles.patches()).joined(touches)

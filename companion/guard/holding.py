@@ -154,10 +154,6 @@ class GiveBack(FixedSetpoint):
     def wish(self) -> int:
         return self._wishes[0]
 
-    def _ask(self, guard: GuardContext) -> None:
-        if guard.vehicle.custom_mode != self.wish:
-            guard.ask_for_mode(self.wish)
-
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self._waits(guard, inputs, now_us):
             return None
@@ -165,21 +161,20 @@ class GiveBack(FixedSetpoint):
             if not guard.is_time_to_give_away(self._began_us, now_us):
                 return None
             self._is_asked = True
-            self._ask(guard)
-        is_seen = guard.vehicle.custom_mode == self.wish
-        outcome = guard.command_outcome(inputs, is_seen, now_us)
-        if is_seen:
+            guard.ask_for_mode(self.wish)
+        outcome = guard.command_outcome(inputs, guard.vehicle.custom_mode == self.wish, now_us)
+        if outcome is None:
+            return None
+        if outcome.succeeded:
             took_ms = (now_us - self._began_us) / 1e3
             name = guard.vehicle.mode_name
             text = f"given back to {name} after {took_ms:.0f} ms"
             guard.report(now_us, "given_back", text, mode=name, after_ms=took_ms)
             return Transition(Trigger.GIVEN_BACK)
-        if outcome is None:
-            return None
         self._wishes.pop(0)
         if not self._wishes:
             return Transition(Trigger.CONTROL_LOST, "the vehicle takes no mode; setpoints stopped")
-        self._ask(guard)
+        guard.ask_for_mode(self.wish)
         # The answers of this step were to the mode before.
         return self.step(guard, Inputs(positions=inputs.positions), now_us)
 

@@ -56,12 +56,11 @@ def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> boo
 
     With `deviations` also where a surface would have to bend towards them by so many standard deviations.
     """
-    latest = guard.vehicle.history.latest
-    if latest is None or (asked.place_ned_m is None and asked.velocity_ned_m_s is None):
+    if asked.place_ned_m is None and asked.velocity_ned_m_s is None:
         return None
     velocity = asked.velocity_ned_m_s or ZERO
     ahead_s = math.hypot(*velocity) / (2.0 * BRAKES_M_S2) + GOES_ON_S
-    here = guard.mission_ned_m(latest.position_ned_m)
+    here = guard.mission_ned_m(guard.latest.position_ned_m)
     place = here if asked.place_ned_m is None else guard.mission_ned_m(asked.place_ned_m)
     known = all_known(guard)
     goal = plus(place, ahead_s, velocity)
@@ -74,10 +73,8 @@ def lead_into(guard: GuardContext, asked: Asked, deviations: float = 0.0) -> boo
     return leads_behind or known.block([here, goal])
 
 
-def stop(guard: GuardContext) -> Target | None:
+def stop(guard: GuardContext) -> Target:
     """Where the vehicle comes to rest when it brakes now."""
-    latest = guard.vehicle.history.latest
-    if latest is None:
-        return None
+    latest = guard.latest
     brakes_s = math.hypot(*latest.velocity_ned_m_s) / (2.0 * BRAKES_M_S2)
     return Target(plus(latest.position_ned_m, brakes_s, latest.velocity_ned_m_s), guard.yaw_rad)

@@ -155,12 +155,11 @@ class Watching:
     def target(self, guard: GuardContext, now_us: int) -> Target | None:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         vehicle, seen_us = guard.vehicle, guard.others_setpoint_us
-        latest = vehicle.history.latest
         streams_elsewhere = guard.program_elsewhere or (seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US)
         is_wanted = vehicle.autopilot.wants_setpoints_first and not vehicle.flies_setpoints
-        if latest is None or not is_wanted or streams_elsewhere:
+        if not is_wanted or streams_elsewhere:
             return None
-        return Target(latest.position_ned_m, None)
+        return Target(guard.latest.position_ned_m, None)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         # Where the mode needs no stream, one that has left it may have been sent somewhere once.

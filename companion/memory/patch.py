@@ -84,13 +84,14 @@ class Patch:
 
     def faces(self, place_ned_m: Vector3, beside_m: float) -> bool:
         """Whether a place is in front of the assumed extent, or at most `beside_m` beside it."""
-        if self.off_m(place_ned_m) <= 0.0:
-            return False
+        return self.off_m(place_ned_m) > 0.0 and self.is_near(place_ned_m, beside_m)
+
+    def is_near(self, place_ned_m: Vector3, beside_m: float) -> bool:
+        """Whether a place, off the plane or on it, is at most `beside_m` beside the assumed extent."""
         if self.is_steep:
             return self.beside_m(place_ned_m) <= self.assumed_beyond_m() + beside_m
-        (left_m, right_m), (low_m, high_m) = self.assumed_along_m(), self.assumed_heights_m()
-        along_m, height_m = self.along_m(place_ned_m), -place_ned_m[2]
-        return left_m - beside_m <= along_m <= right_m + beside_m and low_m - beside_m <= height_m <= high_m + beside_m
+        is_beside = _outside_m(self.along_m(place_ned_m), self.assumed_along_m()) <= beside_m
+        return is_beside and _outside_m(-place_ned_m[2], self.assumed_heights_m()) <= beside_m
 
     def assumed_beyond_m(self) -> float:
         """Of a ceiling or a floor: how far it is assumed to extend beyond its touches."""
@@ -137,9 +138,8 @@ def touch_of(
     """
     if normal.direction_ned == ZERO:
         return None
-    n, e, d = velocity_ned_m_s
-    is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
-    is_behind = along(normal.direction_ned, away_from((-n, -e, -d))) < FROM_BEHIND
+    is_fast = math.hypot(*velocity_ned_m_s) >= LEAST_SPEED_M_S
+    is_behind = along(normal.direction_ned, away_from(minus(ZERO, velocity_ned_m_s))) < FROM_BEHIND
     surface_ned_m = plus(centre_ned_m, -reach_m, normal.direction_ned)
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
     return Patch((surface_ned_m,), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
@@ -174,20 +174,13 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     """Whether the touch is one more of the patch's surface."""
     if patch.is_steep != touch.is_steep:
         return False
-    place = touch.centre_ned_m
-    beside_m = patch.beside_m(place)
     errors_rad = math.hypot(patch.normal_error_rad, touch.normal_error_rad)
     angle_rad = math.acos(max(-1.0, min(1.0, along(patch.normal_ned, touch.normal_ned))))
     if angle_rad > min(MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)):
         return False
-    if patch.is_steep:
-        is_near = beside_m <= patch.assumed_beyond_m() + 2.0 * clearance_m
-    else:
-        is_near = (
-            _outside_m(patch.along_m(place), patch.assumed_along_m()) <= 2.0 * clearance_m
-            and _outside_m(-place[2], patch.assumed_heights_m()) <= 2.0 * clearance_m
-        )
-    return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + patch.bends_m(beside_m)
+    place = touch.centre_ned_m
+    errors_m = 2.0 * PLACE_ERROR_M + patch.bends_m(patch.beside_m(place))
+    return patch.is_near(place, 2.0 * clearance_m) and abs(patch.off_m(place)) <= errors_m
 
 
 def _joined(patches: Sequence[Patch], touch: Patch) -> Patch:

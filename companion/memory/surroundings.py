@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 import shapely
 from shapely import LineString, MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -42,7 +43,7 @@ class Walls:
 
     def holds(self, place: Place) -> bool:
         """Whether a place lies in one of them, for a vehicle that has a size."""
-        return any(distance_m < self.least_m for distance_m in _distances_m(Point(place), self.cores))
+        return bool(np.any(shapely.distance(Point(place), self.cores) < self.least_m))
 
     def keeps_off(self, line: BaseGeometry, ends: Sequence[Place]) -> bool:
         """Whether a line keeps the clearance, or what these of its ends leave of it, and stays off the cores."""
@@ -121,15 +122,10 @@ def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
 
 def _keeps(line: BaseGeometry, ends: Sequence[Place], shapes: Sequence[BaseGeometry], off_m: float) -> bool:
     """Off every shape by `off_m`, or as far as the ends are; never through a shape that the ends are outside of."""
-    needs_m = [off_m] * len(shapes)
+    needs_m = np.full(len(shapes), off_m)
     for end in ends:
-        ends_m = _distances_m(Point(end), shapes)
-        needs_m = [min(need_m, end_m - ROUNDING_M) for need_m, end_m in zip(needs_m, ends_m, strict=True)]
-    return all(distance_m >= need_m for distance_m, need_m in zip(_distances_m(line, shapes), needs_m, strict=True))
-
-
-def _distances_m(geometry: BaseGeometry, shapes: Sequence[BaseGeometry]) -> list[float]:
-    return [float(distance_m) for distance_m in shapely.distance(geometry, shapes)]
+        needs_m = np.minimum(needs_m, shapely.distance(Point(end), shapes) - ROUNDING_M)
+    return bool(np.all(shapely.distance(line, shapes) >= needs_m))
 
 
 # Nobody knows how thick what was hit is; thinner than an inner wall is rare.
@@ -144,9 +140,7 @@ def assumed_area(patch: Patch) -> BaseGeometry:
     """
     if patch.is_steep:
         return core(patch)
-    low_m, high_m = patch.assumed_along_m()
-    touched_low_m, touched_high_m = patch.touched_along_m()
-    beyond_m = max(touched_low_m - low_m, high_m - touched_high_m)
+    beyond_m = patch.touched_along_m()[0] - patch.assumed_along_m()[0]  # at either end
     return _wall(patch, beyond_m * math.sin(patch.normal_error_rad))
 
 

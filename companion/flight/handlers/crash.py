@@ -63,8 +63,7 @@ class Crashed(FixedSetpoint):
     def __init__(self, flight: FlightContext) -> None:
         flight.command_client.cancel()
         flight.expected_mode, flight.is_wreck = None, True
-        latest = flight.vehicle.history.latest
-        self._place_ned_m = None if latest is None else latest.position_ned_m
+        self._place_ned_m = flight.latest.position_ned_m
         self._ask_us, self._is_forced = 0, False
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
@@ -85,9 +84,8 @@ class Crashed(FixedSetpoint):
 
     def _flies_again(self, flight: FlightContext) -> bool:
         """Whether it is upright, above the ground, and somewhere else."""
-        latest, height_m = flight.vehicle.history.latest, flight.height_m
-        tips = flight.reflex.crash.tipped.since_us is not None
-        if latest is None or height_m is None or self._place_ned_m is None or tips:
+        height_m, tips = flight.height_m, flight.reflex.crash.tipped.since_us is not None
+        if height_m is None or tips:
             return False
-        away_m = math.dist(latest.position_ned_m, self._place_ned_m)
+        away_m = math.dist(flight.latest.position_ned_m, self._place_ned_m)
         return min(away_m, height_m) > flight.mission.companion.min_detection_height_m

@@ -28,7 +28,7 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
         return Transition(Trigger.REFUSED, inputs.refusal)
     stop_reason = _stop_reason(flight, state, inputs.stop_reason, now_us)
     if stop_reason is not None:
-        return Transition(Trigger.INTERRUPTED, stop_reason, hand_over=state not in ON_THE_GROUND)
+        return Transition(Trigger.INTERRUPTED, stop_reason)
     silent = _link_silent(flight, state, now_us)
     if silent is not None or state not in ON_SETPOINTS:
         return silent
@@ -36,7 +36,7 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
     # The mission's own conditions are looked at with each new position, so that a silent link is not one of them.
     if reason is None and inputs.positions and flight.armed_at_us is not None:
         reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
-    return None if reason is None else Transition(Trigger.INTERRUPTED, reason, hand_over=True)
+    return None if reason is None else Transition(Trigger.INTERRUPTED, reason)
 
 
 def _stop_reason(flight: FlightContext, state: State, asked: str | None, now_us: int) -> str | None:
@@ -53,12 +53,12 @@ def _stop_reason(flight: FlightContext, state: State, asked: str | None, now_us:
 def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transition | None:
     vehicle = flight.vehicle
     if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
-        return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
+        return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion", is_left=True)
     holder = taken_by(flight, flight.command_client.requested_mode)
     if holder is None or (state is State.LANDING and _may_be_down(flight, now_us)):
         return None
     who = "a failsafe of the vehicle" if holder == "failsafe" else "the pilot"
-    return Transition(Trigger.CONTROL_LOST, f"{who} took over in {vehicle.mode_name}; setpoints stopped")
+    return Transition(Trigger.CONTROL_LOST, f"{who} took over in {vehicle.mode_name}; setpoints stopped", is_left=True)
 
 
 def _may_be_down(flight: FlightContext, now_us: int) -> bool:
@@ -92,15 +92,13 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition
     if text is None:
         return None
     # A vehicle that has been told to land is already doing what is safe.
-    landing = state is State.LANDING and flight.expected_mode == flight.vehicle.autopilot.land
-    return Transition(Trigger.INTERRUPTED, text, hand_over=not landing)
+    is_landing = state is State.LANDING and flight.expected_mode == flight.vehicle.autopilot.land
+    return Transition(Trigger.INTERRUPTED, text, is_left=is_landing)
 
 
 def silent_link(flight: FlightContext, now_us: int) -> str | None:
     """What is wrong with a link on which nothing comes any more; None where something does."""
-    silent_s = flight.silent_s(now_us)
-    is_silent = silent_s > flight.mission.companion.link.silence_s
-    return f"the link has been silent for {silent_s:.1f} s" if is_silent else None
+    return f"the link has been silent for {flight.silent_s(now_us):.1f} s" if flight.is_silent(now_us) else None
 
 
 def silent_position(flight: FlightContext) -> str | None:
@@ -112,13 +110,11 @@ def silent_position(flight: FlightContext) -> str | None:
 
 
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
-    when, history = flight.mission.abort_when, flight.vehicle.history
-    latest = history.latest
-    earlier = None if latest is None else history.before(latest.time_boot_us)
+    when, earlier = flight.mission.abort_when, flight.vehicle.history.before(flight.latest.time_boot_us)
     # Two positions in a row have to say so: one forged or broken packet ends no flight.
-    if when.outside_fence_by_m is not None and latest is not None and earlier is not None:
+    if when.outside_fence_by_m is not None and earlier is not None:
         fence = flight.mission.fence
-        places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (latest, earlier)]
+        places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (flight.latest, earlier)]
         outside_m = min(map(fence.outside_by_m, places))
         if outside_m > when.outside_fence_by_m:
             return f"the vehicle is {outside_m:.2f} m outside the fence"

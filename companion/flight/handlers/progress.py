@@ -45,7 +45,7 @@ class _OnTrajectory:
         """The heading at this motion."""
         return flight.heading_towards(flight.yaw_rad)
 
-    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target:
         elapsed_s = self._elapsed_s(flight)
         place, velocity, acceleration = motion = self._trajectory.at(elapsed_s)
         yaw_rad = self._turned(flight, motion, now_us)
@@ -55,9 +55,8 @@ class _OnTrajectory:
 
     def _is_there(self, flight: FlightContext) -> bool:
         """Whether it has arrived at its goal."""
-        latest, most_m = flight.vehicle.history.latest, flight.mission.companion.flight.acceptance_radius_m
-        assert latest is not None, "the flight is in the air"
-        return math.dist(latest.position_ned_m, self._goal(flight)) <= most_m
+        most_m = flight.mission.companion.flight.acceptance_radius_m
+        return math.dist(flight.latest.position_ned_m, self._goal(flight)) <= most_m
 
     def _goal(self, flight: FlightContext) -> Vector3:
         return flight.local_ned_m(self._trajectory.target_m)
@@ -129,7 +128,7 @@ class FlyItems(_OnTrajectory):
         if self._motion is not None:
             flight.tally.left = left_of(self._motion, self._trajectory, self._elapsed_s(flight))
 
-    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+    def target(self, flight: FlightContext, now_us: int) -> Target:
         """A velocity that is held back goes on from there, and from rest. It does not catch up."""
         line = self._trajectory
         if isinstance(self._motion, items.VelocityItem) and isinstance(line, LineProfile) and flight.target is not None:
@@ -141,8 +140,7 @@ class FlyItems(_OnTrajectory):
                 left = left_of(self._motion, line, self._elapsed_s(flight))
                 self._plan(flight, left, flight.mission_ned_m(sent), now_us)
         target = super().target(flight, now_us)
-        if target is not None:
-            self._wanted_ned_m = target.position_ned_m
+        self._wanted_ned_m = target.position_ned_m
         return target
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
@@ -158,9 +156,9 @@ class FlyItems(_OnTrajectory):
                 return Transition(_TRIGGERS[flight.step.name])
             is_cut_off = bool(self._out_of_reach)
             if is_cut_off:
-                trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
-                if trigger is not None:
-                    return Transition(trigger, self._out_of_reach, hand_over=trigger is Trigger.INTERRUPTED)
+                policy = flight.mission.obstacles.on_unreachable
+                if policy != "continue":
+                    return Transition(_TRIGGERS[policy], self._out_of_reach)
             elif not self._is_done(flight, now_us):
                 return self._overdue(flight, now_us)
             self._leave(flight, now_us)
@@ -206,8 +204,8 @@ class FlyItems(_OnTrajectory):
             return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
         if item.steady is None:
             return item.file is not None and flight.file_awaited is None
-        latest, target = flight.vehicle.history.latest, flight.target
-        assert latest is not None and target is not None, "the flight is in the air"
+        latest, target = flight.latest, flight.target
+        assert target is not None, "the flight is in the air"
         is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
         is_steady = is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s
         self._steady.update(is_steady, latest.time_boot_us)
@@ -229,11 +227,10 @@ class FlyItems(_OnTrajectory):
             if item.on_timeout == "continue":
                 self._leave(flight, now_us)
                 return self.step(flight, Inputs(), now_us)
-            trigger = _TRIGGERS[item.on_timeout]
-            return Transition(trigger, text, hand_over=trigger is Trigger.INTERRUPTED)
+            return Transition(_TRIGGERS[item.on_timeout], text)
         patience_s = flight.mission.companion.flight.arrival_timeout_s
         if self._over_since_us is not None and now_us - self._over_since_us > patience_s * 1e6:
-            return Transition(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}")
         return None
 
 
@@ -241,7 +238,8 @@ class HoldAfterRecovery:
     """Stay at the recovery setpoint for the policy's time."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
-        hold_s = flight.on_collision.hold_s
+        own = flight.steps[flight.tally.index].item.on_collision
+        hold_s = (own or flight.mission.on_collision).hold_s
         self._until_us = now_us + round(hold_s * 1e6)
         self._target = flight.target
         flight.report(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)
@@ -270,18 +268,15 @@ class Heading:
 
     def turned(self, yaw_rad: float | None, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
         """The heading turned on until now, in the shorter direction."""
-        wanted = self._wanted(yaw_rad, position_m, velocity_m_s)
+        wanted = self.fixed_rad
+        if not self.is_fixed:
+            north, east, _ = velocity_m_s if self._centre_m is None else minus(self._centre_m, position_m)
+            wanted = math.atan2(east, north) if math.hypot(north, east) > _LEAST_LENGTH else yaw_rad
         step, self._at_us = self.rate_rad_s * ((now_us - self._at_us) * 1e-6), now_us
         if wanted is None or yaw_rad is None:
             return wanted
         turn = math.remainder(wanted - yaw_rad, math.tau)
         return wanted if abs(turn) <= step else yaw_rad + math.copysign(step, turn)
-
-    def _wanted(self, yaw_rad: float | None, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
-        if self.is_fixed:
-            return self.fixed_rad
-        north, east, _ = velocity_m_s if self._centre_m is None else minus(self._centre_m, position_m)
-        return math.atan2(east, north) if math.hypot(north, east) > _LEAST_LENGTH else yaw_rad
 
 
 class FlyHome(_OnTrajectory):
@@ -315,5 +310,5 @@ class FlyHome(_OnTrajectory):
         if self._is_there(flight):
             return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
-            return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, "not arrived at home")
         return None

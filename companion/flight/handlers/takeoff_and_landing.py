@@ -39,7 +39,6 @@ class TakeOff:
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
-        self._climbed_until_us = flight.trajectory_us  # on the clock of ways
         flight.yaw_rad = flight.vehicle.heading_rad
         self._ground_ned_m = mean_position(flight)
         flight.report(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
@@ -69,7 +68,7 @@ class TakeOff:
         if outcome is None:
             return None
         if not outcome.succeeded:
-            return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}")
         flight.expected_mode = flight.vehicle.autopilot.setpoints
         self._now = self._arm
         flight.vehicle.said = ""  # what it warned of before may have another reason
@@ -82,49 +81,45 @@ class TakeOff:
             return None
         if not outcome.succeeded:
             why = flight.vehicle.said or flight.vehicle.autopilot.remedies.not_armed
-            return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}")
         self._now = self._climb
         if self._is_told:
             self._now, flight.target = self._leave_ground, None
             flight.command_client.begin(take_off(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
-        self._climbed_until_us = flight.trajectory_us
-        self._ground_ned_m = mean_position(flight)
-        latest = flight.vehicle.history.latest
-        assert latest is not None, "a flight begins only with positions arriving"
-        flight.origin_ned_m = origin_of(flight, self._ground_ned_m, latest.time_boot_us, now_us)
-        top_m = self._item.height_m - self._ground_ned_m[2]
+        self._climbed_until_us = flight.trajectory_us  # on the clock of ways
+        ground, boot_us = mean_position(flight), flight.latest.time_boot_us
+        flight.origin_ned_m = origin_of(flight, ground, boot_us, now_us)
         config, most_m_s = flight.mission.companion.flight, flight.mission.limits.max_speed_m_s
-        self._profile = climb(self._ground_ned_m, top_m, config, most_m_s)
-        text = f"armed at {as_text(self._ground_ned_m)}, climbing to {self._item.height_m:g} m"
-        flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
+        self._profile = climb(ground, self._item.height_m - ground[2], config, most_m_s)
+        text = f"armed at {as_text(ground)}, climbing to {self._item.height_m:g} m"
+        flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=boot_us)
         return None
 
     def _leave_ground(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         """Until the vehicle has agreed to take off by itself."""
         outcome = flight.command_outcome(inputs, False, now_us)
         if outcome is not None and not outcome.succeeded:
-            return Transition(Trigger.REFUSED, f"no take-off: {outcome.text}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"no take-off: {outcome.text}")
         if outcome is not None:
             self._now = self._climb
         return None
 
     def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        profile, latest = self._profile, flight.vehicle.history.latest
-        assert profile is not None
-        limits = flight.mission.companion.flight
-        if latest is not None and latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
+        profile, latest, limits = self._profile, flight.latest, flight.mission.companion.flight
+        assert profile is not None, "it is armed"
+        if latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
             self._climbing_s += (flight.trajectory_us - self._climbed_until_us) * 1e-6
         self._climbed_until_us = flight.trajectory_us
-        is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
-        if self._is_told and is_up and latest is not None and math.hypot(*latest.velocity_ned_m_s) < ARRIVES_M_S:
+        is_up = math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
+        if self._is_told and is_up and math.hypot(*latest.velocity_ned_m_s) < ARRIVES_M_S:
             # The mission's first way begins here.
             flight.target = Target(profile.target_m, flight.yaw_rad)
             return Transition(Trigger.TAKEN_OFF)
         if not self._is_told and is_up and self._climbing_s >= profile.duration_s:
             return Transition(Trigger.TAKEN_OFF)
         if (now_us - self._started_us) * 1e-6 > profile.duration_s + limits.arrival_timeout_s:
-            return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time")
         return None
 
 
@@ -146,9 +141,8 @@ def origin_of(flight: FlightContext, ground_ned_m: Vector3, boot_us: int, now_us
 
 def mean_position(flight: FlightContext) -> Vector3:
     """Mean of the last second's positions, local NED."""
-    latest = flight.vehicle.history.latest
-    assert latest is not None, "a flight begins only with positions arriving"
-    samples = flight.vehicle.history.between(latest.time_boot_us - ORIGIN_MEAN_US, latest.time_boot_us + 1)
+    boot_us = flight.latest.time_boot_us
+    samples = flight.vehicle.history.between(boot_us - ORIGIN_MEAN_US, boot_us + 1)
     return mean_of([sample.position_ned_m for sample in samples])
 
 
@@ -171,8 +165,7 @@ class Rest:
 
     def at(self, flight: FlightContext, goal_ned_m: Vector3) -> bool:
         """Call with each position."""
-        config, latest = flight.mission.companion, flight.vehicle.history.latest
-        assert latest is not None, "the flight is in the air"
+        config, latest = flight.mission.companion, flight.latest
         place = flight.reflex.place_ned_m(latest)
         off_m = max(math.dist(each, goal_ned_m) for each in (place, plus(place, BRAKES_S, latest.velocity_ned_m_s)))
         self._steady.update(off_m <= config.flight.acceptance_radius_m, latest.time_boot_us)
@@ -217,13 +210,13 @@ class Land(FixedSetpoint):
             if outcome is None:
                 return None
             if not outcome.succeeded:
-                return Transition(Trigger.INTERRUPTED, f"no landing: {outcome.text}", hand_over=True)
+                return Transition(Trigger.INTERRUPTED, f"no landing: {outcome.text}")
             self._landing, self._target = True, None
             flight.expected_mode = flight.vehicle.autopilot.land
             flight.report(now_us, "landing", "landing here")
         if now_us - self._started_us > LANDING_TIMEOUT_US:
             seconds = LANDING_TIMEOUT_US // 1_000_000
-            return Transition(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land")
+            return Transition(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land", is_left=True)
         return None
 
 
@@ -254,7 +247,8 @@ class TakeBack(Recover):
                 flight.ask_for_mode(flight.vehicle.autopilot.setpoints)
             outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
             if outcome is not None and not outcome.succeeded:
-                return Transition(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
+                text = f"no recovery from a hit in the landing: {outcome.text}"
+                return Transition(Trigger.INTERRUPTED, text, is_left=True)
             if outcome is not None:
                 self._is_taken, flight.expected_mode = True, flight.vehicle.autopilot.setpoints
         return super().step(flight, inputs, now_us)
