@@ -229,7 +229,7 @@ def test_what_follows_within_two_seconds_is_one_event():
     assert first.until_s == pytest.approx(first.at_s + 1.5) and second.until_s == pytest.approx(second.at_s + 1.0)
 
 
-def test_a_log_that_cannot_be_read_is_named_and_a_folder_without_logs_is_an_error(tmp_path, capsys):
+def test_a_log_that_cannot_be_read_is_named_and_a_folder_without_logs_is_an_error(tmp_path):
     (tmp_path / "empty.bin").write_bytes(b"")
     assert main(["flights", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
     assert "the file is empty" in (tmp_path / "out" / "flights.md").read_text()

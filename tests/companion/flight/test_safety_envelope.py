@@ -41,9 +41,9 @@ METRES = st.floats(-30, 30)
 POINT = st.tuples(METRES, METRES, METRES)
 
 
-def around(vehicle=(0.0, 0.0, -1.5), has_floor=True) -> Surroundings:
+def around(vehicle=(0.0, 0.0, -1.5)) -> Surroundings:
     local = tuple(v + o for v, o in zip(vehicle, ORIGIN, strict=True))
-    return Surroundings(local, ORIGIN, has_floor)
+    return Surroundings(local, ORIGIN, True)
 
 
 def asked(place, velocity=None, acceleration=None) -> Target:

@@ -271,10 +271,10 @@ def test_a_flight_keeps_in_a_polygon_that_bends():
 # --- touch after touch
 
 
-def explore(width_m: float, offset_m: float, error_deg: float, limit: int = 12) -> tuple[list[Patch], bool]:
+def explore(width_m: float, offset_m: float, error_deg: float) -> tuple[list[Patch], bool]:
     """A point with the vehicle's reach, a wall 4 m north, and a memory; touches until it is through or gives up."""
     fence, touches, start = Fence(radius_m=11, max_height_m=2.4), [], START
-    while len(touches) < limit:
+    while len(touches) < 12:
         known = around(*remembered((), touches, CLEARANCE_M), fence=fence)
         places = route(known, start, GOAL)
         if places is None:

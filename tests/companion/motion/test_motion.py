@@ -194,12 +194,12 @@ def test_a_receiver_that_gets_worse_is_known_for_worse():
     assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.8, rel=0.4)
 
 
-def clipped(off_m_s=6.0, rebound_m_s=-3.0):
+def clipped(rebound_m_s=-3.0):
     """A vehicle just after a hit of which its estimate knows nothing, and its belief."""
     air = Air(0.112, noise_m_s=0.02, began_us=HIT_US)
     contact = Contact((4.0, 0.0, -2.0), (3.0, 0.0, 0.0), SOUTH)
     found = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
-    air.velocities, air.reported_off_m_s = [rebound_m_s], off_m_s
+    air.velocities, air.reported_off_m_s = [rebound_m_s], 6.0
     return air, found
 
 

@@ -28,9 +28,9 @@ def turned(vector, angle_rad):
     return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2])
 
 
-def hit(speed_m_s, slant_rad=0.0, climb_m_s=0.0):
+def hit(speed_m_s, slant_rad=0.0):
     """North into a wall whose normal is turned from south by the slant."""
-    return Contact(AT, (speed_m_s, 0.0, climb_m_s), turned(SOUTH, slant_rad))
+    return Contact(AT, (speed_m_s, 0.0, 0.0), turned(SOUTH, slant_rad))
 
 
 def off_m(touched, place):
