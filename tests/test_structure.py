@@ -20,6 +20,7 @@ import bench.main
 import rebound_cli.main
 
 PACKAGES = ("companion", "sim_vehicle", "rebound_cli", "bench")
+ROOT = Path(__file__).parent.parent
 
 
 @functools.cache
@@ -45,15 +46,14 @@ def _statements(node: ast.AST) -> Iterator[ast.AST]:
             yield from _statements(child)
 
 
-def module_imports(root: Path) -> dict[str, set[str]]:
-    """Every module of the project below ``root``, and those of them that it imports."""
-    files = [path for name in PACKAGES for path in (root / name).rglob("*.py")]
-    names = [".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__") for path in files]
+@functools.cache
+def imports_of_all() -> dict[str, set[str]]:
+    """Every module of the project, and those of them that it imports."""
+    files = [path for name in PACKAGES for path in (ROOT / name).rglob("*.py")]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in files]
     paths = dict(zip(names, files, strict=True))
     return {module: {name for name in imported_names(path) if name in paths} for module, path in paths.items()}
 
-
-ROOT = Path(__file__).parent.parent
 
 # Modules through which code touches the world outside: sockets, ports, clocks, processes, the environment, files.
 OUTSIDE = {
@@ -75,9 +75,6 @@ def sources(package: str) -> list[Path]:
 
 def name(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
-
-
-imports_of_all = functools.cache(lambda: module_imports(ROOT))
 
 
 def breaches(packages: tuple[str, ...], forbidden: set[str]) -> list[str]:
@@ -133,12 +130,16 @@ def test_only_the_shell_touches_the_world_outside(package: str) -> None:
     assert found == []
 
 
-def test_no_module_needs_itself_by_way_of_others() -> None:
-    # Not even late or for its types alone: two files that need each other are one concept, or hide a third.
+def assert_no_circle(arrows: dict[str, set[str]]) -> None:
     try:
-        graphlib.TopologicalSorter(imports_of_all()).prepare()
+        graphlib.TopologicalSorter(arrows).prepare()
     except graphlib.CycleError as cycle:
         pytest.fail(" is imported by ".join(cycle.args[1]))
+
+
+def test_no_module_needs_itself_by_way_of_others() -> None:
+    # Not even late or for its types alone: two files that need each other are one concept, or hide a third.
+    assert_no_circle(imports_of_all())
 
 
 def test_no_folder_needs_itself_by_way_of_others() -> None:
@@ -151,10 +152,7 @@ def test_no_folder_needs_itself_by_way_of_others() -> None:
             apart = [pair for pair in zip(*ways, strict=False) if pair[0] != pair[1]]
             if apart:
                 arrows.setdefault(apart[0][0], set()).add(apart[0][1])
-    try:
-        graphlib.TopologicalSorter(arrows).prepare()
-    except graphlib.CycleError as cycle:
-        pytest.fail(" is imported by ".join(cycle.args[1]))
+    assert_no_circle(arrows)
 
 
 def test_no_folder_of_code_has_more_than_twelve_files() -> None:
@@ -231,7 +229,7 @@ def test_every_command_runs_a_function_that_there_is(main: Any) -> None:
         assert callable(getattr(importlib.import_module(module), function)), function
 
 
-COMPANION = Path(__file__).parent.parent / "companion"
+COMPANION = ROOT / "companion"
 CONFIGS = [COMPANION / "reflex" / "config.py", COMPANION / "motion" / "config.py"]
 # Nothing, one, two, a half; microseconds and seconds, metres and centimetres; what only rounding makes.
 FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
@@ -289,24 +287,24 @@ STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")
 QUICK = ("--set", "companion.link.heartbeat_wait_s=0.2")
 
 
-def alone(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def alone(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", WITHOUT + code], cwd=ROOT, capture_output=True, text=True, timeout=120)
 
 
 def test_missions_are_checked_and_drawn(tmp_path):
     code = f"from rebound_cli.main import main\nsys.exit(main(['check', 'wall', 'square', '--out', {str(tmp_path)!r}]))"
-    done = alone(code, tmp_path)
+    done = alone(code)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("drawn in") == 2
 
 
-def test_what_an_extra_brings_is_named_package_by_package_for_the_python_that_runs(tmp_path):
-    done = alone("from rebound_cli.main import main\nsys.exit(main(['sim']))", tmp_path)
+def test_what_an_extra_brings_is_named_package_by_package_for_the_python_that_runs():
+    done = alone("from rebound_cli.main import main\nsys.exit(main(['sim']))")
     assert done.returncode == 1
     assert f"[sim]: {sys.executable} -m pip install 'numba>=" in done.stderr and "'matplotlib>=" in done.stderr
 
 
-def test_a_mission_is_flown_and_a_wall_recovered_from(tmp_path):
+def test_a_mission_is_flown_and_a_wall_recovered_from():
     code = """
 from tests.companion.fake_vehicle import FakeVehicle, flight
 f = flight(FakeVehicle(wall_north_m=3.0), items=[
@@ -315,13 +313,13 @@ f.run_to("holding")
 f.run_to_end()
 assert len(f.report.collisions) == 1 and f.report.outcome == "completed"
 """
-    done = alone(code, tmp_path)
+    done = alone(code)
     assert done.returncode == 0, done.stderr
 
 
 def test_help_imports_nothing_that_is_slow():
     code = "import sys\nfrom rebound_cli.main import build_parser\nbuild_parser()\nprint(*sys.modules)"
-    imported = alone(code, ROOT).stdout.split()
+    imported = alone(code).stdout.split()
     assert not {"numpy", "pydantic", "pymavlink", "shapely", "sim_vehicle", "yaml"} & set(imported)
 
 
@@ -335,7 +333,7 @@ main([*{command!r}, "--connect", "udpin://127.0.0.1:0", "--out", {str(tmp_path /
 simulated = {{name for name in sys.modules if name.startswith("sim_vehicle.")}} - {{"sim_vehicle.errors"}}
 print(*linecache.cache, *simulated, gc.isenabled(), gc.get_freeze_count())
 """
-    said = alone(code, tmp_path).stdout
+    said = alone(code).stdout
     assert "no HEARTBEAT" in said
     # Then the collector is as it was, and no line tells of a file of source or of a process
     assert said.splitlines()[-1] == "True 0" and "started:" not in said

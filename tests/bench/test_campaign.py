@@ -17,8 +17,7 @@ from bench.studies import kills
 from bench.studies.detection.detectors import work_out_hit
 from bench.studies.detection.hits import work_out_flown
 from bench.studies.faults import work_out_fault
-from tests.rebound_cli.command import ROOT
-from tests.test_structure import module_imports
+from tests.test_structure import imports_of_all
 
 
 @dataclass(frozen=True)
@@ -105,22 +104,17 @@ def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
 # --- its version is made of all code that its rows follow from
 
 
-@pytest.fixture(scope="module")
-def imports():
-    return module_imports(ROOT)
-
-
 @pytest.mark.parametrize(
     "work_out",
     [work_out_mission, work_out_hit, work_out_flown, work_out_fault, kills.work_out],
     ids=lambda function: function.__module__,
 )
-def test_all_code_that_a_row_follows_from_is_in_its_version(work_out, imports):
+def test_all_code_that_a_row_follows_from_is_in_its_version(work_out):
     # Given all that the function's module imports, by whatever way
     reached, left = set(), {work_out.__module__}
     while left:
         reached |= left
-        left = {name for module in left for name in imports.get(module, ())} - reached
+        left = {name for module in left for name in imports_of_all().get(module, ())} - reached
     # Then each lies in a package whose code the version is made of, or only shows or names what was found
     packages = [str(importlib.import_module(room).__package__) for room in CODE]
     beside = [name for name in reached if not any(f"{name}.".startswith(f"{package}.") for package in packages)]

@@ -70,7 +70,6 @@ class FakeVehicle:
     armed: bool = False
     failsafe: bool = False
     landed: int = 1
-    fold_m: float = 0.0
     touching: bool = False
     push_m_s2: tuple[float, float] = (0.0, 0.0)  # scripted lateral force of the next sample, body x and y
     setpoints: list = field(default_factory=list)  # (time_us, message)
@@ -279,9 +278,9 @@ def hovering(vehicle: FakeVehicle | None = None, **changes: Any) -> Flight:
     return f
 
 
-def strike(f: Flight, x_m_s2: float = 12.0, y_m_s2: float = 0.0, samples: int = 3) -> None:
+def strike(f: Flight, x_m_s2: float = 12.0, y_m_s2: float = 0.0) -> None:
     """Something pushes the vehicle's body for a few IMU samples."""
-    for _ in range(samples):
+    for _ in range(3):
         f.vehicle.push_m_s2 = (x_m_s2, y_m_s2)
         f.step()
 

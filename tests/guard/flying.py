@@ -61,8 +61,8 @@ class Watched(Told, Commanded):
     def passes(self, sender: str, packet: bytes) -> None:
         self.on_wire.append((self.time_s, sender, decoded(packet)))
 
-    def velocity(self, north: float, east: float = 0.0, down: float = 0.0) -> None:
-        values = (0.0, 0.0, 0.0, north, east, down, *[0.0] * 5)
+    def velocity(self, north: float, east: float = 0.0) -> None:
+        values = (0.0, 0.0, 0.0, north, east, *[0.0] * 6)
         boot_ms = round(1e3 * self.time_s)
         self.send(dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, VELOCITY_ONLY, *values))
 
@@ -167,9 +167,9 @@ class GuardedFlight(Watched):
 class AttachedFlight(Watched):
     """What the program sends goes through the guard's gate, as MAVSDK's does; `sender` is "guard" or "program"."""
 
-    def __init__(self, config: GuardConfig | None = None) -> None:
+    def __init__(self) -> None:
         super().__init__("foldable", None)
-        self.guard = AttachedGuard(config or GuardConfig(), 1)
+        self.guard = AttachedGuard(GuardConfig(), 1)
         self.outgoing: list[tuple[str, bytes]] = []
 
     @property
@@ -186,10 +186,10 @@ class AttachedFlight(Watched):
         self.set_mode(OFFBOARD)
         return ends
 
-    def fly_into_the_wall(self, speed_m_s: float = 1.5) -> None:
+    def fly_into_the_wall(self) -> None:
         """Take off, OFFBOARD, north until the guard holds."""
         self.take_off()
-        self.fly_by(speed_m_s)
+        self.fly_by(1.5)
         self.run_until(lambda: self.guard.core.machine.holds, 20.0)
 
     def _exchange(self) -> None:

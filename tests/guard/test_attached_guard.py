@@ -10,7 +10,6 @@ from bench.fly import commanded
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.core import POLL_INTERVAL_US
-from companion.guard.config import GuardConfig
 from companion.guard.holding import is_foreign
 from companion.guard.onward import stop
 from companion.guard.states import State
@@ -32,8 +31,8 @@ def setpoint(system_id: int = 1) -> bytes:
     return message.pack(dialect.MAVLink(None, *PROGRAM))
 
 
-def holding(config: GuardConfig | None = None) -> AttachedFlight:
-    air = AttachedFlight(config)
+def holding() -> AttachedFlight:
+    air = AttachedFlight()
     air.fly_into_the_wall()
     return air
 
@@ -118,8 +117,7 @@ def test_the_gate_keeps_out_a_programs_setpoints_for_this_vehicle_and_nothing_el
 
 @pytest.mark.parametrize("chooses", ["mode", "enable"])
 def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebody_chooses(chooses):
-    air = AttachedFlight()
-    air.fly_into_the_wall()
+    air = holding()
     air.run_for(0.3)
     step = air.vehicle.step
     air.vehicle.step = lambda packets: (step(b""), ())[1]

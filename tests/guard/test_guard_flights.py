@@ -182,14 +182,6 @@ def test_told_to_stop_while_it_holds_it_gives_the_vehicle_to_hold_first():
     assert (air.mode, air.guard.core.machine.outcome) == ("AUTO.LOITER", "stopped with Ctrl-C")
 
 
-def test_a_link_that_falls_silent_while_the_guard_holds_leaves_the_vehicle_to_its_own_failsafe():
-    air = recovering()
-    # the guard's ears and mouth are cut off; its clock goes on
-    for number in range(100):
-        air.guard.step(b"", air.now_us + 20_000 * (number + 1))
-    assert air.state is State.STOOD_DOWN
-
-
 def test_a_position_that_ends_while_the_guard_holds_has_the_vehicle_given_back_to_hold():
     air = recovering(then="previous")
     readers = air.guard._decoder._readers

@@ -68,7 +68,7 @@ def plain_path():
     )
 
 
-def hit(at_s=10.0, speed_m_s=2.0, obstacle="wall", normal=(-1.0, 0.0, 0.0), place=(2.0, 0.0, -2.08), kind="wall"):
+def hit(at_s=10.0, speed_m_s=2.0, obstacle="wall", normal=(-1.0, 0.0, 0.0), place=(2.0, 0.0, -2.08)):
     velocity = tuple(-speed_m_s * part for part in normal)
     return Hit(
         obstacle=obstacle,
@@ -83,7 +83,7 @@ def hit(at_s=10.0, speed_m_s=2.0, obstacle="wall", normal=(-1.0, 0.0, 0.0), plac
         impulse_ned_n_s=(0.0, 0.0, 0.0),
         energy_before_j=1.0,
         energy_after_j=0.1,
-        kind=kind,
+        kind="wall",
     )
 
 

@@ -41,9 +41,9 @@ METRES = st.floats(-30, 30)
 POINT = st.tuples(METRES, METRES, METRES)
 
 
-def around(vehicle=(0.0, 0.0, -1.5), has_floor=True) -> Surroundings:
+def around(vehicle=(0.0, 0.0, -1.5)) -> Surroundings:
     local = tuple(v + o for v, o in zip(vehicle, ORIGIN, strict=True))
-    return Surroundings(local, ORIGIN, has_floor)
+    return Surroundings(local, ORIGIN, True)
 
 
 def asked(place, velocity=None, acceleration=None) -> Target:
@@ -233,8 +233,8 @@ HELD_BY_ATTITUDE_S = MOST_HELD_S + NOTICED_S
 WALL = Surface((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0), LEAST_FREE_M)
 
 
-def surroundings(known=(), vehicle=HERE) -> Surroundings:
-    return Surroundings(vehicle, HOME, True, known=known)
+def before_wall(vehicle=HERE) -> Surroundings:
+    return Surroundings(vehicle, HOME, True, known=[KnownSurface(WALL)])
 
 
 def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, tuple]:
@@ -255,7 +255,7 @@ def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, t
 def test_no_setpoint_beside_the_wall_leads_a_vehicle_that_follows_it_there_while_px4_holds_it(v, a, north_m, is_slow):
     # Given any velocity and acceleration, asked for at a place off the wall where the vehicle flies as asked
     here, acceleration = (north_m, 0.0, -1.5), (*a, 0.0)
-    sent, _ = bounded(Target(here, 0.0, v, acceleration), surroundings([KnownSurface(WALL)], here), ROOM, DEFAULTS)
+    sent, _ = bounded(Target(here, 0.0, v, acceleration), before_wall(here), ROOM, DEFAULTS)
     # When PX4's own loops fly it on for as long as they hold it
     motion = MotionState(here, REST if is_slow else sent.velocity_ned_m_s)
     place, _ = flown(sent, motion, HELD_S + NOTICED_S)
@@ -268,7 +268,7 @@ def test_no_setpoint_beside_the_wall_leads_a_vehicle_that_follows_it_there_while
 def test_a_place_that_moves_stays_in_front_of_the_wall_or_as_near_as_the_vehicle_is(vehicle_off_m, sent_off_m):
     # Given a place that has moved on through the wall; one that the vehicle is behind is in a wrong place
     asked = Target((0.9, 0.2, -1.5), 0.0, REST)
-    around = surroundings([KnownSurface(WALL)], (0.5 - vehicle_off_m, 0.0, -1.5))
+    around = before_wall((0.5 - vehicle_off_m, 0.0, -1.5))
     sent, reason = bounded(asked, around, ROOM, DEFAULTS)
     assert WALL.off_m(sent.position_ned_m) == pytest.approx(sent_off_m)
     assert sent.position_ned_m[1:] == (0.2, -1.5) and bool(reason) is (sent_off_m > -0.4)
@@ -281,7 +281,7 @@ def test_a_lean_that_is_held_leads_no_nearer_to_the_wall_than_can_be_braked(off_
     lean = Lean(Belief(HERE, velocity), (), 15.0, HELD_BY_ATTITUDE_S)
     asked = Target(HERE, 0.0, None, (6.0, 1.0, 0.0), lean)
     # When PX4 holds what is sent until it notices the silence, and then brakes with 3 m/s^2
-    sent, _ = bounded(asked, surroundings([KnownSurface(WALL)]), ROOM, DEFAULTS)
+    sent, _ = bounded(asked, before_wall(), ROOM, DEFAULTS)
     north_m_s = velocity[0] + HELD_BY_ATTITUDE_S * sent.acceleration_ned_m_s2[0]
     north_m = HERE[0] + 0.5 * HELD_BY_ATTITUDE_S * (velocity[0] + north_m_s)
     # Then it stops off the wall, where physics allows that at all, and along the wall nothing is taken

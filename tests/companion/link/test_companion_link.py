@@ -16,9 +16,9 @@ from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, FakeVehicle, fl
 from tests.companion.flight.test_companion_authority import heartbeat
 
 
-def failed(vehicle: FakeVehicle, limit_s: float = 14.0):
+def failed(vehicle: FakeVehicle):
     f = flight(vehicle)
-    report = f.run_to_end(limit_s)
+    report = f.run_to_end(14.0)
     assert (report.outcome, f.state) == ("failed", "aborted")
     return f, report
 

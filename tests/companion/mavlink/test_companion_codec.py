@@ -11,7 +11,6 @@ import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from companion import messages as ours
-from companion.autopilot.px4.firmware import PX4
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.named import named
@@ -308,23 +307,6 @@ def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
     assert m.get_type() == "SET_ATTITUDE_TARGET"
     assert (m.type_mask, m.target_system, m.target_component, m.time_boot_ms) == (0x03, 7, 1, 2000)
     assert (m.q, m.thrust, m.body_yaw_rate) == ([0.5, 0.5, -0.5, 0.5], 0.625, 1.5)
-
-
-@pytest.mark.parametrize(
-    ("command", "number", "parameters"),
-    [
-        (PX4.set_mode(4 << 16 | 6 << 24), 176, (1, 4, 6)),
-        (ours.ARM, 400, (1, 0, 0)),
-        (ours.DISARM, 400, (0, 0, 0)),
-        (ours.DISARM_BY_FORCE, 400, (0, 21196, 0)),
-        (ours.set_message_interval(105, 4000), 511, (105, 4000, 0)),
-        (ours.request_message(148), 512, (148, 0, 0)),
-    ],
-)
-def test_commands_carry_their_parameters_and_zeros(command, number, parameters):
-    m = sent(ours.SendCommand(command, 3))
-    assert (m.command, m.confirmation, m.target_system, m.target_component) == (number, 3, 7, 1)
-    assert tuple(getattr(m, f"param{index}") for index in range(1, 8)) == (*parameters, 0, 0, 0, 0)
 
 
 @pytest.mark.parametrize(

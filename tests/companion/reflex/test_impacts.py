@@ -32,9 +32,8 @@ def approaching(acceleration_m_s2=0.0):
     return estimator
 
 
-def begun(estimator, free_until_us=CONTACT_US):
-    impact = Impact(free_until_us + 4_000, free_until_us, (-20.0, 0.0, 0.0))
-    return estimator.begin(impact)
+def begun(estimator):
+    return estimator.begin(Impact(CONTACT_US + 4_000, CONTACT_US, (-20.0, 0.0, 0.0)))
 
 
 @pytest.mark.parametrize("acceleration", [0.0, 2.0, -0.52])

@@ -30,7 +30,7 @@ def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True, known_wind_m_
     )
 
 
-def said(north_m_s, since_us=60_000, position=AT):
+def said(north_m_s, since_us, position):
     return LocalPosition(HIT_US + since_us, position, (north_m_s, 0.0, 0.0))
 
 

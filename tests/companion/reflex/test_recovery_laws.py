@@ -28,9 +28,9 @@ def turned(vector, angle_rad):
     return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2])
 
 
-def hit(speed_m_s, slant_rad=0.0, climb_m_s=0.0):
+def hit(speed_m_s, slant_rad=0.0):
     """North into a wall whose normal is turned from south by the slant."""
-    return Contact(AT, (speed_m_s, 0.0, climb_m_s), turned(SOUTH, slant_rad))
+    return Contact(AT, (speed_m_s, 0.0, 0.0), turned(SOUTH, slant_rad))
 
 
 def off_m(touched, place):
@@ -128,19 +128,18 @@ def up_of(attitude_wxyz):
     return body_to_ned(attitude_wxyz, (0.0, 0.0, -1.0))
 
 
-def flown(velocity, surfaces, wind_m_s2=ZERO, full_m_s2=FULL_M_S2, believed_full_m_s2=FULL_M_S2, seconds=3.0):
-    """Places and velocities of a vehicle whose attitude follows as a critically damped loop of 12 rad/s does."""
+def flown(velocity, surfaces, wind_m_s2):
+    """Places and velocities in 3 s of a vehicle whose attitude follows as a critically damped loop of 12 rad/s does."""
     place, up, turns, tick_s, path = HERE, (0.0, 0.0, -1.0), ZERO, 0.004, []
-    for _ in range(round(seconds / tick_s)):
+    for _ in range(round(3.0 / tick_s)):
         ahead = plus(up, 0.05, turns)
         tilt = (GRAVITY_M_S2 * ahead[0] / -ahead[2], GRAVITY_M_S2 * ahead[1] / -ahead[2], 0.0)
         belief = Belief(place, velocity, 0.0, tilt, wind_m_s2, tilted(up, 0.0))
-        asked = lean(belief, surfaces, full_m_s2=believed_full_m_s2)
-        attitude, thrust = attitude_and_thrust(wanted(belief, surfaces, HERE[2]), asked)
+        attitude, thrust = attitude_and_thrust(wanted(belief, surfaces, HERE[2]), lean(belief, surfaces))
         pulls = plus(plus(ZERO, 144.0, minus(up_of(attitude), up)), -24.0, turns)
         turns = plus(turns, tick_s, pulls)
         up = plus(up, tick_s, turns)
-        force = plus(plus(wind_m_s2, thrust * full_m_s2, up), GRAVITY_M_S2, (0.0, 0.0, 1.0))
+        force = plus(plus(wind_m_s2, thrust * FULL_M_S2, up), GRAVITY_M_S2, (0.0, 0.0, 1.0))
         velocity = plus(velocity, tick_s, force)
         place = plus(place, tick_s, velocity)
         path.append((place, velocity))

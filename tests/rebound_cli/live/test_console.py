@@ -181,8 +181,8 @@ def server(path):
     server.close()
 
 
-def hand_over(server, *events, running_s=5.0):
-    server.hand_over(lambda: WATCHING, events, running_s, "90.0 kB/s")
+def hand_over(server, *events):
+    server.hand_over(lambda: WATCHING, events, 5.0, "90.0 kB/s")
 
 
 def test_who_asks_hears_the_latest_state_and_how_old_it_is(server, path):

@@ -22,17 +22,17 @@ def position(time_us, height_m, speed_m_s=0.0):
     return LocalPosition(time_us, (0.0, 0.0, -height_m), (speed_m_s, 0.0, 0.0))
 
 
-def flight(duration_s=10.0, interval_us=4000, hit_us=HIT_US, gap=None, push_m_s2=40.0):
-    """Armed at 1 s, in the air from 2 s on, 1 m/s north; a push from ahead at `hit_us`, for 24 ms."""
-    noise = np.random.default_rng(1).normal(0.0, 0.3, (round(duration_s * 1e6 / interval_us), 3))
+def flight(hit_us=HIT_US, gap=None, push_m_s2=40.0):
+    """Ten seconds: armed at 1 s, in the air from 2 s on, 1 m/s north; a push from ahead at `hit_us`, for 24 ms."""
+    noise = np.random.default_rng(1).normal(0.0, 0.3, (2500, 3))
     heard = [
         LoggedSample(0, beat(False)),
         LoggedSample(0, ExtendedState(LandedState.ON_GROUND)),
         LoggedSample(SECOND, beat(True)),
+        LoggedSample(2 * SECOND, ExtendedState(LandedState.IN_AIR)),
     ]
-    heard.append(LoggedSample(2 * SECOND, ExtendedState(LandedState.IN_AIR)))
     for index, (x, y, z) in enumerate(noise.tolist()):
-        time_us = index * interval_us
+        time_us = index * 4000
         if gap is not None and gap[0] <= time_us < gap[1]:
             continue
         push = -push_m_s2 if hit_us is not None and hit_us < time_us <= hit_us + 24_000 else 0.0

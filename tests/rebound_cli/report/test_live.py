@@ -106,8 +106,8 @@ def asked(server, path, method="GET", host=None):
     return connection.getresponse()
 
 
-def stream_until(server, kind):
-    """Every chunk of a stream until an event of that kind."""
+def stream_of(server):
+    """Every chunk of a stream until the flight is done."""
     chunks = []
     with closing(asked(server, "/live")) as answer:
         assert answer.getheader("Content-Type") == "text/event-stream"
@@ -116,7 +116,7 @@ def stream_until(server, kind):
             assert line, "the stream has ended"
             if line.startswith(b"data: "):
                 chunks.append(json.loads(line.removeprefix(b"data: ")))
-                if any(event["kind"] == kind for event in chunks[-1]["events"]):
+                if any(event["kind"] == "done" for event in chunks[-1]["events"]):
                     return chunks
 
 
@@ -129,7 +129,7 @@ def test_a_browser_gets_the_page_and_all_of_the_flight(wall_folder, whole):
         assert opened.attributes("src") == [] and opened.attributes("href") == []
         for name, columns in COLUMNS.items():
             assert tuple(opened.data["tables"][name]["columns"]) == columns
-        chunks = stream_until(server, "done")
+        chunks = stream_of(server)
     assert [row for chunk in chunks for row in chunk["rows"]["path"]] == whole[0]["path"]
 
 
@@ -166,8 +166,8 @@ def test_browsers_that_do_not_read_or_have_gone_disturb_nobody(wall_folder):
             client.sendall(b"GET /live HTTP/1.1\r\nHost: 127.0.0.1:1\r\n\r\n")
         for client in lazy[::2]:
             client.close()
-        assert stream_until(server, "done")
-        assert stream_until(server, "done")
+        assert stream_of(server)
+        assert stream_of(server)
         for client in lazy:
             client.close()
 
@@ -258,7 +258,7 @@ def test_of_a_real_flight_it_is_said_how_to_make_one_unless_nothing_was_heard(tm
 def test_the_base_install_is_enough_to_write_one(wall_flight, tmp_path):
     out = tmp_path / "page.html"
     words = ["report", str(wall_flight[0]), "--out", str(out)]
-    done = alone(f"from rebound_cli.main import main\nsys.exit(main({words!r}))", tmp_path)
+    done = alone(f"from rebound_cli.main import main\nsys.exit(main({words!r}))")
     assert done.returncode == 0, done.stderr
     assert out.stat().st_size > 1_000_000
 

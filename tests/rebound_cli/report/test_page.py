@@ -186,7 +186,7 @@ def test_it_says_first_what_was_hit_and_a_hit_has_its_place_its_normal_with_its_
     assert 0.3 < imu["side"][row] / imu["side_threshold"][row] < 1.0
 
 
-def test_a_recovery_shows_what_was_wanted_and_flown_until_it_was_handed_over(wall_folder, opened):
+def test_a_recovery_shows_what_was_wanted_and_flown_until_it_was_handed_over(opened):
     wanted, flown = opened.table("wanted"), opened.table("attitude")
     times_s = {event["kind"]: event["t"] for event in opened.data["events"]}
     # Given a recovery by attitude: its setpoints begin with the hit and end with the hand-over

@@ -57,8 +57,8 @@ def files(root):
     return {path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file()}
 
 
-def unit(run="guard", connect=f"serial://{UART}:921600", systemd=252, **more):
-    return unit_text(ServiceSettings(run=run, connect=connect, **more), PYTHON, systemd, "dialout")
+def unit(connect=f"serial://{UART}:921600", systemd=252, **more):
+    return unit_text(ServiceSettings(connect=connect, **more), PYTHON, systemd, "dialout")
 
 
 def values(text, key):

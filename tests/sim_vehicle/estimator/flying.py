@@ -63,16 +63,6 @@ class Flight:
 HOVER = TrajectorySetpoint(position_ned_m=(0.0, 0.0, -HEIGHT_M), yaw_rad=0.0)
 
 
-def cruise(speed_m_s: float, acceleration_m_s2: float = 2.0) -> Callable[[float], TrajectorySetpoint]:
-    """North at a speed reached with a constant acceleration."""
-
-    def setpoint_at(time_s: float) -> TrajectorySetpoint:
-        speed = min(speed_m_s, acceleration_m_s2 * time_s)
-        return TrajectorySetpoint((None, 0.0, -HEIGHT_M), (speed, None, None), yaw_rad=0.0)
-
-    return setpoint_at
-
-
 def circle(radius_m: float, speed_m_s: float) -> Callable[[float], TrajectorySetpoint]:
     """Round a circle that begins at the origin, northwards."""
 
@@ -85,22 +75,23 @@ def circle(radius_m: float, speed_m_s: float) -> Callable[[float], TrajectorySet
     return setpoint_at
 
 
-def hit_wall(airframe: Airframe, speed_m_s: float, seed: int, after_ms: tuple[int, ...]) -> tuple[Flight, list[float]]:
+def hit_wall(airframe: Airframe, speed_m_s: float, after_ms: tuple[int, ...]) -> tuple[Flight, list[float]]:
     """Fly head-on at a wall and, from the touch on, to half a second's way behind it, as the paper's eq. 3.
 
     And the length of the velocity error, m/s, before the touch and at these times after it.
     """
     distance_m = 2 + 0.75 * speed_m_s**2
     scene = Scene.model_validate({"walls": [{"point_ned_m": [distance_m, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]}]})
-    flight = Flight(airframe, seed, scene)
+    flight = Flight(airframe, 1, scene)
     flight.climb()
-    way = cruise(speed_m_s)
     time_s, now_ms, errors_m_s = 0.0, 0, [math.nan]
     reach_m = distance_m - airframe.geometry.reach_m * math.cos(math.pi / 4) - 1.0
     while flight.plant.state.peak_force_n == 0.0:
         errors_m_s = [float(np.linalg.norm(flight.velocity_error_m_s))]
         last = flight.output
-        flight.fly(way(time_s), STEP_S)
+        speeding_up_m_s = min(speed_m_s, 2.0 * time_s)
+        north = TrajectorySetpoint((None, 0.0, -HEIGHT_M), (speeding_up_m_s, None, None), yaw_rad=0.0)
+        flight.fly(north, STEP_S)
         time_s += STEP_S
         assert flight.plant.state.body[0] < reach_m + 2.0, "the wall was passed"
     v_c, x_c = last.velocity_ned_m_s[0], last.position_ned_m[0]

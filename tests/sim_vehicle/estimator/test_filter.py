@@ -229,7 +229,7 @@ def test_the_filter_finds_the_gyroscopes_bias(hover):
 
 
 def test_a_hit_on_the_arms_stop_clips_and_flow_brings_the_velocity_back():
-    flight, (before, clipped, seen, later) = hit_wall(filtered(), 4.0, seed=1, after_ms=(48, 200, 1000))
+    flight, (before, clipped, seen, later) = hit_wall(filtered(), 4.0, after_ms=(48, 200, 1000))
     # Given a hit that the accelerometer could not follow
     assert flight.output.clipping_counts[0] > 10
     assert before < 0.1
@@ -263,7 +263,7 @@ def test_cameras_that_are_turned_down_for_a_second_reset_the_position():
     # Given a rigid hit seen by cameras alone, by a filter that allows next to nothing for clipping
     only = {name: {"fitted": False} for name in ("optical_flow", "range_finder", "compass")}
     changes = {"sensors": {**only, "motion_capture": {"fitted": True}}, "estimator": {"clipped_excess_m_s2": 4.9}}
-    flight, (_, astray, later) = hit_wall(filtered("rigid", changes), 2.0, seed=1, after_ms=(800, 3000))
+    flight, (_, astray, later) = hit_wall(filtered("rigid", changes), 2.0, after_ms=(800, 3000))
     # Then its position runs away from the cameras', which its gate turns down, until it is reset to them
     assert astray > 1.0
     assert later < 0.1

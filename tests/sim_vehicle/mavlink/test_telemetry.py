@@ -230,8 +230,7 @@ def test_asked_and_received(monkeypatch, kind, asked_hz, received_hz, gaps):
     monkeypatch.setattr(module, "MISSED_LOOPS_SHARE", 0.0)
     client, _ = asked(NUMBERS[kind], 1e6 / asked_hz)
     assert client.rate_hz(kind, 8.0) == pytest.approx(received_hz, rel=0.005)
-    times_s = [time_s for time_s, message in client.received if message.get_type() == kind]
-    assert {round(1e3 * (b - a)) for a, b in pairwise(times_s)} == gaps
+    assert {round(1e3 * (b - a)) for a, b in pairwise(client.times(kind))} == gaps
 
 
 def told_interval_us(client: Client, message_id: int) -> int:

@@ -50,14 +50,10 @@ def addressed_to(kind: type, payload: bytes, system: int, component: int) -> byt
     for name, value in (("target_system", system), ("target_component", component), ("target", system)):
         if name in kind.fieldnames:
             # Fields before the targets may be arrays of several numbers each
-            place = 0
-            for field in kind.ordered_fieldnames:
-                if field == name:
-                    break
-                index = kind.fieldnames.index(field)
-                count = kind.array_lengths[kind.ordered_fieldnames.index(field)]
-                place += count if count and kind.fieldtypes[index] != "char" else 1
-            values[place] = value
+            before = kind.ordered_fieldnames[: kind.ordered_fieldnames.index(name)]
+            types = [kind.fieldtypes[kind.fieldnames.index(field)] for field in before]
+            counts = (1 if of == "char" else count or 1 for of, count in zip(types, kind.array_lengths, strict=False))
+            values[sum(counts)] = value
     packed: bytes = kind.unpacker.pack(*values)
     return packed
 

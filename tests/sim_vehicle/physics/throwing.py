@@ -6,7 +6,6 @@ from typing import Any
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.setpoint import Setpoint
 from sim_vehicle.estimator.estimate import Estimate
-from sim_vehicle.plant.interval import FINE_STEPS
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
@@ -57,7 +56,6 @@ def throw(
     airframe: Airframe,
     speed_m_s: float,
     yaw_rad: float = 0.0,
-    fine_steps: int = FINE_STEPS,
     gap_m: float = 0.05,
     rates_frd_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
     duration_s: float = 0.4,
@@ -70,7 +68,7 @@ def throw(
     free = airframe.model_copy(update={"surface": airframe.surface.model_copy(update={"guard_friction": 0.0})})
     wall = {"point_ned_m": [10, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0], "width_m": 20, "height_m": 20}
     scene = Scene.model_validate({"walls": [wall], "start": {"yaw_deg": math.degrees(yaw_rad)}})
-    plant = Plant(free, scene, seed=1, fine_steps=fine_steps)
+    plant = Plant(free, scene, seed=1)
     plant.state.body[0:3] = [10 - airframe.geometry.reach_m - gap_m, 0.0, -HEIGHT_M]
     plant.state.body[3:6] = [speed_m_s, 0.0, 0.0]
     plant.state.body[10:13] = rates_frd_rad_s
