@@ -46,7 +46,6 @@ def advance_interval(
     setpoints: Floats,
     motors: int,
     noise: Floats,
-    fine_steps: int,
     all_constants: Floats,
     disturbances: Floats,
     faces: Floats,
@@ -90,7 +89,7 @@ def advance_interval(
         spin_motors(state, spun, constants, disturbance)
         for i in range(3):
             scratch.velocity_before[i] = state.body[3 + i]
-        move_body(state, awake, fine_steps, constants, disturbance, faces, moving, behind, near, forces, scratch)
+        move_body(state, awake, constants, disturbance, faces, moving, behind, near, forces, scratch)
         add_raw_sample(state, scratch, noise, raw, constants, disturbance)
         state.time_us += constants.raw_interval_us
     close_old_hit(state)
@@ -149,7 +148,6 @@ def spin_motors(state: PlantState, share: float, constants: Constants, disturban
 def move_body(
     state: PlantState,
     awake: bool,
-    fine_steps: int,
     constants: Constants,
     disturbance: Disturbance,
     faces: Floats,
@@ -170,7 +168,7 @@ def move_body(
         tip_speed = constants.reach_m * (abs(body[10]) + abs(body[11]) + abs(body[12]))
         travel_m = (speed + tip_speed + fastest_m_s(moving, faces)) * raw_s
         if find_close(body, behind, near, travel_m + TOUCH_MARGIN_M, constants, faces, scratch):
-            steps = fine_steps
+            steps = FINE_STEPS
     step_s = raw_s / steps
     for step in range(steps):
         if touches:

@@ -39,19 +39,11 @@ def _onboard_estimator(airframe: Airframe, body: Floats, seed: int) -> "OnboardE
 class Plant:
     """Airframe, world and seed in; one interval a step. The same inputs give the same bits."""
 
-    def __init__(
-        self,
-        airframe: Airframe,
-        scene: Scene,
-        seed: int,
-        keeps_path: bool = True,
-        fine_steps: int = interval.FINE_STEPS,
-    ) -> None:
+    def __init__(self, airframe: Airframe, scene: Scene, seed: int, keeps_path: bool = True) -> None:
         self._rng = np.random.default_rng(seed)
         self.constants = constants_from(airframe, self._rng)
         """What does not change in a flight, but for `tune`."""
         self.disturbance = calm(scene.wind_ned_m_s)
-        self._fine_steps = fine_steps
         self._raw_samples = int(self.constants.raw_per_interval)
         north, east, _ = scene.start.position_ned_m
         centre: Vector3 = (north, east, -airframe.geometry.foot_depth_m)
@@ -141,7 +133,6 @@ class Plant:
             self._asked.box,
             motors,
             self._rng.standard_normal(out=self._noise),
-            self._fine_steps,
             self._constants_box,
             self._disturbance_box,
             around.faces,
