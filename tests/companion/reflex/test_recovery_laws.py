@@ -196,6 +196,14 @@ def test_thrust_presses_a_vehicle_on_no_more_than_its_attitude_loop_holds(leans_
     assert pressing * FULL_M_S2 * math.sin(math.radians(leans_deg)) <= max(1.001, LEAST_THRUST * FULL_M_S2)
 
 
+def test_under_an_overhang_that_it_touches_a_vehicle_keeps_the_thrust_that_carries_it():
+    # Given a level vehicle at its height below a ceiling, or a wall that leans over it by 30 degrees
+    for normal in ((0.0, 0.0, 1.0), (-math.cos(math.radians(30.0)), 0.0, math.sin(math.radians(30.0)))):
+        belief, above = Belief(HERE, ZERO), Surface(HERE, normal, 0.35)
+        _, thrust = attitude_and_thrust(wanted(belief, [above], HERE[2]), lean(belief, [above]))
+        assert thrust * FULL_M_S2 == pytest.approx(GRAVITY_M_S2, rel=0.01)
+
+
 def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
     # Given one that accelerates by 1 m/s^2 to the north where it takes itself for level
     belief = Belief(HERE, ZERO, level_m_s2=(1.0, 0.0, 0.0))
