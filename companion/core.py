@@ -98,7 +98,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
-        self._repeat_law(samples, now_us)
+        if self._law.pending is not None or not self._is_met:
+            self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
         if now_us >= self._heartbeat_due_us:
             self._beat(now_us)
@@ -161,7 +162,9 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
         flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
-        flight.blind.update(self.reflex.monitor.no_data_reason is not None, now_us)
+        is_blind = self.reflex.monitor.no_data_reason is not None
+        if is_blind or flight.blind.since_us is not None:
+            flight.blind.update(is_blind, now_us)
         for notice in reaction.notices:
             flight.report(now_us, notice.kind, notice.text, **notice.data)
         if reaction.has_touched_down:
