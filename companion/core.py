@@ -109,6 +109,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
                 self._inform(now_us)
             except Exception as error:
                 self.fault(error, now_us)
+        if not flight.outbox and not flight.events:
+            return NOTHING
         outputs = Outputs(tuple(flight.outbox), tuple(flight.events))
         flight.outbox, flight.events = [], []
         return outputs
