@@ -67,10 +67,12 @@ class GuardMachine(StateMachine):
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
         before = self.handler
-        self._take(self._from_outside(inputs, now_us), now_us)
+        if (asked := self._from_outside(inputs, now_us)) is not None:
+            self._take(asked, now_us)
         if self.state in MAY_CRASH:
-            is_meant = self.state not in HOLDING and goes_down(self.flight, now_us)
-            self._take(crashed(self.flight, is_meant, now_us), now_us)
+            meant = self.state not in HOLDING and goes_down(self.flight, now_us)
+            if (crash := crashed(self.flight, meant, now_us)) is not None:
+                self._take(crash, now_us)
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over
@@ -85,7 +87,8 @@ class GuardMachine(StateMachine):
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
                 self._take(Transition(Trigger.HIT), now_us)
-        self._take_all(self._led_back() or self.handler.step(self.flight, inputs, now_us), now_us)
+        if (transition := self._led_back() or self.handler.step(self.flight, inputs, now_us)) is not None:
+            self._take_all(transition, now_us)
         return self.handler is not before
 
     def _give_away(self, text: str, now_us: int) -> None:
