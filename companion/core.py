@@ -130,8 +130,13 @@ class Core(ABC, Generic[FlightT, MachineT]):
             samples, refusal = self._hear(self._in_one_frame(samples, now_us), now_us)
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
-            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
-            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
+            acks: list[CommandAck] = []
+            positions: list[LocalPosition] = []
+            for sample in samples:
+                if isinstance(sample, LocalPosition):
+                    positions.append(sample)
+                elif isinstance(sample, CommandAck):
+                    acks.append(sample)
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
