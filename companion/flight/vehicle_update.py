@@ -59,6 +59,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 flight.round_trip.update(sample, now_us)
         was_known = vehicle.is_mode_known
         vehicle.update(sample, now_us, flight.own_modes)
+        if type(sample) in _FLYING:
+            flight.flies = _flies(vehicle)
         is_mode_lost |= was_known and not vehicle.is_mode_known
         streams.count(type(sample), now_us)
     _advance_trajectory_time(flight, now_us)
@@ -139,10 +141,14 @@ def note_height(flight: FlightContext) -> None:
         flight.has_climbed = True
     elif height_m is None or vehicle.stands:
         flight.has_climbed = False
-    if _flies(vehicle) and not flight.is_wreck:
+    if flight.flies and not flight.is_wreck:
         flight.flew_us = flight.stepped_us
     stepped_us, flew_us = flight.stepped_us, flight.flew_us
     flight.may_crash = stepped_us is not None and flew_us is not None and stepped_us - flew_us < LIES_US
+
+
+# What tells whether it flies.
+_FLYING = frozenset((messages.Heartbeat, messages.ExtendedState, messages.AttitudeTarget))
 
 
 def _flies(vehicle: Vehicle) -> bool:
