@@ -5,11 +5,12 @@ infinity in it has a length that is within no limit.
 """
 
 import math
+import re
 import struct
 from collections.abc import Callable, Mapping
 from inspect import signature
-from itertools import accumulate
 from math import hypot
+from operator import itemgetter
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
@@ -31,20 +32,26 @@ class Reader:
         names = list(signature(make).parameters)
         self._takes_source = names[0] == "source"
         self._names = names[self._takes_source :]
-        # One name may stand for several values: q[4].
-        begins = accumulate(message.lengths, initial=0)
-        places: dict[str, int | slice] = {
-            name: begin if length == 1 else slice(begin, begin + length)
-            for name, length, begin in zip(message.ordered_fieldnames, message.lengths, begins, strict=False)
-        }
-        self._places = [places[name] for name in self._names]
-        self._unpacker, self._make, self.name = message.unpacker, make, str(message.msgname)
+        # The fields that are not named are passed over. One name may stand for several values: q[4].
+        places, count, layout = dict[str, int | slice](), 0, "<"
+        parts = re.findall(r"\d*[a-zA-Z]", message.unpacker.format)
+        for name, length, part in zip(message.ordered_fieldnames, message.lengths, parts, strict=True):
+            if name not in self._names:
+                layout += f"{struct.calcsize('<' + part)}x"
+                continue
+            layout += part
+            places[name] = count if length == 1 else slice(count, count + length)
+            count += length
+        picked = [places[name] for name in self._names]
+        self._pick = None if picked == list(range(count)) else itemgetter(*picked)
+        self._unpacker, self._make, self.name = struct.Struct(layout), make, str(message.msgname)
 
     def from_payload(self, payload: bytes, source: tuple[int, int]) -> Sample | None:
         """MAVLink 2 leaves out the zeros at a payload's end."""
         unpacker = self._unpacker
-        values = unpacker.unpack(payload.ljust(unpacker.size, b"\0")[: unpacker.size])
-        fields = [values[place] for place in self._places]
+        fields = unpacker.unpack(payload.ljust(unpacker.size, b"\0")[: unpacker.size])
+        if self._pick is not None:
+            fields = self._pick(fields)
         return self._make(source, *fields) if self._takes_source else self._make(*fields)
 
 
