@@ -132,7 +132,7 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
     for surface in leant_on:
         if surface.off_m(place) <= 0.5 * reflex.PLACE_SPREAD_M:
-            # What it touches turns it further on, the more it is pressed: by its thrust, less its weight under an overhang.
+            # What it touches turns it on, the more it is pressed: by its thrust, less its weight under an overhang.
             pushes_m_s2 = reflex.MOST_PUSH_M_S2 + max(0.0, GRAVITY_M_S2 * surface.normal_ned[2])
             thrust_m_s2 = min(thrust_m_s2, pushes_m_s2 / -along(up, surface.normal_ned))
     thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
