@@ -69,7 +69,7 @@ class ContactForce:
         """
         impulse_m_s = self.impulse_ned_m_s
         off_m_s = along(plus(self.came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s))
-        return self.is_over and not self.has_gap and off_m_s < -SAME_M_S
+        return self.is_over and off_m_s < -SAME_M_S
 
 
 @dataclass(frozen=True, slots=True)
