@@ -15,6 +15,7 @@ class ForceNoise:
 
     mean_frd_m_s2: Vector3 = ZERO
     variance_m2_s4: Vector3 = ZERO
+    load_factor: float = 1.0  # mean, by which the variance was learnt
     known_s: float = 0.0
     side_m_s2: float = 0.0  # standard deviation on the noisier of x and y
     vertical_m_s2: float = 0.0  # standard deviation on z
@@ -22,7 +23,8 @@ class ForceNoise:
     def learn(self, force_frd_m_s2: Vector3, step_s: float, load_factor: float) -> None:
         """Take one sample, ``step_s`` after the last; the first ones count as a plain mean.
 
-        Rotors that are not balanced shake with the square of their speed, as thrust grows: with the load factor.
+        Rotors that are not balanced shake with the square of their speed, as thrust grows: with the load factor. Others
+        shake on when that falls.
         """
         if self.known_s <= 0.0:
             self.mean_frd_m_s2 = force_frd_m_s2
@@ -31,11 +33,12 @@ class ForceNoise:
         (f_x, f_y, f_z), (m_x, m_y, m_z), (v_x, v_y, v_z) = force_frd_m_s2, self.mean_frd_m_s2, self.variance_m2_s4
         x, y, z = f_x - m_x, f_y - m_y, f_z - m_z
         self.mean_frd_m_s2 = (m_x + mean_share * x, m_y + mean_share * y, m_z + mean_share * z)
-        x, y, z = x / load_factor, y / load_factor, z / load_factor
+        self.load_factor += share * (load_factor - self.load_factor)
+        grown = reflex.EXCESS * max(1.0, load_factor / self.load_factor)
         v_x, v_y, v_z = v_x + share * (x * x - v_x), v_y + share * (y * y - v_y), v_z + share * (z * z - v_z)
         self.variance_m2_s4 = (v_x, v_y, v_z)
-        self.side_m_s2 = reflex.EXCESS * load_factor * math.sqrt(max(v_x, v_y))
-        self.vertical_m_s2 = reflex.EXCESS * load_factor * math.sqrt(v_z)
+        self.side_m_s2 = grown * math.sqrt(max(v_x, v_y))
+        self.vertical_m_s2 = grown * math.sqrt(v_z)
 
 
 @dataclass(slots=True)

@@ -14,6 +14,7 @@ from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import EXCESS, EstimateConfig, FusedConfig
 from companion.reflex.detection.detector import Evidence, ImpactKind, Phase, Situation
+from companion.reflex.detection.free_flight import ForceNoise
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import promise_of
 from companion.reflex.detection.impact import ImpactEstimator
@@ -346,6 +347,15 @@ def test_the_noise_of_a_climb_is_that_of_its_samples():
     climbing = Flight(noise=1.0, lift=lambda t: 2.0 * GRAVITY)
     climbing.fly()
     assert climbing.state.threshold_m_s2 == pytest.approx(6.3 * 2.0, rel=0.15)
+
+
+@pytest.mark.parametrize(("before", "now", "shakes"), [(1.0, 1.0, 1.0), (1.0, 1.5, 1.5), (1.5, 1.0, 1.0)])
+def test_vibration_grows_with_the_load_at_once_and_falls_as_it_is_seen_to(before, now, shakes):
+    # Given four seconds of noise at one load, then a sample at another
+    noise, draw = ForceNoise(), random.Random(1)
+    for load in [before] * 800 + [now]:
+        noise.learn((draw.gauss(0.0, 1.0), 0.0, -GRAVITY * load), 0.005, load)
+    assert noise.side_m_s2 == pytest.approx(EXCESS * shakes, rel=0.1)
 
 
 def test_what_thrust_there_is_is_learnt_before_the_detector_trusts_its_noise():
