@@ -19,6 +19,7 @@ from companion.motion.doppler import Doppler
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO
 from companion.reflex.config import NOTICED_S, EstimateConfig
+from companion.reflex.detection.detector import Impact
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import Contact, MotionState
 from companion.reflex.recovery.motion_estimator import MotionEstimator
@@ -172,6 +173,18 @@ def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(
     # And where the velocity before it is not known, nothing is changed by it
     record.contact = replace(record.contact, velocity_error_m_s=50.0)
     assert record.normal.direction_ned == pytest.approx((-half, -half, 0.0), abs=0.02)
+
+
+def test_a_second_hit_of_a_vehicle_whose_velocity_is_not_known_turns_no_normal_by_what_follows_it():
+    # Given a clipped hit, whose velocity is known to 0.7 m/s, and another one at once
+    contact = Contact(AT, (2.0, 0.0, 0.0), SOUTH, 0.2)
+    flight = flight_with(estimator=MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig()))
+    impact = Impact(HIT_US + 100_000, HIT_US + 96_000, (-20.0, 0.0, 0.0))
+    estimate = flight.reflex.monitor.estimator.begin(impact)
+    record = flight.reflex.begin(estimate, FlightRoom(flight), 100_000)
+    # Then its velocity is the belief's, as uncertain as that
+    assert record.contact.velocity_ned_m_s == pytest.approx((-0.9, 0.0, 0.0))
+    assert record.contact.velocity_error_m_s == pytest.approx(SAME_M_S + 0.3 * 2.0)
 
 
 def test_the_way_off_follows_the_normal_as_it_becomes_known():
