@@ -149,13 +149,10 @@ class Recovery:
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. While it is touched it is where the vehicle is: frames and arms fold, obstacles move."""
         estimator, normal = self.record.estimator, self.record.normal
-        is_touched, pushes = (
-            sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S,
-            estimator.pushed_m_s2,
-        )
-        if pushes != ZERO:
+        is_touched = sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S
+        if (pushed := estimator.pushed_m_s2) != ZERO:
             # A vehicle that slides round a pole touches it on another side.
-            is_touched, normal = True, Normal(unit(pushes), reflex.IMPULSE_RAD)
+            is_touched, normal = True, Normal(unit(pushed), reflex.IMPULSE_RAD)
         off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)
         self._has_left = (self._has_left or off_m_s > 0.0) and not is_touched
         here, place = estimator.motion.position_ned_m, self._contact.position_ned_m
