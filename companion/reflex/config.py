@@ -157,10 +157,6 @@ MOST_TILT_RAD = 0.61
 HOVER_MARGIN, TURN_MARGIN = 1.1, 1.0 / (1.0 - 0.15)
 # So PX4's loop of the yaw rate has no more than this to brake; the rest of the turn is asked for.
 BRAKED_RAD_S = 1.0
-# A vehicle that touches a surface and leans onto it is pressed on with no more than this. With a guard 0.1 m below the
-# centre that turns a vehicle of 0.002 m^2 (inertia per mass) by 50 rad/s^2: what an attitude loop of 7 rad/s makes of
-# an error of one radian. Half of what tips a vehicle over.
-MOST_PUSH_M_S2 = 0.5 * HELD_M_S2
 # The rotors keep turning: PX4's MPC_THR_MIN.
 LEAST_THRUST = 0.12
 # The thrust gain is good enough to fly by after so long: 15 reports of the thrust at 30 Hz.

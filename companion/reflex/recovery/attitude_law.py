@@ -127,14 +127,11 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     up, place = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0)), belief.position_ned_m
     leant_on = [surface for surface in lean.surfaces if along(up, surface.normal_ned) < 0.0]
     presses = any(surface.off_m(place) < surface.distance_m for surface in leant_on)
+    lies = any(surface.off_m(place) <= 0.0 for surface in leant_on)
     upright = -up[2]
-    by_axis = along((n, e, -lifts_m_s2), up)
+    # One that lies on a surface does not climb: the thrust for that presses it on.
+    by_axis = along((n, e, (max(d, 0.0) if lies else d) - GRAVITY_M_S2), up)
     thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
-    for surface in leant_on:
-        if surface.off_m(place) <= 0.5 * reflex.PLACE_SPREAD_M:
-            # What it touches turns it on, the more it is pressed: by its thrust, less its weight under an overhang.
-            pushes_m_s2 = reflex.MOST_PUSH_M_S2 + max(0.0, GRAVITY_M_S2 * surface.normal_ned[2])
-            thrust_m_s2 = min(thrust_m_s2, pushes_m_s2 / -along(up, surface.normal_ned))
     thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
     n, e, d = minus((n, e, -lifts_m_s2), belief.level_m_s2)
     turned_rad = belief.heading_error_rad
