@@ -23,9 +23,9 @@ class Normal:
     error_rad: float = reflex.UNKNOWN_RAD
 
     def with_direction(self, vector_ned: Vector3, error_rad: float) -> "Normal":
-        """The normal after another vector of that direction; a zero vector changes nothing."""
+        """The normal after another vector of that direction; a zero or an unknown one changes nothing."""
         other = unit(vector_ned)
-        if other == ZERO:
+        if other == ZERO or error_rad == math.inf:
             return self
         was, more = 0.0 if self.direction_ned == ZERO else self.error_rad**-2, error_rad**-2
         n, e, d = (was * a + more * b for a, b in zip(self.direction_ned, other, strict=True))

@@ -150,7 +150,7 @@ class MotionEstimator:
         return minus(self.external_m_s2, self.known_wind_m_s2)
 
     @property
-    def pushed_m_s2(self) -> Vector3:
+    def contact_m_s2(self) -> Vector3:
         """External force per mass across the thrust, horizontal, by what is touched; zero where it may be wind.
 
         One that ends is no push the other way.
@@ -161,7 +161,7 @@ class MotionEstimator:
     @property
     def wind_m_s2(self) -> Vector3:
         """External force per mass across the thrust, horizontal: wind and drag."""
-        return self.known_wind_m_s2 if self.pushed_m_s2 != ZERO else minus(self.external_m_s2, self._bias_m_s2)
+        return self.known_wind_m_s2 if self.contact_m_s2 != ZERO else minus(self.external_m_s2, self._bias_m_s2)
 
     def belief(self, strapdown: Strapdown) -> Belief:
         """What the attitude law goes by."""

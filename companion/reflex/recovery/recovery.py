@@ -150,7 +150,7 @@ class Recovery:
         """Update the surface. While it is touched it is where the vehicle is: frames and arms fold, obstacles move."""
         estimator, normal = self.record.estimator, self.record.normal
         is_touched = sample.time_boot_us - estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S
-        if (pushed := estimator.pushed_m_s2) != ZERO:
+        if (pushed := estimator.contact_m_s2) != ZERO:
             # A vehicle that slides round a pole touches it on another side.
             is_touched, normal = True, Normal(unit(pushed), reflex.IMPULSE_RAD)
         off_m_s = along(estimator.motion.velocity_ned_m_s, normal.direction_ned)

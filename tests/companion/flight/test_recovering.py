@@ -171,8 +171,10 @@ def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(
     record.estimator.after_ned_m_s, record.estimator.after_error_m_s = after_ned_m_s, 0.05
     assert record.normal.direction_ned == pytest.approx(direction_ned, abs=0.02)
     # And where the velocity before it is not known, nothing is changed by it
-    record.contact = replace(record.contact, velocity_error_m_s=50.0)
-    assert record.normal.direction_ned == pytest.approx((-half, -half, 0.0), abs=0.02)
+    record.contact = replace(record.contact, velocity_error_m_s=math.inf)
+    assert record.normal.direction_ned == (-half, -half, 0.0)
+    record.estimator.note_contact(True, HIT_US, Normal(), 0.0)
+    assert record.normal.direction_ned == ZERO
 
 
 def test_a_second_hit_of_a_vehicle_whose_velocity_is_not_known_turns_no_normal_by_what_follows_it():

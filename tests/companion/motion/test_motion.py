@@ -11,7 +11,7 @@ from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, RECEI
 from companion.motion.delay import Delay
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
-from companion.motion.rotation import tilt_rad, turned, yaw_rad
+from companion.motion.rotation import body_to_ned, tilt_rad, turned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, plus
@@ -35,6 +35,25 @@ def test_history_keeps_two_seconds_drops_late_packets_and_starts_anew_after_a_re
     assert history.add(rebooted)
     assert history.between(0, CONTACT_US) == [rebooted]
     assert history.before(1001) is rebooted and history.before(1000) is None
+
+
+HALF = math.sqrt(0.5)
+
+
+@pytest.mark.parametrize(
+    ("attitude", "nose_ned", "right_ned", "yaw"),
+    [
+        ((1.0, 0.0, 0.0, 0.0), (1, 0, 0), (0, 1, 0), 0.0),  # nose north
+        ((HALF, 0.0, 0.0, HALF), (0, 1, 0), (-1, 0, 0), math.pi / 2),  # nose east
+        ((HALF, 0.0, HALF, 0.0), (0, 0, -1), (0, 1, 0), None),  # nose up
+        ((HALF, HALF, 0.0, 0.0), (1, 0, 0), (0, 0, 1), 0.0),  # right wing down
+    ],
+)
+def test_rotation_on_attitudes_everyone_knows(attitude, nose_ned, right_ned, yaw):
+    assert body_to_ned(attitude, (1.0, 0.0, 0.0)) == pytest.approx(nose_ned, abs=1e-12)
+    assert body_to_ned(attitude, (0.0, 1.0, 0.0)) == pytest.approx(right_ned, abs=1e-12)
+    if yaw is not None:
+        assert yaw_rad(attitude) == pytest.approx(yaw)
 
 
 NOISE_M_S = 0.05
