@@ -102,6 +102,9 @@ class FusedState(DetectorState):
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
         alone = math.dist(force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2])
+        if math.hypot(*self.floor.mean_frd_m_s2[:2]) > config.side_threshold_m_s2:
+            # The mean is a push, whose end is none.
+            alone = min(alone, math.hypot(*force_frd_m_s2[:2]))
         if self.phase is not Phase.ARMED or self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
             return alone, 1.0, False
         together, of_two = self._together_m_s2(force_frd_m_s2), self.before_threshold_m_s2 / self.threshold_m_s2

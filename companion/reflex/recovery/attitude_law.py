@@ -19,7 +19,7 @@ from companion.messages import AttitudeSetpoint, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import LEVEL
-from companion.motion.vector import ZERO, along, flat, limited, minus, plus
+from companion.motion.vector import ZERO, along, flat, limited, minus, plus, unit
 from companion.reflex import config as reflex
 from companion.reflex.surface import Surface, projected
 
@@ -124,20 +124,32 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     # One that turns by more than a radian within its attitude's lag does not get the tilt that is asked for.
     most_m_s2 /= max(1.0, turns_rad_s * reflex.LEAD_S)
     n, e, _ = limited(flat(acceleration_ned_m_s2), most_m_s2)
-    up, place = body_to_ned(belief.attitude_wxyz, (0.0, 0.0, -1.0)), belief.position_ned_m
-    leant_on = [surface for surface in lean.surfaces if along(up, surface.normal_ned) < 0.0]
-    presses = any(surface.off_m(place) < surface.distance_m for surface in leant_on)
-    lies = any(surface.off_m(place) <= 0.0 for surface in leant_on)
-    upright = -up[2]
-    # One that lies on a surface does not climb: the thrust for that presses it on.
-    by_axis = along((n, e, (max(d, 0.0) if lies else d) - GRAVITY_M_S2), up)
-    thrust_m_s2 = by_axis if presses or upright < reflex.LEAST_UPRIGHT_COSINE else lifts_m_s2 / upright
-    thrust = min(max(thrust_m_s2 / full_m_s2, reflex.LEAST_THRUST), 1.0)
+    thrust = min(max(_thrust_m_s2((n, e, d), lean) / full_m_s2, reflex.LEAST_THRUST), 1.0)
     n, e, d = minus((n, e, -lifts_m_s2), belief.level_m_s2)
     turned_rad = belief.heading_error_rad
     c, s = math.cos(turned_rad), math.sin(turned_rad)
     # No heading is asked for but the vehicle's own: motors that turn it have no thrust left to lift it.
     return tilted((n * c - e * s, n * s + e * c, d), turn_rad(belief.attitude_wxyz) + turned_rad), thrust
+
+
+def _thrust_m_s2(asked_m_s2: Vector3, lean: Lean) -> float:
+    """What carries the vehicle at its tilt; where that leans on a near surface, the part that leads off it."""
+    n, e, d = asked_m_s2
+    place, up = lean.belief.position_ned_m, body_to_ned(lean.belief.attitude_wxyz, (0.0, 0.0, -1.0))
+    # A hit turns it sooner than its motors give less: the tilt by then counts.
+    ahead = unit(plus(lean.belief.tilt_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)))
+    sides = [(one, -along(ahead, one.normal_ned), one.off_m(place)) for one in lean.surfaces]
+    leant_on = [(one, onto, off_m) for one, onto, off_m in sides if onto > 0.0 and off_m < one.distance_m]
+    if not leant_on and -up[2] >= reflex.LEAST_UPRIGHT_COSINE:
+        return (GRAVITY_M_S2 - d) / -up[2]
+    # One that lies on a surface does not climb: the thrust for that presses it on.
+    lies = any(off_m <= 0.0 for _, _, off_m in leant_on)
+    thrust_m_s2 = along((n, e, (max(d, 0.0) if lies else d) - GRAVITY_M_S2), ahead if leant_on else up)
+    for one, onto, off_m in leant_on:
+        # What a hit has turned onto it, and is to lean off it, presses by less than tips it over.
+        if off_m < reflex.PLACE_SPREAD_M and along((n, e, 0.0), one.normal_ned) > 0.0:
+            thrust_m_s2 = min(thrust_m_s2, reflex.PRESSES_M_S2 / onto)
+    return thrust_m_s2
 
 
 def turn_rad(attitude_wxyz: Quaternion) -> float:

@@ -155,8 +155,11 @@ class MotionEstimator:
 
         One that ends is no push the other way.
         """
-        least_m_s2 = min(math.hypot(*self._new_m_s2), math.hypot(*self.external_m_s2))
-        return self._new_m_s2 if least_m_s2 > reflex.HELD_M_S2 else ZERO
+        new, all_m_s2, normal = self._new_m_s2, self.external_m_s2, level(self.normal).direction_ned
+        least_m_s2 = min(math.hypot(*new), math.hypot(*all_m_s2))
+        # What pushes off what was hit is that, sooner than wind.
+        off_m_s2 = min(along(new, normal), along(all_m_s2, normal))
+        return new if least_m_s2 > reflex.HELD_M_S2 or off_m_s2 > reflex.PRESSES_M_S2 else ZERO
 
     @property
     def wind_m_s2(self) -> Vector3:

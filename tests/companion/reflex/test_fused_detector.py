@@ -272,8 +272,9 @@ def gone(t):
         {"noise": 2.5},
         {"noise": 1.0, "lift": lambda t: GRAVITY * (1.0 + min(1.5, max(0, t - HIT_US) / 6e4))},  # and more as it climbs
         {"push": lambda t: (1.5 * (t > HIT_US), 0.0, 0.0)},  # an accelerometer whose zero moves at once
+        {"push": lambda t: (-3.0 * min(1.0, max(0.0, (t - HIT_US) / 1.5e6)) * (t < 5_000_000), 0.0, 0.0)},  # a door
     ],
-    ids=["free fall", "motor failure", "payload drop", "climbs", "gust", "shaking", "shaking climb", "zero moves"],
+    ids=["free fall", "motor fails", "payload drop", "climbs", "gust", "shaking", "shaking climb", "zero moves", "end"],
 )
 def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
     until_us = 3_150_000 if "rates" in scene else 6_000_000

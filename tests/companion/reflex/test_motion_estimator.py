@@ -236,6 +236,8 @@ def test_what_a_wrong_tilt_makes_is_known_on_when_the_reported_attitude_counts_a
         (False, 0.0, -0.35, 0.0),
         (False, 0.0, 1.9, 1.5),
         (False, 0.0, 2.4, 0.0),  # more is no wind, but what it lies on
+        (False, 0.0, -0.9, -0.5),
+        (False, 0.0, -1.1, 0.0),  # off what was hit sooner
         (False, 2.3, 0.2, 0.6),  # and where that ends nothing pushes
         (True, 1.2, 0.9, 0.9),
         (False, 1.2, 0.9, 1.2),
