@@ -101,11 +101,14 @@ class FusedState(DetectorState):
         Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
-        alone = math.dist(force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2])
-        if math.hypot(*self.floor.mean_frd_m_s2[:2]) > config.side_threshold_m_s2:
-            # The mean is a push, whose end is none.
-            alone = min(alone, math.hypot(*force_frd_m_s2[:2]))
-        if self.phase is not Phase.ARMED or self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
+        force, mean = force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2]
+        alone = math.dist(force, mean)
+        if self.phase is not Phase.ARMED:
+            return alone, 1.0, False
+        if math.hypot(*mean) > config.side_threshold_m_s2:
+            # The mean is a push, whose end is no hit.
+            alone = min(alone, math.hypot(*force))
+        if self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
             return alone, 1.0, False
         together, of_two = self._together_m_s2(force_frd_m_s2), self.before_threshold_m_s2 / self.threshold_m_s2
         return (together, of_two, True) if together / of_two > alone / reflex.CLEAR else (alone, reflex.CLEAR, False)
