@@ -250,6 +250,13 @@ def test_a_hit_is_no_noise_that_would_hide_the_next_one():
     assert struck.state.velocity.limit < 1.1 * free.state.velocity.limit
 
 
+def test_a_hit_against_a_wind_shows_by_how_it_differs_from_that():
+    def push(t):
+        return (1.6 if HIT_US < t < HIT_US + 60_000 else -0.6, 0.0, 0.0)
+
+    assert len(Flight(push, noise=0.05).fly()) == 1
+
+
 # --- no collision -------------------------------------------------------------------------------------------
 
 

@@ -194,12 +194,12 @@ def test_what_is_held_is_safe_by_what_is_certain_of_the_speed_away_from_a_surfac
 
 @pytest.mark.parametrize(
     ("off_m", "velocity_m_s", "presses_m_s2"),
-    [(0.0, 0.0, PRESSES_M_S2), (0.2, 0.0, math.inf), (0.05, -2.5, math.inf)],
+    [(0.0, -0.3, PRESSES_M_S2), (0.2, 0.0, math.inf), (0.0, -2.5, math.inf)],
     ids=["turned onto it", "not at it", "follows it"],
 )
 def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it(off_m, velocity_m_s, presses_m_s2):
-    # Given a vehicle below its height that will lean by 40 degrees into the wall, which it touches or is near to
-    into_rad, place = math.radians(40.0), minus(HERE, (off_m, 0.0, 0.0))
+    # Given a vehicle below its height that will lean by 20 degrees into the wall, which it touches or is near to
+    into_rad, place = math.radians(20.0), minus(HERE, (off_m, 0.0, 0.0))
     up = (math.sin(into_rad), 0.0, -math.cos(into_rad))
     belief = Belief(place, (velocity_m_s, 0.0, 0.0), 0.0, (GRAVITY_M_S2 * math.tan(into_rad), 0.0, 0.0))
     near = Surface(HERE, SOUTH, 0.25)
@@ -207,12 +207,13 @@ def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it(off_m, ve
     attitude, pressing = attitude_and_thrust(asked, lean(belief, [near]))
     # Then its thrust is the projection of the force that is wanted, not what would carry it, or climb; and where a hit
     # has turned it onto the wall it presses by less than tips it over
-    leans = up_of(attitude)
-    climbs_m_s2 = 0.0 if off_m == 0.0 else -MOST_CLIMB_M_S2
+    leans, climbs_m_s2 = up_of(attitude), 0.0 if off_m == 0.0 else -MOST_CLIMB_M_S2
     level_m_s2 = leans[0] / -leans[2] * (GRAVITY_M_S2 + MOST_CLIMB_M_S2)
     projection = along((level_m_s2, 0.0, climbs_m_s2 - GRAVITY_M_S2), up)
-    wanted_m_s2 = min(projection, presses_m_s2 / math.sin(into_rad))
-    assert pressing == pytest.approx(max(LEAST_THRUST, wanted_m_s2 / FULL_M_S2))
+    assert pressing == pytest.approx(min(projection, presses_m_s2 / math.sin(into_rad)) / FULL_M_S2)
+    # And in front of a wall that is far it is what carries it and climbs
+    _, lifting = attitude_and_thrust(asked, lean(belief, [FAR]))
+    assert lifting == pytest.approx((GRAVITY_M_S2 + MOST_CLIMB_M_S2) / FULL_M_S2)
 
 
 def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
