@@ -21,7 +21,7 @@ from companion.mavlink.delivery import Delivery
 from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
-from companion.reflex.config import EXCESS
+from companion.reflex.detection.health import alarms_per_h
 
 # The streams need a second to settle at their new rates; what comes then counts.
 SETTLING_US = 1_000_000
@@ -72,7 +72,7 @@ class Survey:
     def setup(self) -> Setup:
         identity, fused = self.vehicle.identity, self.config.fused
         imu_hz = self.streams.rates_hz().get("HIGHRES_IMU", 0.0)
-        per_h = 3600.0 * imu_hz * math.exp(-0.5 * (EXCESS * fused.noise_factor) ** 2)
+        per_h = alarms_per_h(fused.noise_factor, imu_hz)
         return Setup(
             parameters=self.parameters,
             line=self.line,

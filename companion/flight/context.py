@@ -215,13 +215,14 @@ class FlightContext:
         """The vehicle has met the ground, and bounces or slides along it until it has climbed again."""
         self.has_climbed = False
 
-    def heading_towards(self, wanted_rad: float | None, rate_rad_s: float = TURNING_RAD_S) -> float | None:
-        """The heading to ask for on the way to a wanted one: it leads the vehicle's own by what turns it at a rate.
+    def heading_towards(self, rate_rad_s: float = TURNING_RAD_S) -> float | None:
+        """The heading to ask for on the way to the wanted one: it leads the vehicle's own by what turns it at a rate.
 
         Motors that turn a vehicle as fast as they can have no thrust left to climb with. One that something holds they
         turn over it.
         """
-        heading_rad, lead_rad = self.vehicle.heading_rad, rate_rad_s / defaults.YAW_GAIN_PER_S
+        wanted_rad, heading_rad = self.yaw_rad, self.vehicle.heading_rad
+        lead_rad = rate_rad_s / defaults.YAW_GAIN_PER_S
         if wanted_rad is None or heading_rad is None:
             return wanted_rad
         short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
@@ -274,7 +275,8 @@ class FlightContext:
     def count_asked_mode(self) -> None:
         """The vehicle is about to be in the mode that it was asked for: no report of before says otherwise."""
         if (asked := self.command_client.requested_mode) is not None:
-            self.expected_mode, self.vehicle.mode = asked, ModeReport(asked, None, False)
+            self.expected_mode = asked
+            self.vehicle.count_mode(ModeReport(asked, None, False))
 
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
         """Advance the command client; report a failure."""

@@ -156,9 +156,14 @@ class Vehicle:
         is_known = self.mode is None or report.custom_mode in (self.mode.custom_mode, *own_modes)
         if is_known or not own_modes or self.unconfirmed_mode is not None:
             self.conflicts += is_known and self.unconfirmed_mode is not None
-            self.mode, self.pilot, self.unconfirmed_mode = report, self.autopilot.pilot(report.custom_mode), None
+            self.count_mode(report)
+            self.unconfirmed_mode = None
         else:
             self.unconfirmed_mode = report
+
+    def count_mode(self, report: ModeReport) -> None:
+        """It is the vehicle's from now on."""
+        self.mode, self.pilot = report, self.autopilot.pilot(report.custom_mode)
 
     def _update_armed(self, armed: bool) -> None:
         is_on_ground = self.landed is messages.LandedState.ON_GROUND

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
 from companion.motion.vector import ZERO, along, minus, plus
-from companion.reflex.config import FROM_BEHIND, STEEP
-from companion.reflex.surface import Normal, away_from
+from companion.reflex.config import PLACE_SPREAD_M
+from companion.reflex.surface import Normal, away_from, is_from_behind
 
 # One touch shows one place. Half a metre to every side is assumed. A trajectory round it then passes a metre beside the
 # touch, clear of a pole or a door leaf. A surface that is longer costs one more hit.
@@ -42,7 +42,7 @@ class Patch:
 
     @property
     def is_steep(self) -> bool:
-        return abs(self.normal_ned[2]) > STEEP
+        return self.normal_ned[2] != 0.0
 
     @property
     def centre_ned_m(self) -> Vector3:
@@ -139,15 +139,12 @@ def touch_of(
     if normal.direction_ned == ZERO:
         return None
     is_fast = math.hypot(*velocity_ned_m_s) >= LEAST_SPEED_M_S
-    is_behind = along(normal.direction_ned, away_from(minus(ZERO, velocity_ned_m_s))) < FROM_BEHIND
+    is_behind = is_from_behind(normal.direction_ned, away_from(minus(ZERO, velocity_ned_m_s)))
     surface_ned_m = plus(centre_ned_m, -reach_m, normal.direction_ned)
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
     return Patch((surface_ned_m,), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
 
 
-# Error of a touch's place: the position drifts by some centimetres between two hits, and the touching part of the guard
-# is not known.
-PLACE_ERROR_M = 0.1
 # Normals this near to each other may be one surface's however sure each is of itself: a wall is not quite plane.
 LEAST_ANGLE_RAD = math.radians(25.0)
 # Walls of a corner stand at 90 degrees: normals that differ by more than this are never one surface's.
@@ -179,7 +176,7 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     if angle_rad > min(MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)):
         return False
     place = touch.centre_ned_m
-    errors_m = 2.0 * PLACE_ERROR_M + patch.bends_m(patch.beside_m(place))
+    errors_m = 2.0 * PLACE_SPREAD_M + patch.bends_m(patch.beside_m(place))
     return patch.is_near(place, 2.0 * clearance_m) and abs(patch.off_m(place)) <= errors_m
 
 
@@ -214,7 +211,7 @@ def _turned_to_places(patch: Patch) -> Patch:
     base_m = high_m - low_m
     if base_m < LEAST_BASE_M:
         return patch
-    error_rad = math.atan(2.0 * PLACE_ERROR_M / base_m)
+    error_rad = math.atan(2.0 * PLACE_SPREAD_M / base_m)
     if error_rad >= patch.normal_error_rad:
         return patch
     along_rad = 0.5 * math.atan2(2.0 * ne, nn - ee)

@@ -40,8 +40,12 @@ def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, is_hidden: bool =
     if not is_unclear or math.hypot(n, e, d) <= reflex.APPROACH_M_S:
         return normal
     back = Normal().with_direction((-n, -e, -d), reflex.APPROACH_RAD)
-    is_behind = along(normal.direction_ned, back.direction_ned) < reflex.FROM_BEHIND
-    return normal if is_behind else back
+    return normal if is_from_behind(normal.direction_ned, back.direction_ned) else back
+
+
+def is_from_behind(pushed_ned: Vector3, back_ned: Vector3) -> bool:
+    """Whether a push is along the flight, and not back to where the vehicle came from; unit vectors."""
+    return along(pushed_ned, back_ned) < reflex.FROM_BEHIND
 
 
 def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3, error_m_s: float) -> Normal:

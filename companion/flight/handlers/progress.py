@@ -43,7 +43,7 @@ class _OnTrajectory:
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
         """The heading at this motion."""
-        return flight.heading_towards(flight.yaw_rad)
+        return flight.heading_towards()
 
     def target(self, flight: FlightContext, now_us: int) -> Target:
         elapsed_s = self._elapsed_s(flight)
@@ -145,7 +145,7 @@ class FlyItems(_OnTrajectory):
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
         flight.yaw_rad = self._heading.turned(flight.yaw_rad, motion[0], motion[1], now_us)
-        return flight.heading_towards(flight.yaw_rad, self._heading.rate_rad_s)
+        return flight.heading_towards(self._heading.rate_rad_s)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         damage, wanted = flight.motors.damage, flight.mission.on_damage
@@ -245,7 +245,7 @@ class HoldAfterRecovery:
         flight.report(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)
 
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
-        return self._target and replace(self._target, yaw_rad=flight.heading_towards(flight.yaw_rad))
+        return self._target and replace(self._target, yaw_rad=flight.heading_towards())
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return Transition(Trigger.HOLD_ENDED) if now_us >= self._until_us else None

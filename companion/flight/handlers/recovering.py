@@ -45,7 +45,7 @@ class Recover:
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
         """Attitude and thrust until it rests; then its place."""
         place = self._recovery.record.setpoint_ned_m
-        yaw_rad = flight.heading_towards(flight.yaw_rad)
+        yaw_rad = flight.heading_towards()
         if not self._recovery.leans:
             return Target(place, yaw_rad)
         acceleration, lean = flight.reflex.lean()

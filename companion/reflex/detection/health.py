@@ -123,11 +123,9 @@ def promise_of(
 ) -> Promise:
     """From the thresholds and the standard deviations that they are compared with.
 
-    Sideways noise exceeds a threshold of r standard deviations with exp(-r^2/2), by Rayleigh; each of the 3 axes of a
-    velocity adds to its step, by Maxwell.
+    Each of the 3 axes of a velocity adds to its step, by Maxwell.
     """
-    per_sample = math.exp(-0.5 * _ratio(EXCESS * state.threshold_m_s2, state.floor.side_m_s2) ** 2)
-    per_hour = 3600.0 * imu_hz * per_sample
+    per_hour = alarms_per_h(_ratio(state.threshold_m_s2, state.floor.side_m_s2), imu_hz)
     if not state.jump.known or len(fixes) < 2:
         return Promise(state.threshold_m_s2, math.inf, per_hour)
     caution = 1.0 if resets_are_counted else 2.0
@@ -138,6 +136,11 @@ def promise_of(
         per_step = math.erfc(math.sqrt(0.5) * r) + math.sqrt(2.0 / math.pi) * r * math.exp(-0.5 * r * r)
     velocity_hz = (len(fixes) - 1) * 1e6 / max(fixes[-1].time_boot_us - fixes[0].time_boot_us, 1)
     return Promise(state.threshold_m_s2, jump_m_s, per_hour + 3600.0 * velocity_hz * per_step)
+
+
+def alarms_per_h(spreads: float, imu_hz: float) -> float:
+    """By sideways noise that a threshold of so many learnt spreads exceeds: exp(-r^2/2) of its samples, by Rayleigh."""
+    return 3600.0 * imu_hz * math.exp(-0.5 * (EXCESS * spreads) ** 2)
 
 
 def _ratio(threshold: float, spread: float) -> float:
