@@ -137,18 +137,18 @@ def _thrust_m_s2(asked_m_s2: Vector3, lean: Lean) -> float:
     n, e, d = asked_m_s2
     place, up = lean.belief.position_ned_m, body_to_ned(lean.belief.attitude_wxyz, (0.0, 0.0, -1.0))
     # A hit turns it sooner than its motors give less: the tilt by then counts.
-    ahead = unit(plus(lean.belief.tilt_m_s2, -GRAVITY_M_S2, (0.0, 0.0, 1.0)))
-    sides = [(one, -along(ahead, one.normal_ned), one.off_m(place)) for one in lean.surfaces]
-    leant_on = [(one, onto, off_m) for one, onto, off_m in sides if onto > 0.0 and off_m < one.distance_m]
-    if not leant_on and -up[2] >= reflex.LEAST_UPRIGHT_COSINE:
+    tilt_n, tilt_e, _ = lean.belief.tilt_m_s2
+    ahead = unit((tilt_n, tilt_e, -GRAVITY_M_S2))
+    near = [one for one in lean.surfaces if one.off_m(place) < one.distance_m and along(ahead, one.normal_ned) < 0.0]
+    if not near and -up[2] >= reflex.LEAST_UPRIGHT_COSINE:
         return (GRAVITY_M_S2 - d) / -up[2]
     # One that lies on a surface does not climb: the thrust for that presses it on.
-    lies = any(off_m <= 0.0 for _, _, off_m in leant_on)
-    thrust_m_s2 = along((n, e, (max(d, 0.0) if lies else d) - GRAVITY_M_S2), ahead if leant_on else up)
-    for one, onto, off_m in leant_on:
+    lies = any(one.off_m(place) <= 0.0 for one in near)
+    thrust_m_s2 = along((n, e, (max(d, 0.0) if lies else d) - GRAVITY_M_S2), ahead if near else up)
+    for one in near:
         # What a hit has turned onto it, and is to lean off it, presses by less than tips it over.
-        if off_m < reflex.PLACE_SPREAD_M and along((n, e, 0.0), one.normal_ned) > 0.0:
-            thrust_m_s2 = min(thrust_m_s2, reflex.PRESSES_M_S2 / onto)
+        if one.off_m(place) < reflex.PLACE_SPREAD_M and along((n, e, 0.0), one.normal_ned) > 0.0:
+            thrust_m_s2 = min(thrust_m_s2, -reflex.PRESSES_M_S2 / along(ahead, one.normal_ned))
     return thrust_m_s2
 
 

@@ -155,9 +155,12 @@ class MotionEstimator:
 
         One that ends is no push the other way.
         """
-        new, all_m_s2, normal = self._new_m_s2, self.external_m_s2, level(self.normal).direction_ned
+        new, all_m_s2 = self._new_m_s2, self.external_m_s2
         least_m_s2 = min(math.hypot(*new), math.hypot(*all_m_s2))
+        if least_m_s2 <= reflex.PRESSES_M_S2:
+            return ZERO
         # What pushes off what was hit is that, sooner than wind.
+        normal = level(self.normal).direction_ned
         off_m_s2 = min(along(new, normal), along(all_m_s2, normal))
         return new if least_m_s2 > reflex.HELD_M_S2 or off_m_s2 > reflex.PRESSES_M_S2 else ZERO
 
