@@ -216,6 +216,12 @@ def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it(off_m, ve
     assert lifting == pytest.approx((GRAVITY_M_S2 + MOST_CLIMB_M_S2) / FULL_M_S2)
 
 
+def test_under_a_ceiling_that_is_not_quite_level_it_is_carried_on():
+    ceiling = Surface(HERE, (-0.05, 0.0, math.sqrt(1.0 - 0.05**2)), 0.35)
+    _, thrust = attitude_and_thrust((-1.0, 0.0, 0.0), lean(Belief(HERE, ZERO), [ceiling]))
+    assert thrust == pytest.approx(GRAVITY_M_S2 / FULL_M_S2, rel=0.01)
+
+
 def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
     # Given one that accelerates by 1 m/s^2 to the north where it takes itself for level
     belief = Belief(HERE, ZERO, level_m_s2=(1.0, 0.0, 0.0))
