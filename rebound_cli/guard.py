@@ -86,7 +86,7 @@ def _recorded(
     finally:
         recorder.close()
         core, flight = guard.core, guard.core.flight
-        outcome, hits = core.machine.outcome, [asdict(collision) for collision in core.collisions()]
+        outcome, hits = flight.reason, [asdict(collision) for collision in core.collisions()]
         summary = {
             "outcome": outcome or "goes on in the next folder",
             "collisions": hits,

@@ -58,7 +58,7 @@ class Between:
         self._clients: dict[str, _Client] = {}
         self._vehicle = Decoder({}, _is_whole)
         self._asked: deque[int] = deque(maxlen=_MOST_ASKED)
-        self._news: deque[str] = deque()
+        self.news: deque[str] = deque()  # about a client, for a person
         self._budget_bytes, self._budget_us = 0.0, 0
 
     def has_room(self, client: str) -> bool:
@@ -78,7 +78,7 @@ class Between:
         if not self.has_room(name):
             if not client.is_flood_told:
                 client.is_flood_told = True
-                self._news.append(f"{name} sends more than the link to the vehicle carries: the rest of it is lost")
+                self.news.append(f"{name} sends more than the link to the vehicle carries: the rest of it is lost")
             return
         for packet, _ in client.framer.feed(received):
             if not isinstance(packet, Stray):
@@ -122,14 +122,6 @@ class Between:
             return None
         setpoint, self._setpoint, self._told_us = self._setpoint, None, now_us
         return setpoint
-
-    def note(self, text: str) -> None:
-        """Something that whoever has the sockets knows of a client."""
-        self._news.append(text)
-
-    def news(self) -> str | None:
-        """Something about a client that a person should know, once."""
-        return self._news.popleft() if self._news else None
 
     def _lets_pass(self, packet: bytes) -> bool:
         if not is_for(packet, self.system_id):

@@ -54,7 +54,6 @@ class GuardMachine(StateMachine):
     flight: GuardContext
     handler: Handler
     state: State = State.CONNECTING
-    outcome: str = ""  # why it ended
     judged: Asked | None = None  # the program's setpoint that was last looked at
 
     @property
@@ -95,7 +94,7 @@ class GuardMachine(StateMachine):
         self._take(Transition(Trigger.STOPPED, text), now_us)
 
     def _release(self, text: str) -> None:
-        self.state, self.handler, self.outcome = State.ENDED, Released(), text
+        self.state, self.handler, self.flight.reason = State.ENDED, Released(), text
 
     def _is_beside_program(self) -> bool:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
@@ -204,7 +203,7 @@ class GuardMachine(StateMachine):
             case State.CRASHED:
                 return Crashed(guard)
             case State.ENDED:
-                self.outcome = transition.text
+                guard.reason = transition.text
                 return Released()
 
 

@@ -79,10 +79,10 @@ class CollisionGuard:
         self._thread.start()
         with self._changed:
             self._changed.wait_for(lambda: self.state is not State.CONNECTING, START_TIMEOUT_S)
-            state, outcome = self.state, self._guard.core.machine.outcome
+            state, reason = self.state, self._guard.core.flight.reason
         if state in (State.CONNECTING, State.ENDED):
             self.stop()
-            raise GuardError(f"No guard: {outcome or 'the vehicle does not answer'}.")
+            raise GuardError(f"No guard: {reason or 'the vehicle does not answer'}.")
 
     def stop(self) -> None:
         """Give the vehicle back if the guard holds it, and release MAVSDK. Takes 10 s at most."""

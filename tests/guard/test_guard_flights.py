@@ -179,7 +179,7 @@ def test_told_to_stop_while_it_holds_it_gives_the_vehicle_to_hold_first():
     air.run_for(0.7)
     air.guard.stop("stopped with Ctrl-C")
     air.run_until(lambda: air.guard.finished, 2.0)
-    assert (air.mode, air.guard.core.machine.outcome) == ("AUTO.LOITER", "stopped with Ctrl-C")
+    assert (air.mode, air.guard.core.flight.reason) == ("AUTO.LOITER", "stopped with Ctrl-C")
 
 
 def test_a_position_that_ends_while_the_guard_holds_has_the_vehicle_given_back_to_hold():
@@ -285,7 +285,7 @@ def test_a_report_of_the_ground_moves_heights_and_fence_only_while_somebody_else
 def test_a_guard_does_not_begin_at_the_end_of_a_slow_link():
     air = Air(faults=[{"kind": "wire", "delay_s": 0.2, "at_s": 0}])
     air.run_until(lambda: air.guard.finished, 30.0)
-    assert air.guard.core.machine.outcome.startswith(
+    assert air.guard.core.flight.reason.startswith(
         "the round trip to the vehicle takes 404 ms and at most 100 ms are allowed"
     )
 

@@ -61,7 +61,7 @@ class UdpPort:
                     self._between.hear(_name(sender), content)
                 elif not self._is_full:
                     self._is_full = True
-                    self._between.note(f"{_name(sender)} sends to the clients' port, too; it is not listened to")
+                    self._between.news.append(f"{_name(sender)} sends to the clients' port, too; it is not listened to")
 
     def send(self, packets: Sequence[bytes]) -> None:
         for datagram in datagrams(packets, DATAGRAM_BYTES):
@@ -116,7 +116,7 @@ class TcpPort:
                 unread += content
             elif name not in self._told:
                 self._told.add(name)
-                self._between.note(f"{name} does not read what it is sent: what it misses is lost")
+                self._between.news.append(f"{name} does not read what it is sent: what it misses is lost")
             # That one has gone is learned when it is read.
             with suppress(OSError):
                 del unread[: client.send(unread)]
@@ -181,7 +181,8 @@ class SharedConnection:
         return self._vehicle.way(frame)
 
     def news(self) -> str | None:
-        return self._vehicle.news() or self._between.news()
+        told = self._between.news
+        return self._vehicle.news() or (told.popleft() if told else None)
 
     @property
     def counts(self) -> LinkCounts:
