@@ -2,6 +2,7 @@
 
 import pytest
 
+from companion.autopilot.interface import Pilot
 from companion.autopilot.px4.firmware import PX4
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
 from companion.guard.config import GuardConfig
@@ -70,6 +71,14 @@ def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_n
 
 
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
+
+
+def test_a_mode_that_the_vehicle_is_about_to_be_in_says_who_flies_it():
+    guard = GuardCore(GuardConfig()).flight
+    guard.vehicle.count_mode(ModeReport(MANUAL, None, False))
+    guard.ask_for_mode(PX4.setpoints)
+    guard.count_asked_mode()
+    assert (guard.vehicle.custom_mode, guard.vehicle.pilot) == (PX4.setpoints, Pilot.SETPOINTS)
 
 
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):

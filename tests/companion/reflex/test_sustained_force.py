@@ -184,7 +184,7 @@ def test_a_beam_met_at_a_crawl_is_moved_away_from():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("speed_m_s", [0.06, 0.8, 1.2, 1.4, 1.6])
+@pytest.mark.parametrize("speed_m_s", [0.06, 0.8, 1.2, 1.3, 1.4, 1.6])
 def test_a_door_that_comes_after_the_hovering_vehicle_is_moved_away_from(speed_m_s):
     # Given a hovering vehicle, and a door that pushes it, or strikes it and goes on for two metres more
     comes = {"velocity_ned_m_s": [-speed_m_s, 0, 0], "from_s": 9.5, "until_s": 20.5 if speed_m_s < 0.1 else 12.5}
