@@ -36,59 +36,58 @@ def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int
     """Take up an expectation; what can be said at once is said."""
     expectation = Expectation(item, now_us, len(flight.collisions), ExpectationReport(label, describe(item)))
     flight.expectations.append(expectation)
+    _look(flight, expectation, now_us)
+
+
+def review(flight: FlightContext, now_us: int, is_over: bool = False) -> None:
+    """Look at those that are still open. `is_over`: a hit that has not come will not, and none is none."""
+    for expectation in flight.expectations:
+        if expectation.report.met is None:
+            _look(flight, expectation, now_us, is_over)
+
+
+def _look(flight: FlightContext, expectation: Expectation, now_us: int, is_over: bool = False) -> None:
+    verdict = _verdict(flight, expectation, now_us)
+    if verdict is None and is_over:
+        verdict = isinstance(expectation.item.check, items.ExpectNoHit), "none until the end of the flight"
+    if verdict is not None:
+        met, detail = verdict
+        expectation.report = replace(expectation.report, met=met, detail=detail)
+        text = f"{'met' if met else 'NOT met'}: {expectation.report.text} ({detail})"
+        flight.report(now_us, "expect", text, met=met)
+
+
+def _verdict(flight: FlightContext, expectation: Expectation, now_us: int) -> tuple[bool, str] | None:
+    """Whether it is met, and what was found; None while a hit may still come."""
+    hits = [record.report() for record in flight.collisions]
+    since, waited_s = hits[expectation.hits_before :], (now_us - expectation.began_us) * 1e-6
     place = flight.mission_ned_m(flight.latest.position_ned_m)
-    match item.check:
-        case items.ExpectHit() | items.ExpectNoHit():
-            return
-        case items.ExpectHits() as hits:
+    match expectation.item.check:
+        case items.ExpectHit() as wanted:
+            bounds = wanted.min_speed_m_s, wanted.max_speed_m_s
+            found = next((hit for hit in since if _is_within(hit.impact_speed_m_s, *bounds)), None)
+            if found is None:
+                return (False, _heard_of(since)) if waited_s > wanted.within_s else None
+            after_s = (found.detected_at_us - expectation.began_us) * 1e-6
+            return after_s <= wanted.within_s, f"{found.impact_speed_m_s:.2f} m/s after {after_s:.2f} s"
+        case items.ExpectNoHit(for_s=for_s):
+            if since:
+                return False, _heard_of(since)
+            return (True, "none") if for_s is not None and waited_s > for_s else None
+        case items.ExpectHits() as number:
             resume = flight.mission.resume
-            count = len(flight.collisions) + (0 if resume is None else resume.hits)
-            met = _is_within(count, hits.at_least, hits.at_most) and hits.exactly in (None, count)
-            detail = f"{count}"
+            count = len(hits) + (0 if resume is None else resume.hits)
+            return _is_within(count, number.at_least, number.at_most) and number.exactly in (None, count), f"{count}"
         case items.ExpectRecovered() as recovered:
-            met, detail = _recovered(recovered, [record.report() for record in flight.collisions])
+            return _recovered(recovered, hits)
         case items.ExpectFlightTime(at_most_s=at_most_s):
             assert flight.armed_at_us is not None
             flown_s = (now_us - flight.armed_at_us) * 1e-6
-            met, detail = flown_s <= at_most_s, f"{flown_s:.1f} s"
+            return flown_s <= at_most_s, f"{flown_s:.1f} s"
         case items.ExpectPosition(ned_m=goal, within_m=within_m):
-            met, detail = math.dist(place, goal) <= within_m, as_text(place)
+            return math.dist(place, goal) <= within_m, as_text(place)
         case items.ExpectHeight() as height:
-            met, detail = _is_within(-place[2], height.min_m or 0.0, height.max_m), f"{-place[2]:.2f} m"
-    _decide(flight, expectation, met, detail, now_us)
-
-
-def review(flight: FlightContext, now_us: int) -> None:
-    """Look at those that are still open: has the hit come, is the time over?"""
-    for expectation in flight.expectations:
-        if expectation.report.met is not None:
-            continue
-        hits = [record.report() for record in flight.collisions[expectation.hits_before :]]
-        waited_s = (now_us - expectation.began_us) * 1e-6
-        match expectation.item.check:
-            case items.ExpectHit() as wanted:
-                bounds = wanted.min_speed_m_s, wanted.max_speed_m_s
-                found = next((hit for hit in hits if _is_within(hit.impact_speed_m_s, *bounds)), None)
-                if found is not None:
-                    after_s = (found.detected_at_us - expectation.began_us) * 1e-6
-                    detail = f"{found.impact_speed_m_s:.2f} m/s after {after_s:.2f} s"
-                    _decide(flight, expectation, after_s <= wanted.within_s, detail, now_us)
-                elif waited_s > wanted.within_s:
-                    _decide(flight, expectation, False, _heard_of(hits), now_us)
-            case items.ExpectNoHit(for_s=for_s):
-                if hits:
-                    _decide(flight, expectation, False, _heard_of(hits), now_us)
-                elif for_s is not None and waited_s > for_s:
-                    _decide(flight, expectation, True, "none", now_us)
-
-
-def close(flight: FlightContext, now_us: int) -> None:
-    """The flight is over: a hit that has not come will not, and none is none."""
-    review(flight, now_us)
-    for expectation in flight.expectations:
-        if expectation.report.met is None:
-            met = isinstance(expectation.item.check, items.ExpectNoHit)
-            _decide(flight, expectation, met, "none until the end of the flight", now_us)
+            return _is_within(-place[2], height.min_m or 0.0, height.max_m), f"{-place[2]:.2f} m"
 
 
 def failure(flight: FlightContext) -> str | None:
@@ -99,12 +98,6 @@ def failure(flight: FlightContext) -> str | None:
     first = failed[0]
     more = f", and {len(failed) - 1} more" if len(failed) > 1 else ""
     return f"expectation of item {first.label} not met: {first.text} (was: {first.detail}){more}"
-
-
-def _decide(flight: FlightContext, expectation: Expectation, met: bool, detail: str, now_us: int) -> None:
-    expectation.report = replace(expectation.report, met=met, detail=detail)
-    word = "met" if met else "NOT met"
-    flight.report(now_us, "expect", f"{word}: {expectation.report.text} ({detail})", met=met)
 
 
 def _heard_of(hits: list[CollisionReport]) -> str:

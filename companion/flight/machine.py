@@ -197,7 +197,7 @@ class Machine(StateMachine):
 
     def _done(self, now_us: int) -> Handler:
         flight = self.flight
-        expectations.close(flight, now_us)
+        expectations.review(flight, now_us, is_over=True)
         failure = expectations.failure(flight)
         left = "" if flight.step.name in ("land", "return") else f"; not flown from item {flight.step.label} on"
         flight.outcome = "completed" if failure is None else "failed"
@@ -212,7 +212,7 @@ class Machine(StateMachine):
         flight = self.flight
         flight.outcome = "failed" if transition.trigger is Trigger.REFUSED or flight.fault else "aborted"
         flight.reason = transition.text
-        expectations.close(flight, now_us)
+        expectations.review(flight, now_us, is_over=True)
         text = f"{flight.outcome}: {transition.text}"
         flight.report(
             now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index
