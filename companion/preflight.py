@@ -47,13 +47,13 @@ UNEVEN_US = 8_000
 
 
 @dataclass(slots=True)
-class Survey:
-    """All that is heard. Times on the companion's clock unless named boot times."""
+class Preflight:
+    """All that is heard. Holds no clock and no socket; times are microseconds of any epoch."""
 
     config: CompanionConfig
     started_us: int
-    streams: StreamMonitor
     line: SerialLine | None = None
+    streams: StreamMonitor = field(init=False)
     delivery: Delivery = field(default_factory=Delivery)
     vehicle: Vehicle = field(default_factory=Vehicle)
     refusal: str | None = None
@@ -67,6 +67,11 @@ class Survey:
     now_us: int = 0
     heartbeat_due_us: int = 0
     ask_due_us: int = 0
+    _decoder: Decoder = field(default_factory=Decoder)
+    _encoder: Encoder = field(default_factory=Encoder)
+
+    def __post_init__(self) -> None:
+        self.streams = StreamMonitor(self.config.streams, (MessageId.VIBRATION,))
 
     @property
     def setup(self) -> Setup:
@@ -93,81 +98,100 @@ class Survey:
         since_us = self.streams.started_us
         return self.refusal is not None or (since_us is not None and self.now_us >= since_us + LISTENING_US)
 
+    @property
+    def _listens(self) -> bool:
+        """What is set afterwards, and the time in which a person reads, changes nothing of what was listened to."""
+        return self.streams.started_us is not None and not self.finished
 
-def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[messages.Outgoing]:
-    """Take what was heard, return what is to be sent; call it every 50 ms at least."""
-    survey.now_us = now_us
-    outgoing: list[messages.Outgoing] = []
-    for sample in samples:
-        _hear(survey, sample, outgoing)
-    if now_us >= survey.heartbeat_due_us:
-        # From the start: a vehicle may wait for somebody before it speaks, or learn from it what time it is.
-        survey.heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
-        outgoing.append(messages.OnboardHeartbeat(active=False))
-    if survey.heard_since_us is None:
-        wait_s = survey.config.link.heartbeat_wait_s
-        if survey.refusal is None and now_us - survey.started_us > wait_s * 1e6:
-            survey.refusal = f"no {NAMES} was heard within {wait_s:g} s; check the address, the cable and the baud rate"
+    def step(self, received: bytes, now_us: int) -> tuple[bytes, ...]:
+        """Call with what was received since the last call, every 50 ms at least; what is to be sent."""
+        frames, known = self._decoder.feed(received), self.vehicle.identity
+        if known is not None and self._listens:
+            for frame, _ in frames:
+                self.delivery.take(frame, (known.system_id, known.component_id))
+        outgoing = self.advance([sample for _, sample in frames if sample is not None], now_us)
+        identity = self.vehicle.identity
+        if identity is not None and known is None:
+            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot)
+            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot)
+        return tuple(packet for message in outgoing for packet in self._encoder.packets(message))
+
+    def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:
+        """Packets that set it. `parameters` has the vehicle's answer after further steps."""
+        self.parameters.pop(name, None)
+        return (*self._encoder.packets(messages.SetParameter(name, value)), *self.step(b"", now_us))
+
+    def advance(self, samples: Sequence[Sample], now_us: int) -> list[messages.Outgoing]:
+        """A step without the codec."""
+        self.now_us = now_us
+        outgoing: list[messages.Outgoing] = []
+        for sample in samples:
+            self._hear(sample, outgoing)
+        if now_us >= self.heartbeat_due_us:
+            # From the start: a vehicle may wait for somebody before it speaks, or learn from it what time it is.
+            self.heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
+            outgoing.append(messages.OnboardHeartbeat(active=False))
+        if self.heard_since_us is None:
+            wait_s = self.config.link.heartbeat_wait_s
+            if self.refusal is None and now_us - self.started_us > wait_s * 1e6:
+                where = "check the address, the cable and the baud rate"
+                self.refusal = f"no {NAMES} was heard within {wait_s:g} s; {where}"
+            return outgoing
+        self._ask(outgoing)
+        if self.streams.started_us is None and now_us - self.heard_since_us >= SETTLING_US:
+            self.streams.start(now_us)
         return outgoing
-    _ask(survey, outgoing)
-    if survey.streams.started_us is None and now_us - survey.heard_since_us >= SETTLING_US:
-        survey.streams.start(now_us)
-    return outgoing
 
+    def _hear(self, sample: Sample, outgoing: list[messages.Outgoing]) -> None:
+        now_us, listens = self.now_us, self._listens
+        self.vehicle.update(sample, now_us)
+        if listens:
+            self.streams.count(type(sample), now_us)
+        match sample:
+            case messages.Heartbeat() if is_autopilot(sample) and self.heard_since_us is None and self.refusal is None:
+                identity = identify(sample)
+                if isinstance(identity, str):
+                    self.refusal = identity
+                else:
+                    self.heard_since_us = now_us
+                    self.vehicle.identity, self.vehicle.autopilot = identity, identity.autopilot
+            case messages.Parameter(name, value) if name in self.vehicle.autopilot.asked(self.line):
+                self.parameters[name] = value
+            case messages.EstimatorStatus():
+                self.estimator.append(sample)
+            case messages.TimeSync(asked_ns, None):
+                outgoing.append(messages.TimeSync(asked_ns, now_us * 1000))
+            case messages.TimeSync():
+                self.round_trip.update(sample, now_us)
+            case messages.ImuSample() if listens:
+                self.imu.append(sample)
+                self.delivery.arrived(sample.time_boot_us, now_us)
+            case messages.LocalPosition() if listens:
+                self.positions.append(sample)
+            case messages.Vibration() if listens:
+                self.vibration.append(sample)
 
-def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> None:
-    # What is set afterwards, and the time in which a person reads, changes nothing of what was listened to.
-    now_us, listens = survey.now_us, survey.streams.started_us is not None and not survey.finished
-    survey.vehicle.update(sample, now_us)
-    if listens:
-        survey.streams.count(type(sample), now_us)
-    match sample:
-        case messages.Heartbeat() if is_autopilot(sample) and survey.heard_since_us is None and survey.refusal is None:
-            identity = identify(sample)
-            if isinstance(identity, str):
-                survey.refusal = identity
-            else:
-                survey.vehicle.identity, survey.heard_since_us = identity, now_us
-                survey.vehicle.autopilot = identity.autopilot
-        case messages.Parameter(name, value) if name in survey.vehicle.autopilot.asked(survey.line):
-            survey.parameters[name] = value
-        case messages.EstimatorStatus():
-            survey.estimator.append(sample)
-        case messages.TimeSync(asked_ns, None):
-            outgoing.append(messages.TimeSync(asked_ns, now_us * 1000))
-        case messages.TimeSync():
-            survey.round_trip.update(sample, now_us)
-        case messages.ImuSample() if listens:
-            survey.imu.append(sample)
-            survey.delivery.arrived(sample.time_boot_us, now_us)
-        case messages.LocalPosition() if listens:
-            survey.positions.append(sample)
-        case messages.Vibration() if listens:
-            survey.vibration.append(sample)
-
-
-def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
-    if survey.now_us >= survey.round_trip.due_us:
-        outgoing.append(survey.round_trip.ask(survey.now_us))
-    if survey.now_us < survey.ask_due_us:
-        return
-    survey.ask_due_us = survey.now_us + ASK_AGAIN_US
-    commands: list[messages.VehicleCommand] = []
-    autopilot = survey.vehicle.autopilot
-    asked = autopilot.asked(survey.line)
-    outgoing += [messages.ReadParameter(name) for name in asked if name not in survey.parameters]
-    if survey.vehicle.version is None:
-        commands.append(messages.request_message(MessageId.AUTOPILOT_VERSION))
-    if survey.streams.started_us is None:
-        commands += [stream.request() for stream in survey.streams.streams]
-        commands += autopilot.streams
-        if autopilot.lesser_imu is not None:
-            # Of a board that has no other. Where both come, the finer one counts.
-            commands.append(
-                messages.set_message_interval(autopilot.lesser_imu, round(1e6 / survey.config.streams.highres_imu_hz))
-            )
-        commands.append(messages.set_message_interval(autopilot.estimator_message, 1_000_000))
-    outgoing += [SendCommand(command, 0) for command in commands]
+    def _ask(self, outgoing: list[messages.Outgoing]) -> None:
+        if self.now_us >= self.round_trip.due_us:
+            outgoing.append(self.round_trip.ask(self.now_us))
+        if self.now_us < self.ask_due_us:
+            return
+        self.ask_due_us = self.now_us + ASK_AGAIN_US
+        autopilot = self.vehicle.autopilot
+        asked = autopilot.asked(self.line)
+        outgoing += [messages.ReadParameter(name) for name in asked if name not in self.parameters]
+        commands: list[messages.VehicleCommand] = []
+        if self.vehicle.version is None:
+            commands.append(messages.request_message(MessageId.AUTOPILOT_VERSION))
+        if self.streams.started_us is None:
+            commands += [stream.request() for stream in self.streams.streams]
+            commands += autopilot.streams
+            if autopilot.lesser_imu is not None:
+                # Of a board that has no other. Where both come, the finer one counts.
+                interval_us = round(1e6 / self.config.streams.highres_imu_hz)
+                commands.append(messages.set_message_interval(autopilot.lesser_imu, interval_us))
+            commands.append(messages.set_message_interval(autopilot.estimator_message, 1_000_000))
+        outgoing += [SendCommand(command, 0) for command in commands]
 
 
 def spread(vectors: Sequence[Vector3]) -> float:
@@ -175,7 +199,7 @@ def spread(vectors: Sequence[Vector3]) -> float:
     return float(np.sqrt(np.var(vectors, axis=0).sum()))
 
 
-def findings(survey: Survey) -> list[PreflightItem]:
+def findings(survey: Preflight) -> list[PreflightItem]:
     """All items, in the order in which they would be mended."""
     autopilot, setup = survey.vehicle.autopilot, survey.setup
     found = [item for judge in autopilot.judge_vehicle for item in judge(setup)]
@@ -185,7 +209,7 @@ def findings(survey: Survey) -> list[PreflightItem]:
     return [*found, autopilot.sight(setup)] if setup.imu_hz else found
 
 
-def _delivery(survey: Survey) -> Iterator[PreflightItem]:
+def _delivery(survey: Preflight) -> Iterator[PreflightItem]:
     delivery, line = survey.delivery, survey.line
     if delivery.received:
         lost, bad, sent = delivery.lost, delivery.unreadable_bytes, delivery.received + delivery.lost
@@ -205,7 +229,7 @@ def _delivery(survey: Survey) -> Iterator[PreflightItem]:
         yield judged("arrival", found, (is_held or jitter_us > UNEVEN_US, DOUBTFUL, remedy))
 
 
-def _streams(survey: Survey) -> Iterator[PreflightItem]:
+def _streams(survey: Preflight) -> Iterator[PreflightItem]:
     rates = survey.streams.rates_hz()
     remedies = survey.vehicle.autopilot.remedies
     for stream in survey.streams.streams:
@@ -219,7 +243,7 @@ def _streams(survey: Survey) -> Iterator[PreflightItem]:
             )
 
 
-def _estimate(survey: Survey) -> Iterator[PreflightItem]:
+def _estimate(survey: Preflight) -> Iterator[PreflightItem]:
     if not survey.positions:
         remedy = "wait for GPS, flow or motion capture; QGroundControl's arming checks name what is missing"
         yield PreflightItem("position", BAD, "no LOCAL_POSITION_NED", remedy)
@@ -253,7 +277,7 @@ def _estimate(survey: Survey) -> Iterator[PreflightItem]:
         )
 
 
-def _vibration(survey: Survey) -> Iterator[PreflightItem]:
+def _vibration(survey: Preflight) -> Iterator[PreflightItem]:
     doing = "hovering" if survey.flies else "standing"
     if survey.vibration:
         clipped = survey.vibration[-1].clipped - survey.vibration[0].clipped
@@ -275,7 +299,7 @@ def _vibration(survey: Survey) -> Iterator[PreflightItem]:
         yield judged("shaking", found, (shakes_m_s2 > STANDS_M_S2, DOUBTFUL, remedy))
 
 
-def _time(survey: Survey) -> PreflightItem:
+def _time(survey: Preflight) -> PreflightItem:
     median_us, worst_us = survey.round_trip.median_us, survey.round_trip.worst_us
     if median_us is None or worst_us is None:
         return PreflightItem("time", DOUBTFUL, "TIMESYNC is not answered", survey.vehicle.autopilot.remedies.no_time)
@@ -287,38 +311,9 @@ def _time(survey: Survey) -> PreflightItem:
     )
 
 
-def _battery(survey: Survey) -> PreflightItem:
+def _battery(survey: Preflight) -> PreflightItem:
     percent = survey.vehicle.battery_percent
     if percent is None:
         return PreflightItem("battery", DOUBTFUL, "unknown", survey.vehicle.autopilot.remedies.no_battery)
     cases = ((percent < BAD_BATTERY, BAD, "charge it"), (percent < DOUBTFUL_BATTERY, DOUBTFUL, "charge it"))
     return judged("battery", f"{percent} %", *cases)
-
-
-class Preflight:
-    """Joins the codec with the pure survey; holds no clock and no socket. Times are microseconds, any epoch."""
-
-    def __init__(self, config: CompanionConfig, now_us: int, line: SerialLine | None = None) -> None:
-        self._decoder, self._encoder = Decoder(), Encoder()
-        self.survey = Survey(config, now_us, StreamMonitor(config.streams, (MessageId.VIBRATION,)), line)
-
-    def step(self, received: bytes, now_us: int) -> tuple[bytes, ...]:
-        """Call with what was received since the last call; what is to be sent."""
-        survey = self.survey
-        frames = self._decoder.feed(received)
-        samples = [sample for _, sample in frames if sample is not None]
-        known = survey.vehicle.identity
-        if known is not None and survey.streams.started_us is not None and not survey.finished:
-            for frame, _ in frames:
-                survey.delivery.take(frame, (known.system_id, known.component_id))
-        outgoing = advance(survey, samples, now_us)
-        identity = survey.vehicle.identity
-        if identity is not None and known is None:
-            self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot)
-            self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot)
-        return tuple(packet for message in outgoing for packet in self._encoder.packets(message))
-
-    def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:
-        """Packets that set it. `survey.parameters` has the vehicle's answer after further steps."""
-        self.survey.parameters.pop(name, None)
-        return (*self._encoder.packets(messages.SetParameter(name, value)), *self.step(b"", now_us))

@@ -32,14 +32,14 @@ def run_preflight(options: Namespace) -> int:
     try:
         preflight = Preflight(config, clock.now_us(), serial_line(options.connect))
         console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")
-        while not preflight.survey.finished:
+        while not preflight.finished:
             _exchange(preflight, connection, clock)
             if (news := connection.news()) is not None:
                 console.print(news)
-        if preflight.survey.refusal is not None:
-            raise ConfigurationError(preflight.survey.refusal[:1].upper() + preflight.survey.refusal[1:] + ".")
-        found = findings(preflight.survey)
-        show(console, preflight.survey.vehicle, found)
+        if preflight.refusal is not None:
+            raise ConfigurationError(preflight.refusal[:1].upper() + preflight.refusal[1:] + ".")
+        found = findings(preflight)
+        show(console, preflight.vehicle, found)
         if options.json:
             print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
         if options.fix:
@@ -89,7 +89,7 @@ def _fix(
     console: Console, preflight: Preflight, connection: Connection, clock: Clock, found: list[PreflightItem]
 ) -> list[PreflightItem]:
     """Set what can be set, one by one as the person agrees; the findings afterwards."""
-    if preflight.survey.vehicle.armed:
+    if preflight.vehicle.armed:
         raise ConfigurationError("The vehicle is armed: nothing is set on a vehicle that may be flying.")
     for finding in found:
         if finding.fix is None:
@@ -102,8 +102,8 @@ def _fix(
         for frame in preflight.set_parameter(name, value, clock.now_us()):
             connection.send(frame)
         until_us = clock.now_us() + round(SETTING_TAKES_S * 1e6)
-        while name not in preflight.survey.parameters and clock.now_us() < until_us:
+        while name not in preflight.parameters and clock.now_us() < until_us:
             _exchange(preflight, connection, clock)
-        answer = preflight.survey.parameters.get(name)
+        answer = preflight.parameters.get(name)
         console.print(f"  {name} is {'not told' if answer is None else format(answer, 'g')} now")
-    return findings(preflight.survey)
+    return findings(preflight)

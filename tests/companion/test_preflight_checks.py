@@ -8,7 +8,7 @@ from companion import messages
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.messages import Attitude, LocalPosition, Parameter, ReadParameter, Sample, TimeSync
 from companion.mission.config import CompanionConfig
-from companion.preflight import Preflight, Survey, advance, findings
+from companion.preflight import Preflight, findings
 
 PX4 = messages.Heartbeat(1, 1, 2, 12, False, 0, 3)
 HEALTHY = {
@@ -56,10 +56,10 @@ def surveyed(
     held_us=0,
     flies=False,
     shakes_m_s2=0.0,
-) -> Survey:
+) -> Preflight:
     """A vehicle that was listened to for the whole time; its samples arrive in batches, every `held_us`."""
-    survey = Preflight(CompanionConfig(), 0, line).survey
-    advance(survey, [PX4], 0)
+    survey = Preflight(CompanionConfig(), 0, line)
+    survey.advance([PX4], 0)
     step_us, asked = 4_000, []
     held: list[Sample] = []
     for number in range(11_200_000 // step_us):
@@ -81,17 +81,17 @@ def surveyed(
             samples += [replace(PX4, armed=flies), messages.ExtendedState(messages.LandedState(2 if flies else 1))]
         if asked and now_us - asked[0] // 1000 >= trip_us:
             samples.append(TimeSync(asked.pop(0), 1))
-        sent = advance(survey, samples, now_us)
+        sent = survey.advance(samples, now_us)
         asked += [message.asked_ns for message in sent if isinstance(message, TimeSync)]
     assert survey.finished
     return survey
 
 
-def verdicts(survey: Survey) -> dict[str, Verdict]:
+def verdicts(survey: Preflight) -> dict[str, Verdict]:
     return {finding.item: finding.verdict for finding in findings(survey)}
 
 
-def found_in(survey: Survey):
+def found_in(survey: Preflight):
     return {finding.item: finding for finding in findings(survey)}
 
 
@@ -220,29 +220,29 @@ def test_what_is_measured_is_judged(wrong, item, verdict):
 def test_the_time_in_which_a_person_reads_changes_nothing():
     survey = surveyed()
     before = verdicts(survey)
-    advance(survey, [messages.ImuSample(80_000_000, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))], 80_000_000)
+    survey.advance([messages.ImuSample(80_000_000, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))], 80_000_000)
     assert verdicts(survey) == before
 
 
 def test_of_a_copter_the_lesser_imu_is_asked_for_too():
-    survey = Preflight(CompanionConfig(), 0).survey
-    sent = advance(survey, [replace(PX4, autopilot=3)], 1_000_000)
+    survey = Preflight(CompanionConfig(), 0)
+    sent = survey.advance([replace(PX4, autopilot=3)], 1_000_000)
     assert (27, 4000) in [message.command.parameters for message in sent if isinstance(message, messages.SendCommand)]
 
 
 def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
     known = {name: value for name, value in HEALTHY.items() if name != "COM_OF_LOSS_T"}
     survey = surveyed(known)
-    asked = [message for message in advance(survey, [], 12_000_000) if isinstance(message, ReadParameter)]
+    asked = [message for message in survey.advance([], 12_000_000) if isinstance(message, ReadParameter)]
     assert asked == [ReadParameter("COM_OF_LOSS_T")]
     found = found_in(survey)["COM_OF_LOSS_T"]
     assert found.verdict is Verdict.DOUBTFUL and "did not tell" in found.found
 
 
 def test_silence_is_told_after_the_stated_wait():
-    survey = Preflight(CompanionConfig(), 0).survey
-    advance(survey, [], 9_900_000)
+    survey = Preflight(CompanionConfig(), 0)
+    survey.advance([], 9_900_000)
     assert not survey.finished
-    advance(survey, [], 10_100_000)
+    survey.advance([], 10_100_000)
     assert survey.finished
     assert "no PX4" in (survey.refusal or "")

@@ -141,7 +141,7 @@ def test_bash_completes_commands_options_choices_and_files(typed, offered, capsy
 def surveyed(damaged: Callable[[bytes], bytes] = bytes) -> tuple[Preflight, SimulatedVehicle]:
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), seed=1, keeps_path=False)
     preflight = Preflight(CompanionConfig(), vehicle.time_boot_us)
-    while not preflight.survey.finished:
+    while not preflight.finished:
         exchange(preflight, vehicle, damaged=damaged)
     return preflight, vehicle
 
@@ -160,8 +160,8 @@ def exchange(
 
 def test_the_simulated_vehicle_is_found_ready_but_for_what_a_fresh_px4_leaves_open():
     preflight, vehicle = surveyed()
-    found = {finding.item: finding for finding in findings(preflight.survey)}
-    assert preflight.survey.vehicle.identity is not None
+    found = {finding.item: finding for finding in findings(preflight)}
+    assert preflight.vehicle.identity is not None
     assert not [item for item, finding in found.items() if finding.verdict is Verdict.BAD]
     assert [item for item, finding in found.items() if finding.fix] == [
         "COM_OBL_RC_ACT",
@@ -175,8 +175,8 @@ def test_the_simulated_vehicle_is_found_ready_but_for_what_a_fresh_px4_leaves_op
     exchange(preflight, vehicle, preflight.set_parameter("COM_RCL_EXCEPT", 4, vehicle.time_boot_us))
     for _ in range(25):
         exchange(preflight, vehicle)
-    assert preflight.survey.parameters["COM_RCL_EXCEPT"] == 4
-    assert {finding.item: finding for finding in findings(preflight.survey)}["COM_RCL_EXCEPT"].verdict is Verdict.GOOD
+    assert preflight.parameters["COM_RCL_EXCEPT"] == 4
+    assert {finding.item: finding for finding in findings(preflight)}["COM_RCL_EXCEPT"].verdict is Verdict.GOOD
 
 
 def test_packets_that_are_lost_or_damaged_on_the_way_are_counted():
@@ -190,10 +190,10 @@ def test_packets_that_are_lost_or_damaged_on_the_way_are_counted():
         return packet[:-3] + bytes((packet[-3] ^ 0xFF,)) + packet[-2:] if number % 100 == 0 else packet
 
     preflight, _ = surveyed(worn)
-    delivery = preflight.survey.delivery
+    delivery = preflight.delivery
     assert delivery.lost == pytest.approx(0.11 * (delivery.received + delivery.lost), rel=0.03)
     assert delivery.unreadable_bytes > 10 * delivery.lost / 11
-    finding = {finding.item: finding for finding in findings(preflight.survey)}["packets"]
+    finding = {finding.item: finding for finding in findings(preflight)}["packets"]
     assert finding.verdict is Verdict.DOUBTFUL
     assert "(11." in finding.found or "(10." in finding.found
 
