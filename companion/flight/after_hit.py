@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from companion.flight.context import BeforeHit, FlightContext, Target, Transition
-from companion.flight.states import State, Trigger
+from companion.flight.states import TABLE, State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, WaitForItem
 from companion.mission.policy import OnCollision
 from companion.reflex.recovery.collision import recoveries_from
@@ -60,14 +60,8 @@ def lands_anyway(flight: FlightContext) -> bool:
     return flight.is_landing and recoveries_from(flight.collisions) >= flight.mission.on_collision.max_hits
 
 
-# What goes on after a hit that was none.
-_GOES_ON = {
-    State.TAKEOFF: Trigger.RECOVERED_TO_RETRY,
-    State.MISSION: Trigger.RECOVERED_TO_RETRY,
-    State.HOLDING: Trigger.RECOVERED_TO_HOLD,
-    State.RETURNING: Trigger.RECOVERED_TO_RETURN,
-    State.LANDING: Trigger.RECOVERED_TO_LAND,
-}
+# What leads from a recovery back to each state.
+_BACK_TO = {state: trigger for trigger, state in TABLE[State.RECOVERING].items()}
 
 
 def note_before(flight: FlightContext, state: State) -> None:
@@ -89,4 +83,5 @@ def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     flight.step_index = before.step_index
     flight.after_recovery = before.after_recovery
     flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
-    return Transition(_GOES_ON[before.state])
+    # A climb goes on as the mission's first item.
+    return Transition(_BACK_TO.get(before.state, Trigger.RECOVERED_TO_RETRY))
