@@ -59,7 +59,6 @@ class Target:
         return Target(self.position_ned_m, self.yaw_rad)
 
     def setpoint(self, time_us: int) -> PositionSetpoint | AttitudeSetpoint:
-        """As it is sent."""
         if self.lean is not None and self.acceleration_ned_m_s2 is not None:
             return self.lean.setpoint(time_us, self.acceleration_ned_m_s2)
         velocity, acceleration = self.velocity_ned_m_s, self.acceleration_ned_m_s2
@@ -190,7 +189,6 @@ class FlightContext:
 
     @property
     def latest(self) -> LocalPosition:
-        """The newest position and velocity."""
         latest = self.vehicle.history.latest
         assert latest is not None, "a flight begins only with positions arriving"
         return latest
@@ -229,7 +227,6 @@ class FlightContext:
         return wanted_rad if abs(short_rad) <= lead_rad else heading_rad + math.copysign(lead_rad, short_rad)
 
     def report(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
-        """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
 
     @property
@@ -238,7 +235,6 @@ class FlightContext:
         return () if self.expected_mode is None else (self.expected_mode, self.command_client.requested_mode)
 
     def silent_s(self, now_us: int) -> float:
-        """Seconds since the last message of the vehicle."""
         return (now_us - self.vehicle.last_received_us) * 1e-6
 
     def is_silent(self, now_us: int) -> bool:

@@ -111,7 +111,6 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Setpoint
 
 
 def is_finite(target: Target) -> bool:
-    """Whether every number of the setpoint is."""
     values = [*target.position_ned_m, *(target.velocity_ned_m_s or ()), *(target.acceleration_ned_m_s2 or ())]
     if target.lean is not None:
         belief = target.lean.belief
@@ -133,11 +132,11 @@ def _with_place(
         reasons += ["too near to what is known"] if place is not asked else []
     if around.last_ned_m is not None:
         most_m = limits.max_speed_m_s * around.since_last_s + _ROUNDING_M
-        place, is_fast = _within_step(place, around.last_ned_m, most_m)
-        reasons += [f"moves faster than {limits.max_speed_m_s:g} m/s"] if is_fast else []
+        wanted, place = place, _within_step(place, around.last_ned_m, most_m)
+        reasons += [f"moves faster than {limits.max_speed_m_s:g} m/s"] if place is not wanted else []
     if vehicle is not None:
-        place, is_far = _within_step(place, vehicle, limits.max_step_m)
-        reasons += [f"more than {limits.max_step_m:g} m from the vehicle"] if is_far else []
+        wanted, place = place, _within_step(place, vehicle, limits.max_step_m)
+        reasons += [f"more than {limits.max_step_m:g} m from the vehicle"] if place is not wanted else []
     if around.origin_ned_m is not None:
         inside = _within_fence(place, around.origin_ned_m, fence, around.has_floor)
         if math.dist(inside, place) > _ROUNDING_M:
@@ -224,12 +223,10 @@ def _ahead(around: Surroundings, fence: Fence, start: Vector3, end: Vector3) -> 
     return surfaces
 
 
-def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3, bool]:
-    """The place, or where the way from the start to it is `most_m` long; and whether that is shorter."""
+def _within_step(place: Vector3, start: Vector3, most_m: float) -> Vector3:
+    """The place, or where the way from the start to it is `most_m` long."""
     distance_m = math.dist(place, start)
-    if distance_m <= most_m:
-        return place, False
-    return towards(start, place, most_m / distance_m), True
+    return place if distance_m <= most_m else towards(start, place, most_m / distance_m)
 
 
 def _within_fence(place: Vector3, origin: Vector3, fence: Fence, has_floor: bool) -> Vector3:

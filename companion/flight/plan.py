@@ -68,8 +68,8 @@ def _condition(item: items.WaitForItem) -> str:
     return "for a hit" if item.hit else f"for the file {item.file}"
 
 
-def describe_after_recovery(on_collision: OnCollision) -> str:
-    words = {
+def _after_recovery(on_collision: OnCollision) -> str:
+    then = {
         "hold": f"hold for {on_collision.hold_s:g} s, then go on with the next item",
         "continue": "go on with the next item at once",
         "retry": f"try the item again at {on_collision.retry_speed_factor:.0%} of the speed",
@@ -77,18 +77,14 @@ def describe_after_recovery(on_collision: OnCollision) -> str:
         "return": "return to above the start and land",
         "land": "land",
     }
-    return words[on_collision.then]
-
-
-def describe_limit(on_collision: OnCollision) -> str:
-    return f"hit {on_collision.max_hits}: {_AFTER[on_collision.after_max_hits]}"
+    return f"{then[on_collision.then]}; hit {on_collision.max_hits}: {_AFTER[on_collision.after_max_hits]}"
 
 
 def describe_modifiers(item: items.MissionItem) -> str:
     """What an item has of its own beside its action, or nothing."""
     parts = []
     if item.on_collision is not None:
-        parts.append(f"on a hit: {describe_after_recovery(item.on_collision)}; {describe_limit(item.on_collision)}")
+        parts.append(f"on a hit: {_after_recovery(item.on_collision)}")
     if item.timeout_s is not None:
         parts.append(f"after {item.timeout_s:g} s: {item.on_timeout}")
     return "; ".join(parts)
@@ -123,7 +119,7 @@ def mission_lines(mission: Mission, autopilot: Autopilot = ASSUMED) -> list[str]
     lines += [
         f"Fence      setpoints stay {describe_fence(mission.fence)}",
         f"On a hit   detector {mission.companion.detector}, recovery law {_law(mission.recovery)}; "
-        f"then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
+        f"then {_after_recovery(on_hit)}",
         *([] if mission.on_damage == "tell" else [f"{_DAMAGED}: {_AFTER[mission.on_damage]}"]),
         f"Obstacles  keep {obstacles.margin_m:g} m off what is known; no way: {_AFTER[obstacles.on_unreachable]}",
         *[f"Known      {describe_patch(patch)}" for patch in obstacles.patches()],

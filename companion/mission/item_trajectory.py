@@ -62,7 +62,6 @@ class SpeedLimits:
         return self.slowed_m_s(speed), acceleration, self.speeding_up_m_s2
 
     def slowed_m_s(self, speed_m_s: float) -> float:
-        """A speed in another try."""
         return max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
 
 
@@ -73,7 +72,6 @@ def climb(start_m: Vector3, height_m: float, config: FlightConfig, most_m_s: flo
 
 
 def stay(place_m: Vector3) -> LineProfile:
-    """A trajectory of no length."""
     return LineProfile(place_m, place_m, 1.0, 1.0)
 
 
@@ -207,7 +205,6 @@ def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, k
 
 
 def lines(places_m: Sequence[Vector3], limits: SpeedAndAccelerations) -> Chain:
-    """Straight from each to the next, at rest in each."""
     return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
 

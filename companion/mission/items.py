@@ -345,7 +345,6 @@ class MissionItem(StrictModel):
 
     @property
     def _given(self) -> dict[str, Any]:
-        """Actions by their names."""
         given = {field.removesuffix("_"): value for field, value in self if value is not None}
         return {name: value for name, value in given.items() if name in ACTIONS}
 

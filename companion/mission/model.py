@@ -62,7 +62,6 @@ class Mission(StrictModel):
     """The simulated world (see `sim_vehicle.scene.Scene`)."""
 
     def known(self, patches: tuple[Patch, ...], keeps_in: bool = True) -> ObstacleMap:
-        """The map of these."""
         return ObstacleMap(patches, self.fence, self.companion.estimate.reach_m, self.obstacles.margin_m, keeps_in)
 
     @model_validator(mode="after")

@@ -92,7 +92,6 @@ class LineProfile:
         return plus(self.start_m, way, (n, e, d)), (n * rate, e * rate, d * rate), (n * change, e * change, d * change)
 
     def moved(self, by_m: Vector3) -> "LineProfile":
-        """The same elsewhere."""
         return replace(self, start_m=plus(self.start_m, 1.0, by_m), target_m=plus(self.target_m, 1.0, by_m))
 
 

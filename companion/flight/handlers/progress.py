@@ -42,7 +42,6 @@ class _OnTrajectory:
         return (flight.trajectory_us - self._trajectory_began_us) * 1e-6
 
     def _turned(self, flight: FlightContext, motion: Motion, now_us: int) -> float | None:
-        """The heading at this motion."""
         return flight.heading_towards()
 
     def target(self, flight: FlightContext, now_us: int) -> Target:
@@ -54,7 +53,6 @@ class _OnTrajectory:
         return target if flight.has_position and elapsed_s < self._trajectory.duration_s else target.at_rest()
 
     def _is_there(self, flight: FlightContext) -> bool:
-        """Whether it has arrived at its goal."""
         most_m = flight.mission.companion.flight.acceptance_radius_m
         return math.dist(flight.latest.position_ned_m, self._goal(flight)) <= most_m
 
@@ -259,7 +257,6 @@ class Heading:
     """A heading that turns to the item's. Radians clockwise from north; None: the vehicle chooses."""
 
     def __init__(self, action: items.Action, yaw_rad: float | None, now_us: int) -> None:
-        """`yaw_rad`: the present one."""
         asked, self._at_us = getattr(action, "yaw_deg", None), now_us
         self.rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else TURNING_RAD_S
         self.fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad

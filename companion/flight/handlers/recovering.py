@@ -8,7 +8,6 @@ from companion.reflex.recovery.recovery import Progress
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
-    """Have the reflex recover from a collision, and tell of it."""
     record, reason = flight.reflex.begin(estimate, FlightRoom(flight), now_us), flight.reflex.why_by_position
     if reason is not None and not flight.told_by_position:
         flight.told_by_position = True
