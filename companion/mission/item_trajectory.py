@@ -77,15 +77,9 @@ def stay(place_m: Vector3) -> LineProfile:
 
 def first_leg(item: items.Motion, start_m: Vector3) -> Vector3:
     """The vector to the item's first point; of an orbit, to its centre, as all directions follow."""
-    match item:
-        case items.VelocityItem():
-            return item.velocity_ned_m_s
-        case items.GoToItem():
-            first = item.position_ned_m
-        case items.PathItem():
-            first = item.points_ned_m[0]
-        case items.OrbitItem():
-            first = item.centre_ned_m
+    if isinstance(item, items.VelocityItem):
+        return item.velocity_ned_m_s
+    first = item.centre_ned_m if isinstance(item, items.OrbitItem) else _points_of(item)[0]
     return minus(first, start_m)
 
 
@@ -152,7 +146,7 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
         return Planned(own)
     if isinstance(item, items.OrbitItem) and item.turns > 1.0:
         return _turn_by_turn(item, start_m, speeds, known)
-    points = _points_of(item, own)
+    points = _round_by_points(item, own) if isinstance(item, items.OrbitItem) else _points_of(item)
     places, left_out = [start_m], 0
     for point in points:
         is_welcome = not isinstance(item, items.OrbitItem) or known.is_clear(point, start_m)
@@ -254,15 +248,13 @@ def _leaves(trajectory: Trajectory, fence: Fence) -> bool:
     return any(fence.outside_by_m(place) > ROUNDING_M for place in looks(trajectory))
 
 
-def _points_of(item: items.GoToItem | items.PathItem | items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:
-    match item:
-        case items.GoToItem():
-            return (item.position_ned_m,)
-        case items.PathItem():
-            return item.points_ned_m
-        case items.OrbitItem():
-            assert isinstance(own, Chain), "to the circle and round it"
-            circle = own.parts[1]
-            count = math.ceil(360.0 * item.turns / ROUND_BY_DEG)
-            # Evenly in time is nearly evenly round, as a circle's ramps are short.
-            return [circle.at(circle.duration_s * number / count)[0] for number in range(count + 1)]
+def _points_of(item: items.GoToItem | items.PathItem) -> Sequence[Vector3]:
+    return item.points_ned_m if isinstance(item, items.PathItem) else (item.position_ned_m,)
+
+
+def _round_by_points(item: items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:
+    assert isinstance(own, Chain), "to the circle and round it"
+    circle = own.parts[1]
+    count = math.ceil(360.0 * item.turns / ROUND_BY_DEG)
+    # Evenly in time is nearly evenly round, as a circle's ramps are short.
+    return [circle.at(circle.duration_s * number / count)[0] for number in range(count + 1)]

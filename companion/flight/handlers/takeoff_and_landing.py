@@ -84,7 +84,7 @@ class TakeOff:
             return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}")
         self._now = self._climb
         if self._is_told:
-            self._now, flight.target = self._leave_ground, None
+            flight.target = None
             flight.command_client.begin(take_off(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us  # on the clock of ways
@@ -96,18 +96,13 @@ class TakeOff:
         flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=boot_us)
         return None
 
-    def _leave_ground(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        """Until the vehicle has agreed to take off by itself."""
-        outcome = flight.command_outcome(inputs, False, now_us)
-        if outcome is not None and not outcome.succeeded:
-            return Transition(Trigger.REFUSED, f"no take-off: {outcome.text}")
-        if outcome is not None:
-            self._now = self._climb
-        return None
-
     def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         profile, latest, limits = self._profile, flight.latest, flight.mission.companion.flight
         assert profile is not None, "it is armed"
+        # A vehicle that takes off by itself has to agree to it.
+        outcome = None if flight.command_client.pending is None else flight.command_outcome(inputs, False, now_us)
+        if outcome is not None and not outcome.succeeded:
+            return Transition(Trigger.REFUSED, f"no take-off: {outcome.text}")
         if latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
             self._climbing_s += (flight.trajectory_us - self._climbed_until_us) * 1e-6
         self._climbed_until_us = flight.trajectory_us
