@@ -18,15 +18,7 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
-from companion.mission.item_trajectory import (
-    LEAST_TRY_M_S,
-    Planned,
-    SpeedLimits,
-    climb,
-    home_around,
-    stay,
-    trajectory_around,
-)
+from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, stay, trajectory_around
 from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, Handover, OnCollision, OnCrash, OnDamage, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
@@ -214,19 +206,3 @@ def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:
         if beyond_m > _ROUNDING_M:
             return fence.complaint(position)
     return None
-
-
-def longest_s(mission: Mission, wait_s: float) -> float:
-    """Time of all steps, `wait_s` for each wait without a known end."""
-    return sum(wait_s if leg.lasts_s is None else leg.lasts_s for leg in itinerary(mission))
-
-
-def tried_again_s(mission: Mission) -> float:
-    """Time of the longest step that `retry` flies again after each hit, always as slowly as it ever does."""
-    longest = 0.0
-    for leg in itinerary(mission):
-        policy = leg.step.item.on_collision or mission.on_collision
-        if policy.then == "retry" and leg.trajectory is not None:
-            slowest_s = max(leg.lasts_s or 0.0, leg.trajectory.distance_m / LEAST_TRY_M_S)
-            longest = max(longest, policy.max_hits * slowest_s)
-    return longest

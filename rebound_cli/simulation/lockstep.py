@@ -7,7 +7,8 @@ from functools import partial
 from typing import Protocol
 
 from companion.companion import Companion
-from companion.mission.model import Mission, longest_s, tried_again_s
+from companion.mission.item_trajectory import LEAST_TRY_M_S
+from companion.mission.model import Mission, itinerary
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import look_for_file
@@ -45,8 +46,16 @@ class SteppedVehicle(Protocol):
 
 def virtual_time_limit_s(mission: Mission) -> float:
     """Longest virtual time a mission may reasonably take; a flight beyond it hangs."""
-    hits = mission.on_collision.max_hits * (mission.on_collision.hold_s + mission.companion.settled.timeout_s)
-    return _LIMIT_MARGIN_S + _LIMIT_FACTOR * longest_s(mission, _LONGEST_WAIT_S) + hits + tried_again_s(mission)
+    recovers_s = mission.on_collision.hold_s + mission.companion.settled.timeout_s
+    limit_s, again_s = _LIMIT_MARGIN_S + mission.on_collision.max_hits * recovers_s, 0.0
+    for leg in itinerary(mission):
+        limit_s += _LIMIT_FACTOR * (_LONGEST_WAIT_S if leg.lasts_s is None else leg.lasts_s)
+        policy = leg.step.item.on_collision or mission.on_collision
+        if policy.then == "retry" and leg.trajectory is not None:
+            # The longest of these, after each hit, and always as slowly as it is ever tried again.
+            slowest_s = max(leg.lasts_s or 0.0, leg.trajectory.distance_m / LEAST_TRY_M_S)
+            again_s = max(again_s, policy.max_hits * slowest_s)
+    return limit_s + again_s
 
 
 def fly_mission_lockstep(
