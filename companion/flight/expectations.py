@@ -79,7 +79,14 @@ def _verdict(flight: FlightContext, expectation: Expectation, now_us: int) -> tu
             count = len(hits) + (0 if resume is None else resume.hits)
             return _is_within(count, number.at_least, number.at_most) and number.exactly in (None, count), f"{count}"
         case items.ExpectRecovered() as recovered:
-            return _recovered(recovered, hits)
+            if not hits:
+                return False, "no hit"
+            settled_s, past_m = hits[-1].settled_after_s, hits[-1].overshoot_m
+            if settled_s is None:
+                return False, "not settled"
+            is_soon = _is_within(settled_s, None, recovered.within_s)
+            is_good = is_soon and _is_within(past_m, None, recovered.max_overshoot_m)
+            return is_good, f"settled after {settled_s:.2f} s, {past_m:.2f} m too far"
         case items.ExpectFlightTime(at_most_s=at_most_s):
             assert flight.armed_at_us is not None
             flown_s = (now_us - flight.armed_at_us) * 1e-6
@@ -102,16 +109,6 @@ def failure(flight: FlightContext) -> str | None:
 
 def _heard_of(hits: list[CollisionReport]) -> str:
     return ", ".join(f"hit at {hit.impact_speed_m_s:.2f} m/s" for hit in hits) or "no hit"
-
-
-def _recovered(wanted: items.ExpectRecovered, hits: list[CollisionReport]) -> tuple[bool, str]:
-    if not hits:
-        return False, "no hit"
-    settled_s, overshoot_m = hits[-1].settled_after_s, hits[-1].overshoot_m
-    if settled_s is None:
-        return False, "not settled"
-    is_good = _is_within(settled_s, None, wanted.within_s) and _is_within(overshoot_m, None, wanted.max_overshoot_m)
-    return is_good, f"settled after {settled_s:.2f} s, {overshoot_m:.2f} m too far"
 
 
 def _is_within(value: float, low: float | None, high: float | None) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from companion.flight import expectations
 from companion.flight.context import TURNING_RAD_S, FlightContext, Inputs, StepTally, Target, Transition
-from companion.flight.handlers.takeoff_and_landing import Rest
+from companion.flight.handlers.takeoff_and_landing import rests
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
@@ -76,7 +76,7 @@ class FlyItems(_OnTrajectory):
         self._trajectory_began_us = flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading(step.action, flight.yaw_rad, now_us)
-        self._steady, self._rest = Lasting(), Rest()
+        self._steady = Lasting()  # at the setpoint, or at the item's goal
         self._trajectory: Trajectory = stay(start)
         self._is_held, self._wanted_ned_m = False, flight.target.position_ned_m
         self._motion: items.Motion | None = None
@@ -185,9 +185,8 @@ class FlyItems(_OnTrajectory):
                     return False
                 if self._over_since_us is None:
                     self._over_since_us = now_us
-                return self._is_there(flight) and (
-                    not self._is_judged(flight) or self._rest.at(flight, self._goal(flight))
-                )
+                is_there = self._is_there(flight)
+                return is_there and (not self._is_judged(flight) or rests(flight, self._steady, self._goal(flight)))
 
     def _is_judged(self, flight: FlightContext) -> bool:
         """Whether what is expected follows, and then the landing: its rest belongs to the item."""

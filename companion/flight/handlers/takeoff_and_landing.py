@@ -152,19 +152,15 @@ BRAKES_S = 1.0
 RESTS_WITHIN_US = 6_000_000
 
 
-class Rest:
-    """Whether a vehicle stays at a place: one that turns round is slow for a moment, too."""
-
-    def __init__(self) -> None:
-        self._steady = Lasting()
-
-    def at(self, flight: FlightContext, goal_ned_m: Vector3) -> bool:
-        """Call with each position."""
-        config, latest = flight.mission.companion, flight.latest
-        place = flight.reflex.place_ned_m(latest)
-        off_m = max(math.dist(each, goal_ned_m) for each in (place, plus(place, BRAKES_S, latest.velocity_ned_m_s)))
-        self._steady.update(off_m <= config.flight.acceptance_radius_m, latest.time_boot_us)
-        return self._steady.lasts_us >= config.settled.duration_s * 1e6
+def rests(flight: FlightContext, near: Lasting, goal_ned_m: Vector3) -> bool:
+    """Whether a vehicle stays at a place: one that turns round is slow for a moment, too. `near`: for how long it has
+    been there; call with each position.
+    """
+    config, latest = flight.mission.companion, flight.latest
+    place = flight.reflex.place_ned_m(latest)
+    off_m = max(math.dist(each, goal_ned_m) for each in (place, plus(place, BRAKES_S, latest.velocity_ned_m_s)))
+    near.update(off_m <= config.flight.acceptance_radius_m, latest.time_boot_us)
+    return near.lasts_us >= config.settled.duration_s * 1e6
 
 
 class Land(FixedSetpoint):
@@ -178,7 +174,7 @@ class Land(FixedSetpoint):
         self._started_us = now_us
         self._target = flight.target and flight.target.at_rest()
         self._is_asked = self._landing = False
-        self._rest = Rest()
+        self._near = Lasting()
         flight.is_landing = True
 
     def _waits(self, flight: FlightContext, now_us: int) -> bool:
@@ -187,8 +183,8 @@ class Land(FixedSetpoint):
         is_high = height_m is not None and height_m >= flight.mission.companion.min_detection_height_m
         if self._target is None or is_hurt or not is_high:
             return False
-        rests = self._rest.at(flight, self._target.position_ned_m)
-        return not rests and now_us - self._started_us < RESTS_WITHIN_US
+        is_moving = not rests(flight, self._near, self._target.position_ned_m)
+        return is_moving and now_us - self._started_us < RESTS_WITHIN_US
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if flight.vehicle.armed is False:
