@@ -9,7 +9,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from companion.autopilot.px4.modes import AUTO_LOITER
 from companion.companion import StepResult
 from companion.mavlink.packet import message_id_of
 from companion.messages import ComputerStatus
@@ -24,8 +23,9 @@ from rebound_cli.main import main
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.timing import TOO_LATE_US, Timing
+from rebound_cli.simulation.lockstep import EPOCH_US
 from tests.rebound_cli.command import SQUARE, assert_comes_again, events_of, run_here
-from tests.rebound_cli.live.flying import EPOCH_US, World, fly
+from tests.rebound_cli.live.flying import World, fly
 
 
 class Gone:
@@ -122,7 +122,7 @@ def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, happen
     failed_us = next(event.time_us for event in recorder.events if event.kind == "aborted")
     assert companion.finished and world.now_us() - failed_us < HANDING_OVER_US
     world.sleep(1.1)
-    assert world.custom_mode == AUTO_LOITER
+    assert world.vehicle.mode == "Hold"
     assert words in problem and "the vehicle was handed over" in problem and "\n" not in problem
     assert words in companion.report().reason
     assert_comes_again(tmp_path)
