@@ -11,7 +11,7 @@ from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, RECEI
 from companion.motion.delay import Delay
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
-from companion.motion.rotation import body_to_ned, tilt_rad, turned, yaw_rad
+from companion.motion.rotation import tilt_rad, turned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, plus
@@ -35,25 +35,6 @@ def test_history_keeps_two_seconds_drops_late_packets_and_starts_anew_after_a_re
     assert history.add(rebooted)
     assert history.between(0, CONTACT_US) == [rebooted]
     assert history.before(1001) is rebooted and history.before(1000) is None
-
-
-HALF = math.sqrt(0.5)
-
-
-@pytest.mark.parametrize(
-    ("attitude", "nose_ned", "right_ned", "yaw"),
-    [
-        ((1.0, 0.0, 0.0, 0.0), (1, 0, 0), (0, 1, 0), 0.0),  # nose north
-        ((HALF, 0.0, 0.0, HALF), (0, 1, 0), (-1, 0, 0), math.pi / 2),  # nose east
-        ((HALF, 0.0, HALF, 0.0), (0, 0, -1), (0, 1, 0), None),  # nose up
-        ((HALF, HALF, 0.0, 0.0), (1, 0, 0), (0, 0, 1), 0.0),  # right wing down
-    ],
-)
-def test_rotation_on_attitudes_everyone_knows(attitude, nose_ned, right_ned, yaw):
-    assert body_to_ned(attitude, (1.0, 0.0, 0.0)) == pytest.approx(nose_ned, abs=1e-12)
-    assert body_to_ned(attitude, (0.0, 1.0, 0.0)) == pytest.approx(right_ned, abs=1e-12)
-    if yaw is not None:
-        assert yaw_rad(attitude) == pytest.approx(yaw)
 
 
 NOISE_M_S = 0.05
@@ -151,12 +132,13 @@ def test_the_delay_is_learnt_where_the_vehicle_speeds_up_and_brakes(late_s):
     assert air.doppler.trusted_variance_m2_s2 == pytest.approx(FINEST_DOPPLER_M_S**2, rel=0.2)
 
 
-def test_a_steady_flight_teaches_no_delay_and_the_receivers_noise():
+def test_a_steady_flight_teaches_no_delay_and_the_receivers_noise_also_when_it_gets_worse():
     air = Air(0.2, noise_m_s=0.4)
-    for _ in range(7_500):
-        air.step()
-    assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(RECEIVER_DELAY_S, abs=0.02)
-    assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.4, rel=0.25)
+    for air.noise_m_s in (0.4, 0.8):
+        for _ in range(7_500):
+            air.step()
+        assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(RECEIVER_DELAY_S, abs=0.02)
+        assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(air.noise_m_s, rel=0.25)
 
 
 def test_a_hit_that_the_receiver_shows_before_any_sample_is_neither_its_noise_nor_its_delay():
@@ -170,16 +152,6 @@ def test_a_hit_that_the_receiver_shows_before_any_sample_is_neither_its_noise_no
         air.step()
     assert air.doppler.delay.delay_s(air.doppler.variance_m2_s2) == pytest.approx(known, abs=0.002)
     assert air.doppler.variance_m2_s2 < 1.3 * variance_m2_s2
-
-
-def test_a_receiver_that_gets_worse_is_known_for_worse():
-    air = Air(0.012, noise_m_s=0.05)
-    for _ in range(3_000):
-        air.step()
-    air.noise_m_s = 0.8
-    for _ in range(7_500):
-        air.step()
-    assert math.sqrt(air.doppler.trusted_variance_m2_s2) == pytest.approx(0.8, rel=0.4)
 
 
 def clipped(rebound_m_s=-3.0):

@@ -105,14 +105,6 @@ def angle_deg(normal):
     return math.degrees(math.atan2(-e, -n))
 
 
-# A force counts by its direction alone.
-@pytest.mark.parametrize("size", [1e-3, 1.0, 500.0])
-@pytest.mark.parametrize("speed_m_s", [0.0, 0.4, 2.0])
-def test_the_force_shows_the_normal_however_the_vehicle_came(size, speed_m_s):
-    normal = normal_of(turned(30.0, size), (speed_m_s, 0.0, 0.0))
-    assert angle_deg(normal) == pytest.approx(30.0) and normal.error_rad == pytest.approx(IMPULSE_RAD)
-
-
 # In a hover the force alone tells, and what pushes along the flight came from behind.
 @pytest.mark.parametrize(
     ("force", "speed_m_s", "normal_deg"),

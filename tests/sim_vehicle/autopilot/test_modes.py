@@ -221,10 +221,12 @@ def test_a_takeoff_to_latitude_and_longitude_0_stays_on_the_ground_until_it_disa
     assert not flight.autopilot.arming.armed
 
 
-def test_reposition_flies_there_at_the_speed_asked_for_and_holds():
+@pytest.mark.parametrize("flags", [0, 1, 2, 3])
+def test_reposition_flies_there_at_the_speed_asked_for_and_holds(flags):
     flight = hovering(5.0)
-    asked = (3.0, 1, 0, math.radians(90.0), *place(30.0, 0.0), SEA_LEVEL_HOME_M + 8.0)
-    assert flight.ask(DO_REPOSITION, *asked) is Result.ACCEPTED
+    asked = (3.0, flags, 0, math.radians(90.0), *place(30.0, 0.0), SEA_LEVEL_HOME_M + 8.0)
+    # Without the change of mode alone it is flown, too, as in hold
+    assert flight.ask(DO_REPOSITION, *asked) is (Result.ACCEPTED if flags == 1 else Result.UNSUPPORTED)
     flight.fly(5.0)
     assert flight.state.velocity_ned_m_s[0] == pytest.approx(3.0, abs=0.1)
     flight.fly(15.0)
@@ -245,14 +247,6 @@ def test_a_reposition_of_nothing_stops_the_vehicle():
     assert flight.autopilot.modes.flown is Mode.LOITER
     # v (v / 2a + 0.6 s) with 3 m/s^2
     assert north_east(flight)[0] - begun == pytest.approx(4.0 * (4.0 / 6.0 + 0.6), abs=0.6)
-
-
-@pytest.mark.parametrize("flags", [0, 2, 3])
-def test_a_reposition_without_the_change_of_mode_is_not_supported_and_flown_in_hold(flags):
-    flight = hovering(5.0)
-    assert flight.ask(DO_REPOSITION, -1, flags, 0, NAN, *place(3.0, 0.0), NAN) is Result.UNSUPPORTED
-    flight.fly(8.0)
-    assert math.dist(north_east(flight), (3.0, 0.0)) < 0.1
 
 
 @pytest.mark.parametrize("radius_m", [10.0, -10.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.physics.inertia import ZZ, inertia_of
+from sim_vehicle.physics.inertia import ZZ
 from sim_vehicle.physics.layout import POINTS, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.record import new_record
 from sim_vehicle.physics.rigid_body import runge_kutta_step
@@ -116,15 +116,6 @@ def test_the_walls_impulse_is_the_change_of_momentum(name: str, speed_m_s: float
     change = airframe.mass_kg * (np.array(hit.rebound_velocity_ned_m_s) - np.array(hit.impact_velocity_ned_m_s))
     assert hit.impulse_ned_n_s[0] == pytest.approx(change[0], rel=0.01)
     assert hit.impulse_ned_n_s[1] == pytest.approx(change[1], abs=0.01 * abs(change[0]))
-
-
-def test_the_inertias_rate_is_its_slope() -> None:
-    constants = constants_from(load_built_in("foldable"), np.random.default_rng(1))
-    folds, rates, step_s = np.array([0.01, 0.02, 0.0, 0.03]), np.array([-0.5, 0.1, 0.3, -0.2]), 1e-6
-    before, after, rate, unused = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
-    inertia_of(folds, rates, constants, before, rate)
-    inertia_of(folds + step_s * rates, rates, constants, after, unused)
-    assert (after - before) / step_s == pytest.approx(rate, rel=1e-3)
 
 
 def test_arms_that_unfold_slow_a_spin_as_a_skaters_do() -> None:
