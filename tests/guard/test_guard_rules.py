@@ -23,23 +23,6 @@ def test_while_the_guard_holds_whoever_takes_the_vehicle_has_it_and_every_failur
         assert TABLE[state].get(trigger, state) is State.GIVING_BACK
 
 
-def test_only_a_person_a_failsafe_a_disarm_or_a_crash_lets_go_of_a_recovery():
-    lets_go = {trigger for trigger, state in TABLE[State.RECOVERING].items() if state not in HOLDING}
-    assert lets_go == {Trigger.CONTROL_LOST, Trigger.DISARMED, Trigger.CRASHED}
-
-
-def test_a_crash_is_told_wherever_hits_are_answered_and_ends_with_a_disarm_or_a_take_off():
-    assert {state for state in State if Trigger.CRASHED in TABLE[state]} == {*HOLDING, State.WATCHING}
-    ends = {trigger for trigger, state in TABLE[State.CRASHED].items() if state is State.STANDING_BY}
-    assert ends == {Trigger.DISARMED, Trigger.FLIES_AGAIN} and State.CRASHED not in HOLDING
-
-
-def test_a_hit_is_answered_where_the_guard_watches_and_never_takes_the_vehicle_back():
-    answered = {state for state in State if TABLE[state].get(Trigger.HIT) in HOLDING}
-    assert answered == {State.WATCHING, State.TAKING_OVER, State.RECOVERING, State.GIVING_BACK}
-    assert TABLE[State.STOOD_DOWN].get(Trigger.ENABLED) is State.STANDING_BY
-
-
 @pytest.mark.parametrize(
     ("before", "now", "counts"),
     [
