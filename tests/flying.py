@@ -16,8 +16,6 @@ from companion.report import Event, FlightReport
 
 
 class Told(VirtualTime):
-    """What has been told, for who looks for it."""
-
     def kinds(self) -> list[str]:
         return [event.kind for event in self.events]
 
@@ -77,5 +75,4 @@ class Flight(Told):
         return [(t, decoded(frame)) for t, frame in self.sent if t > since_us and message_id_of(frame) == number]
 
     def setpoints_since(self, time_us: int) -> list[tuple[int, Any]]:
-        """Setpoints by place."""
         return self.messages("SET_POSITION_TARGET_LOCAL_NED", time_us)

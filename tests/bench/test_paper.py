@@ -67,7 +67,6 @@ def test_every_flight_states_the_papers_detector_law_and_gain():
 
 @pytest.fixture(scope="module")
 def sample():
-    """The row of the sample scenario."""
     return fly(flights.SAMPLE.flights(1)[0])
 
 

@@ -26,14 +26,11 @@ def browser():
 
 @pytest.fixture(scope="session")
 def file(wall, tmp_path_factory):  # noqa: F811
-    """Its page, where nothing else is."""
     return write_page(wall, tmp_path_factory.mktemp("page") / "flight.html")
 
 
 @pytest.fixture
 def opened(browser):
-    """Opens an address as a person would."""
-
     @contextmanager
     def opening(address, width=1280, height=900, **options):
         context = browser.new_context(viewport={"width": width, "height": height}, **options)

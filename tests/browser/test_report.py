@@ -25,7 +25,6 @@ LINE = 0.5 / 113
 
 
 def saved(shown, button):
-    """What a download holds."""
     with shown.page.expect_download() as waiting:
         shown.page.get_by_role("button", name=button).click()
     return waiting.value.path().read_text()

@@ -46,7 +46,6 @@ def cpu_s(process):
 
 
 def wait_for(shown, kind):
-    """Until the page tells of an event of that kind."""
     shown.page.get_by_role("cell", name=kind, exact=True).first.wait_for(timeout=1e3 * HANGS_S)
 
 

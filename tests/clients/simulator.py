@@ -21,8 +21,6 @@ ROOT = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class Simulator:
-    """Where its links are."""
-
     companion_port: int
     """It sends here unasked, as PX4's SITL does to 14540."""
     tcp_port: int

@@ -15,8 +15,6 @@ MAVPROXY = os.environ.get("MAVPROXY", "mavproxy.py")
 
 
 class Console:
-    """Its input and all that it has printed."""
-
     def __init__(self, process: subprocess.Popen, output: Path) -> None:
         self._process = process
         self._output = output

@@ -38,7 +38,6 @@ class Attacker:
         return bytes(message.pack(self._tx))
 
     def _true(self, message_id: int) -> mav.MAVLink_message:
-        """As the vehicle would say it now."""
         v, kind = self._vehicle, mav.mavlink_map[message_id]
         now = {"time_usec": v.time_us, "time_boot_ms": v.time_us // 1000, "q1": 1.0, "fields_updated": 0x3F}
         now |= dict(zip(("x", "y", "z", "vx", "vy", "vz"), (*v.position, *v.velocity), strict=True))
@@ -70,7 +69,6 @@ class Attacker:
 
 
 def attacked(f: Flight, packets: Iterable[bytes]) -> None:
-    """One step of the flight with these packets before the vehicle's own."""
     sent = len(f.sent)
     f.step(b"".join(packets))
     for _, frame in f.sent[sent:]:

@@ -51,7 +51,6 @@ class Bench:
         return opened
 
     def run(self, seconds: float = 0.0) -> bytes:
-        """What the guard hears meanwhile."""
         received, until_s = b"", time.monotonic() + seconds
         while True:
             received += self.shared.receive(0.05)

@@ -51,7 +51,6 @@ def through_attempts(connection):
 
 @pytest.fixture
 def closing():
-    """Closes what it is given at the end."""
     with contextlib.ExitStack() as given:
         yield lambda one: given.enter_context(contextlib.closing(one))
 
@@ -72,7 +71,6 @@ class Line:
         return os.read(self._controller, 4096)
 
     def close(self):
-        """Pulls the plug."""
         if self._controller >= 0:
             os.close(self._device)
             os.close(self._controller)

@@ -16,7 +16,6 @@ def name_of(path):
 
 
 def manual():
-    """Every page of the manual, README and CONTRIBUTING."""
     return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
@@ -26,6 +25,5 @@ def by_hand():
 
 
 def blocks(path):
-    """Each fenced block of a page: its language and its text."""
     found = _BLOCK.findall(path.read_text(encoding="utf-8"))
     return [(language, re.sub(f"^{indent}", "", text, flags=re.MULTILINE)) for indent, language, text in found]

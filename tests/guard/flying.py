@@ -67,11 +67,9 @@ class Watched(Told, Commanded):
         self.send(dialect.MAVLink_set_position_target_local_ned_message(boot_ms, 1, 1, 1, VELOCITY_ONLY, *values))
 
     def stop_all(self) -> None:
-        """Whatever is repeated."""
         self._repeated.clear()
 
     def sent_by(self, sender: str, name: str = "", since_s: float = 0.0, until_s: float = math.inf) -> list[Any]:
-        """Messages on the wire whose name contains that, in that time."""
         return [
             message
             for at_s, who, message in self.on_wire
@@ -187,7 +185,6 @@ class AttachedFlight(Watched):
         return ends
 
     def fly_into_the_wall(self) -> None:
-        """Take off, OFFBOARD, north until the guard holds."""
         self.take_off()
         self.fly_by(1.5)
         self.run_until(lambda: self.guard.core.machine.holds, 20.0)

@@ -26,7 +26,6 @@ RUN_CHECKS, STALL_S = 401, 1.6  # more than the silence after which the guard le
 
 
 def setpoint(system_id: int = 1) -> bytes:
-    """One of the program's."""
     message = dialect.MAVLink_set_position_target_local_ned_message(7, system_id, 1, 1, 0xDF8, *[1.0] * 11)
     return message.pack(dialect.MAVLink(None, *PROGRAM))
 

@@ -103,7 +103,6 @@ def test_a_late_thread_lets_go_of_no_recovery(flies, loss_s, late_s):
 
 @contextmanager
 def silent(air: BetweenFlight) -> Iterator[None]:
-    """Nothing passes, either way."""
     take, push = air.link.take, air.link.push
     air.link.take, air.link.push = lambda: (take(), ())[1], lambda packet: None
     yield
@@ -443,7 +442,6 @@ IDS = sorted(dialect.mavlink_map)
 
 
 def pieces(content: bytes, chance: random.Random) -> list[bytes]:
-    """Cut anywhere."""
     cuts = sorted(chance.sample(range(1, len(content)), len(content) // 200))
     return [content[start:end] for start, end in zip([0, *cuts], [*cuts, len(content)], strict=True)]
 

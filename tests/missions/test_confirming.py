@@ -27,7 +27,6 @@ def imu(air: Flight, force_m_s2: float, rate_rad_s: float = 0.0) -> bytes:
 
 
 def motion(air: Flight) -> tuple[float, ...]:
-    """Place and velocity as the vehicle last told them."""
     latest = air.companion.core.flight.vehicle.history.latest
     return (*latest.position_ned_m, *latest.velocity_ned_m_s)
 

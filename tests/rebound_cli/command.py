@@ -99,7 +99,6 @@ def taken_off(vehicle):
 
 
 def processes_naming(text):
-    """Ids of the running processes whose command line contains `text`."""
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():

@@ -20,5 +20,4 @@ def wall_folder(wall_flight):
 
 @pytest.fixture(scope="session")
 def wall(wall_folder):
-    """All that its page shows."""
     return recorded_flight(wall_folder)

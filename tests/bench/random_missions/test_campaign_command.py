@@ -69,7 +69,6 @@ def test_every_failure_is_listed_with_its_cause_and_the_command_to_see_it_again(
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The command on one mission."""
     folder = tmp_path_factory.mktemp("campaign")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)

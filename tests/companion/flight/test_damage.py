@@ -164,8 +164,6 @@ HURT = (0.0, 0.0, 0.16, 0.0)
 
 
 class Flown:
-    """A vehicle's outputs ten times a second."""
-
     def __init__(self, most=2000.0):
         self.monitor, self.now_us = MotorWatch(), 0
         self._most, self._random = most, random.Random(1)

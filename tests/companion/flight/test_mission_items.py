@@ -14,7 +14,6 @@ from tests.flying import Flight
 
 
 def flown(*items, vehicle=None, **changes) -> Flight:
-    """The flight over, completed or not."""
     f = flight(vehicle, items=[TAKEOFF, *items, LANDING], **changes)
     f.run_to_end()
     return f
@@ -27,7 +26,6 @@ def item_times_s(f: Flight) -> list[float]:
 
 
 def setpoints_in(f: Flight, name: str) -> list:
-    """Setpoints heard by the vehicle during the item of that name."""
     items = [event for event in f.events if event.kind == "item"]
     index = next(k for k, event in enumerate(items) if event.data["name"] == name)
     start, end = (items[k].time_us - f.now_us + f.vehicle.time_us for k in (index, index + 1))
@@ -191,7 +189,6 @@ HOLD = {"hold": {"duration_s": 1}}
 
 
 def between(*items) -> dict:
-    """These, flown at 5 m/s at most."""
     return {"items": [TAKEOFF, *items, LANDING], "limits": {"max_speed_m_s": 5}}
 
 

@@ -112,7 +112,6 @@ def listening_decoder() -> Decoder:
 
 
 def heard(message):
-    """What is made of one message of the vehicle's."""
     return listening_decoder().feed(packed(message))[0][1]
 
 

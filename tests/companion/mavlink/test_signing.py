@@ -18,7 +18,6 @@ IMU = mav.MAVLink_highres_imu_message(1, 0.0, 0.0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0,
 
 
 def vehicle(stamp: int = NOW, key: bytes | None = KEY, link: int = 3, component: int = 1) -> mav.MAVLink:
-    """pymavlink as the vehicle."""
     end = mav.MAVLink(None, 1, component)
     end.signing.secret_key, end.signing.sign_outgoing = key, key is not None
     end.signing.timestamp, end.signing.link_id = stamp, link

@@ -17,7 +17,6 @@ STILL = (0.0, 0.0, 0.0)
 
 
 def told(estimator, t_us, velocity_ned_m_s, position_ned_m=STILL):
-    """The vehicle's reports at one time."""
     estimator.update(Odometry(t_us, position_ned_m, velocity_ned_m_s, 0))
     estimator.update(LocalPosition(t_us, position_ned_m, velocity_ned_m_s))
 

@@ -35,7 +35,6 @@ class Cable:
             os.close(port)
 
     def plug(self) -> str:
-        """Returns what the name leads to."""
         # The next one is there before this one goes: it gets another name.
         near, self._next = self._next, _terminal()
         with self._lock:

@@ -93,7 +93,6 @@ def test_the_link_is_a_rate_and_then_a_silence():
 
 
 def planned():
-    """A companion with a plan that is ready."""
     return Mock(plan_is_ready=Mock(return_value=True), plan_text=lambda: "the plan")
 
 

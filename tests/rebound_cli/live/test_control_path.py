@@ -56,8 +56,6 @@ BREAKS = Mock(side_effect=ValueError("nobody thought of this"))
 
 
 class EverySecond:
-    """A computer that is the same every second."""
-
     due_us = 0
 
     def status(self, now_us):

@@ -46,7 +46,6 @@ def structure(letters):
 
 
 def described(number, name, letters, columns):
-    """A message of FMT."""
     length = 89 if name == "FMT" else 3 + structure(letters).size
     fields = struct.pack("<BB4s16s64s", number, length, name.encode(), letters.encode(), columns.encode())
     return HEAD + bytes([128]) + fields

@@ -107,7 +107,6 @@ def asked(server, path, method="GET", host=None):
 
 
 def stream_of(server):
-    """Every chunk of a stream until the flight is done."""
     chunks = []
     with closing(asked(server, "/live")) as answer:
         assert answer.getheader("Content-Type") == "text/event-stream"

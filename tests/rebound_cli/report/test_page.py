@@ -62,11 +62,9 @@ class Opened(HTMLParser):
             self.styles.append(text)
 
     def table(self, name):
-        """Its columns as numbers."""
         return {column: unpacked(data) for column, data in self.data["tables"][name]["columns"].items()}
 
     def attributes(self, name):
-        """Every value that any element has for it."""
         return [attributes[name] for _, attributes in self.tags if name in attributes]
 
 

@@ -209,7 +209,6 @@ def flight(wall, wall_folder):
 
 @pytest.fixture(scope="module")
 def topics(wall_folder, tmp_path_factory):
-    """Of the file as the command writes it."""
     out = tmp_path_factory.mktemp("exported") / "wall.mcap"
     assert main(["logs", "export", str(wall_folder), "--format", "mcap", "--out", str(out)]) == 0
     return read_mcap(out.read_bytes())

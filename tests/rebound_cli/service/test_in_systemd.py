@@ -117,7 +117,6 @@ class Sandbox:
         return self.run(PYTHON, "-P", "-m", "rebound_cli", *words)
 
     def shown(self, name: str) -> str:
-        """What systemd knows of the service."""
         return self.run("systemctl", "show", "-P", name, "rebound.service").stdout.strip()
 
     def wait_for(self, condition, within_s: float = 40.0) -> None:
@@ -162,7 +161,6 @@ pytestmark = [pytest.mark.realtime, pytest.mark.skipif(not os.environ.get("REBOU
 
 
 def events(sandbox):
-    """Of the newest run."""
     runs = sorted(sandbox.file("/var/lib/rebound/runs").iterdir())
     return [json.loads(line)["kind"] for line in (runs[-1] / "events.jsonl").read_text().splitlines()]
 

@@ -130,12 +130,10 @@ class Flight:
         return self.acks[0].result if self.acks else None
 
     def texts(self) -> list[str]:
-        """All that was said."""
         return [text.text for text in self.autopilot.texts]
 
 
 def target(position: Axis3 = FREE, velocity: Axis3 = FREE, **others: Any) -> PositionTarget:
-    """A setpoint for this vehicle in the local frame."""
     return replace(PositionTarget(1, position, velocity, FREE, None, None, is_force=False), **others)
 
 
@@ -164,19 +162,16 @@ def in_offboard(setpoint: PositionTarget, **parameters: float) -> Flight:
 
 
 def north_east(flight: Flight) -> tuple[float, float]:
-    """Where it is."""
     north, east, _ = flight.state.position_ned_m
     return north, east
 
 
 def set_mode(flight: Flight, mode: Mode) -> Result | None:
-    """DO_SET_MODE."""
     custom = NUMBERS[mode].custom_mode
     return flight.ask(DO_SET_MODE, 1, custom >> 16 & 0xFF, custom >> 24)
 
 
 def place(north_m: float, east_m: float) -> tuple[float, float]:
-    """Latitude and longitude of a local place."""
     there = ORIGIN.place_at((north_m, east_m, 0.0))
     return there.latitude_deg, there.longitude_deg
 
@@ -194,13 +189,11 @@ def item(
 
 
 def action(command: int, *params: float) -> StoredItem:
-    """An item without a place."""
     a, b, c, d, e, f, g = (*params, *[0.0] * (7 - len(params)))
     return StoredItem(kinds.FRAME_MISSION, command, 1, (a, b, c, d, e, f, g))
 
 
 def upload(flight: Flight, *items: StoredItem, kind: MissionType = MissionType.MISSION) -> None:
-    """Store a list as a link would."""
     flight.autopilot.missions.replace(kind, items)
     flight.fly(0.06)
 

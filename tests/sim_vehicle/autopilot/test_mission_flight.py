@@ -26,7 +26,6 @@ def mission_state(flight: Flight) -> int:
 
 
 def begun(*items: StoredItem) -> Flight:
-    """On the ground with that mission, started."""
     flight = Flight()
     upload(flight, *items)
     assert mission_state(flight) == 2, flight.texts()
@@ -182,7 +181,6 @@ KEEP_IN = polygon(kinds.FENCE_POLYGON_INCLUSION, *SQUARE)
 
 
 def outward(flight: Flight, north_m_s: float, seconds: float) -> None:
-    """OFFBOARD away from home at that speed."""
     away = kinematic_plant.target(velocity=(north_m_s, 0.0, 0.0))
     flight.fly(0.2, away)
     assert set_mode(flight, Mode.OFFBOARD) is Result.ACCEPTED

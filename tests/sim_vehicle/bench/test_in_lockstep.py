@@ -24,7 +24,6 @@ class Pilot(End):
         self.vehicle = vehicle
 
     def fly(self, seconds: float) -> None:
-        """Let time pass and listen, an interval at a time."""
         until_s = self.vehicle.time_s + seconds
         while self.vehicle.time_s < until_s - 1e-9:
             self.hear([self.vehicle.advance(0.0)], self.vehicle.time_s)
@@ -39,14 +38,12 @@ class Pilot(End):
 
 
 def hovering(**setup: Any) -> Pilot:
-    """Taken off in a vehicle of its own."""
     pilot = Pilot(LockstepVehicle(**setup))
     pilot.take_off()
     return pilot
 
 
 def standing(**setup: Any) -> Pilot:
-    """On the ground, a second after boot."""
     pilot = Pilot(LockstepVehicle(**setup))
     pilot.fly(1.0)
     pilot.forget()

@@ -129,7 +129,6 @@ class Sitl:
         self.states.sendto(packet(count, *(STOPPED,) * 16), ("127.0.0.1", self.json_port))
 
     def state(self) -> dict | None:
-        """What has come; None where nothing has."""
         try:
             return json.loads(self.states.recv(2048))
         except BlockingIOError:

@@ -107,7 +107,6 @@ def whole_of(message) -> int:
 
 
 def told(client: Client, message: dialect.MAVLink_message) -> list:
-    """The values that are told because of it."""
     client.forget()
     client.send(message)
     client.run(0.05)

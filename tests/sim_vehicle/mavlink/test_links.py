@@ -97,7 +97,6 @@ def signed(end: End, time_stamp: int = 10**15, key: bytes = KEY) -> None:
 
 @pytest.fixture
 def guarded() -> Vehicle:
-    """A vehicle that has a key."""
     vehicle = Vehicle(ONBOARD, GROUND, signing=Signing(KEY))
     vehicle.vehicle.parameters.set("MAV_SIGN_CFG", 1)
     return vehicle
@@ -194,7 +193,6 @@ def served(vehicle: SimulatedVehicle, *ports: Port, truth_path: Path | None = No
 
 @contextmanager
 def bound() -> Iterator[socket.socket]:
-    """Somebody on UDP."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
         peer.bind(("127.0.0.1", 0))
         peer.settimeout(TIMEOUT_S)

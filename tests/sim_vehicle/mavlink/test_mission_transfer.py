@@ -33,7 +33,6 @@ def wire_item(
 
 
 def sent(message, peer=CLIENT):
-    """The message as it comes from that peer."""
     message._header.srcSystem, message._header.srcComponent = peer
     return message
 
@@ -83,7 +82,6 @@ class Exchange:
         return list(back)
 
     def ask(self, message: object) -> list:
-        """One message and what comes back at once."""
         self.asked.append(message)
         return self.step()
 
@@ -107,7 +105,6 @@ class Exchange:
         raise AssertionError("no acknowledgement came")
 
     def download(self):
-        """The items that the client gets, in their order."""
         (told,) = of_type(self.ask(said("request_list", MissionType.MISSION)), "MISSION_COUNT")
         asked = (said("request_int", number, MissionType.MISSION) for number in range(told.count))
         items = [of_type(self.ask(each), "MISSION_ITEM_INT")[0] for each in asked]
