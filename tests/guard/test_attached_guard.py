@@ -212,8 +212,8 @@ class Joined:
             assert self.guard._incoming(name, (1, 1), fields_json.encode())
         return goes_on
 
-    def lets_a_setpoint_pass(self):
-        name, fields_json = named(setpoint())
+    def lets_pass(self, packet):
+        name, fields_json = named(packet)
         return self.guard._outgoing(name, PROGRAM, fields_json.encode())
 
     def until_over(self, at_most_us: int) -> int:
@@ -241,16 +241,16 @@ def test_a_fault_in_a_step_gives_the_vehicle_back(monkeypatch):
     # When it goes on
     joined.until_over(GIVING_BACK_US)
     # Then the vehicle holds by itself, it is told why, and the program's setpoints pass again
-    assert joined.air.mode == AUTO_LOITER and joined.lets_a_setpoint_pass()
+    assert joined.air.mode == AUTO_LOITER and joined.lets_pass(setpoint())
     assert any("nobody thought of this" in event.text for event in joined.guard.events)
 
 
 def test_a_fault_in_the_gate_lets_no_setpoint_pass_while_the_guard_holds(monkeypatch):
     joined = Joined(monkeypatch)
     monkeypatch.setattr(joined.air.guard, "lets_pass", fails)
-    assert not joined.lets_a_setpoint_pass()
+    assert not joined.lets_pass(setpoint())
     joined.until_over(GIVING_BACK_US)
-    assert joined.air.mode == AUTO_LOITER and joined.lets_a_setpoint_pass()
+    assert joined.air.mode == AUTO_LOITER and joined.lets_pass(setpoint())
     # And what came with the last message is told, also beside a listener that fails
     joined.guard._untold, joined.guard._listeners = ["the last"], [fails, joined.link.sent.append]
     assert not joined.guard._turn() and joined.link.sent == ["the last"]
@@ -277,8 +277,7 @@ def test_a_mode_that_mavsdk_asks_for_is_a_choice_also_while_the_guard_holds_and_
     joined = Joined(monkeypatch)
     joined.air.guard.core.flight.awaits_choice = True
     asks = dialect.MAVLink_command_long_message(1, 1, SET_MODE, 0, 1, *commanded.OFFBOARD, 0, 0, 0, 0)
-    name, fields_json = named(asks.pack(dialect.MAVLink(None, *PROGRAM)))
-    assert joined.guard._outgoing(name, PROGRAM, fields_json.encode())
+    assert joined.lets_pass(asks.pack(dialect.MAVLink(None, *PROGRAM)))
     assert not joined.air.guard.core.flight.awaits_choice
 
 

@@ -23,6 +23,12 @@ def test_while_the_guard_holds_whoever_takes_the_vehicle_has_it_and_every_failur
         assert TABLE[state].get(trigger, state) is State.GIVING_BACK
 
 
+def test_a_crash_is_told_wherever_hits_are_answered_and_ends_with_a_disarm_or_a_take_off():
+    assert {state for state in State if Trigger.CRASHED in TABLE[state]} == {*HOLDING, State.WATCHING}
+    ends = {trigger for trigger, state in TABLE[State.CRASHED].items() if state is State.STANDING_BY}
+    assert ends == {Trigger.DISARMED, Trigger.FLIES_AGAIN} and State.CRASHED not in HOLDING
+
+
 @pytest.mark.parametrize(
     ("before", "now", "counts"),
     [
