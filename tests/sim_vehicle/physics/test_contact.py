@@ -7,12 +7,8 @@ import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.physics.inertia import ZZ
-from sim_vehicle.physics.layout import POINTS, Scratch, calm, constants_from, initial_state
-from sim_vehicle.physics.record import new_record
-from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from sim_vehicle.world import build_world
 from tests.sim_vehicle.physics.throwing import closed_form_of_eq_2, first_hit, motors_off, quiet, throw
 
 # The two airframes of the paper without noise.
@@ -131,32 +127,6 @@ def test_arms_that_unfold_slow_a_spin_as_a_skaters_do() -> None:
     assert plant.state.fold_m.max() == pytest.approx(airframe.arms.hysteresis_m)
     assert plant.state.body[12] < 0.85 * spin
     assert plant.state.inertia[ZZ] * plant.state.body[12] == pytest.approx(momentum, rel=1e-3)
-
-
-def test_the_integrator_is_of_fourth_order() -> None:
-    """A tumble with drag: halving the step divides the error by sixteen."""
-    airframe = load_built_in("foldable")
-    world = build_world(())
-    constants = constants_from(airframe, np.random.default_rng(1))
-
-    def tumbled(steps: int) -> np.ndarray:
-        state = initial_state((0.0, 0.0, -50.0), 0.3)
-        state.body[3:6], state.body[10:13] = [3.0, -1.0, 0.5], [6.0, -4.0, 5.0]
-        state.motor_thrust_n[:4] = [2.0, 3.0, 2.5, 2.2]
-        count = len(world.faces)
-        behind, near = np.zeros((POINTS, count), np.int64), np.zeros(count, np.int64)
-        forces = np.zeros((2, POINTS, count))
-        for _ in range(steps):
-            runge_kutta_step(
-                state, behind, near, False, 0.5 / steps, constants, calm((0.0, 0.0, 0.0)),
-                world.faces, np.zeros(0, np.int64), forces, new_record(Scratch),
-            )  # fmt: skip
-        return np.array(state.body)
-
-    exact = tumbled(3200)
-    errors = [np.abs(tumbled(steps) - exact).max() for steps in (25, 50, 100)]
-    orders = [math.log2(errors[0] / errors[1]), math.log2(errors[1] / errors[2])]
-    assert orders == pytest.approx([4.0, 4.0], abs=0.4)
 
 
 # As the built-in airframes, whose 0.16 s begin when an estimate 0.02 s late has seen the hit.
