@@ -29,6 +29,12 @@ def test_a_crash_is_told_wherever_hits_are_answered_and_ends_with_a_disarm_or_a_
     assert ends == {Trigger.DISARMED, Trigger.FLIES_AGAIN} and State.CRASHED not in HOLDING
 
 
+def test_a_hit_is_answered_where_the_guard_watches_and_never_takes_the_vehicle_back():
+    answered = {state for state in State if TABLE[state].get(Trigger.HIT) in HOLDING}
+    assert answered == {State.WATCHING, State.TAKING_OVER, State.RECOVERING, State.GIVING_BACK}
+    assert TABLE[State.STOOD_DOWN].get(Trigger.ENABLED) is State.STANDING_BY
+
+
 @pytest.mark.parametrize(
     ("before", "now", "counts"),
     [
