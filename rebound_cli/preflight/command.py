@@ -13,7 +13,7 @@ from companion.errors import ConfigurationError
 from companion.link.vehicle import Vehicle
 from companion.preflight import Preflight, findings
 from companion.shell.clock import Clock
-from companion.shell.connections.addresses import serial_device
+from companion.shell.connections.addresses import parsed
 from companion.shell.connections.connection import Connection
 from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
@@ -51,10 +51,9 @@ def run_preflight(options: Namespace) -> int:
 
 def serial_line(url: str, system: Path = Path("/")) -> SerialLine | None:
     """What the link goes through; None on a network. `system` is where sys is."""
-    serial = serial_device(url)
-    if serial is None:
+    _, scheme, device, baud = parsed(url)
+    if scheme != "serial":
         return None
-    device, baud = serial
     name, timer_ms = Path(device).resolve().name, None
     # The driver of FTDI's converters has it, and no other.
     with suppress(OSError, ValueError):

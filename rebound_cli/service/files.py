@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from companion.errors import AddressError
-from companion.shell.connections.addresses import serial_device
+from companion.shell.connections.addresses import parsed
 from companion.strict_model import StrictModel
 from rebound_cli import exit_codes
 from rebound_cli.flights.kept import SERVICE_RUNS
@@ -40,10 +40,10 @@ SYSUSERS_TEXT = f'{_WRITTEN_BY}\nu {USER} - "Rebound" {STATE_FOLDER}\n'
 
 def _address(url: str) -> str:
     try:
-        device, _ = serial_device(url) or ("", 0)
+        _, scheme, device, _ = parsed(url)
     except AddressError as error:
         raise ValueError(str(error)) from error
-    if device and (_DEVICE.fullmatch(device) is None or ".." in device):
+    if scheme == "serial" and (_DEVICE.fullmatch(device) is None or ".." in device):
         raise ValueError(f"{device!r} is not the name of a device, such as /dev/ttyAMA0")
     return url
 
@@ -62,8 +62,8 @@ class ServiceSettings(StrictModel):
     @property
     def device(self) -> str | None:
         """The serial device; None on a network."""
-        serial = serial_device(self.connect)
-        return None if serial is None else serial[0]
+        address = parsed(self.connect)
+        return address.host if address.scheme == "serial" else None
 
     def arguments(self) -> Sequence[str]:
         """What the service runs, after `rebound`."""

@@ -11,6 +11,7 @@ udp://:14540                     the older form of udpin (or of udpout when a re
 import ipaddress
 import re
 import socket
+from typing import NamedTuple
 
 from companion.errors import AddressError, ConnectionSetupError
 from companion.mavlink.signing import Signing
@@ -25,6 +26,15 @@ _SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
+class Address(NamedTuple):
+    """Of a serial port `host` is the device and `port` the baud rate."""
+
+    url: str
+    scheme: str
+    host: str
+    port: int
+
+
 def open_connection(
     url: str, peer: str | None = None, signing: Signing | None = None, waits: bool = False
 ) -> Selectable:
@@ -33,35 +43,23 @@ def open_connection(
     `waits`: a port that is not there, or a server that does not answer, is looked for until it is.
     Raises ConnectionSetupError with one clear sentence.
     """
-    scheme, rest = scheme_and_rest(url)
-    if scheme == "udp":
-        scheme = "udpin" if host_and_port(url, rest)[0] in ("", "0.0.0.0", "[::]") else "udpout"
+    address = parsed(url)
+    _, scheme, host, port = address
     if peer is not None and scheme != "udpin":
         raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
-    if scheme == "serial":
-        return serial_port(*_device_and_baud(url, rest), waits)
-    host, port = host_and_port(url, rest)
-    if scheme in ("udpout", "tcpout"):
-        check_one_host(url, scheme, host, port)
-    if scheme == "udpin":
-        return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), signing))
-    if scheme == "udpout":
-        return udp_out(host, port)
-    if scheme == "tcpout":
-        return tcp_out(host, port, waits)
-    return TcpInConnection(host, port)
+    match scheme:
+        case "serial":
+            return serial_port(host, port, waits)
+        case "udpin":
+            return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), signing))
+        case "tcpin":
+            return TcpInConnection(host, port)
+    check_one_host(address)
+    return udp_out(host, port) if scheme == "udpout" else tcp_out(host, port, waits)
 
 
-def serial_device(url: str) -> tuple[str, int] | None:
-    """Device and baud rate of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
-    scheme, rest = scheme_and_rest(url)
-    if scheme == "serial":
-        return _device_and_baud(url, rest)
-    host_and_port(url, rest)
-    return None
-
-
-def scheme_and_rest(url: str) -> tuple[str, str]:
+def parsed(url: str) -> Address:
+    """Nothing is opened, and no name looked up. Raises AddressError."""
     scheme, separator, rest = url.partition("://")
     if not separator:
         meant = _meant(url)
@@ -69,7 +67,20 @@ def scheme_and_rest(url: str) -> tuple[str, str]:
         raise AddressError(f"{url!r} is not a connection address: {hint}")
     if scheme not in _SCHEMES:
         raise AddressError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
-    return scheme, rest
+    if scheme == "serial":
+        device, _, baud = rest.rpartition(":")
+        if not device or not baud.isdecimal() or int(baud) == 0:
+            raise AddressError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
+        return Address(url, scheme, device, int(baud))
+    match = _HOST_PORT.match(rest)
+    if match is None:
+        raise AddressError(f"{url!r} names no host and port: use {_FORMS}.")
+    host, port = match["host"], int(match["port"])
+    if port > _MOST_PORT:
+        raise AddressError(f"{url!r}: there is no port {port}, the last is {_MOST_PORT}.")
+    if scheme == "udp":
+        scheme = "udpin" if host in ("", "0.0.0.0", "[::]") else "udpout"
+    return Address(url, scheme, host, port)
 
 
 def _meant(text: str) -> str | None:
@@ -92,8 +103,9 @@ def _meant(text: str) -> str | None:
     return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
 
 
-def check_one_host(url: str, scheme: str, host: str, port: int) -> None:
+def check_one_host(remote: Address) -> None:
     """Only who answers from the address that was sent to is ever heard."""
+    url, scheme, host, port = remote
     if not host or port == 0:
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     _, address = resolve(host, port)
@@ -117,19 +129,3 @@ def _peer(text: str, listening: str) -> tuple[str, int | None]:
             f"--peer {text}: this host is unknown over {version}; give HOST or HOST:PORT."
         ) from error
     return str(address[0]), int(port) if port else None
-
-
-def _device_and_baud(url: str, rest: str) -> tuple[str, int]:
-    device, separator, baud = rest.rpartition(":")
-    if not separator or not device or not baud.isdecimal() or int(baud) == 0:
-        raise AddressError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
-    return device, int(baud)
-
-
-def host_and_port(url: str, rest: str) -> tuple[str, int]:
-    match = _HOST_PORT.match(rest)
-    if match is None:
-        raise AddressError(f"{url!r} names no host and port: use {_FORMS}.")
-    if int(match["port"]) > _MOST_PORT:
-        raise AddressError(f"{url!r}: there is no port {match['port']}, the last is {_MOST_PORT}.")
-    return match["host"], int(match["port"])

@@ -12,7 +12,7 @@ from typing import Any
 
 from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
-from companion.shell.connections.addresses import check_one_host, host_and_port, scheme_and_rest, serial_device
+from companion.shell.connections.addresses import check_one_host, parsed
 from companion.shell.connections.connection import LinkCounts, Selectable, Way, bound_socket, resolve, send_datagram
 from companion.shell.connections.streams import BITS_A_BYTE
 
@@ -148,7 +148,11 @@ class SharedConnection:
             received = self._vehicle.receive(0.0)
             if received and (packets := self._between.to_clients(received)):
                 self._to_clients(packets)
-            self._serve()
+            now_us = time.monotonic_ns() // 1000
+            for port in self._ports:
+                port.receive(now_us)
+            for packet in self._between.to_vehicle(now_us):
+                self._vehicle.send(packet)
             if received or time.monotonic() >= until_s:
                 return received
 
@@ -159,13 +163,6 @@ class SharedConnection:
             sources += port.sources()
         longest_s = TURN_S if self._between.waits else LOOK_S if vehicle is None else timeout_s
         select.select(sources, [], [], max(min(timeout_s, longest_s), 0.0))
-
-    def _serve(self) -> None:
-        now_us = time.monotonic_ns() // 1000
-        for port in self._ports:
-            port.receive(now_us)
-        for packet in self._between.to_vehicle(now_us):
-            self._vehicle.send(packet)
 
     def _to_clients(self, packets: Sequence[bytes]) -> None:
         for port in self._ports:
@@ -196,21 +193,21 @@ class SharedConnection:
 
 def carried_bytes_s(url: str) -> float:
     """What a link carries. Raises AddressError."""
-    serial = serial_device(url)
-    return NETWORK_BYTES_S if serial is None else serial[1] / BITS_A_BYTE
+    address = parsed(url)
+    return address.port / BITS_A_BYTE if address.scheme == "serial" else NETWORK_BYTES_S
 
 
 def _open(url: str, between: Between) -> UdpPort | TcpPort:
-    scheme, rest = scheme_and_rest(url)
+    address = parsed(url)
+    _, scheme, host, port = address
     if scheme not in ("udpin", "udpout", "tcpin"):
         forms = "udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"
         raise AddressError(f"--between {url}: clients come by {forms}.")
-    host, port = host_and_port(url, rest)
     if scheme == "tcpin":
         return TcpPort(bound_socket(socket.SOCK_STREAM, host, port), between)
     if scheme == "udpin":
         return UdpPort(bound_socket(socket.SOCK_DGRAM, host, port), None, between)
-    check_one_host(url, scheme, host, port)
+    check_one_host(address)
     family, remote = resolve(host, port)
     return UdpPort(socket.socket(family, socket.SOCK_DGRAM), remote, between)
 
