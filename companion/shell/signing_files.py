@@ -62,12 +62,21 @@ class StampFile:
         self._path = key_file.with_name(key_file.name + ".stamp")
 
     def first(self, now_us: int) -> int:
-        """The time stamp to begin with: by the clock, or two minutes after the one kept, if that is later.
+        """The time stamp to begin with: by the clock, or two minutes after the one kept, if that is later. It is kept.
 
         In the first, more may have been sent and heard before the program ended. The second is how far behind the first
         packet of a stream may be. So nothing recorded before passes now, even where the clock was set back.
         Raises SigningFileError.
         """
+        stamp = self._next(now_us)
+        try:
+            self.keep(stamp)
+        except OSError as error:
+            text = f"{self._path}: cannot be written: {error.strerror}; keep the key in a folder that you may write to."
+            raise SigningFileError(text) from None
+        return stamp
+
+    def _next(self, now_us: int) -> int:
         try:
             content = self._path.read_bytes()
         except FileNotFoundError:
@@ -83,11 +92,3 @@ class StampFile:
     def keep(self, stamp: int) -> None:
         """Whenever the program or the power ends, the file holds the old stamp or the new one. Raises OSError."""
         write_whole(self._path, b"%d\n" % stamp)
-
-    def keep_first(self, stamp: int) -> None:
-        """Before the first packet; shows that it can be kept at all. Raises SigningFileError."""
-        try:
-            self.keep(stamp)
-        except OSError as error:
-            text = f"{self._path}: cannot be written: {error.strerror}; keep the key in a folder that you may write to."
-            raise SigningFileError(text) from None

@@ -18,7 +18,6 @@ class SignedConnection:
     """What comes is heard only if it is signed, what goes is signed; no flight waits for the disk with its stamp."""
 
     def __init__(self, connection: Connection, signing: Signing, stamps: StampFile, clock: Clock) -> None:
-        stamps.keep_first(signing.stamp)
         self._connection, self.signing, self._stamps, self._clock = connection, signing, stamps, clock
         self._kept = signing.stamp
         self._writer = Background("the signatures' time stamp")
@@ -63,12 +62,9 @@ def open_signed(
         return shared(open_connection(options.connect, options.peer, waits=waits))
     clock, stamps = Clock(), StampFile(options.signing_key)
     signing = Signing(read_key(options.signing_key), stamps.first(clock.now_us()))
-    connection = shared(open_connection(options.connect, options.peer, signing, waits))
-    try:
-        return SignedConnection(connection, signing, stamps, clock)
-    except Exception:
-        connection.close()
-        raise
+    return SignedConnection(
+        shared(open_connection(options.connect, options.peer, signing, waits)), signing, stamps, clock
+    )
 
 
 def refused_packets(connection: Connection | None) -> dict[str, int]:

@@ -43,9 +43,9 @@ def test_a_missing_key_is_one_sentence(tmp_path):
         read_key(tmp_path / "none")
 
 
-def test_the_first_stamp_is_the_clocks_where_there_is_none_yet(file):
-    assert StampFile(file).first(NOW_US) == NOW
-    assert StampFile(file).first(0) == 0, "a clock before 2015"
+@pytest.mark.parametrize(("now_us", "stamp"), [(NOW_US, NOW), (0, 0)], ids=["now", "before 2015"])
+def test_the_first_stamp_is_the_clocks_where_there_is_none_yet(file, now_us, stamp):
+    assert StampFile(file).first(now_us) == stamp
 
 
 @pytest.mark.parametrize("passed_us", [-86_400_000_000, -NOW_US, 0, 10_000_000])
@@ -61,6 +61,7 @@ def test_a_power_cut_leaves_the_old_stamp(file, monkeypatch):
     monkeypatch.setattr(os, "fsync", lambda file: (_ for _ in ()).throw(OSError("power cut")))
     with pytest.raises(OSError, match="power cut"):
         StampFile(file).keep(NOW + 10 * MINUTE)
+    monkeypatch.undo()
     # Then the companion begins after the old one, and is not refused
     assert StampFile(file).first(0) == NOW + 2 * MINUTE
 
@@ -75,7 +76,7 @@ def test_a_damaged_stamp_is_one_sentence_with_the_remedy(file, content):
 def test_a_stamp_that_cannot_be_kept_is_told_before_the_flight(file):
     file.with_name("key.stamp.part").mkdir()
     with pytest.raises(SigningFileError, match="a folder that you may write to"):
-        StampFile(file).keep_first(NOW)
+        StampFile(file).first(NOW_US)
 
 
 EPOCH_US = 1_600_000_000_000_000
