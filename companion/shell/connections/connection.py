@@ -84,9 +84,8 @@ class UdpConnection:
     def receive(self, timeout_s: float) -> bytes:
         pieces: list[bytes] = []
         with suppress(OSError):
-            for number in range(MOST_DATAGRAMS):
-                if not readable(self._socket, 0.0 if number else timeout_s):
-                    break
+            readable(self._socket, timeout_s)
+            for _ in range(MOST_DATAGRAMS):
                 datagram, sender = self._socket.recvfrom(READ_SIZE)
                 if self._peer.accepts(datagram, sender[:2], time.monotonic_ns() // 1000):
                     pieces.append(datagram)
