@@ -23,6 +23,7 @@ IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
 
 NAN = math.nan
+NOT_GIVEN = (NAN, NAN, NAN)
 
 # ONBOARD_COMPUTER_STATUS: the largest number of a field says that it is not used.
 _UNUSED_INT8, _UNUSED_UINT8, _UNUSED_INT16, _UNUSED_UINT32 = 0x7F, 0xFF, 0x7FFF, 0xFFFFFFFF
@@ -112,21 +113,14 @@ class Encoder:
                 return dialect.MAVLink_param_set_message(*self._target, name.encode(), *told)
 
     def _position(self, setpoint: PositionSetpoint) -> Any:
-        type_mask, yaw = IGNORE_YAW_RATE, setpoint.yaw_rad
         velocity, acceleration = setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2
-        if velocity is None:
-            type_mask |= IGNORE_VELOCITY
-            velocity = (NAN, NAN, NAN)
-        if acceleration is None:
-            type_mask |= IGNORE_ACCELERATION
-            acceleration = (NAN, NAN, NAN)
-        if yaw is None:
-            type_mask |= IGNORE_YAW
-            yaw = NAN
+        type_mask, yaw = IGNORE_YAW_RATE, NAN if setpoint.yaw_rad is None else setpoint.yaw_rad
+        type_mask |= IGNORE_VELOCITY if velocity is None else 0
+        type_mask |= IGNORE_ACCELERATION if acceleration is None else 0
+        type_mask |= IGNORE_YAW if setpoint.yaw_rad is None else 0
         head = (_time_ms(setpoint.time_us), *self._target, dialect.MAV_FRAME_LOCAL_NED, type_mask)
-        return dialect.MAVLink_set_position_target_local_ned_message(
-            *head, *setpoint.position_ned_m, *velocity, *acceleration, yaw, NAN
-        )
+        motion = (*setpoint.position_ned_m, *(velocity or NOT_GIVEN), *(acceleration or NOT_GIVEN))
+        return dialect.MAVLink_set_position_target_local_ned_message(*head, *motion, yaw, NAN)
 
 
 def _time_ms(time_us: int) -> int:
