@@ -35,7 +35,6 @@ class RoundTrip:
     _is_told: bool = False
 
     def ask(self, now_us: int) -> TimeSync:
-        """The next request."""
         self.due_us = now_us + (INTERVAL_US if self._recent_us else FIRST_INTERVAL_US)
         self._asked_ns.append(now_us * 1000)
         return TimeSync(now_us * 1000)
@@ -79,11 +78,7 @@ class RoundTrip:
 
     def alarm(self) -> str | None:
         """The report of a round trip that has become too long, once until the last few are all short."""
-        present_us = self.present_us
-        if present_us is None or present_us <= MOST_US:
-            self._is_told = self._is_told and any(trip_us > MOST_US for trip_us in self._recent_us)
-            return None
-        if self._is_told:
-            return None
-        self._is_told = True
-        return f"round trip {present_us / 1e3:.0f} ms: hits are answered late"
+        present_us, was_told = self.present_us or 0, self._is_told
+        is_long = present_us > MOST_US
+        self._is_told = is_long or (was_told and any(trip_us > MOST_US for trip_us in self._recent_us))
+        return f"round trip {present_us / 1e3:.0f} ms: hits are answered late" if is_long and not was_told else None
