@@ -225,7 +225,11 @@ class CollisionGuard:
             if not self._is_over and self._clock.now_us() >= self._guard.next_deadline_us():
                 with self._guarded():
                     self._send(self._guard.step(b"", self._clock.now_us()))
-            self._end_after_a_fault()
+            until_us = self._faulty_until_us
+            if until_us is not None and (self._guard.core.machine.finished or self._clock.now_us() >= until_us):
+                # From here on the program's own setpoints pass.
+                self._is_over = True
+                self._changed.notify_all()
             goes_on = not self._is_over
             told, self._untold = self._untold, []
             self.events.extend(told)
@@ -236,10 +240,3 @@ class CollisionGuard:
             except Exception:
                 _LOG.exception("a listener of the guard's events failed")
         return goes_on
-
-    def _end_after_a_fault(self) -> None:
-        until_us = self._faulty_until_us
-        if until_us is not None and (self._guard.core.machine.finished or self._clock.now_us() >= until_us):
-            # From here on the program's own setpoints pass.
-            self._is_over = True
-            self._changed.notify_all()
