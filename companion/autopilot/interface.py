@@ -56,7 +56,6 @@ class Autopilot:
 
     name: str
     mav_autopilot: int
-    """MAV_AUTOPILOT, by which HEARTBEAT announces it."""
     setpoints: int
     """The mode that flies setpoints."""
     hold: int
@@ -75,7 +74,6 @@ class Autopilot:
     attitude_mask: int
     """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
     least_version: tuple[int, int, int]
-    """Older ones are refused."""
     streams: tuple[VehicleCommand, ...] = ()
     """Asked for beside those that all autopilots have."""
     filters_imu: bool = False
@@ -83,9 +81,7 @@ class Autopilot:
     lesser_imu: MessageId | None = None
     """Of boards that do not have HIGHRES_IMU."""
     estimator_message: MessageId
-    """In which it tells how good its estimate is."""
     sticks_message: MessageId
-    """In which it tells where the pilot's sticks are."""
     is_told_to_take_off: bool = False
     """Its setpoints do not lift it off the ground: a command does."""
     wants_setpoints_first: bool

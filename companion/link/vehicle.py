@@ -178,7 +178,6 @@ class Vehicle:
 
     @property
     def is_airborne(self) -> bool:
-        """Whether it is armed, and does not say that it is on the ground."""
         return self.armed is True and self.landed is not messages.LandedState.ON_GROUND
 
     @property

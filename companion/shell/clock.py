@@ -18,5 +18,4 @@ class Clock:
         return time_us - time_us % STAMP_STEP_US
 
     def sleep(self, duration_s: float) -> None:
-        """Let so much of it pass; no time where that is negative."""
         time.sleep(max(duration_s, 0.0))

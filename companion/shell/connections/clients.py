@@ -44,11 +44,9 @@ class UdpPort:
         self._is_full = False
 
     def sources(self) -> list[socket.socket]:
-        """What may be read."""
         return [self._socket]
 
     def receive(self, now_us: int) -> None:
-        """Hand over what has come."""
         for sender, heard_us in [*self._heard_us.items()]:
             if sender != self._remote and now_us - heard_us > FORGOTTEN_US:
                 del self._heard_us[sender]

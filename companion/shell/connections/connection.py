@@ -114,7 +114,6 @@ class UdpConnection:
 
 
 def udp_in(host: str, port: int, peer: Peer | None = None) -> UdpConnection:
-    """Listens on a local port."""
     return UdpConnection(bound_socket(socket.SOCK_DGRAM, host, port), peer or Peer())
 
 

@@ -51,7 +51,6 @@ class Peer:
         self.moves = 0
 
     def accepts(self, datagram: bytes, sender: Address, now_us: int) -> bool:
-        """Whether the datagram is to be heard."""
         if self._is_heard(datagram, sender, now_us):
             return True
         self.dropped += 1

@@ -183,7 +183,6 @@ class StreamConnection:
         return None if descriptor is None else Way(frame, descriptor)
 
     def send(self, frame: bytes) -> None:
-        """Send one packet; it is dropped while there is no stream."""
         if self._stream is not None:
             self._stream.send(frame)
 
@@ -202,7 +201,6 @@ class StreamConnection:
 
 
 def tcp_out(host: str, port: int, waits: bool = False) -> StreamConnection:
-    """A client of a TCP server."""
     open_anew = partial(_connected, host, port, ATTEMPT_S)
     try:
         stream = _connected(host, port, TCP_CONNECT_TIMEOUT_S)
