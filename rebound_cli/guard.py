@@ -11,8 +11,9 @@ from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.shell.clock import Clock
+from companion.shell.connections.addresses import Opened
 from companion.shell.connections.clients import SharedConnection, carried_bytes_s
-from companion.shell.connections.connection import Connection, Selectable
+from companion.shell.connections.connection import Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.flights.kept import folder_with_room, hits_text
@@ -37,7 +38,7 @@ def run_guard(options: Namespace) -> int:
         if config.between:
             between = Between(carried_bytes_s(options.connect))
 
-        def shared(opened: Selectable) -> Connection:
+        def shared(opened: Opened) -> Connection:
             return opened if between is None else SharedConnection(opened, config.between, between)
 
         connection = open_signed(options, config.companion.link.wait, shared)

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.clock import Clock
-from companion.shell.connections.addresses import open_connection
-from companion.shell.connections.connection import Connection, LinkCounts, Selectable, Way
+from companion.shell.connections.addresses import Opened, open_connection
+from companion.shell.connections.connection import Connection, LinkCounts, Way
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 
@@ -52,7 +52,7 @@ class SignedConnection:
 
 
 def open_signed(
-    options: Namespace, waits: bool = False, shared: Callable[[Selectable], Connection] = lambda opened: opened
+    options: Namespace, waits: bool = False, shared: Callable[[Opened], Connection] = lambda opened: opened
 ) -> Connection:
     """To the vehicle at --connect; `shared` makes of it one that others have, too, with signatures of their own.
 

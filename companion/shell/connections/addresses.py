@@ -11,13 +11,16 @@ udp://:14540                     the older form of udpin (or of udpout when a re
 import ipaddress
 import re
 import socket
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from companion.errors import AddressError, ConnectionSetupError
 from companion.mavlink.signing import Signing
-from companion.shell.connections.connection import ANY_HOST, Selectable, resolve, udp_in, udp_out
+from companion.shell.connections.connection import ANY_HOST, UdpConnection, resolve, udp_in, udp_out
 from companion.shell.connections.peer import Peer
-from companion.shell.connections.streams import TcpInConnection, serial_port, tcp_out
+from companion.shell.connections.streams import StreamConnection, TcpInConnection, serial_port, tcp_out
+
+# To a vehicle. Both have a descriptor, None while there is nothing that bytes could come from.
+Opened: TypeAlias = UdpConnection | StreamConnection
 
 _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
 _MOST_PORT = 65_535  # 16 bits
@@ -35,9 +38,7 @@ class Address(NamedTuple):
     port: int
 
 
-def open_connection(
-    url: str, peer: str | None = None, signing: Signing | None = None, waits: bool = False
-) -> Selectable:
+def open_connection(url: str, peer: str | None = None, signing: Signing | None = None, waits: bool = False) -> Opened:
     """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin, and only genuine packets pin it.
 
     `waits`: a port that is not there, or a server that does not answer, is looked for until it is.

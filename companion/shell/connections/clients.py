@@ -12,8 +12,8 @@ from typing import Any
 
 from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
-from companion.shell.connections.addresses import check_one_host, parsed
-from companion.shell.connections.connection import LinkCounts, Selectable, Way, bound_socket, resolve, send_datagram
+from companion.shell.connections.addresses import Opened, check_one_host, parsed
+from companion.shell.connections.connection import LinkCounts, Way, bound_socket, resolve, send_datagram
 from companion.shell.connections.streams import BITS_A_BYTE
 
 # A sender of heartbeats has missed nine.
@@ -127,7 +127,7 @@ class TcpPort:
 class SharedConnection:
     """The vehicle's connection, for the guard, with its clients beside it."""
 
-    def __init__(self, vehicle: Selectable, clients: Sequence[str], between: Between) -> None:
+    def __init__(self, vehicle: Opened, clients: Sequence[str], between: Between) -> None:
         """`clients`: their addresses. Raises AddressError, ConnectionSetupError."""
         self._vehicle, self._between = vehicle, between
         self._ports: list[UdpPort | TcpPort] = []

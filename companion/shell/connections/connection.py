@@ -62,13 +62,6 @@ class Connection(Protocol):
     def close(self) -> None: ...
 
 
-class Selectable(Connection, Protocol):
-    """One that can be waited for together with others."""
-
-    def fileno(self) -> int | None:
-        """None while there is nothing that bytes could come from."""
-
-
 class UdpConnection:
     """A UDP socket on which one peer is heard (see `peer`) and answered."""
 
