@@ -43,8 +43,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 vehicle.conflicts += 1
                 continue
         elif isinstance(sample, messages.Refused):
-            text = flight.refusals.add(sample, now_us)
-            if text is not None:
+            if flight.refusals.add(sample.message, now_us):
+                text = f"{sample.message} is not accepted: {sample.reason}"
                 flight.report(now_us, "implausible", text, message=sample.message)
             continue
         elif isinstance(sample, messages.VehicleText) and sample.text != vehicle.said:

@@ -4,7 +4,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import defaults
-from companion.messages import Refused
 
 # One broken packet is a matter for the count. For as long the last setpoint is flown on.
 LASTING_US = defaults.LOSS_US
@@ -17,13 +16,11 @@ class Refusals:
     counts: Counter[str] = field(default_factory=Counter)
     _runs: dict[str, tuple[int, int]] = field(default_factory=dict)  # the first and the last refusal
 
-    def add(self, refused: Refused, now_us: int) -> str | None:
-        """Count one more; returns the report, once a run."""
-        name = refused.message
+    def add(self, name: str, now_us: int) -> bool:
+        """Count one more; whether to report it, once a run."""
         self.counts[name] += 1
         since_us, last_us = self._runs.get(name, (now_us, now_us))
         if now_us - last_us >= LASTING_US:
             since_us = last_us = now_us
         self._runs[name] = (since_us, now_us)
-        was_told, lasts = last_us - since_us >= LASTING_US, now_us - since_us >= LASTING_US
-        return f"{name} is not accepted: {refused.reason}" if lasts and not was_told else None
+        return last_us - since_us < LASTING_US <= now_us - since_us

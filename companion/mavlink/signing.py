@@ -22,7 +22,6 @@ from companion.mavlink.packet import (
     packet_length,
     source_of,
 )
-from companion.messages import Refused
 
 KEY_LENGTH = 32
 # Time stamps count ten microseconds since the first of January 2015.
@@ -136,7 +135,7 @@ class Signing:
         message_id, (system, component) = message_id_of(packet), source_of(packet)
         message = dialect.mavlink_map.get(message_id)
         last = f"{message.msgname if message else message_id} of system {system}, component {component}"
-        if self._refusals.add(Refused(reason, last), now_us) is not None:
+        if self._refusals.add(reason, now_us):
             self._news[reason] = f"{_TEXTS[reason]}: {self._refusals.counts[reason]} so far, the last {last}"
 
 

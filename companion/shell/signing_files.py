@@ -1,6 +1,7 @@
 """The files of message signing: the key, and beside it the time stamp that outlives the program.
 
-A key is 32 bytes, written as 64 hexadecimal digits; only its owner may read the file.
+A key is 32 bytes, written as 64 hexadecimal digits; only its owner may read the file. No error's text holds what a file
+does.
 """
 
 import os
@@ -19,40 +20,36 @@ _MOST_BYTES = 200
 _FOR_OTHERS = 0o077
 
 
-class SigningFileError(ConfigurationError):
-    """A key or a time stamp that cannot be used. Its text never holds what the file does."""
-
-
 def read_key(path: Path) -> bytes:
-    """The key. Raises SigningFileError."""
+    """The key. Raises ConfigurationError."""
     try:
         with path.open("rb") as file:
             mode, content = os.fstat(file.fileno()).st_mode, file.read(_MOST_BYTES)
     except OSError as error:
         text = f"key {path}: cannot be read: {error.strerror}; `rebound key new {path}` makes one."
-        raise SigningFileError(text) from None
+        raise ConfigurationError(text) from None
     if mode & _FOR_OTHERS:
         text = f"key {path}: not only its owner may use it (mode {mode & 0o777:03o}): chmod 600 {path}"
-        raise SigningFileError(f"{text}, or make a new key if others could have read it.")
+        raise ConfigurationError(f"{text}, or make a new key if others could have read it.")
     digits = _DIGITS.fullmatch(content)
     key = bytes.fromhex(digits[1].decode()) if digits is not None else b""
     if not any(key):
         text = f"key {path}: not a key, which is {2 * KEY_LENGTH} hexadecimal digits and not all 0"
-        raise SigningFileError(f"{text}; `rebound key new FILE` makes one.")
+        raise ConfigurationError(f"{text}; `rebound key new FILE` makes one.")
     return key
 
 
 def write_new(path: Path, content: bytes) -> None:
-    """A file for its owner alone, where there is none yet. Raises SigningFileError."""
+    """A file for its owner alone, where there is none yet. Raises ConfigurationError."""
     try:
         with open(path, "xb", opener=partial(os.open, mode=0o600)) as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
     except FileExistsError:
-        raise SigningFileError(f"{path} exists already and is left as it is: give another name.") from None
+        raise ConfigurationError(f"{path} exists already and is left as it is: give another name.") from None
     except OSError as error:
-        raise SigningFileError(f"{path}: cannot be written: {error.strerror}.") from None
+        raise ConfigurationError(f"{path}: cannot be written: {error.strerror}.") from None
 
 
 class StampFile:
@@ -66,14 +63,14 @@ class StampFile:
 
         In the first, more may have been sent and heard before the program ended. The second is how far behind the first
         packet of a stream may be. So nothing recorded before passes now, even where the clock was set back.
-        Raises SigningFileError.
+        Raises ConfigurationError.
         """
         stamp = self._next(now_us)
         try:
             self.keep(stamp)
         except OSError as error:
             text = f"{self._path}: cannot be written: {error.strerror}; keep the key in a folder that you may write to."
-            raise SigningFileError(text) from None
+            raise ConfigurationError(text) from None
         return stamp
 
     def _next(self, now_us: int) -> int:
@@ -82,11 +79,11 @@ class StampFile:
         except FileNotFoundError:
             return max(stamp_at(now_us), 0)
         except OSError as error:
-            raise SigningFileError(f"{self._path}: cannot be read: {error.strerror}.") from None
+            raise ConfigurationError(f"{self._path}: cannot be read: {error.strerror}.") from None
         kept = _STAMP.fullmatch(content)
         if kept is None or int(kept[1]) > LAST_STAMP:
             text = f"{self._path} holds no time stamp; once the clock is right, delete it"
-            raise SigningFileError(f"{text}: it keeps packets that were recorded before from being played again.")
+            raise ConfigurationError(f"{text}: it keeps packets that were recorded before from being played again.")
         return min(max(stamp_at(now_us), int(kept[1]) + 2 * MINUTE), LAST_STAMP)
 
     def keep(self, stamp: int) -> None:

@@ -56,7 +56,7 @@ def open_signed(
 ) -> Connection:
     """To the vehicle at --connect; `shared` makes of it one that others have, too, with signatures of their own.
 
-    Raises ConnectionSetupError, SigningFileError.
+    Raises ConnectionSetupError, ConfigurationError.
     """
     if options.signing_key is None:
         return shared(open_connection(options.connect, options.peer, waits=waits))

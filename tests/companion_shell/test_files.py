@@ -6,9 +6,10 @@ import pytest
 from pymavlink import mavutil
 
 from bench.fly.packets import GROUND_STATION, made
+from companion.errors import ConfigurationError
 from companion.mavlink.decode import Decoder
 from companion.mavlink.signing import MINUTE, UNIX_AT_2015_US, stamp_at
-from companion.shell.signing_files import SigningFileError, StampFile, read_key, write_new
+from companion.shell.signing_files import StampFile, read_key, write_new
 from companion.shell.tlog import TlogWriter, may_be_logged, read_tlog
 
 KEY = bytes(range(32))
@@ -25,21 +26,21 @@ def file(tmp_path):
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o610, 0o644])
 def test_a_key_that_others_may_use_is_refused_with_the_remedy(file, mode):
     file.chmod(mode)
-    with pytest.raises(SigningFileError, match=f"mode {mode:o}.*chmod 600 {file}"):
+    with pytest.raises(ConfigurationError, match=f"mode {mode:o}.*chmod 600 {file}"):
         read_key(file)
 
 
 @pytest.mark.parametrize("content", ["", "secret\n", KEY.hex()[:-1], KEY.hex() + "0", "0" * 64, KEY.hex() + " # mine"])
 def test_what_is_no_key_is_refused_without_showing_it(file, content):
     file.write_text(content)
-    with pytest.raises(SigningFileError) as refusal:
+    with pytest.raises(ConfigurationError) as refusal:
         read_key(file)
     assert "not a key" in str(refusal.value) and KEY.hex()[:-1] not in str(refusal.value)
     assert "secret" not in str(refusal.value) and refusal.value.__context__ is None
 
 
 def test_a_missing_key_is_one_sentence(tmp_path):
-    with pytest.raises(SigningFileError, match=r"No such file.*rebound key new"):
+    with pytest.raises(ConfigurationError, match=r"No such file.*rebound key new"):
         read_key(tmp_path / "none")
 
 
@@ -69,13 +70,13 @@ def test_a_power_cut_leaves_the_old_stamp(file, monkeypatch):
 @pytest.mark.parametrize("content", ["", "yesterday", "-5", str(2**48)])
 def test_a_damaged_stamp_is_one_sentence_with_the_remedy(file, content):
     file.with_name("key.stamp").write_text(content)
-    with pytest.raises(SigningFileError, match="delete it"):
+    with pytest.raises(ConfigurationError, match="delete it"):
         StampFile(file).first(NOW_US)
 
 
 def test_a_stamp_that_cannot_be_kept_is_told_before_the_flight(file):
     file.with_name("key.stamp.part").mkdir()
-    with pytest.raises(SigningFileError, match="a folder that you may write to"):
+    with pytest.raises(ConfigurationError, match="a folder that you may write to"):
         StampFile(file).first(NOW_US)
 
 

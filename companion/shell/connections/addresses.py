@@ -29,7 +29,7 @@ _SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
-class Address(NamedTuple):
+class Endpoint(NamedTuple):
     """Of a serial port `host` is the device and `port` the baud rate."""
 
     url: str
@@ -59,7 +59,7 @@ def open_connection(url: str, peer: str | None = None, signing: Signing | None =
     return udp_out(host, port) if scheme == "udpout" else tcp_out(host, port, waits)
 
 
-def parsed(url: str) -> Address:
+def parsed(url: str) -> Endpoint:
     """Nothing is opened, and no name looked up. Raises AddressError."""
     scheme, separator, rest = url.partition("://")
     if not separator:
@@ -72,7 +72,7 @@ def parsed(url: str) -> Address:
         device, _, baud = rest.rpartition(":")
         if not device or not baud.isdecimal() or int(baud) == 0:
             raise AddressError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
-        return Address(url, scheme, device, int(baud))
+        return Endpoint(url, scheme, device, int(baud))
     match = _HOST_PORT.match(rest)
     if match is None:
         raise AddressError(f"{url!r} names no host and port: use {_FORMS}.")
@@ -81,7 +81,7 @@ def parsed(url: str) -> Address:
         raise AddressError(f"{url!r}: there is no port {port}, the last is {_MOST_PORT}.")
     if scheme == "udp":
         scheme = "udpin" if host in ("", "0.0.0.0", "[::]") else "udpout"
-    return Address(url, scheme, host, port)
+    return Endpoint(url, scheme, host, port)
 
 
 def _meant(text: str) -> str | None:
@@ -104,7 +104,7 @@ def _meant(text: str) -> str | None:
     return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
 
 
-def check_one_host(remote: Address) -> None:
+def check_one_host(remote: Endpoint) -> None:
     """Only who answers from the address that was sent to is ever heard."""
     url, scheme, host, port = remote
     if not host or port == 0:
