@@ -65,7 +65,7 @@ class Autopilot:
     descents: frozenset[int]
     """Modes that end on the ground."""
     modes: Mapping[int, Mode]
-    mode_mask: int
+    mode_mask: int = -1
     """Of a mode that is not listed the one with these bits alone counts, where it is."""
     mode_parameters: Callable[[int], tuple[int, int]]
     """The second and the third of the command that asks for it."""
@@ -73,7 +73,7 @@ class Autopilot:
     """A parameter that is a whole number travels as a float of its value, and not as the bytes of the number."""
     attitude_mask: int
     """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
-    least_version: tuple[int, int, int]
+    least_version: tuple[int, int, int] = (0, 0, 0)
     streams: tuple[VehicleCommand, ...] = ()
     """Asked for beside those that all autopilots have."""
     filters_imu: bool = False

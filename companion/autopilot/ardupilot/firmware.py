@@ -28,7 +28,6 @@ ARDUPILOT = Autopilot(
     sticks=modes.LOITER,
     descents=frozenset({modes.LAND}),
     modes=modes.MODES,
-    mode_mask=-1,
     mode_parameters=lambda mode: (mode, 0),
     casts_whole_numbers=True,
     # All three rates or none: with one that is left out alone Copter stops where it is.

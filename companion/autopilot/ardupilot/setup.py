@@ -132,7 +132,6 @@ def _checks(name: str, bits: float, setup: Setup) -> PreflightItem:
     return judged(name, found, (bits != all_checks, DOUBTFUL, remedy), beyond=" are left out")
 
 
-# What decides whether a collision is survived.
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     LOSS: _timeout,
     OPTIONS: _options,

@@ -27,7 +27,6 @@ PX4 = Autopilot(
     mode_mask=modes.MAIN,
     mode_parameters=modes.parts,
     attitude_mask=0x03,  # PX4's attitude loop makes the rates of roll and pitch
-    least_version=(0, 0, 0),
     estimator_message=MessageId.ESTIMATOR_STATUS,
     sticks_message=MessageId.MANUAL_CONTROL,
     wants_setpoints_first=True,

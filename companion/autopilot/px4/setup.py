@@ -22,7 +22,7 @@ INTEGRATION = "IMU_INTEG_RATE"
 RCL_EXCEPT_OFFBOARD = 4
 RC_DISABLED = 4
 FLIGHTTERM_OFF = 121212
-# COM_OBL_RC_ACT: 0 position, 1 altitude, 2 stabilised, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
+# COM_OBL_RC_ACT.
 LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
 LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
 # A contact of a stiff frame (the paper's accelerometer shows 0.001 s), for the share of them that samples see.
@@ -179,7 +179,6 @@ def _captured(name: str, value: float, setup: Setup) -> PreflightItem:
     return judged(name, f"{value:g}", (value < least, DOUBTFUL, remedy), mended=least, beyond=beyond)
 
 
-# What decides whether a collision is survived.
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     INTEGRATION: _integration,
     LOSS: _offboard_loss_time,
