@@ -14,7 +14,8 @@ from bench.fly.packets import ARM, COMMAND, SET_MODE, SETPOINT, custom_mode, dec
 from bench.fly.station import GroundStation
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
-from companion.shell.connections.connection import MOST_DATAGRAMS, LinkCounts
+from companion.shell.connections.connection import MOST_DATAGRAMS
+from companion.shell.connections.peer import LinkCounts
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.bench.faults import FaultRequest
@@ -114,6 +115,7 @@ class Air:
     """Whether somebody else has flown since the first item: PX4's failsafe, its landing, a pilot."""
     has_pilot: bool = False  # seen in his mode since he has taken over
     is_overruled: bool = False  # whether the vehicle has left the pilot's mode
+    counts: LinkCounts = field(default_factory=LinkCounts)
     _to_vehicle: list[bytes] = field(default_factory=list)
     _waiting: list[bytes] = field(default_factory=list)
     _station: GroundStation | None = None
@@ -158,10 +160,6 @@ class Air:
 
     def news(self) -> str | None:
         return None
-
-    @property
-    def counts(self) -> LinkCounts:
-        return LinkCounts()
 
     def close(self) -> None:
         """There is nothing to close."""

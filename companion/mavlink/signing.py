@@ -66,13 +66,9 @@ class Signing:
         self._framer = Decoder({}, self._is_packet)
         self._streams: dict[tuple[int, int, int], int] = {}  # newest stamp by link, system and component
         self._refusals = Refusals()
+        self.refused = self._refusals.counts  # packets, by reason
         self._news: dict[str, str] = {}  # by reason
         self.stamp = stamp
-
-    @property
-    def refused(self) -> dict[str, int]:
-        """How many packets were refused, by reason."""
-        return dict(self._refusals.counts)
 
     def news(self) -> str | None:
         """That packets have been refused for a while, once a run of them."""
@@ -136,7 +132,7 @@ class Signing:
         message = dialect.mavlink_map.get(message_id)
         last = f"{message.msgname if message else message_id} of system {system}, component {component}"
         if self._refusals.add(reason, now_us):
-            self._news[reason] = f"{_TEXTS[reason]}: {self._refusals.counts[reason]} so far, the last {last}"
+            self._news[reason] = f"{_TEXTS[reason]}: {self.refused[reason]} so far, the last {last}"
 
 
 def _stamp(packet: bytes) -> int:

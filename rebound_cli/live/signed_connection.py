@@ -6,7 +6,7 @@ from collections.abc import Callable
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.clock import Clock
 from companion.shell.connections.addresses import Opened, open_connection
-from companion.shell.connections.connection import Connection, LinkCounts, Way
+from companion.shell.connections.connection import Connection, Way
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 
@@ -19,7 +19,7 @@ class SignedConnection:
 
     def __init__(self, connection: Connection, signing: Signing, stamps: StampFile, clock: Clock) -> None:
         self._connection, self.signing, self._stamps, self._clock = connection, signing, stamps, clock
-        self._kept = signing.stamp
+        self._kept, self.counts = signing.stamp, connection.counts
         self._writer = Background("the signatures' time stamp")
 
     def receive(self, timeout_s: float) -> bytes:
@@ -40,10 +40,6 @@ class SignedConnection:
 
     def news(self) -> str | None:
         return self._connection.news() or self.signing.news() or self._writer.news()
-
-    @property
-    def counts(self) -> LinkCounts:
-        return self._connection.counts
 
     def close(self) -> None:
         self._connection.close()
@@ -69,4 +65,4 @@ def open_signed(
 
 def refused_packets(connection: Connection | None) -> dict[str, int]:
     """How many, by reason; of a connection without a key, none."""
-    return connection.signing.refused if isinstance(connection, SignedConnection) else {}
+    return dict(connection.signing.refused) if isinstance(connection, SignedConnection) else {}

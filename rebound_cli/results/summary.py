@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from companion.errors import ReboundError
 from companion.memory.stored import as_data
 from companion.report import FlightReport
-from companion.shell.connections.connection import LinkCounts
+from companion.shell.connections.peer import LinkCounts
 from rebound_cli.results.timing import Timing
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
 

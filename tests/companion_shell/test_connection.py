@@ -38,8 +38,8 @@ def test_the_vehicles_heartbeat_pins_its_address():
     assert peer.accepts(IMU + HEARTBEAT, VEHICLE, 0)
     for datagram in (b"\0", IMU, HEARTBEAT):
         assert not peer.accepts(datagram, STRANGER, 1)
-    assert (peer.answered, peer.dropped) == (VEHICLE, 3)
-    assert "10.0.0.66:4444" in peer.news() and peer.news() is None, "told once"
+    assert (peer.answered, peer.counts.stranger_datagrams) == (VEHICLE, 3)
+    assert "10.0.0.66:4444" in peer.news.pop() and not peer.news, "told once"
 
 
 @pytest.mark.parametrize(("silent_us", "is_heard"), [(490_000, False), (510_000, True)])
@@ -64,8 +64,8 @@ def test_a_vehicle_that_moved_is_heard_and_answered_within_a_second():
                 heard_us = now_us
         # Then it is answered there within the second, and told once
         assert heard_us is not None and heard_us <= 1_000_000
-        assert (peer.answered, peer.moves) == (moved, 1)
-        assert f"now sends from {moved[0]}:{moved[1]}" in peer.news()
+        assert (peer.answered, peer.counts.reconnects) == (moved, 1)
+        assert f"now sends from {moved[0]}:{moved[1]}" in peer.news.pop()
 
 
 def test_who_fills_a_gap_of_the_vehicles_loses_its_place_to_it():

@@ -13,7 +13,7 @@ from typing import Any
 from companion.errors import AddressError
 from companion.guard.between import Between, datagrams
 from companion.shell.connections.addresses import Opened, check_one_host, parsed
-from companion.shell.connections.connection import LinkCounts, Way, bound_socket, resolve, send_datagram
+from companion.shell.connections.connection import Way, bound_socket, resolve, send_datagram
 from companion.shell.connections.streams import BITS_A_BYTE
 
 # A sender of heartbeats has missed nine.
@@ -129,7 +129,7 @@ class SharedConnection:
 
     def __init__(self, vehicle: Opened, clients: Sequence[str], between: Between) -> None:
         """`clients`: their addresses. Raises AddressError, ConnectionSetupError."""
-        self._vehicle, self._between = vehicle, between
+        self._vehicle, self._between, self.counts = vehicle, between, vehicle.counts
         self._ports: list[UdpPort | TcpPort] = []
         try:
             for client in clients:
@@ -178,10 +178,6 @@ class SharedConnection:
     def news(self) -> str | None:
         told = self._between.news
         return self._vehicle.news() or (told.popleft() if told else None)
-
-    @property
-    def counts(self) -> LinkCounts:
-        return self._vehicle.counts
 
     def close(self) -> None:
         self._vehicle.close()

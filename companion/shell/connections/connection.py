@@ -5,11 +5,10 @@ import select
 import socket
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from companion.errors import ConnectionSetupError
-from companion.shell.connections.peer import Peer
+from companion.shell.connections.peer import LinkCounts, Peer
 
 # A socket holds no more: Linux counts each datagram as 768 bytes or more of the 212,992 in net.core.rmem_default.
 MOST_DATAGRAMS = 300
@@ -26,19 +25,13 @@ class Way(NamedTuple):
     address: Any = None  # of a datagram
 
 
-@dataclass(frozen=True, slots=True)
-class LinkCounts:
-    """What summary.json says of a connection, under these names."""
-
-    reconnects: int = 0
-    stranger_datagrams: int = 0
-
-
 class Connection(Protocol):
     """Bytes in, packets out. A link that breaks is silent until it is there again, and no call waits for that.
 
     The companion's own timeouts deal with the silence; who has control after it is for the vehicle to say.
     """
+
+    counts: LinkCounts  # so far
 
     def receive(self, timeout_s: float) -> bytes:
         """All that has come, once something has, or b"" when nothing came in time.
@@ -55,10 +48,6 @@ class Connection(Protocol):
     def news(self) -> str | None:
         """Something about the link that a person should know, once."""
 
-    @property
-    def counts(self) -> LinkCounts:
-        """So far."""
-
     def close(self) -> None: ...
 
 
@@ -69,6 +58,7 @@ class UdpConnection:
         """`remote` is where to send before anybody has spoken; None: nowhere."""
         self._socket, self._peer, self._remote = opened, peer, remote
         self._socket.setblocking(False)
+        self.counts = peer.counts
 
     @property
     def local_port(self) -> int:
@@ -96,11 +86,7 @@ class UdpConnection:
         return None if remote is None else Way(frame, self._socket.fileno(), remote)
 
     def news(self) -> str | None:
-        return self._peer.news()
-
-    @property
-    def counts(self) -> LinkCounts:
-        return LinkCounts(self._peer.moves, self._peer.dropped)
+        return self._peer.news.popleft() if self._peer.news else None
 
     def close(self) -> None:
         self._socket.close()

@@ -11,7 +11,9 @@ genuine packets pin, hold and move an address. Before, whoever has the key is an
 the vehicle learns the time from what it is sent.
 """
 
+from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import islice
 from typing import TypeAlias
 
@@ -29,11 +31,19 @@ Address: TypeAlias = tuple[str, int]
 RELEASED_US = defaults.LOSS_US // 2
 
 
+@dataclass(slots=True)
+class LinkCounts:
+    """What summary.json says of a connection, under these names."""
+
+    reconnects: int = 0
+    stranger_datagrams: int = 0
+
+
 class Peer:
     """Changed by `accepts` alone; times in microseconds, any epoch.
 
-    `dropped` counts datagrams that were not heard, `moves` how often the vehicle came back from another address.
-    `only` is the host, or the host and port, that the person named: nobody else is heard, pinned or not.
+    A vehicle that came back from another address counts as reconnected. `only` is the host, or the host and port, that
+    the person named: nobody else is heard, pinned or not.
     """
 
     def __init__(self, only: tuple[str, int | None] | None = None, signing: Signing | None = None) -> None:
@@ -45,25 +55,19 @@ class Peer:
         self._vehicle: tuple[int, int] | None = None  # system and component
         self._last_us = 0
         self._told: set[Address] = set()
-        self._news: str | None = None
+        self.news = deque[str]()  # a stranger that was turned away for the first time, and where the vehicle has gone
         self.answered: Address | None = None
-        self.dropped = 0
-        self.moves = 0
+        self.counts = LinkCounts()
 
     def accepts(self, datagram: bytes, sender: Address, now_us: int) -> bool:
         if self._is_heard(datagram, sender, now_us):
             return True
-        self.dropped += 1
+        self.counts.stranger_datagrams += 1
         # An attacker has sixty thousand ports; the first few tell all there is to tell.
         if sender not in self._told and len(self._told) < 3:
             self._told.add(sender)
-            self._news = f"{sender[0]}:{sender[1]} sends to this port, too; it is not listened to"
+            self.news.append(f"{sender[0]}:{sender[1]} sends to this port, too; it is not listened to")
         return False
-
-    def news(self) -> str | None:
-        """A stranger that has just been turned away for the first time."""
-        news, self._news = self._news, None
-        return news
 
     def _is_heard(self, datagram: bytes, sender: Address, now_us: int) -> bool:
         if self._only is not None and (sender[0] != self._only[0] or self._only[1] not in (None, sender[1])):
@@ -90,8 +94,8 @@ class Peer:
 
     def _pin(self, sender: Address, now_us: int) -> None:
         if self._pinned is not None:
-            self.moves += 1
-            self._news = f"the vehicle now sends from {sender[0]}:{sender[1]}, and answers go there"
+            self.counts.reconnects += 1
+            self.news.append(f"the vehicle now sends from {sender[0]}:{sender[1]}, and answers go there")
         self._before = None if sender == self._before else self._pinned
         self._pinned = self.answered = sender
         self._last_us, self._moved = now_us, None

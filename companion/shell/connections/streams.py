@@ -21,7 +21,8 @@ from queue import Empty, SimpleQueue
 from companion.autopilot.known import defaults
 from companion.errors import ConnectionSetupError
 from companion.mavlink.packet import packet_length
-from companion.shell.connections.connection import READ_SIZE, LinkCounts, Way, bound_socket, plain, readable
+from companion.shell.connections.connection import READ_SIZE, Way, bound_socket, plain, readable
+from companion.shell.connections.peer import LinkCounts
 
 # A local server answers within milliseconds and a radio link within a second; longer means nobody is there.
 TCP_CONNECT_TIMEOUT_S = 5.0
@@ -132,7 +133,7 @@ class StreamConnection:
         self._news = deque([] if missing is None else [f"{missing} Waiting for it."])
         self._is_missed = missing is not None
         self._lost_s: float | None = None
-        self._reconnects = 0
+        self.counts = LinkCounts()
         if stream is None:
             self._begin(None)
 
@@ -154,7 +155,7 @@ class StreamConnection:
         except Empty:
             return
         if self._lost_s is not None:
-            self._reconnects += 1
+            self.counts.reconnects += 1
             self._news.append(f"connected again after {time.monotonic() - self._lost_s:.1f} s: {self._stream.at}")
         elif self._is_missed:
             self._news.append(f"connected: {self._stream.at}")
@@ -188,10 +189,6 @@ class StreamConnection:
 
     def news(self) -> str | None:
         return self._news.popleft() if self._news else None
-
-    @property
-    def counts(self) -> LinkCounts:
-        return LinkCounts(reconnects=self._reconnects)
 
     def close(self) -> None:
         """What a thread still opens ends with the program."""

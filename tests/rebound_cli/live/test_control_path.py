@@ -12,7 +12,7 @@ import pytest
 from companion.companion import StepResult
 from companion.mavlink.packet import message_id_of
 from companion.messages import ComputerStatus
-from companion.shell.connections.connection import LinkCounts
+from companion.shell.connections.peer import LinkCounts
 from companion.shell.tlog import read_tlog
 from rebound_cli import fly as command
 from rebound_cli.background import MOST_WAITING, Background
