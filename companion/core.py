@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+from companion.autopilot.interface import AWAY_M_S2
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.damage import note_motors
 from companion.flight.envelope import Surroundings, bounded
@@ -265,27 +266,28 @@ class Core(ABC, Generic[FlightT, MachineT]):
         in a recovery by position its place.
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
-        words, recovery, held_s = flight.vehicle.autopilot.last_words, self.reflex.recovery, self.reflex.loss_s
+        recovery, held_s = self.reflex.recovery, self.reflex.loss_s
+        misled_s, place_m = flight.vehicle.autopilot.misled_s, flight.vehicle.autopilot.last_place_m
         if self._leans is None or latest is None or target is None or recovery is None:
             return ()
         since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.sample_time_boot_us)
-        left_s, lean, now_us = words.misled_s - since_s, target.lean, self.now_us - self.started_at_us
+        left_s, lean, now_us = misled_s - since_s, target.lean, self.now_us - self.started_at_us
         if lean is None or held_s is None:
             # By a position from now on. An autopilot that brakes by itself receives it again until it flies well.
             again = self.resets.sent(target.at_rest().setpoint(now_us))
-            return self._repeated(again, held_s or HELD_S, left_s if words.away_m is None else 0.0)
+            return self._repeated(again, held_s or HELD_S, left_s if place_m is None else 0.0)
         # It brakes by itself when it has noticed the silence; another place takes a new tilt.
-        until_s = left_s - held_s - NOTICED_S if words.away_m is None else max(0.0, left_s) + LEAD_S
+        until_s = left_s - held_s - NOTICED_S if place_m is None else max(0.0, left_s) + LEAD_S
         if until_s <= 0.0:
             return ()
         north, east, _ = lean.surfaces[0].normal_ned
-        brakes = braked(lean.belief, (north, east, 0.0), left_s) if words.away_m is None else ZERO
-        asked = plus(brakes, words.away_m_s2, (north, east, 0.0))
+        brakes = braked(lean.belief, (north, east, 0.0), left_s) if place_m is None else ZERO
+        asked = plus(brakes, AWAY_M_S2, (north, east, 0.0))
         tilt = self.resets.sent(lean.tilted_by(asked).setpoint(now_us, asked))
         tilts = self._repeated(tilt, held_s, until_s)
-        if words.away_m is None:
+        if place_m is None:
             return tilts
-        n, e, _ = plus(latest.position_ned_m, words.away_m, (north, east, 0.0))
+        n, e, _ = plus(latest.position_ned_m, place_m, (north, east, 0.0))
         place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
         kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
         return (*tilts, (until_s, self.resets.sent(PositionSetpoint(now_us, kept.position_ned_m, None))))

@@ -7,6 +7,9 @@ from enum import Enum
 from companion.autopilot.setup import PreflightItem, SerialLine, Setup
 from companion.messages import MessageId, VehicleCommand
 
+# Of the tilt that a dead companion has said, off the obstacle: as much as the vehicle's own attitude may be wrong by.
+AWAY_M_S2 = 1.5
+
 
 class Pilot(Enum):
     """Who moves the vehicle in a mode."""
@@ -36,18 +39,6 @@ class Remedies:
     no_battery: str
     no_estimator: str
     not_armed: str
-
-
-@dataclass(frozen=True, slots=True)
-class LastWords:
-    """What is said to a vehicle whose companion has died near an obstacle, until it flies well by itself: a tilt."""
-
-    misled_s: float
-    """After a hit its own velocity is too wrong for so long to fly by."""
-    away_m_s2: float
-    """Of the tilt, off the obstacle: as much as its own attitude may be wrong by."""
-    away_m: float | None = None
-    """The place that is said then, off the obstacle. None: it brakes by itself then, and is braked until then."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +85,10 @@ class Autopilot:
     """Read before it is flown by attitude."""
     attitude_held_s: Callable[[Mapping[str, int | float]], float]
     """From these: for so long an attitude is flown on; infinite where no attitude with a thrust can be asked for."""
-    last_words: LastWords
+    misled_s: float
+    """After a hit its own velocity is too wrong for so long to fly by: until then a dead companion has said a tilt."""
+    last_place_m: float | None = None
+    """Off the obstacle: the place that is said then. None: it brakes by itself then, and is braked until then."""
     loss_parameter: str
     """For so many seconds the last setpoint is flown on."""
     rate_parameter: str

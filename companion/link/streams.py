@@ -48,8 +48,6 @@ def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -
 class StreamMonitor:
     """Counts received messages. Rates are means over the companion's time, so lost packets lower them."""
 
-    __slots__ = ("_counts", "_until_us", "asked", "started_us", "streams")
-
     def __init__(self, config: StreamsConfig, for_detector: Collection[MessageId] = ()) -> None:
         self.streams = wanted_streams(config, for_detector)
         self.asked: dict[float, messages.VehicleCommand] = {}  # by message, and what stands in for one, too

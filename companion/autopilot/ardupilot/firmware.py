@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.ardupilot import modes, setup
-from companion.autopilot.interface import Autopilot, LastWords, Remedies
+from companion.autopilot.interface import Autopilot, Remedies
 from companion.messages import MessageId, VehicleCommand, set_message_interval
 
 # RC_Channel.h: while FORCEFLYING is high, neither the crash check nor the land detector stops the motors. A recovery
@@ -45,14 +45,10 @@ ARDUPILOT = Autopilot(
     keeps_trim=True,  # AC_PosControl: init_xy_controller, since 4.7 NE_init_controller
     attitude_parameters=(setup.LOSS, setup.OPTIONS),
     attitude_held_s=setup.attitude_held_s,
-    last_words=LastWords(
-        # Wrong by up to 7 m/s after a clipped hit, and by less than 1 m/s from then on.
-        misled_s=0.8,
-        # Of a vehicle that is level by a tilt which is then wrong by 9 degrees.
-        away_m_s2=1.5,
-        # By a tilt that is wrong by 8 degrees a vehicle at rest drifts 2 m towards the obstacle before it is turned.
-        away_m=4.0,
-    ),
+    # Wrong by up to 7 m/s after a clipped hit, and by less than 1 m/s from then on.
+    misled_s=0.8,
+    # By a tilt that is wrong by 8 degrees a vehicle at rest drifts 2 m towards the obstacle before it is turned.
+    last_place_m=4.0,
     loss_parameter=setup.LOSS,
     rate_parameter="SERIALn_BAUD",
     sight=setup.sight,

@@ -1,6 +1,6 @@
 """PX4 behind the interface of autopilots."""
 
-from companion.autopilot.interface import Autopilot, LastWords, Remedies
+from companion.autopilot.interface import Autopilot, Remedies
 from companion.autopilot.px4 import modes, setup
 from companion.messages import MessageId, VehicleCommand
 
@@ -34,7 +34,7 @@ PX4 = Autopilot(
     attitude_parameters=(setup.LOSS,),
     attitude_held_s=lambda told: told[setup.LOSS],
     # Of a real one, by motion capture: its velocity is wrong by up to 7 m/s, and then its tilt by 8 degrees.
-    last_words=LastWords(misled_s=1.4, away_m_s2=1.5),
+    misled_s=1.4,
     loss_parameter=setup.LOSS,
     rate_parameter="MAV_x_RATE",
     sight=setup.sight,
