@@ -69,17 +69,19 @@ class Patch:
 
     def touched_along_m(self) -> tuple[float, float]:
         """Of a wall: from where to where it was touched."""
-        return _range([self.along_m(place) for place in self.touches_ned_m])
+        places_m = [self.along_m(place) for place in self.touches_ned_m]
+        return min(places_m), max(places_m)
 
     def assumed_along_m(self) -> tuple[float, float]:
         """Of a wall: both ends of its assumed extent."""
-        return _grown(self.touched_along_m(), self.reaches_m)
+        return self._grown(*self.touched_along_m())
 
     def assumed_heights_m(self) -> tuple[float, float]:
         """Lowest and highest height of its assumed extent; unbounded above a ceiling and below a floor."""
-        low, high = touched = _range([-place[2] for place in self.touches_ned_m])
+        heights_m = [-place[2] for place in self.touches_ned_m]
+        low, high = min(heights_m), max(heights_m)
         if not self.is_steep:
-            return _grown(touched, self.reaches_m)
+            return self._grown(low, high)
         return (low, math.inf) if self.normal_ned[2] > 0.0 else (-math.inf, high)
 
     def faces(self, place_ned_m: Vector3, beside_m: float) -> bool:
@@ -95,29 +97,21 @@ class Patch:
 
     def assumed_beyond_m(self) -> float:
         """Of a ceiling or a floor: how far it is assumed to extend beyond its touches."""
-        widest_m = max(math.dist(a[:2], b[:2]) for a in self.touches_ned_m for b in self.touches_ned_m)
-        return goes_on_m(widest_m, self.reaches_m)
+        return self._beyond_m(max(math.dist(a[:2], b[:2]) for a in self.touches_ned_m for b in self.touches_ned_m))
 
+    def _grown(self, low_m: float, high_m: float) -> tuple[float, float]:
+        beyond_m = self._beyond_m(high_m - low_m)
+        return low_m - beyond_m, high_m + beyond_m
 
-def goes_on_m(known_m: float, reaches_m: float) -> float:
-    """How far a surface of known length `known_m` is assumed to extend beyond it."""
-    return max(reaches_m, min(GOES_ON_MOST_M, GOES_ON * known_m))
+    def _beyond_m(self, known_m: float) -> float:
+        """How far it is assumed to extend beyond a known length."""
+        return max(self.reaches_m, min(GOES_ON_MOST_M, GOES_ON * known_m))
 
 
 def mean_of(places: Sequence[Vector3]) -> Vector3:
     """Mean of one or more positions, m."""
     n, e, d = (sum(axis) / len(places) for axis in zip(*places, strict=True))
     return (n, e, d)
-
-
-def _range(values: Sequence[float]) -> tuple[float, float]:
-    return min(values), max(values)
-
-
-def _grown(touched: tuple[float, float], reaches_m: float) -> tuple[float, float]:
-    low, high = touched
-    beyond_m = goes_on_m(high - low, reaches_m)
-    return low - beyond_m, high + beyond_m
 
 
 # Slower than this the obstacle came to the vehicle: it moves, and will not stand there as a wall does. The map keeps it
@@ -153,20 +147,6 @@ MOST_ANGLE_RAD = math.radians(60.0)
 LEAST_BASE_M = 0.4
 
 
-def remembered(known: Sequence[Patch], touches: Sequence[Patch], clearance_m: float) -> tuple[Patch, ...]:
-    """The known patches and what the touches, in their order, add to them.
-
-    ``clearance_m``: how far the vehicle's centre stays off a surface. Through a gap of less than twice that it cannot
-    pass, so what lies on both sides of such a gap may as well be one.
-    """
-    patches = list(known)
-    for touch in touches:
-        fitting = [patch for patch in patches if is_same(patch, touch, clearance_m)]
-        patches = [patch for patch in patches if patch not in fitting]
-        patches.append(_joined(fitting, touch))
-    return tuple(patches)
-
-
 def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     """Whether the touch is one more of the patch's surface."""
     if patch.is_steep != touch.is_steep:
@@ -180,8 +160,8 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     return patch.is_near(place, 2.0 * clearance_m) and abs(patch.off_m(place)) <= errors_m
 
 
-def _joined(patches: Sequence[Patch], touch: Patch) -> Patch:
-    """One patch of all; the normal by the means of the normals, then by the places where those lie far apart."""
+def joined(patches: Sequence[Patch], touch: Patch) -> Patch:
+    """The touch and the patches of its surface as one; the normal by the means, then by places that lie far apart."""
     parts = [*patches, touch]
     weights = [part.hits / max(part.normal_error_rad, 1e-3) ** 2 for part in parts]
     total = sum(weights)
@@ -191,14 +171,14 @@ def _joined(patches: Sequence[Patch], touch: Patch) -> Patch:
     size = math.sqrt(n * n + e * e + d * d)
     # Normals of one surface have errors in common (friction leans all alike): the mean is no better than the best.
     error_rad = min(part.normal_error_rad for part in parts)
-    joined = Patch(
+    patch = Patch(
         touches_ned_m=tuple(place for part in parts for place in part.touches_ned_m),
         normal_ned=(n / size, e / size, d / size) if size > 1e-6 * total else touch.normal_ned,
         normal_error_rad=error_rad,
         reaches_m=max(part.reaches_m for part in parts),
         found_at_us=min(part.found_at_us for part in parts),
     )
-    return joined if joined.is_steep else _turned_to_places(joined)
+    return patch if patch.is_steep else _turned_to_places(patch)
 
 
 def _turned_to_places(patch: Patch) -> Patch:

@@ -14,7 +14,7 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.fence import Fence
-from companion.memory.surroundings import ROUNDING_M, ObstacleMap, Place, Walls
+from companion.memory.surroundings import ROUNDING_M, ObstacleMap, Place
 from companion.messages import Vector3
 
 # For ways along an edge of a polygon; less than what the safety envelope takes for rounding.
@@ -29,23 +29,23 @@ def route(known: ObstacleMap, start_ned_m: Vector3, goal_ned_m: Vector3) -> tupl
     """
     start, goal = start_ned_m[:2], goal_ned_m[:2]
     from_m, to_m = -start_ned_m[2], -goal_ned_m[2]
-    found = _search(known, known.walls(from_m, to_m, start_ned_m), start, goal)
+    found = _search(known.between(from_m, to_m, start_ned_m), start, goal)
     if found is not None:
         return _sloped(start_ned_m, goal_ned_m, found)
     for level_m in sorted(known.levels_m(), key=lambda level_m: abs(level_m - from_m) + abs(level_m - to_m)):
-        if known.walls(to_m, level_m, start_ned_m).holds(goal) or known.is_capped(start, from_m, level_m):
+        if known.between(to_m, level_m, start_ned_m).holds(goal) or known.is_capped(start, from_m, level_m):
             continue
-        found = _search(known, known.walls(level_m, level_m, start_ned_m), start, goal)
+        found = _search(known.between(level_m, level_m, start_ned_m), start, goal)
         if found is not None:
             return (*[(n, e, -level_m) for n, e in (start, *found)], goal_ned_m)
     return None
 
 
-def _search(known: ObstacleMap, walls: Walls, start: Place, goal: Place) -> list[Place] | None:
+def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None:
     """The shortest way over the corners of what is known (A*): the places after the start."""
-    if walls.holds(goal):
+    if known.holds(goal):
         return None
-    graph = _Graph(known.fence, walls, start, goal)
+    graph = _Graph(known, start, goal)
     # Of each entry: how long a way over its last place is at least, that place, and the way to it.
     queue: list[tuple[float, int, list[Place]]] = [(math.dist(start, goal), START, [])]
     lengths, done = {START: 0.0}, set[int]()
@@ -68,13 +68,13 @@ def _search(known: ObstacleMap, walls: Walls, start: Place, goal: Place) -> list
 class _Graph:
     """The start, the goal, and the corners of what is known and of the fence."""
 
-    def __init__(self, fence: Fence, walls: Walls, start: Place, goal: Place) -> None:
-        self._walls = walls
+    def __init__(self, known: ObstacleMap, start: Place, goal: Place) -> None:
+        self._known, fence = known, known.fence
         self._fence = _fence_shape(fence)
-        self._inner = shapely.union_all(walls.grown(walls.clearance_m - ROUNDING_M))
+        self._inner = known.grown(known.clearance_m - ROUNDING_M)
         shapely.prepare(self._fence)
         shapely.prepare(self._inner)
-        around = shapely.get_coordinates(shapely.union_all(walls.grown(walls.clearance_m)))
+        around = shapely.get_coordinates(known.grown(known.clearance_m))
         corners = [corner for corner in ((float(n), float(e)) for n, e in around) if fence.contains(*corner)]
         corners += fence.polygon_ne_m or ()
         free = [corner for corner in dict.fromkeys(corners) if not self._inner.intersects(Point(corner))]
@@ -94,7 +94,7 @@ class _Graph:
     def _is_free(self, here: int, there: int, line: BaseGeometry) -> bool:
         # From the start and to the goal as near as those themselves are.
         ends = [self.places[end] for end in (here, there) if end in (START, GOAL)]
-        return self._walls.keeps_off(line, ends) if ends else not self._inner.intersects(line)
+        return self._known.keeps_off(line, ends) if ends else not self._inner.intersects(line)
 
 
 def _fence_shape(fence: Fence) -> BaseGeometry:

@@ -1,7 +1,7 @@
 """Obstacle memory as people and files have it: the mission's `obstacles:` part and `obstacles.json`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -83,11 +83,6 @@ def as_data(patch: Patch) -> dict[str, Any]:
         "reaches_m": round(patch.reaches_m, _DIGITS),
         "found_at_us": patch.found_at_us,
     }
-
-
-def file_data(patches: Sequence[Patch]) -> Mapping[str, Any]:
-    """What an `obstacles.json` holds."""
-    return {"patches": [as_data(patch) for patch in patches]}
 
 
 def _rounded(vector: Sequence[float]) -> list[float]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -10,7 +11,7 @@ from shapely import LineString, MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.fence import Fence
-from companion.memory.patch import Patch, remembered
+from companion.memory.patch import Patch, is_same, joined
 from companion.messages import Vector3
 
 Place = tuple[float, float]
@@ -27,35 +28,7 @@ LEAST_FREE_M = 0.15
 LEVEL_SLACK_M = 0.01
 
 
-@dataclass(frozen=True, slots=True)
-class Walls:
-    """Obstacles at some height: the assumed area of each patch, and its core."""
-
-    areas: Sequence[BaseGeometry]
-    cores: Sequence[BaseGeometry]
-    reach_m: float
-    clearance_m: float
-
-    @property
-    def least_m(self) -> float:
-        """How near a vehicle's centre may come to a core."""
-        return min(self.reach_m + LEAST_FREE_M, self.clearance_m - SLACK_M)
-
-    def holds(self, place: Place) -> bool:
-        """Whether a place lies in one of them, for a vehicle that has a size."""
-        return bool(np.any(shapely.distance(Point(place), self.cores) < self.least_m))
-
-    def keeps_off(self, line: BaseGeometry, ends: Sequence[Place]) -> bool:
-        """Whether a line keeps the clearance, or what these of its ends leave of it, and stays off the cores."""
-        is_clear = _keeps(line, ends, self.areas, self.clearance_m - SLACK_M)
-        return is_clear and _keeps(line, ends, self.cores, self.least_m)
-
-    def grown(self, by_m: float) -> list[BaseGeometry]:
-        """The assumed areas, grown by `by_m` on every side."""
-        return [shape.buffer(by_m, join_style="mitre") for shape in self.areas]
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ObstacleMap:
     """All patches for one vehicle: `reach_m` from its centre to the guards' rim, `margin_m` from there to surfaces.
 
@@ -72,20 +45,55 @@ class ObstacleMap:
     def clearance_m(self) -> float:
         return self.reach_m + self.margin_m
 
-    def joined(self, touches: Sequence[Patch]) -> "ObstacleMap":
-        """With what the touches, in their order, add to it."""
-        return replace(self, patches=remembered(self.patches, touches, self.clearance_m))
+    @property
+    def least_m(self) -> float:
+        """How near a vehicle's centre may come to a core."""
+        return min(self.reach_m + LEAST_FREE_M, self.clearance_m - SLACK_M)
 
-    def walls(self, from_m: float, to_m: float, start_ned_m: Vector3) -> Walls:
-        """Between two heights, for a vehicle that starts there."""
+    @cached_property
+    def areas(self) -> list[BaseGeometry]:
+        """The assumed area of each patch, in plan."""
+        return [*map(assumed_area, self.patches)]
+
+    @cached_property
+    def cores(self) -> list[BaseGeometry]:
+        return [*map(core, self.patches)]
+
+    def joined(self, touches: Sequence[Patch]) -> "ObstacleMap":
+        """With what the touches, in their order, add to it.
+
+        Through a gap of less than twice the clearance the vehicle cannot pass, so what lies on both sides of such a gap
+        may as well be one.
+        """
+        patches = list(self.patches)
+        for touch in touches:
+            fitting = [patch for patch in patches if is_same(patch, touch, self.clearance_m)]
+            patches = [patch for patch in patches if patch not in fitting]
+            patches.append(joined(fitting, touch))
+        return replace(self, patches=tuple(patches))
+
+    def between(self, from_m: float, to_m: float, start_ned_m: Vector3) -> "ObstacleMap":
+        """What of it stands between two heights, for a vehicle that starts there."""
         here = [patch for patch in self.patches if self._meets(patch, from_m, to_m)]
-        there = [patch for patch in here if not _is_within(patch, start_ned_m)]
-        return Walls([*map(assumed_area, there)], [*map(core, there)], self.reach_m, self.clearance_m)
+        return replace(self, patches=tuple(patch for patch in here if not _is_within(patch, start_ned_m)))
+
+    def holds(self, place: Place) -> bool:
+        """Whether a place lies in one of the patches, for a vehicle that has a size."""
+        return bool(np.any(shapely.distance(Point(place), self.cores) < self.least_m))
+
+    def keeps_off(self, line: BaseGeometry, ends: Sequence[Place]) -> bool:
+        """Whether a line keeps the clearance, or what these of its ends leave of it, and stays off the cores."""
+        is_clear = _keeps(line, ends, self.areas, self.clearance_m - SLACK_M)
+        return is_clear and _keeps(line, ends, self.cores, self.least_m)
+
+    def grown(self, by_m: float) -> BaseGeometry:
+        """The assumed areas as one, grown by `by_m` on every side."""
+        return shapely.union_all([shape.buffer(by_m, join_style="mitre") for shape in self.areas])
 
     def is_clear(self, place_ned_m: Vector3, start_ned_m: Vector3) -> bool:
         """Whether a place keeps the whole clearance."""
-        walls = self.walls(-place_ned_m[2], -place_ned_m[2], start_ned_m)
-        return walls.keeps_off(Point(place_ned_m[:2]), ())
+        here = self.between(-place_ned_m[2], -place_ned_m[2], start_ned_m)
+        return here.keeps_off(Point(place_ned_m[:2]), ())
 
     def _meets(self, patch: Patch, from_m: float, to_m: float) -> bool:
         bottom_m, top_m = patch.assumed_heights_m()
@@ -109,9 +117,8 @@ class ObstacleMap:
     def block(self, points_ned_m: Sequence[Vector3]) -> bool:
         """Whether a line through these points comes too near to a patch."""
         heights, places = [-point[2] for point in points_ned_m], [point[:2] for point in points_ned_m]
-        start, goal = places[0], places[-1]
-        walls = self.walls(min(heights), max(heights), points_ned_m[0])
-        return walls.holds(goal) or not walls.keeps_off(LineString(places), (start, goal))
+        here = self.between(min(heights), max(heights), points_ned_m[0])
+        return here.holds(places[-1]) or not here.keeps_off(LineString(places), (places[0], places[-1]))
 
 
 def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from companion.errors import ReboundError
-from companion.memory.stored import file_data
+from companion.memory.stored import as_data
 from companion.shell.files import write_whole
 from companion.shell.tlog import TlogWriter, may_be_logged
 from rebound_cli import __version__
@@ -162,7 +162,7 @@ class FlightRecorder:
         """The memory as it is by now."""
         if patches != self._obstacles:
             self._obstacles = patches
-            self._do(write_json, self._folder / OBSTACLES_NAME, file_data(patches))
+            self._do(write_json, self._folder / OBSTACLES_NAME, {"patches": [as_data(patch) for patch in patches]})
 
     def close(self) -> None:
         """Return when all is written that could be."""

@@ -11,9 +11,9 @@ from pydantic import ValidationError
 from shapely import LineString, Point
 
 from companion.fence import Fence
-from companion.memory.patch import REACHES_M, Patch, is_same, remembered, touch_of
+from companion.memory.patch import REACHES_M, Patch, is_same, touch_of
 from companion.memory.route import route
-from companion.memory.stored import KnownPatch, ObstacleFile, as_data, file_data
+from companion.memory.stored import KnownPatch, ObstacleFile, as_data
 from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
 from companion.mission.item_trajectory import SpeedLimits, home_around, left_of, looks, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem
@@ -94,7 +94,7 @@ def test_the_surface_is_a_guards_reach_ahead_of_the_centre_or_behind_one_that_it
 
 
 def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
-    (patch,) = remembered((), [wall(0.0), wall(1.05)], CLEARANCE_M)
+    (patch,) = around().joined([wall(0.0), wall(1.05)]).patches
     low_m, high_m = patch.assumed_along_m()
     assert patch.hits == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
 
@@ -103,7 +103,7 @@ def test_the_places_give_a_better_normal_than_the_pushes():
     """Two touches 2 m apart on a wall turned by 10 degrees, each with a normal 20 degrees off."""
     slope = math.tan(math.radians(10.0))
     touches = [wall(east_m, normal=turned(30.0), north_m=4.0 - slope * east_m) for east_m in (0.0, 1.0, 2.0)]
-    (patch,) = remembered((), touches, CLEARANCE_M)
+    (patch,) = around().joined(touches).patches
     assert patch.normal_ned == pytest.approx(turned(10.0), abs=0.02)
     assert math.degrees(patch.normal_error_rad) < 6.0
 
@@ -119,7 +119,7 @@ def test_the_places_give_a_better_normal_than_the_pushes():
     ],
 )
 def test_another_surface_is_another_patch(other):
-    assert len(remembered((), [wall(0.0), other], CLEARANCE_M)) == 2
+    assert len(around().joined([wall(0.0), other]).patches) == 2
     assert not is_same(wall(0.0), other, CLEARANCE_M)
 
 
@@ -134,8 +134,8 @@ def test_a_ceiling_whose_direction_is_not_known_well_bends_beside_its_touch():
 
 
 def test_a_patch_comes_back_from_a_file_as_it_was():
-    known = remembered((), [wall(0.0), wall(1.05), wall(0.0, normal=turned(90.0))], CLEARANCE_M)
-    stored = ObstacleFile.model_validate(file_data(known))
+    known = around().joined([wall(0.0), wall(1.05), wall(0.0, normal=turned(90.0))]).patches
+    stored = ObstacleFile.model_validate({"patches": [as_data(patch) for patch in known]})
     for before, after in zip(known, stored.patches, strict=True):
         patch = after.patch()
         assert patch.hits == before.hits and patch.found_at_us == before.found_at_us
@@ -266,7 +266,7 @@ def explore(width_m: float, offset_m: float, error_deg: float) -> tuple[list[Pat
     """A point with the vehicle's reach, a wall 4 m north, and a memory; touches until it is through or gives up."""
     fence, touches, start = Fence(radius_m=11, max_height_m=2.4), [], START
     while len(touches) < 12:
-        known = around(*remembered((), touches, CLEARANCE_M), fence=fence)
+        known = around(fence=fence).joined(touches)
         places = route(known, start, GOAL)
         if places is None:
             return touches, False
