@@ -48,8 +48,6 @@ POLL_INTERVAL_US = 50_000
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Messages to send and events of one step."""
-
     messages: tuple[Outgoing, ...]
     events: tuple[Event, ...]
 
@@ -92,7 +90,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def begin(self, now_us: int) -> None:
         """Before the first step: times count from now on."""
         self.started_at_us = self.now_us = now_us
-        self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self.reflex.restart(now_us)
 
     def advance(self, samples: Sequence[Sample], now_us: int) -> Outputs:
@@ -128,7 +125,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         """
         flight = self.flight
         try:
-            samples, refusal = self._hear(self._in_one_frame(samples, now_us), now_us)
+            samples = self._in_one_frame(samples, now_us)
+            refusal = self._hear(samples, now_us)
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
             acks: list[CommandAck] = []
@@ -164,8 +162,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
         return samples
 
     @abstractmethod
-    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
-        """The samples of this flight, and why the vehicle is refused."""
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
+        """Update what is known of the vehicle; why it is refused, or None."""
 
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
@@ -355,8 +353,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
 
 class FlightCore(Core[FlightContext, Machine]):
-    """The core of one flight of a mission."""
-
     def __init__(self, mission: Mission) -> None:
         flight = FlightContext(mission)
         super().__init__(flight, Machine(flight, Connect()))
@@ -374,8 +370,8 @@ class FlightCore(Core[FlightContext, Machine]):
         off_state = None if state in IN_THE_AIR else state.value
         return situation_of(self.flight, off_state, state is State.LANDING, is_held=True)
 
-    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
-        return samples, update_vehicle(self.flight, samples, now_us)
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
+        return update_vehicle(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         self.stop_reason = None

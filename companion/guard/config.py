@@ -56,12 +56,5 @@ class GuardConfig(StrictModel):
 
     def as_mission(self) -> Mission:
         """What the parts that the guard shares with a flight read: a mission of which nothing is ever flown."""
-        return Mission.model_construct(
-            name="guard",
-            items=(),
-            fence=self.fence,
-            limits=self.limits,
-            on_crash=self.on_crash,
-            recovery=self.recovery,
-            companion=self.companion,
-        )
+        shared = {part: getattr(self, part) for part in Mission.model_fields if part in GuardConfig.model_fields}
+        return Mission.model_construct(name="guard", items=(), **shared)

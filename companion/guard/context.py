@@ -19,13 +19,13 @@ class GuardContext(FlightContext):
     """Changed by the guard's parts within a step.
 
     `keeps_others_out`: no setpoint but the guard's reaches the vehicle while it holds; so it is where all that is sent
-    passes through the guard. `then_hold` says why the vehicle is given back to AUTO.LOITER whatever is configured.
+    passes through the guard. `is_to_hold`: the vehicle is given back to AUTO.LOITER whatever is configured.
     """
 
     config: GuardConfig = field(kw_only=True)
     keeps_others_out: bool = field(kw_only=True)
     previous_mode: int | None = None
-    then_hold: str = ""
+    is_to_hold: bool = False
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
     has_stood: bool = False  # on the ground, or disarmed, since the guard began
     awaits_choice: bool = False  # a program's setpoints are kept out until somebody chooses a mode

@@ -38,11 +38,11 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         off_state = None if state is State.WATCHING or state in HOLDING else why_not(guard) or state.value
         return situation_of(guard, off_state, not holds and goes_down(guard, self.now_us), holds)
 
-    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
         if self.flight.keeps_others_out:
             # A program behind the guard answers, by its own clock: two answers are two times.
             samples = [one for one in samples if not isinstance(one, TimeSync) or one.answered_ns is not None]
-        return samples, observe(self.flight, samples, now_us)
+        return observe(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         guard = self.flight

@@ -121,7 +121,7 @@ class GiveBack(FixedSetpoint):
     def __init__(self, guard: GuardContext, is_crossed: bool, now_us: int) -> None:
         previous = guard.previous_mode
         self._wishes: list[int] = []
-        if guard.config.then == "previous" and not guard.then_hold and previous is not None:
+        if guard.config.then == "previous" and not guard.is_to_hold and previous is not None:
             self._wishes.append(previous)
         self._wishes += [guard.vehicle.autopilot.hold, guard.vehicle.autopilot.land]
         self._target = guard.target.at_rest() if guard.target and not is_crossed else None

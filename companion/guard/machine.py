@@ -118,7 +118,7 @@ class GuardMachine(StateMachine):
     def _remember_mode(self) -> None:
         guard = self.flight
         guard.previous_mode = guard.expected_mode = guard.vehicle.custom_mode
-        guard.then_hold, guard.target = "", None
+        guard.is_to_hold, guard.target = False, None
         guard.yaw_rad = guard.vehicle.heading_rad
 
     def _from_outside(self, inputs: Inputs, now_us: int) -> Transition | None:
@@ -169,8 +169,7 @@ class GuardMachine(StateMachine):
         guard, trigger = self.flight, Trigger[transition.trigger.name]
         if transition.text:
             guard.report(now_us, _KINDS.get(trigger, "guard"), transition.text)
-        if trigger in _TO_HOLD:
-            guard.then_hold = transition.text or trigger.value
+        guard.is_to_hold |= trigger in _TO_HOLD
         if self.state not in HOLDING:
             guard.command_client.cancel()
             guard.expected_mode = None
@@ -193,10 +192,10 @@ class GuardMachine(StateMachine):
                 return Recovering(guard, now_us)
             case State.GIVING_BACK:
                 limit, hits = guard.config.max_hits, recoveries_from(guard.hits)
-                if hits >= limit and not guard.then_hold:
-                    guard.then_hold = f"recovery {hits} of at most {limit}"
+                if hits >= limit and not guard.is_to_hold:
+                    guard.is_to_hold = True
                     if guard.config.then == "previous":
-                        guard.report(now_us, "not_back", f"not given back: {guard.then_hold}")
+                        guard.report(now_us, "not_back", f"not given back: recovery {hits} of at most {limit}")
                 return GiveBack(guard, trigger is Trigger.CROSSED, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)
