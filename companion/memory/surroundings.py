@@ -53,11 +53,11 @@ class ObstacleMap:
     @cached_property
     def areas(self) -> list[BaseGeometry]:
         """The assumed area of each patch, in plan."""
-        return [*map(assumed_area, self.patches)]
+        return [assumed_area(patch, patch.normal_error_rad) for patch in self.patches]
 
     @cached_property
     def cores(self) -> list[BaseGeometry]:
-        return [*map(core, self.patches)]
+        return [assumed_area(patch, 0.0) for patch in self.patches]
 
     def joined(self, touches: Sequence[Patch]) -> "ObstacleMap":
         """With what the touches, in their order, add to it.
@@ -105,14 +105,14 @@ class ObstacleMap:
         levels = set[float]()
         for patch in self.patches:
             bottom_m, top_m = patch.assumed_heights_m()
-            is_ceiling = patch.is_steep and patch.normal_ned[2] > 0.0
-            levels.add(bottom_m - self.clearance_m if is_ceiling else top_m + self.clearance_m)
+            is_above = patch.normal_ned[2] > 0.0
+            levels.add(bottom_m - self.clearance_m if is_above else top_m + self.clearance_m)
         return sorted(level for level in levels if self.fence.min_height_m <= level <= self.fence.max_height_m)
 
     def is_capped(self, start: Place, from_m: float, to_m: float) -> bool:
         """Whether a ceiling, or a floor, is between the vehicle and another height."""
         steep = [patch for patch in self.patches if patch.is_steep and self._meets(patch, from_m, to_m)]
-        return any(core(patch).distance(Point(start)) < self.reach_m for patch in steep)
+        return any(assumed_area(patch, 0.0).distance(Point(start)) < self.reach_m for patch in steep)
 
     def block(self, points_ned_m: Sequence[Vector3]) -> bool:
         """Whether a line through these points comes too near to a patch."""
@@ -124,7 +124,8 @@ class ObstacleMap:
 def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
     """A patch in which the vehicle itself is cannot be there, or not any more."""
     bottom_m, top_m = patch.assumed_heights_m()
-    return bottom_m <= -place_ned_m[2] <= top_m and core(patch).distance(Point(place_ned_m[:2])) < 2.0 * ROUNDING_M
+    is_level = bottom_m <= -place_ned_m[2] <= top_m
+    return is_level and assumed_area(patch, 0.0).distance(Point(place_ned_m[:2])) < 2.0 * ROUNDING_M
 
 
 def _keeps(line: BaseGeometry, ends: Sequence[Place], shapes: Sequence[BaseGeometry], off_m: float) -> bool:
@@ -139,32 +140,21 @@ def _keeps(line: BaseGeometry, ends: Sequence[Place], shapes: Sequence[BaseGeome
 THICKNESS_M = 0.1
 
 
-def assumed_area(patch: Patch) -> BaseGeometry:
+def assumed_area(patch: Patch, error_rad: float) -> BaseGeometry:
     """The area in plan that the surface is assumed to cover, whatever its heights.
 
-    Of a wall: a rectangle behind its front. The normal's error over the wall's length widens it, so that a surface
-    turned by that error still lies within it.
+    Of a wall: a rectangle behind its front. The error of its normal over its length widens it, so that a surface turned
+    by that error still lies within it. Without an error it is the core: a vehicle beside the wall cannot be in it.
     """
     if patch.is_steep:
-        return core(patch)
-    beyond_m = patch.touched_along_m()[0] - patch.assumed_along_m()[0]  # at either end
-    return _wall(patch, beyond_m * math.sin(patch.normal_error_rad))
-
-
-def core(patch: Patch) -> BaseGeometry:
-    """The same without the normal's error: an area that a vehicle beside the wall cannot be in."""
-    if not patch.is_steep:
-        return _wall(patch, 0.0)
-    touched = MultiPoint([place[:2] for place in patch.touches_ned_m]).convex_hull
-    return touched.buffer(max(patch.assumed_beyond_m(), THICKNESS_M), quad_segs=2)
-
-
-def _wall(patch: Patch, drift_m: float) -> BaseGeometry:
+        touched = MultiPoint([place[:2] for place in patch.touches_ned_m]).convex_hull
+        return touched.buffer(max(patch.assumed_beyond_m(), THICKNESS_M), quad_segs=2)
+    low_m, high_m = patch.assumed_along_m()
+    drift_m = (patch.touched_along_m()[0] - low_m) * math.sin(error_rad)
     (north, east, _), (ahead_n, ahead_e, _) = patch.centre_ned_m, patch.normal_ned
     offs_m = [patch.off_m(place) for place in patch.touches_ned_m]
     back_m, front_m = min(offs_m) - max(THICKNESS_M, drift_m), max(offs_m) + drift_m
     # A touch without an assumed extent is as wide as it is thick.
-    low_m, high_m = patch.assumed_along_m()
     low_m, high_m = min(low_m, high_m - THICKNESS_M), max(high_m, low_m + THICKNESS_M)
     corners = ((low_m, back_m), (low_m, front_m), (high_m, front_m), (high_m, back_m))
     return Polygon(

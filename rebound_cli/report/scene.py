@@ -82,7 +82,8 @@ def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
     """In the vehicle's local frame; a wall's in its plane, a ceiling's or a floor's at its height."""
     origin = flight.origin_ned_m
     if patch.is_steep:
-        corners = [(north, east, patch.centre_ned_m[2]) for north, east in assumed_area(patch).exterior.coords[:-1]]
+        outline = assumed_area(patch, 0.0).exterior.coords[:-1]
+        corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline]
     else:
         (n, e, _), (north, east, _) = patch.centre_ned_m, patch.normal_ned
         (left_m, right_m), (low_m, high_m) = patch.assumed_along_m(), patch.assumed_heights_m()

@@ -14,7 +14,7 @@ from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, is_same, touch_of
 from companion.memory.route import route
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data
-from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area
 from companion.mission.item_trajectory import SpeedLimits, home_around, left_of, looks, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem
 from companion.mission.trajectory import CurveProfile
@@ -163,7 +163,7 @@ def test_the_way_round_a_touch_keeps_the_clearance_and_is_the_shortest():
     assert known.block((START, GOAL))
     places = route(known, START, GOAL)
     trajectory = LineString([START[:2], *[place[:2] for place in places]])
-    assert trajectory.distance(assumed_area(known.patches[0])) >= CLEARANCE_M - SLACK_M
+    assert trajectory.distance(known.areas[0]) >= CLEARANCE_M - SLACK_M
     # round the nearer end, which is the western one
     assert all(place[1] < 0.0 for place in places[:-1])
     least_m = math.hypot(4.0, 0.3 + CLEARANCE_M) + math.hypot(3.0, 0.3 + CLEARANCE_M)
@@ -211,7 +211,7 @@ def test_an_orbit_is_flown_round_what_stands_in_it(turns):
     planned = trajectory_around(item, START, PACE, known)
     assert planned.is_detour and planned.left_out >= turns
     places = [planned.trajectory.at(planned.trajectory.duration_s * n / 400)[0] for n in range(401)]
-    assert min(Point(place[:2]).distance(core(known.patches[0])) for place in places) > REACH_M + LEAST_FREE_M
+    assert min(Point(place[:2]).distance(known.cores[0]) for place in places) > REACH_M + LEAST_FREE_M
     assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
 
 
@@ -280,7 +280,7 @@ def explore(width_m: float, offset_m: float, error_deg: float) -> tuple[list[Pat
         touch = touch_of(place, velocity, Normal(seen, math.radians(max(error_deg, 10.0))), REACH_M, 0)
         # Then no touch is made where a wall is remembered
         for patch in known.patches:
-            assert core(patch).distance(Point(touch.centre_ned_m[:2])) > 0.1
+            assert assumed_area(patch, 0.0).distance(Point(touch.centre_ned_m[:2])) > 0.1
         touches.append(touch)
         start = tuple(p + 0.4 * x for p, x in zip(place, normal, strict=True))
     return touches, False
