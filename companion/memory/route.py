@@ -46,11 +46,11 @@ def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None
     if known.holds(goal):
         return None
     graph = _Graph(known, start, goal)
-    # Of each entry: how long a way over its last place is at least, that place, and the way to it.
-    queue: list[tuple[float, int, list[Place]]] = [(math.dist(start, goal), START, [])]
-    lengths, done = {START: 0.0}, set[int]()
+    # Of each entry: how long a way over its last place is at least, that place, its way's length so far, and the way.
+    queue: list[tuple[float, int, float, list[Place]]] = [(math.dist(start, goal), START, 0.0, [])]
+    done = set[int]()
     while queue:
-        _, here, way = heapq.heappop(queue)
+        _, here, length_m, way = heapq.heappop(queue)
         if here == GOAL:
             return way
         if here in done:
@@ -58,10 +58,8 @@ def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None
         done.add(here)
         for there in graph.seen_from(here, done):
             place = graph.places[there]
-            length_m = lengths[here] + math.dist(graph.places[here], place)
-            if length_m < lengths.get(there, math.inf):
-                lengths[there] = length_m
-                heapq.heappush(queue, (length_m + math.dist(place, goal), there, [*way, place]))
+            longer_m = length_m + math.dist(graph.places[here], place)
+            heapq.heappush(queue, (longer_m + math.dist(place, goal), there, longer_m, [*way, place]))
     return None
 
 
