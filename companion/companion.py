@@ -1,5 +1,6 @@
 """The companion as a step function: bytes and the time in, bytes and events out."""
 
+import math
 from collections.abc import Mapping
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -109,7 +110,17 @@ class Stepped(Generic[CoreT]):
 
     def status(self) -> Status:
         """For the live line."""
-        return self.core.status()
+        core, vehicle = self.core, self.core.flight.vehicle
+        latest = vehicle.history.latest
+        return Status(
+            state=core.machine.state.value,
+            vehicle_mode=vehicle.mode_name,
+            armed=vehicle.armed is True,
+            position_ned_m=None if latest is None else latest.position_ned_m,
+            speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
+            detector=core.reflex.monitor.describe(),
+            round_trip_us=core.flight.round_trip.present_us,
+        )
 
 
 class Companion(Stepped[FlightCore]):

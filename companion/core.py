@@ -38,7 +38,7 @@ from companion.reflex.detection.detector import Situation
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import braked
 from companion.reflex.recovery.collision import CollisionReport
-from companion.report import Event, Status
+from companion.report import Event
 
 # MAVLink's heartbeat microservice: once a second.
 HEARTBEAT_INTERVAL_US = 1_000_000
@@ -332,20 +332,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def is_due(self, now_us: int) -> bool:
         """Whether a step is due although no sample came."""
         return now_us >= self.next_deadline_us() or bool(self.flight.events or self.flight.outbox)
-
-    def status(self) -> Status:
-        """The live line's content."""
-        vehicle = self.flight.vehicle
-        latest = vehicle.history.latest
-        return Status(
-            state=self.machine.state.value,
-            vehicle_mode=vehicle.mode_name,
-            armed=vehicle.armed is True,
-            position_ned_m=None if latest is None else latest.position_ned_m,
-            speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
-            detector=self.reflex.monitor.describe(),
-            round_trip_us=self.flight.round_trip.present_us,
-        )
 
     def collisions(self) -> tuple[CollisionReport, ...]:
         """All collisions so far."""
