@@ -222,11 +222,10 @@ class Core(ABC, Generic[FlightT, MachineT]):
                 return
             target = sent = limiter.last.at_rest()
             setpoint = sent.setpoint(now_us - self.started_at_us)
+        flight.outbox.append(self.resets.sent(setpoint))
         if holds:
             flight.target = target
             self._note_sent(sent, now_us)
-        flight.outbox.append(self.resets.sent(setpoint))
-        if holds:
             self._change_law(target.lean is not None, now_us)
 
     def _change_law(self, leans: bool | None, now_us: int) -> None:
