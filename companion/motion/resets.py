@@ -30,15 +30,12 @@ PLACES = frozenset((LocalPosition, Odometry, PositionTarget))
 class Resets:
     """A reset counts from its second message on, so that one forged or broken message shifts nothing."""
 
-    shift_ned_m: Vector3 = ZERO
-    """Offset from this frame to the vehicle's, m."""
+    shift_ned_m: Vector3 = ZERO  # offset from this frame to the vehicle's, m
     _shifts: dict[int, Vector3] = field(default_factory=dict)
     """Offsets by reset counter: a counter that comes back restores its offset."""
     _latest: Odometry | None = None
-    _first: Odometry | None = None
-    """The first message with another counter than the latest's."""
-    _place: LocalPosition | None = None
-    """The latest one accepted; None after a reset."""
+    _first: Odometry | None = None  # the first message with another counter than the latest's
+    _place: LocalPosition | None = None  # the latest one accepted; None after a reset
 
     @property
     def has_shifted(self) -> bool:

@@ -33,8 +33,7 @@ class VelocityFix:
 class Strapdown:
     """Changed only by its methods. Times: vehicle's boot clock; vectors local NED."""
 
-    attitude_wxyz: Quaternion = LEVEL
-    """As last reported, valid or not."""
+    attitude_wxyz: Quaternion = LEVEL  # as last reported, valid or not
     time_boot_us: int = 0
     rates_frd_rad_s: Vector3 = ZERO
     acceleration_ned_m_s2: Vector3 = ZERO
@@ -47,8 +46,7 @@ class Strapdown:
     """
     level_acceleration_m_s2: Vector3 = ZERO
     """Horizontal acceleration, NED, of a vehicle that is level by its reported attitude; zero while that is valid."""
-    heading_error_rad: float = 0.0
-    """Of the reported attitude; zero while that is valid."""
+    heading_error_rad: float = 0.0  # of the reported attitude; zero while that is valid
     sinks_m_s2: float = 0.0
     """By how much less than by its reported attitude a thrust of 1 g lifts; zero while that is valid."""
     fixes: deque[VelocityFix] = field(default_factory=deque)
@@ -95,7 +93,6 @@ class Strapdown:
         self.time_boot_us, self.rates_frd_rad_s, self.acceleration_ned_m_s2 = time_us, w, (a_n, a_e, a_d)
 
     def velocity(self, sample: LocalPosition | Odometry) -> None:
-        """Take one velocity."""
         time_us, told = sample.time_boot_us, self._odometry
         self.has_new_fix, ahead_us = False, time_us - self.time_boot_us
         if isinstance(sample, Odometry):

@@ -57,18 +57,13 @@ def tilt_response(errors: Floats, pushed_m_s2: Floats, elapsed_s: float) -> Floa
 class VelocityValidity:
     """Changed only by its methods. Times: vehicle's boot clock."""
 
-    is_valid: bool = True
-    """Whether the latest hit was measured whole, or has been corrected by now."""
-    hit_boot_us: int = 0
-    """Time of the latest hit."""
+    is_valid: bool = True  # whether the latest hit was measured whole, or has been corrected by now
+    hit_boot_us: int = 0  # of the latest hit
     _is_again: bool = False
     """Whether the velocity was invalid already when the latest hit came: an earlier hit's part stays hidden."""
-    is_disproved: bool = False
-    """Whether a receiver's velocity shows that the vehicle's own is not right yet."""
-    left_m_s: float = math.inf
-    """What is left to correct, once that is known."""
-    _speed_m_s: float = 0.0
-    """Of the latest hit, or of the hardest of those."""
+    is_disproved: bool = False  # whether a receiver's velocity shows that the vehicle's own is not right yet
+    left_m_s: float = math.inf  # what is left to correct, once that is known
+    _speed_m_s: float = 0.0  # of the latest hit, or of the hardest of those
 
     @property
     def is_known(self) -> bool:
@@ -103,5 +98,4 @@ class VelocityValidity:
         self.is_valid = is_fully_measured and (self.is_valid or not self._is_again)
 
     def update(self, time_us: int) -> None:
-        """Take the present time."""
         self.is_valid = self.is_valid or (not self.is_disproved and time_us - self.hit_boot_us > CORRECTED_US)

@@ -19,7 +19,6 @@ from companion.reflex.config import RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.crash import CrashWatch
 from companion.reflex.detection.detector import ImpactKind, Situation
-from companion.reflex.detection.free_flight import ThrustGain
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.detection.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
 from companion.reflex.detection.sustained_force import SustainedForceMonitor
@@ -141,37 +140,31 @@ class Reflex:
         """Record a collision, and begin to recover from it: the motion just before it, and the goal by that."""
         impact, normal, earlier = estimate.impact, level(estimate.normal), self.in_one_recovery()
         place, velocity, error_m_s = estimate.position_ned_m, estimate.velocity_ned_m_s, estimate.velocity_error_m_s
-        before, law = next(iter(earlier), None), self.law
+        before, law, source = next(iter(earlier), None), self.law, self.monitor.estimator
         is_second = law.follows and before is not None and not before.estimator.is_reported
         if before is not None and is_second:
             # The vehicle's estimate is still wrong from the hit before.
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
             error_m_s = before.estimator.spread_m_s
-        fits_models = not self.monitor.estimator.hides_clipping
         contact = Contact(place, velocity, normal.direction_ned, normal.error_rad, error_m_s)
         expected, first_us = contact.rebound(self.law_config.restitution), impact.sample_time_boot_us
+        fits_models, wind_m_s2 = not source.hides_clipping, self.sustained_force.hover_wind_m_s2
+        estimator = MotionEstimator(
+            contact, first_us, expected, self.config.estimate, is_second, fits_models, wind_m_s2
+        )
+        estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal, estimate.impulse_m_s)
         record = CollisionRecord(
             detected_at_us=now_us,
             sample_time_boot_us=first_us,
             detector=self.config.detector,
             contact=contact,
             peak_specific_force_m_s2=impact.size_m_s2,
-            estimator=MotionEstimator(
-                contact,
-                first_us,
-                expected,
-                self.config.estimate,
-                is_second,
-                fits_models,
-                self.sustained_force.hover_wind_m_s2,
-            ),
-            source=self.monitor.estimator,
+            estimator=estimator,
+            source=source,
         )
         if before is None and self._is_attitude_heard:
-            reported_wxyz = self.monitor.estimator.strapdown.attitude_wxyz
-            force_ned = body_to_ned(reported_wxyz, impact.specific_force_frd_m_s2)
+            force_ned = body_to_ned(source.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
             record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
-        record.estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal, estimate.impulse_m_s)
         clearance_m = self.law_config.clearance_m
         surfaces = [Surface(each.contact.position_ned_m, each.normal.direction_ned, clearance_m) for each in earlier]
         self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, self.keeps_trim)
@@ -195,7 +188,7 @@ class Reflex:
         belief = recovery.record.estimator.belief(recovery.record.source.strapdown)
         held_s = self.loss_s + numbers.NOTICED_S + numbers.LEAD_S
         acceleration = wanted(belief, recovery.surfaces, recovery.record.setpoint_ned_m[2])
-        return acceleration, Lean(belief, recovery.surfaces, self.thrust.full_m_s2, held_s)
+        return acceleration, Lean(belief, recovery.surfaces, self.monitor.state.thrust.full_m_s2, held_s)
 
     def follow(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """Take the samples of the step for the motion after the newest hit, and for what shows a crash."""
@@ -256,7 +249,7 @@ class Reflex:
                 return "the autopilot takes no thrust with an attitude"
             held = "for an unknown time" if self.loss_s is None else f"for {self.loss_s:g} s"
             return f"without a companion an attitude is held {held}; {numbers.MOST_HELD_S:g} s is safe"
-        if self.thrust.known_s < numbers.THRUST_LEARNT_S:
+        if self.monitor.state.thrust.known_s < numbers.THRUST_LEARNT_S:
             return "the thrust is not known yet"
         return None if self._is_attitude_heard else "no attitude is heard"
 
@@ -265,11 +258,6 @@ class Reflex:
     def in_one_recovery(self) -> list[CollisionRecord]:
         """The last hits, the newest first, without a recovery in between."""
         return list(takewhile(lambda record: not record.is_over, reversed(self.hits)))
-
-    @property
-    def thrust(self) -> ThrustGain:
-        """Of the vehicle, as the detector has learnt it in free air."""
-        return self.monitor.state.thrust
 
     @property
     def sample_boot_us(self) -> int:

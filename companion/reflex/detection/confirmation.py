@@ -101,11 +101,11 @@ def hypothesis_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s
     """The hypothesis that remains to be confirmed; None where more than one message shows the hit already."""
     impact, size_m_s2 = estimate.impact, math.hypot(*force_ned_m_s2)
     hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
-    is_jump, earlier = impact.evidence is Evidence.VELOCITY_JUMP, estimate.earlier
-    is_sure = not is_jump and (estimate.is_final or earlier is None)
-    if size_m_s2 == 0.0 or impact.is_shown_twice or is_sure:
+    if size_m_s2 == 0.0 or impact.is_shown_twice:
         return None
     away = plus(ZERO, 1.0 / size_m_s2, force_ned_m_s2)
-    if is_jump:
+    if impact.evidence is Evidence.VELOCITY_JUMP:
         return Hypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
-    return Hypothesis(hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, earlier)
+    if estimate.earlier is None:
+        return None
+    return Hypothesis(hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, estimate.earlier)

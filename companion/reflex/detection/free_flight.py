@@ -52,8 +52,7 @@ class ThrustGain:
     fraction_boot_us: int = -CURRENT_US
     full_m_s2: float = 0.0
     known_s: float = 0.0
-    most_m_s2: float = reflex.STRONGEST_M_S2
-    """Largest upward specific force that thrust can explain."""
+    most_m_s2: float = reflex.STRONGEST_M_S2  # largest upward specific force that thrust can explain
 
     def set_fraction(self, time_us: int, fraction: float) -> None:
         self.fraction, self.fraction_boot_us = fraction, time_us

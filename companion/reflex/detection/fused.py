@@ -65,8 +65,7 @@ class FusedState(DetectorState):
     turn: RateJump = field(default_factory=RateJump)
     velocity: Innovation = field(default_factory=Innovation)
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
-    vertical_threshold_m_s2: float = 0.0
-    """Beyond the force that propellers can make."""
+    vertical_threshold_m_s2: float = 0.0  # beyond the force that propellers can make
     floor: ForceNoise = field(default_factory=ForceNoise)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
@@ -74,19 +73,14 @@ class FusedState(DetectorState):
     hovered_boot_us: int | None = None
     """When it last hovered, and had for a while: one that only turns back is slow for a moment, too."""
     contact_began_boot_us: int = 0
-    kind: ImpactKind = ImpactKind.UNKNOWN
-    """Of the present contact, or the latest one."""
-    observed: Impact | None = None
-    """The first loud sample while it is observed whether that is a hand."""
+    kind: ImpactKind = ImpactKind.UNKNOWN  # of the present contact, or the latest one
+    observed: Impact | None = None  # the first loud sample while it is observed whether that is a hand
     last_frd_m_s2: Vector3 = ZERO
-    before_frd_m_s2: Vector3 = ZERO
-    """Of the sample before the last."""
-    before_threshold_m_s2: float = 0.0
-    """Before the last sample was learnt: it may be a hit's first."""
+    before_frd_m_s2: Vector3 = ZERO  # of the sample before the last
+    before_threshold_m_s2: float = 0.0  # before the last sample was learnt: it may be a hit's first
     force: tuple[float, Vector3] = (0.0, ZERO)
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
-    force_before: tuple[float, Vector3] = (0.0, ZERO)
-    """The one before."""
+    force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
@@ -299,7 +293,6 @@ class FusedDetector:
         return self._begun(s, classified(impact, s.velocity_ned_m_s, situation, motion))
 
     def _begun(self, s: FusedState, impact: Impact) -> Impact:
-        """Begin the contact."""
         s.contact_began_boot_us, s.kind = impact.sample_time_boot_us, impact.kind
         s.peak_specific_force_m_s2 = impact.size_m_s2
         return impact
@@ -329,7 +322,7 @@ class FusedDetector:
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
         caution = 1.0 if type(sample) is Odometry and motion.validity.is_known else 2.0
         size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
-        corrected_m_s = motion.validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
+        corrected_m_s = motion.validity.correction_m_s(jump.compared_us)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.ratio
         # What is not of one moment adds to a jump, and not to each other.

@@ -58,12 +58,9 @@ class SampleGate:
 
     latest: Attitude | None = None
     rejected: Attitude | None = None
-    most_rad_s: float = 0.0
-    """The largest rate since the latest attitude."""
-    values: tuple[Vector3, Vector3] | None = None
-    """Of the newest IMU sample."""
-    still_wxyz: Quaternion | None = None
-    """The first attitude since the first of the samples that are equal to it."""
+    most_rad_s: float = 0.0  # the largest rate since the latest attitude
+    values: tuple[Vector3, Vector3] | None = None  # of the newest IMU sample
+    still_wxyz: Quaternion | None = None  # the first attitude since the first of the samples that are equal to it
     is_stuck: bool = False
 
     def imu(self, sample: ImuSample) -> bool:

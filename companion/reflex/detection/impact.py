@@ -157,11 +157,10 @@ class ImpactEstimator(Motion):
 
     def _contact_force(self, impact: Impact, came_ned_m_s: Vector3) -> ContactForce | None:
         """Of a contact that a turn shows the first force is still to come; one that a velocity shows is over."""
-        imu, free, is_shown = self.imu, impact.free_frd_m_s2, impact.evidence is Evidence.FORCE
-        if imu is not None and is_shown:
-            free = minus(imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
-        if imu is None or free is None:
+        imu, is_shown = self.imu, impact.evidence is Evidence.FORCE
+        if imu is None or impact.evidence is Evidence.VELOCITY_JUMP:
             return None
+        free = impact.free_frd_m_s2 or minus(imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
         averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
         contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2, came_ned_m_s)
         contact.is_clipped = self.hides_clipping or not is_shown

@@ -68,8 +68,7 @@ class CollisionMonitor:
     state: DetectorState
     estimator: ImpactEstimator
     stream_health: StreamHealth
-    no_data_reason: str | None = None
-    """Why an armed detector could miss a hit; None while the streams are healthy."""
+    no_data_reason: str | None = None  # why an armed detector could miss a hit; None while the streams are healthy
     gate: SampleGate = field(default_factory=SampleGate)
     imu_fault: str | None = None  # what was wrong with the newest IMU message
     is_attitude_old: bool = False  # too old to integrate the accelerometer

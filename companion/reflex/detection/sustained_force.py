@@ -38,12 +38,10 @@ _UP_FRD = (0.0, 0.0, -1.0)
 class SustainedForceMonitor:
     """Updated with each position, and with the setpoint while one is flown to; reset by `forget`. Vectors: NED."""
 
-    gain: ThrustGain = field(default_factory=ThrustGain)
-    """Learnt at the setpoint."""
+    gain: ThrustGain = field(default_factory=ThrustGain)  # learnt at the setpoint
     time_us: int = 0
     measured_frd_m_s2: Vector3 = (0.0, 0.0, -GRAVITY_M_S2)
-    imu_count: int = 0
-    """IMU samples in the mean since the last position."""
+    imu_count: int = 0  # IMU samples in the mean since the last position
     velocity_m_s: Vector3 = ZERO
     thrust_ned_m_s2: Vector3 = ZERO
     missing_m_s2: Vector3 = ZERO
@@ -51,15 +49,12 @@ class SustainedForceMonitor:
     """Mean of the missing acceleration at the setpoint and in free motion: it balances drag and wind."""
     hover_wind_m_s2: Vector3 = ZERO
     """Horizontal specific force across the thrust when the vehicle hovered last: the wind's."""
-    pushed_since_us: int = 0
-    """Time since which half of a sustained force has been missing."""
+    pushed_since_us: int = 0  # time since which half of a sustained force has been missing
     setpoints: deque[tuple[int, Vector3]] = field(default_factory=deque)
     """Direction of the thrust that the vehicle's attitude control was set to, with its time."""
-    error_variance: float = 0.0
-    """Mean square of the lean's error, beyond them."""
+    error_variance: float = 0.0  # mean square of the lean's error, beyond them
     error_known_s: float = 0.0
-    error_us: int = 0
-    """When it was looked at last."""
+    error_us: int = 0  # when it was looked at last
 
     def forget(self) -> None:
         self.time_us = self.error_us = 0

@@ -22,13 +22,13 @@ class VelocityJump:
     """Changed only by its methods. Times: vehicle's boot clock; vectors local NED."""
 
     averaging_us: int
-    since_us: int = 0
-    """Velocities before this time are not compared."""
+    since_us: int = 0  # velocities before this time are not compared
     delay: Delay = field(default_factory=Delay)
     variance_m2_s2: float = 0.0
     known: int = 0
     newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
     """The newest step without correction for the delay, and the change of the acceleration."""
+    compared_us: Sequence[int] = ()  # times of the velocities that make it, the newest last
 
     def step_m_s(self, fixes: Sequence[VelocityFix]) -> Vector3 | None:
         """Difference of the newest velocity from the recent ones and the accelerometer, m/s; None if not comparable."""
@@ -46,13 +46,9 @@ class VelocityJump:
         # Mean accelerations between velocities, without vibration.
         pairs = zip(pairwise(recent), apart_us, strict=True)
         change = _newest_less_mean(_rate(b.sum_ned_m_s, a.sum_ned_m_s, 1e-6 * us) for (a, b), us in pairs)
-        self.newest = (step, change)
+        self.newest, self.compared_us = (step, change), times[1:]
         late_s = self.delay.delay_s(self.variance_m2_s2)
         return plus(step, late_s, change)
-
-    def compared(self, fixes: Sequence[VelocityFix]) -> Sequence[VelocityFix]:
-        """The velocities that make the newest step, the newest last."""
-        return [fixes[place] for place in range(-reflex.COMPARED - 1, 0)]
 
     def learn(self, step: Vector3) -> None:
         """Learn delay and standard deviation from the newest step, limited to what is no hit."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from companion.messages import Vector3
 from companion.motion.config import DRIFT_M2_S3
+from companion.motion.vector import ZERO, minus
 from companion.reflex import config as reflex
 from companion.reflex.correction import MODELS, Floats, tilt_response
 from companion.reflex.recovery.laws import MotionState
@@ -19,10 +20,9 @@ class FilterBank:
     Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
     """
 
-    __slots__ = ("covariance", "leaves", "log_likelihoods", "state", "tilted")
-
-    def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
+    def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3, time_boot_us: int) -> None:
         """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
+        self.time_boot_us, self._summed_m_s = time_boot_us, ZERO
         models, state = MODELS, np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
         spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
@@ -32,15 +32,17 @@ class FilterBank:
         self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
         self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
 
-    def predict(self, elapsed_s: float, faster_m_s: Vector3, level_m_s2: Vector3) -> None:
-        """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong.
+    def predict(self, time_boot_us: int, summed_m_s: Vector3, level_m_s2: Vector3) -> None:
+        """Up to a time, with the accelerometer's integral until then; its attitude may be slightly wrong.
 
         `level_m_s2`: acceleration of a vehicle that is level by its own tilt. Along e the models contain it.
         """
+        elapsed_s, added = 1e-6 * (time_boot_us - self.time_boot_us), np.array(minus(summed_m_s, self._summed_m_s))
+        self.time_boot_us, self._summed_m_s = time_boot_us, summed_m_s
         hidden, pushed = self.state[..., 2], np.array(level_m_s2)
         along_e = hidden @ pushed / np.maximum((hidden**2).sum(axis=1), 1e-9)
         self.tilted = tilt_response(self.tilted, pushed - along_e[:, None] * hidden, elapsed_s)
-        leads, added = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array(faster_m_s)
+        leads = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0]
         self.covariance = leads @ self.covariance @ leads.T
         self.covariance[:, 1, 1] += DRIFT_M2_S3 * elapsed_s

@@ -68,8 +68,6 @@ class MotionEstimator:
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
     _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
-    _at_boot_us: int = 0  # the bank's time
-    _moved_m_s: Vector3 = ZERO  # the integral up to that time
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
     _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
     _swings_m_s: float = 0.0  # standard deviation of its further swing, by the bank
@@ -80,7 +78,6 @@ class MotionEstimator:
     # For how long the reported velocity, less its mean error and as it is, has been the measured one.
     _steady: Lasting = field(default_factory=Lasting)
     _same: Lasting = field(default_factory=Lasting)
-    _impulse_m_s: float = 0.0  # of the contact, as far as it was measured
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
 
     def __post_init__(self) -> None:
@@ -88,13 +85,12 @@ class MotionEstimator:
         self.normal = Normal(self.contact.normal_ned, self.contact.normal_error_rad)
         self._begin()
 
-    def _begin(self) -> None:
-        self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, ZERO, None
-        self._newest, self._measured, self._steady, self._same = None, None, Lasting(), Lasting()
+    def _begin(self, impulse_m_s: float = 0.0) -> None:
+        self._bank, self._measured, self._newest, self._steady, self._same = None, None, None, Lasting(), Lasting()
         self.has_converged = self._has_agreed = self._was_odd = False
         came_m_s = math.hypot(*self.contact.velocity_ned_m_s)
         # Beyond an elastic rebound the obstacle moved, nobody knows how fast: as much again may be hidden.
-        moved_m_s = self._impulse_m_s if self._impulse_m_s > 2.0 * came_m_s else 0.0
+        moved_m_s = impulse_m_s if impulse_m_s > 2.0 * came_m_s else 0.0
         self.spread_m_s = SAME_M_S + reflex.SPREAD * came_m_s + moved_m_s
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
         self._swings_m_s = 0.0
@@ -102,14 +98,13 @@ class MotionEstimator:
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal, impulse_m_s: float) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal
         by the force, its impulse per mass."""
-        self._impulse_m_s = impulse_m_s
         was_measured, is_pushed = self.is_fully_measured, pushed_boot_us > self.pushed_boot_us
         self.is_fully_measured, self.normal = is_fully_measured and not self.is_second, normal
         if is_pushed:
             self.pushed_boot_us, self._released_m_s = pushed_boot_us, self._summed_m_s
             self.after_ned_m_s, self.after_error_m_s = None, math.inf
         if not self.is_fully_measured and (is_pushed or was_measured):
-            self._begin()
+            self._begin(impulse_m_s)
 
     def imu(self, strapdown: Strapdown) -> None:
         """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
@@ -274,21 +269,21 @@ class MotionEstimator:
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
         """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
-        now_us = self._time_boot_us or at_us
-        if abs(now_us - at_us) > LONGEST_GAP_US or now_us <= self._at_boot_us:
+        now_us, bank = self._time_boot_us or at_us, self._bank
+        before_us = self.hit_boot_us if bank is None else bank.time_boot_us
+        if abs(now_us - at_us) > LONGEST_GAP_US or now_us <= before_us:
             # The report's time is outside the integrated interval.
             return
-        config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - self._at_boot_us), 1e-6 * (now_us - at_us)
+        config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - before_us), 1e-6 * (now_us - at_us)
         # Clipping hides between none and all of the change of velocity.
         half = plus(ZERO, 0.5, minus(self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s))
-        bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
+        bank = self._bank = bank or FilterBank(self.start, self.spread_m_s, half, self.hit_boot_us)
         # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
         level_m_s2 = minus(self.level_m_s2, self._bias_m_s2)
         if not self.fits_models:
             # By a wrong tilt a vehicle that leans reports a climb that there is none of. PX4 corrects its own sooner.
             level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
-        bank.predict(elapsed_s, minus(self._summed_m_s, self._moved_m_s), level_m_s2)
-        self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
+        bank.predict(now_us, self._summed_m_s, level_m_s2)
         g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
         # The report as of now.
         place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)

@@ -83,7 +83,7 @@ def leaning(vehicle):
     f = flight(vehicle, items=[TAKEOFF, INTO_WALL, LANDING])
     f.run_to("mission")
     assert f.companion.last_words() == [], "none is left before a hit"
-    thrust = f.companion.core.reflex.thrust
+    thrust = f.companion.core.reflex.monitor.state.thrust
     thrust.known_s, thrust.full_m_s2 = 1.0, 20.0
     f.run_to("recovering")
     f.run_for(0.1)

@@ -38,7 +38,8 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
     reflex = flight.reflex
     flight.origin_ned_m, reflex.loss_s = (0.0, 0.0, 0.0), loss_s
     flight.vehicle.attitude = reflex.monitor.gate.latest = Attitude(HIT_US, LEVEL)
-    reflex.thrust.full_m_s2, reflex.thrust.known_s = 16.0, learnt_s
+    thrust = reflex.monitor.state.thrust
+    thrust.full_m_s2, thrust.known_s = 16.0, learnt_s
     if estimator is None:
         contact = Contact(AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
