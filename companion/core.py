@@ -225,7 +225,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
         flight.outbox.append(self.resets.sent(setpoint))
         if holds:
             flight.target = target
-            self._note_sent(sent, now_us)
             self._change_law(target.lean is not None, now_us)
 
     def _change_law(self, leans: bool | None, now_us: int) -> None:
@@ -298,9 +297,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def finished(self) -> bool:
         """Ended, and the vehicle has answered the last word, or does not."""
         return self.machine.finished and self._law.pending is None
-
-    def _note_sent(self, target: Target, now_us: int) -> None:
-        """Note a setpoint that was sent while the companion has the vehicle."""
 
     def _beat(self, now_us: int) -> None:
         """Send the companion's HEARTBEAT until the end."""

@@ -20,7 +20,6 @@ from companion.messages import (
     LocalPosition,
     Outgoing,
     PositionSetpoint,
-    PositionTarget,
     Sticks,
     Vector3,
 )
@@ -85,8 +84,7 @@ class Inputs(NamedTuple):
     impacts: Sequence[ImpactEstimate] = ()
     stop_reason: str | None = None
     refusal: str | None = None  # why the other end cannot be flown
-    echoes: Sequence[PositionTarget] = ()  # this and the next two are a guard's
-    sticks: Sequence[Sticks] = ()
+    sticks: Sequence[Sticks] = ()  # this and the next are a guard's
     is_enabled: bool = False  # by a person, after it stood down
 
 

@@ -53,7 +53,7 @@ class Texts:
 # Kinds of events that are told in their own words. What a pilot may have to act on is a warning.
 _WARNING = (
     *("in_the_way", "unreachable", "timeout", "link", "implausible"),
-    *("take_over", "let_go", "refused", "crossed", "not_back"),
+    *("take_over", "let_go", "refused", "not_back"),
     *("left_alone", "lost", "late", "round_trip", "damage", "crash", "crashed"),
 )
 _NOTICE = ("policy", "envelope", "unconfirmed", "given_back")

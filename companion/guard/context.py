@@ -1,13 +1,12 @@
 """What the guard's parts share: a flight's context, and whose vehicle it was before."""
 
 import math
-from collections import deque
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import defaults
 from companion.flight.context import FlightContext
 from companion.guard.config import GuardConfig
-from companion.messages import Asked, Sticks, Vector3
+from companion.messages import Asked, Sticks
 from companion.motion.vector import ZERO, minus, plus
 
 # Setpoints are lost when there is none for so long.
@@ -37,8 +36,6 @@ class GuardContext(FlightContext):
     sticks_us: int | None = None  # when these were heard
     sinks_m_s: float = 0.0  # as its position control is asked for
     sinks_us: int | None = None  # when that was heard
-    # When, and to where; PX4 echoes no attitude.
-    sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
 
     def hear_setpoint(self, asked: Asked, now_us: int) -> None:
         """A program's is on its way. A place without a velocity moves as it has moved since the one before."""

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.core import Core
-from companion.flight.context import Inputs, Target
+from companion.flight.context import Inputs
 from companion.flight.vehicle_update import situation_of
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
 from companion.guard.watching import GuardConnect, goes_down, observe, why_not
-from companion.messages import LandedState, PositionTarget, Sample, Sticks, TimeSync
+from companion.messages import LandedState, Sample, Sticks, TimeSync
 from companion.motion.resets import Resets
 from companion.motion.vector import plus
 from companion.reflex.detection.detector import Situation
@@ -55,8 +55,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         if guard.vehicle.armed is False and self.resets.has_shifted:
             # It may restart, and count its resets from zero.
             self.resets = Resets()
-        echoes = [sample for sample in samples if isinstance(sample, PositionTarget)]
-        inputs = inputs._replace(echoes=echoes, sticks=sticks, is_enabled=self.is_enabled)
+        inputs = inputs._replace(sticks=sticks, is_enabled=self.is_enabled)
         guard.awaits_choice &= not self.is_enabled
         self.is_enabled, held = False, self.machine.holds
         moved = self.machine.step(inputs, now_us)
@@ -94,7 +93,3 @@ class GuardCore(Core[GuardContext, GuardMachine]):
             guard.await_choice("the guard has released the vehicle", now_us)
         elif self.begins_in_flight and vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
             guard.await_choice("begun in flight", now_us)
-
-    def _note_sent(self, target: Target, now_us: int) -> None:
-        if target.lean is None:
-            self.flight.sent_ned_m.append((now_us, target.position_ned_m))

@@ -1,7 +1,5 @@
 """The guard's states with its own setpoints: take over, recover, give back, and stand down for a pilot."""
 
-import math
-
 from companion.autopilot.interface import Pilot
 from companion.flight.context import FixedSetpoint, Inputs, Transition
 from companion.flight.handlers.ending import silent_position
@@ -10,27 +8,29 @@ from companion.guard.context import GuardContext
 from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
 from companion.guard.watching import OTHERS_STOPPED_US
-from companion.messages import MessageId, PositionTarget, SendCommand, request_message
 
-# The vehicle reports its setpoint. Further than this from all that was sent, it is somebody else's: at 12 m/s a moving
-# setpoint advances 0.24 m from one to the next.
-CROSSED_M = 0.5
-# One may be an echo out of order; three are a second stream.
-CROSSED_TIMES = 3
-# What is echoed was sent at most this long ago: a slow echo's period of 0.1 s and the link's delays.
-ECHO_AGE_US = 400_000
-# The first echoes may still be of the mode before.
-ECHO_STALE_US = 200_000
 # PX4 answers in 10 ms; when it does not take the mode its own action for lost setpoints is the next best.
 HAND_OVER_US = 500_000
 
 
-class TakeOver:
+class Recovering:
+    """Until the vehicle rests clear of what it hit."""
+
+    def __init__(self, guard: GuardContext) -> None:
+        self._recover = Recover(guard)
+        self.target = self._recover.target
+
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
+        # Over it is also where the hit was none.
+        is_over = self._recover.step(guard, inputs, now_us) is not None
+        return Transition(Trigger.SETTLED) if is_over else None
+
+
+class TakeOver(Recovering):
     """The recovery began with the first setpoint. The state lasts until the vehicle reports OFFBOARD."""
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
-        self._recover = Recover(guard)
-        self.target = self._recover.target
+        super().__init__(guard)
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
         if guard.command_client.requested_mode != guard.vehicle.autopilot.setpoints:
             guard.count_asked_mode()
@@ -47,9 +47,8 @@ class TakeOver:
             text = f"{name} already, the program's setpoints kept out" if outcome is None else f"{name} confirmed"
             guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return Transition(Trigger.CONFIRMED)
-        # Over it is also where the hit was none.
-        if self._recover.step(guard, inputs, now_us) is not None:
-            return Transition(Trigger.SETTLED)
+        if (settled := super().step(guard, inputs, now_us)) is not None:
+            return settled
         if outcome is not None:
             return Transition(Trigger.NOT_CONFIRMED, outcome.text)
         # A late step is no refusal: the answer may not have been read yet.
@@ -59,72 +58,23 @@ class TakeOver:
         return None
 
 
-class Recovering:
-    """Until the vehicle rests clear of what it hit."""
-
-    def __init__(self, guard: GuardContext, now_us: int) -> None:
-        self._recover = Recover(guard)
-        self.target = self._recover.target
-        self._since_us = now_us  # in OFFBOARD, with no step late and no silence
-        self._late_us = 0
-        self._foreign = 0
-        self._asked_us: int | None = None  # whether the mode is still ours
-
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
-        # In a mode that somebody else has commanded PX4 flies to its own places, and tells these before the mode: only
-        # a later report that says OFFBOARD makes them a program's.
-        self._forget_what_was_late(guard, now_us)
-        vehicle, asked_us = guard.vehicle, self._asked_us
-        if asked_us is not None and vehicle.mode_received_us > asked_us and vehicle.is_mode_known:
-            guard.program_elsewhere = True
-            text = "another program's setpoints reach the vehicle, on a link of its own"
-            return Transition(Trigger.CROSSED, text)
-        if vehicle.is_mode_known and now_us - self._since_us > ECHO_STALE_US:
-            self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
-        if self._foreign >= CROSSED_TIMES and asked_us is None:
-            self._asked_us = now_us
-            guard.outbox.append(SendCommand(request_message(MessageId.HEARTBEAT), 0))
-        # Over it is also where the hit was none.
-        is_over = self._recover.step(guard, inputs, now_us) is not None
-        return Transition(Trigger.SETTLED) if is_over else None
-
-    def _forget_what_was_late(self, guard: GuardContext, now_us: int) -> None:
-        """The echoes that waited for a late step are older than what is known to have been sent. Without the guard's
-        setpoints PX4 leaves OFFBOARD, and flies to its own places until they come again.
-        """
-        late_us = now_us - guard.trajectory_us
-        if late_us != self._late_us or not guard.vehicle.flies_setpoints:
-            self._late_us, self._since_us = late_us, now_us
-            self._foreign, self._asked_us = 0, None
-
-
-def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
-    """Whether the vehicle flies to a place that the guard has not lately asked for, or by a velocity alone.
-
-    Of an attitude PX4 echoes no position.
-    """
-    place = echo.position_ned_m
-    recent = [sent for sent_us, sent in guard.sent_ned_m if now_us - sent_us <= ECHO_AGE_US]
-    return place is None or all(math.dist(sent, place) > CROSSED_M for sent in recent)
-
-
 class GiveBack(FixedSetpoint):
     """Ask for one mode after the other until one is seen; setpoints go on meanwhile.
 
     The first is asked for straight after a report of the present one: a person's own request that shows there is not
     overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
 
-    A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on another link
-    nothing is streamed. When no mode is taken the setpoints stop, and PX4's action for lost setpoints follows.
+    A program's own OFFBOARD needs no asking: its setpoints are let through again. When no mode is taken the setpoints
+    stop, and PX4's action for lost setpoints follows.
     """
 
-    def __init__(self, guard: GuardContext, is_crossed: bool, now_us: int) -> None:
+    def __init__(self, guard: GuardContext, now_us: int) -> None:
         previous = guard.previous_mode
         self._wishes: list[int] = []
         if guard.config.then == "previous" and not guard.is_to_hold and previous is not None:
             self._wishes.append(previous)
         self._wishes += [guard.vehicle.autopilot.hold, guard.vehicle.autopilot.land]
-        self._target = guard.target.at_rest() if guard.target and not is_crossed else None
+        self._target = guard.target.at_rest() if guard.target else None
         self._began_us = now_us
         self._is_asked = self._is_told = False
         self._is_doubted = self.wish == previous  # whether it would hit again

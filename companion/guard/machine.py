@@ -25,7 +25,6 @@ _KINDS = {
     Trigger.CONTROL_LOST: "let_go",
     Trigger.NOT_CONFIRMED: "refused",
     Trigger.POSITION_SILENT: "link",
-    Trigger.CROSSED: "crossed",
     Trigger.LEADS_BACK: "take_over",
     Trigger.WORTH_GUARDING: "watching",
     Trigger.NOT_TO_GUARD: "watching",
@@ -36,7 +35,7 @@ _KINDS = {
 }
 STICKS = "the pilot moved the sticks"
 # After these the vehicle is given back to hold whatever is configured.
-_TO_HOLD = (Trigger.STOPPED, Trigger.NOT_CONFIRMED, Trigger.POSITION_SILENT, Trigger.CROSSED)
+_TO_HOLD = (Trigger.STOPPED, Trigger.NOT_CONFIRMED, Trigger.POSITION_SILENT)
 
 # What is done in a state; one object is made each time the state is entered (see flight.machine).
 Handler: TypeAlias = (
@@ -189,14 +188,14 @@ class GuardMachine(StateMachine):
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
                 return TakeOver(guard, now_us)
             case State.RECOVERING:
-                return Recovering(guard, now_us)
+                return Recovering(guard)
             case State.GIVING_BACK:
                 limit, hits = guard.config.max_hits, recoveries_from(guard.hits)
                 if hits >= limit and not guard.is_to_hold:
                     guard.is_to_hold = True
                     if guard.config.then == "previous":
                         guard.report(now_us, "not_back", f"not given back: recovery {hits} of at most {limit}")
-                return GiveBack(guard, trigger is Trigger.CROSSED, now_us)
+                return GiveBack(guard, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, transition.text.startswith(STICKS), now_us)
             case State.CRASHED:

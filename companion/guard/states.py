@@ -34,7 +34,6 @@ class Trigger(Enum):
     CONFIRMED = "OFFBOARD confirmed"
     NOT_CONFIRMED = "OFFBOARD refused or not confirmed in time"
     POSITION_SILENT = "position silent"
-    CROSSED = "another program's setpoints reach the vehicle"
     SETTLED = "settled, or not in time"
     GIVEN_BACK = "mode confirmed"
     STREAMS_GONE = "the vehicle speaks, its streams have ended, or may have in a silence"
@@ -83,7 +82,6 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
         Trigger.STOPPED: State.GIVING_BACK,
         Trigger.HIT: State.RECOVERING,
         Trigger.POSITION_SILENT: State.GIVING_BACK,
-        Trigger.CROSSED: State.GIVING_BACK,
         Trigger.SETTLED: State.GIVING_BACK,
     },
     State.GIVING_BACK: {

@@ -10,13 +10,12 @@ from bench.fly import commanded
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.core import POLL_INTERVAL_US
-from companion.guard.holding import is_foreign
 from companion.guard.onward import stop
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS
 from companion.mavlink.named import named, packet_from
 from companion.mavlink.packet import message_id_of
-from companion.messages import LocalPosition, PositionTarget
+from companion.messages import LocalPosition
 from companion.shell import mavsdk_guard
 from companion.shell.mavsdk_guard import GIVING_BACK_US, CollisionGuard
 from companion.shell.mavsdk_link import GuardError
@@ -130,15 +129,6 @@ def test_after_a_silence_in_a_recovery_the_program_flies_no_further_until_somebo
         air.set_mode(commanded.OFFBOARD)
     air.run_for(0.5)
     assert not air.guard.core.flight.awaits_choice and air.setpoints("program", air.time_s - 0.2) != []
-
-
-def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_of_late():
-    guard = AttachedFlight().guard.core.flight
-    there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
-    guard.sent_ned_m.append((1_000_000, (1.1, 0.0, -2.0)))
-    assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]
-    # Nor does it have places of the guard's while the guard flies it by attitude
-    assert is_foreign(guard, there, 1_600_000)
 
 
 def test_it_is_stopped_where_it_comes_to_rest_by_the_two_metres_a_second_squared_of_the_manual():

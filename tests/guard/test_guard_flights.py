@@ -7,7 +7,6 @@ from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly.commanded import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, fly_a_mission
 from bench.fly.packets import made
-from companion.autopilot.px4.modes import AUTO_LAND
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.guard.watching import observe
@@ -227,30 +226,13 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
     assert air.guard.core.flight.left_alone == len(air.told("left_alone"))
 
 
-def test_a_second_stream_that_appears_while_the_guard_holds_is_noticed_and_not_fought():
+def test_a_program_that_begins_to_send_setpoints_in_a_recovery_does_not_end_it():
     air = recovering()
+    # When it asks for a way along the wall, on a link of its own
     air.every(0.05, lambda: air.velocity(0.0, 0.5))
-    # PX4 echoes another's place once it is flown by places again
-    air.run_until(lambda: air.told("hand_over") != [], 3.0)
-    air.run_until(lambda: air.told("crossed") != [], 0.8)
-    air.run_until(lambda: air.mode == "AUTO.LOITER", 1.0)
-
-
-def test_a_pilot_whose_setpoints_are_told_before_his_mode_is_no_second_stream():
-    """The vehicle tells its own setpoints fifty times a second, and its mode with the next report."""
-    # Given a guard that holds, and a pilot's mode that flies elsewhere
-    air = recovering()
-    air.run_for(0.3)
-    elsewhere = {"coordinate_frame": 1, "type_mask": 0xDF8, "x": 9.0, "y": 9.0, "z": -2.0}
-    for _ in range(6):
-        air.guard_hears(made("POSITION_TARGET_LOCAL_NED", elsewhere))
-    assert air.state is State.RECOVERING
-    # When the reports say so
-    for _ in range(2):
-        air.guard_hears(made("CURRENT_MODE", {"custom_mode": AUTO_LAND, "intended_custom_mode": AUTO_LAND}))
-    # Then it is his, and no program's; where they say that OFFBOARD goes on it is a program's
-    assert air.state is State.STOOD_DOWN and air.told("crossed") == []
-    assert not air.guard.core.flight.program_elsewhere
+    # Then the vehicle rests all the same, and is given back to hold, where nobody's setpoints count
+    air.run_to(State.WATCHING, 10.0)
+    assert air.told("recovered") != [] and air.told("let_go") == [] and air.mode == "AUTO.LOITER"
 
 
 # --- when it is not to act
