@@ -3,6 +3,7 @@
 import json
 import time
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +20,7 @@ from rebound_cli.flights.kept import folder_with_room
 from rebound_cli.inputs import inputs
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.live.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
+from rebound_cli.live.realtime import AskPerson, Computer, FlightFaultError, Loop, confirm_now, fly_realtime, watched
 from rebound_cli.live.signed_connection import open_signed, refused_packets
 from rebound_cli.live.status import StatusServer, served
 from rebound_cli.replay.recording import Followed
@@ -27,11 +28,12 @@ from rebound_cli.report.showing import offer_page, show_flight, watched_page
 from rebound_cli.results import run_folder
 from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import FlightRecorder
-from rebound_cli.results.summary import FlightFacts, Flown, build_summary
+from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import read_truth
 
 if TYPE_CHECKING:
-    from rebound_cli.simulation.lockstep import SteppedVehicle
+    from sim_vehicle.shell.json_udp import ArduPilotVehicle
+    from sim_vehicle.vehicle import SimulatedVehicle
 
 # Where PX4's SITL sends its onboard streams unasked, plus its instance.
 PX4_COMPANION_PORT = 14540
@@ -39,8 +41,6 @@ PX4_COMPANION_PORT = 14540
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """A flight about to begin."""
-
     mission: Mission
     world: inputs.SimulatedWorld | None
     folder: Path
@@ -102,20 +102,23 @@ def run_fly(options: Namespace) -> int:
 
 
 def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> Flown:
-    if flight.world is not None and options.lockstep:
-        return _fly_lockstep(flight, flight.world)
-    if flight.world is not None and options.sim == "ardupilot":
-        return _fly_ardupilot(flight, flight.world, options.instance)
-    if flight.world is not None:
+    world = flight.world
+    if world is not None and options.lockstep:
+        from sim_vehicle.vehicle import SimulatedVehicle
+
+        return _fly_stepped(flight, SimulatedVehicle(world.airframe, world.scene, world.scene.seed))
+    if world is not None and options.sim == "ardupilot":
+        return _fly_ardupilot(flight, world, options.instance)
+    if world is not None:
         return _fly_beside_vehicle(flight, connection, options.instance)
     assert connection is not None, "--connect has one"
-    confirmation = ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
+    confirm = partial(confirm_now, console=flight.console) if options.yes else AskPerson(flight.console).poll
     operator = flight.mission.companion.operator
     with (
         served(flight.console.print, command="fly", folder=str(flight.folder.resolve())) as server,
         watched(flight.folder, operator.computer_status) as computer,
     ):
-        return _fly_connected(flight, connection, confirmation, server, computer)
+        return _fly_connected(flight, connection, confirm, server, computer)
 
 
 def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: inputs.SimulatedWorld | None) -> None:
@@ -133,7 +136,7 @@ def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: inp
 def _fly_connected(
     flight: Flight,
     connection: Connection,
-    confirmation: ConfirmAtOnce | AskPerson,
+    confirm: Callable[[Companion], None],
     server: StatusServer | None = None,
     computer: Computer | None = None,
 ) -> Flown:
@@ -142,7 +145,7 @@ def _fly_connected(
     if flight.followed is not None:
         loop.step = partial(flight.followed.step, companion)
     try:
-        fly_realtime(companion, loop, confirmation)
+        fly_realtime(companion, loop, confirm)
     except FlightFaultError as error:
         # What is known of the flight is written first.
         fault = error
@@ -175,15 +178,9 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
         # What PX4 said while it booted is old.
         while px4 is not None and px4.receive(0):
             pass
-        flown = _fly_connected(flight, px4 or own, ConfirmAtOnce())
+        flown = _fly_connected(flight, px4 or own, confirm_now)
         vehicle.check_running()
     return replace(flown, truth=read_truth(flight.folder / run_folder.TRUTH_NAME))
-
-
-def _fly_lockstep(flight: Flight, world: inputs.SimulatedWorld) -> Flown:
-    from sim_vehicle.vehicle import SimulatedVehicle
-
-    return _fly_stepped(flight, SimulatedVehicle(world.airframe, world.scene, world.scene.seed))
 
 
 def _fly_ardupilot(flight: Flight, world: inputs.SimulatedWorld, instance: int) -> Flown:
@@ -200,14 +197,14 @@ def _fly_ardupilot(flight: Flight, world: inputs.SimulatedWorld, instance: int) 
         return _fly_stepped(flight, vehicle)
 
 
-def _fly_stepped(flight: Flight, vehicle: "SteppedVehicle") -> Flown:
+def _fly_stepped(flight: Flight, vehicle: "SimulatedVehicle | ArduPilotVehicle") -> Flown:
     from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
     from sim_vehicle.shell.truth_file import save_truth
 
-    flown, truth = fly_mission_lockstep(
+    flown = fly_mission_lockstep(
         flight.mission, vehicle, flight.recorder, flight.interrupts, flight.console, flight.followed
     )
-    save_truth(flight.folder / run_folder.TRUTH_NAME, truth, EPOCH_US)
+    save_truth(flight.folder / run_folder.TRUTH_NAME, vehicle.truth, EPOCH_US)
     return flown
 
 
@@ -215,7 +212,7 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     world = flight.world
     airframe, seed = (world.airframe.name, world.scene.seed) if world else (None, None)
     settled_s = flight.mission.companion.settled.duration_s
-    summary = build_summary(flown, FlightFacts(flight.mission.name, airframe, seed, settled_s))
+    summary = build_summary(flown, settled_s, flight.mission.name, airframe, seed)
     console, writer = flight.console, flight.recorder.writer
     if flown.timing is None:
         # In real time each was printed as it happened.

@@ -46,21 +46,18 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
         if other:
             console.print(f"flown with other versions, so bits may differ: {'; '.join(other)}")
         replay = replay_flight(read_telemetry(file), recording)
-        assert replay.reproduction is not None, "a flight of our own is decided again"
-        return replay, partial(decided_again, folder, recording, replay.reproduction)
+        return replay, partial(decided_again, folder, recording, replay.findings, replay.difference)
     settings = options.companion
     if folder is not None and settings is None:
         console.print(f"with {', '.join(changed)} the flight's own decisions cannot come again and are not compared")
         settings = settings_file(folder)
     config = companion_settings(settings, options.set)
-    log = read_log(file)
-    modes = None if options.any_mode else GuardConfig().modes
-    replay = replay_log(log, config, modes)
-    return replay, partial(replayed_flight, replay, config)
+    replay = replay_log(read_log(file), config, None if options.any_mode else GuardConfig().modes)
+    return replay, partial(replayed_flight, replay)
 
 
 def _exit_code(replay: Replay, expected: int | None, least_watched: float, console: Console) -> int:
-    found, share, again = len(replay.findings.collisions), replay.findings.watched_share, replay.reproduction
+    found, share = len(replay.findings.collisions), replay.findings.watched_share
     if expected is not None and found != expected:
         console.print(f"expected {expected or 'no'} collisions, found {found}")
         return 1
@@ -68,7 +65,7 @@ def _exit_code(replay: Replay, expected: int | None, least_watched: float, conso
         seen = "nothing" if share is None else f"{100.0 * share:.0f} %"
         console.print(f"expected no collisions, and {seen} of the flight was watched: that shows none")
         return 1
-    if again is not None:
-        return int(again.first_difference is not None)
+    if replay.recording is not None:
+        return int(replay.difference is not None)
     # Who expects something has said how much must have been watched.
     return int(share is None or (share == 0.0 and expected is None))

@@ -17,7 +17,7 @@ from companion.shell.tlog import may_be_logged
 from rebound_cli.inputs.inputs import resolved, with_guards
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
+from rebound_cli.live.realtime import FlightFaultError, Loop, confirm_now, fly_realtime
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.airframe import load_built_in
@@ -93,7 +93,7 @@ class FaultedFlight:
         try:
             clock: Any = air
             loop = Loop(self.companion, air, clock, self.recorder, console, self.interrupts)
-            fly_realtime(self.companion, loop, ConfirmAtOnce())
+            fly_realtime(self.companion, loop, confirm_now)
         except FlightFaultError as error:
             self.fault_text = str(error)
         except (Killed, Hung) as end:

@@ -74,7 +74,7 @@ def flown_in(folder: Path, mission: Mission, scene: Scene, airframe: Airframe) -
     """From take-off to the end, log and events left in the folder."""
     recorder = FlightRecorder(folder)
     try:
-        flown, _ = fly_mission_lockstep(mission, SimulatedVehicle(airframe, scene, scene.seed), recorder, Interrupts())
+        flown = fly_mission_lockstep(mission, SimulatedVehicle(airframe, scene, scene.seed), recorder, Interrupts())
     finally:
         recorder.close()
     return flown, tuple(recorder.events)

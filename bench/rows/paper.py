@@ -16,7 +16,7 @@ from companion.report import FlightReport
 from rebound_cli.inputs.inputs import with_guards
 from rebound_cli.results.flight_log import FlightLog, read_flight_log
 from rebound_cli.results.run_folder import TLOG_NAME
-from rebound_cli.results.summary import FlightFacts, build_summary
+from rebound_cli.results.summary import build_summary
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
 from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.scene import Scene
@@ -81,7 +81,7 @@ def fly(flight: StudyFlight) -> Json:
     }
     if not truth.hits:
         return row
-    entries = build_summary(flown, FlightFacts("", None, None, settled_s))["collisions"]
+    entries = build_summary(flown, settled_s, "", None, None)["collisions"]
     told = zip(matches.hit_of_collision, report.collisions, entries, strict=True)
     matched = [(hit, collision, entry["truth"]) for hit, collision, entry in told if hit is not None]
     row |= _of_hits(truth, airframe.arms.hysteresis_m, matches.recontacts)

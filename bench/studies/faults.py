@@ -147,7 +147,7 @@ def _log(flight: FaultedFlight) -> list[str]:
     # A fault inside the program is in no log.
     is_reproducible = not flight.fault_text and not any(event.kind == "fault" for event in flight.recorder.events)
     if flight.number < DECIDED_AGAIN and is_reproducible:
-        difference = reproduce(read_recording(flight.recorder.folder)).first_difference
+        _, difference = reproduce(read_recording(flight.recorder.folder))
         return [] if difference is None else [f"decided otherwise from the log: {difference}"]
     return []
 

@@ -79,8 +79,7 @@ def _kind(value: Any) -> Json:
 
 def _heard(log: Log) -> Iterator[Message]:
     attitude = _LEVEL
-    for heard in log.heard:
-        at_us, sample = heard.at_us, heard.sample
+    for at_us, sample in log.heard:
         match sample:
             case Attitude():
                 attitude = sample.attitude_wxyz

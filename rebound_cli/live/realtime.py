@@ -40,17 +40,11 @@ class FlightFaultError(ReboundError):
     """Something around the flight failed; the vehicle has been handed over, as far as it could be reached."""
 
 
-class ConfirmAtOnce:
+def confirm_now(companion: Companion, console: Console | None = None) -> None:
     """For simulated vehicles, and for --yes; prints the plan first where there is someone to read it."""
-
-    def __init__(self, console: Console | None = None) -> None:
-        self._console = console
-
-    def poll(self, companion: Companion) -> None:
-        if not companion.plan_is_ready():
-            return
-        if self._console is not None:
-            self._console.print(companion.plan_text())
+    if companion.plan_is_ready():
+        if console is not None:
+            console.print(companion.plan_text())
         companion.confirm_plan()
 
 
@@ -275,7 +269,7 @@ class Loop:
                 self._step(received, self.clock.now_us())
 
 
-def fly_realtime(companion: Companion, loop: Loop, confirmation: ConfirmAtOnce | AskPerson) -> None:
+def fly_realtime(companion: Companion, loop: Loop, confirm: Callable[[Companion], None]) -> None:
     """Run the companion's loop until it has finished; after the first interrupt it finishes by itself."""
     recorder = loop.recorder
 
@@ -283,7 +277,7 @@ def fly_realtime(companion: Companion, loop: Loop, confirmation: ConfirmAtOnce |
         if result.events:
             recorder.record_obstacles(companion.obstacles())
             loop.console.events(result.events, companion.core.started_at_us)
-        confirmation.poll(companion)
+        confirm(companion)
         look_for_file(companion, recorder, now_us)
         recorder.record_confirmation(now_us, companion.plan_is_confirmed)
         if companion.stop_reason is not None:

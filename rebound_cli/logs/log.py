@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,7 @@ class LogError(ReboundError):
     """The log cannot be read or holds nothing that a detector could use."""
 
 
-@dataclass(frozen=True, slots=True)
-class LoggedSample:
+class LoggedSample(NamedTuple):
     """A sample and when it was heard, in microseconds of the log's own clock."""
 
     at_us: int
@@ -74,7 +74,7 @@ class Log:
 
     def imu(self) -> list[tuple[int, ImuSample]]:
         """All IMU samples with the time each was heard at."""
-        return [(heard.at_us, heard.sample) for heard in self.heard if isinstance(heard.sample, ImuSample)]
+        return [(at_us, sample) for at_us, sample in self.heard if isinstance(sample, ImuSample)]
 
     @property
     def imu_rate_hz(self) -> float:
@@ -128,9 +128,11 @@ def slow_velocity(name: str, rate_hz: float) -> Iterator[str]:
         yield f"{name} is logged at {rate_hz:.0f} Hz, not 30: v_c is coarser, and no hit between two IMU samples shows"
 
 
-def clipped(log: Log) -> tuple[int, str]:
-    """IMU samples with clipped readings in them, and how that is known."""
+def clipping_text(log: Log) -> str:
+    """How many IMU samples have clipped readings in them, and how that is known."""
     if log.clipped_at_us is not None:
-        return len(log.clipped_at_us), "by the sensor's own flags"
-    count = sum(max(map(abs, sample.specific_force_frd_m_s2)) >= _CLIPPED_M_S2 for _, sample in log.imu())
-    return count, f"samples of {_CLIPPED_M_S2:g} m/s^2 or more"
+        count, how = len(log.clipped_at_us), "by the sensor's own flags"
+    else:
+        count = sum(max(map(abs, sample.specific_force_frd_m_s2)) >= _CLIPPED_M_S2 for _, sample in log.imu())
+        how = f"samples of {_CLIPPED_M_S2:g} m/s^2 or more"
+    return f"clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how})"

@@ -92,22 +92,27 @@ def read_ulog(path: Path) -> Log:
             log = ULog(content, _NAMES)
     except Exception as error:  # damaged files make it raise whatever the bytes led to
         raise LogError(f"{path}: not a readable PX4 log: {error or type(error).__name__}.") from error
-    topics = {
+    topics = dict.fromkeys([(name, 0) for name in _NAMES], Topic({"timestamp": np.array([])}))
+    topics |= {
         (data.name, data.multi_id): Topic(data.data) for data in log.data_list if len(data.data.get("timestamp", ()))
     }
     # The faster of the two: by default sensor_combined is logged whole and vehicle_imu twice a second.
-    inertial = [topic for name in ("vehicle_imu", "sensor_combined") if (topic := topics.get((name, 0))) is not None]
+    inertial = [topic for name in ("vehicle_imu", "sensor_combined") if (topic := topics[name, 0])]
     if not inertial:
         text = "neither sensor_combined nor vehicle_imu in it; PX4 logs them by default (SDLOG_PROFILE)"
         raise LogError(f"{path}: {text}.")
     imu = max(inertial, key=Topic.rate_hz)
     parameters = {k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)}
-    _check_multicopter(path, topics.get(("vehicle_status", 0)), parameters)
-    heard = list(_imu_samples(topics, imu))
-    for names, convert in _CONVERSIONS.items():
-        topic = next((topics[name, 0] for name in names if (name, 0) in topics), None)
-        heard += () if topic is None else convert(topic)
-    heard += _landed_states(topics)
+    _check_multicopter(path, topics["vehicle_status", 0], parameters)
+    heard = [
+        *_imu_samples(topics, imu),
+        *_local_position(topics["vehicle_local_position", 0]),
+        *_attitude(topics["vehicle_attitude", 0]),
+        *_attitude_target(topics["vehicle_attitude_setpoint", 0]),
+        *_heartbeat(topics["vehicle_status", 0]),
+        *_demand(topics["trajectory_setpoint", 0] or topics["vehicle_local_position_setpoint", 0]),
+        *_landed_states(topics),
+    ]
     clipped, intervals = imu.column(*_CLIPPING), imu.column("accelerometer_integral_dt", "delta_velocity_dt")
     return Log(
         path=path,
@@ -128,18 +133,13 @@ def _name(log: ULog) -> str:
     return f"PX4{version}{f' on {hardware}' if hardware else ''}"
 
 
-def _check_multicopter(path: Path, status: Topic | None, parameters: Mapping[str, float]) -> None:
+def _check_multicopter(path: Path, status: Topic, parameters: Mapping[str, float]) -> None:
     """Raise LogError where the vehicle is no multicopter by its MAV_TYPE."""
-
-    def last(field: str) -> float | None:
-        values = None if status is None else status.column(field)
-        return None if values is None else float(values[-1])
-
+    said, kind_of_wing, vtol = (status.column(field) for field in ("system_type", "vehicle_type", "is_vtol"))
     # A parameter counts where the vehicle's own status holds no type; 0 says nothing.
-    said, vtol = last("system_type"), None if status is None else status.column("is_vtol")
     kinds = [
-        int(parameters.get("MAV_TYPE", 0) if said is None else said),
-        _OTHER_TYPES.get(int(last("vehicle_type") or 0), 0),
+        int(parameters.get("MAV_TYPE", 0) if said is None else said[-1]),
+        0 if kind_of_wing is None else _OTHER_TYPES.get(int(kind_of_wing[-1]), 0),
         _VTOL if vtol is not None and vtol.all() else 0,
     ]
     kind = next((kind for kind in kinds if kind and kind not in MULTICOPTERS), max(kinds) or QUADROTOR)
@@ -152,13 +152,12 @@ def _losses(log: ULog, topics: _Topics, imu: Topic) -> Iterator[str]:
     if (lost_s := sum(dropout.duration for dropout in log.dropouts) * 1e-3) > 0:
         yield f"the logger dropped {lost_s:.2f} s of data: nothing is seen there"
     for name, cost in _COSTS.items():
-        topic = topics.get((name, 0))
-        if topic is None:
+        topic = topics[name, 0]
+        if not topic:
             yield f"no {name}: {cost}"
         elif topic.time_us[0] - imu.time_us[0] > _LATE_US:
             yield f"no {name} before {(topic.time_us[0] - log.start_timestamp) * 1e-6:.1f} s: until then {cost}"
-    position = topics.get(("vehicle_local_position", 0))
-    if position is not None:
+    if position := topics["vehicle_local_position", 0]:
         yield from slow_velocity("vehicle_local_position", position.rate_hz())
         for flag, what in (("v_xy_valid", "horizontal velocity"), ("v_z_valid", "vertical velocity")):
             valid = position.column(flag)
@@ -196,12 +195,11 @@ def _imu_samples(topics: _Topics, imu: Topic) -> Iterator[LoggedSample]:
 def _bias(topics: _Topics, sensor: str, at_us: npt.NDArray[np.int64]) -> Floats:
     """What the primary estimator held the bias for at each time; zero where it is not logged."""
     biases, primary = np.zeros((len(at_us), 3)), np.zeros(len(at_us))
-    selector = topics.get(("estimator_selector_status", 0))
-    chosen = None if selector is None else selector.column("primary_instance")
-    if selector is not None and chosen is not None:
+    selector = topics["estimator_selector_status", 0]
+    if (chosen := selector.column("primary_instance")) is not None:
         primary, _ = selector.held(chosen, at_us)
-    instances = [topic for (name, _), topic in sorted(topics.items()) if name == "estimator_sensor_bias"]
-    for instance, topic in enumerate(instances):
+    names = sorted(key for key, topic in topics.items() if key[0] == "estimator_sensor_bias" and topic)
+    for instance, topic in enumerate(topics[name] for name in names):
         values, device = topic.array(f"{sensor}_bias"), topic.vector(f"{sensor}_device_id")
         if values is not None:
             held, is_known = topic.held(values if device is None else np.where(device > 0, values, 0.0), at_us)
@@ -242,8 +240,7 @@ def _attitude_target(topic: Topic) -> Iterator[LoggedSample]:
 
 
 def _heartbeat(topic: Topic) -> Iterator[LoggedSample]:
-    count = len(topic.time_us)
-    arming, none = topic.column("arming_state"), np.full(count, -1.0)
+    arming, none = topic.column("arming_state"), np.full(len(topic), -1.0)
     if arming is None:
         return
     columns = [none if (c := topic.column(n)) is None else c for n in ("nav_state", "failsafe", "system_type")]
@@ -272,9 +269,8 @@ def _landed_states(topics: _Topics) -> Iterator[LoggedSample]:
         ("position_setpoint_triplet", "current.valid"),
         ("position_setpoint_triplet", "current.type"),
     ):
-        topic = topics.get((name, 0))
-        values = None if topic is None else topic.column(field)
-        if topic is not None and values is not None:
+        topic = topics[name, 0]
+        if (values := topic.column(field)) is not None:
             news += [(t, field, int(value)) for t, value in zip(topic.time_us.tolist(), values, strict=True)]
     known: dict[str, int] = {}
     for time_us, field, value in sorted(news, key=lambda item: item[0]):
@@ -290,12 +286,3 @@ def _landed_state(known: Mapping[str, int]) -> messages.LandedState:
         flown = {_TAKEOFF: messages.LandedState.TAKEOFF, _LAND: messages.LandedState.LANDING}
         return flown.get(known.get("current.type", 0), messages.LandedState.IN_AIR)
     return messages.LandedState.IN_AIR
-
-
-_CONVERSIONS = {
-    ("vehicle_local_position",): _local_position,
-    ("vehicle_attitude",): _attitude,
-    ("vehicle_attitude_setpoint",): _attitude_target,
-    ("vehicle_status",): _heartbeat,
-    ("trajectory_setpoint", "vehicle_local_position_setpoint"): _demand,
-}

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.messages import ImuSample, LocalPosition, MessageId, Odometry, Sample
+from companion.messages import ImuSample, LocalPosition, Odometry, Sample
 from companion.reflex.detection.detector import Detector, DetectorState, Evidence, Impact, Motion, Phase, Situation
 from companion.reflex.detection.fused import FusedState
 from companion.reflex.detection.monitor import CollisionMonitor
@@ -53,14 +53,6 @@ class Tested:
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
-    """What the detector went by when it fired: the sample, or the velocity, and whether a hand was thinkable."""
-
-    tested: Tested
-    may_be_hand: bool
-
-
-@dataclass(frozen=True, slots=True)
 class Rows:
     """Grows with the recording, in the order heard."""
 
@@ -83,11 +75,13 @@ class Rows:
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """`shown`: by the boot time of an impact."""
+    """`shown`: by the boot time of an impact, what the detector went by when it fired, the sample or the velocity, and
+    whether a hand was thinkable.
+    """
 
     forces: Rows = field(default_factory=lambda: Rows(FORCES))
     velocities: Rows = field(default_factory=lambda: Rows(JUMPS))
-    shown: dict[int, Shown] = field(default_factory=dict)
+    shown: dict[int, tuple[Tested, bool]] = field(default_factory=dict)
 
     def listen(self, monitor: CollisionMonitor) -> None:
         """To this watch, from now on."""
@@ -95,16 +89,9 @@ class Listener:
 
 
 class _ListenedTo:
-    """A detector with a listener."""
-
-    losses: Mapping[MessageId, str]
-
     def __init__(self, detector: Detector, listener: Listener) -> None:
         self._detector, self._listener = detector, listener
         self.name, self.losses = detector.name, detector.losses
-
-    def initial(self) -> DetectorState:
-        return self._detector.initial()
 
     def step(self, state: DetectorState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         phase = _NUMBERS[state.phase]
@@ -119,11 +106,11 @@ class _ListenedTo:
             self._listener.shown[impact.sample_time_boot_us] = self._shown(state, impact)
         return impact
 
-    def _shown(self, state: DetectorState, impact: Impact) -> Shown:
+    def _shown(self, state: DetectorState, impact: Impact) -> tuple[Tested, bool]:
         if impact.evidence is Evidence.VELOCITY_JUMP:
-            return Shown(self._listener.velocities.one(-1), False)
+            return self._listener.velocities.one(-1), False
         is_soft = isinstance(state, FusedState) and state.may_be_hand(impact.sample_time_boot_us)
-        return Shown(self._listener.forces.one(-1), is_soft)
+        return self._listener.forces.one(-1), is_soft
 
 
 def _forces(s: DetectorState) -> tuple[float, ...]:

@@ -125,16 +125,6 @@ def _steps(tlog: Path) -> dict[int, RecordedStep]:
     return steps
 
 
-@dataclass(frozen=True, slots=True)
-class Reproduction:
-    """What became of it; `first_difference` is None when every packet sent and every event is the same to the bit."""
-
-    findings: Findings
-    extent: Mapping[str, int]  # how many steps, packets and events were compared
-    is_cut: bool
-    first_difference: str | None
-
-
 class Followed:
     """What a companion's monitor finds, noted step by step: of a simulated flight, and of one that is flown again."""
 
@@ -153,7 +143,7 @@ class Followed:
             self.findings.listener.listen(monitor)
         self._watch = monitor
         for event in result.events:
-            self.findings.tell(event.time_us, event.text)
+            self.findings.happenings.append((event.time_us, event.text))
         # A step in which nothing came or went is in no recording.
         if received or result.sent_frames:
             self.findings.note(monitor, known, stepped.core.flight.vehicle.is_airborne, now_us)
@@ -164,8 +154,10 @@ class Followed:
         self.findings.close(self.ended_at_us)
 
 
-def reproduce(recording: Recording) -> Reproduction:
-    """Fly the recording to its end, whatever differs."""
+def reproduce(recording: Recording) -> tuple[Findings, str | None]:
+    """Fly the recording to its end, whatever differs; None when every packet sent and every event is the same to the
+    bit, else the first difference.
+    """
     settings = recording.settings
     stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
     followed, expected, differences = Followed(), list(recording.event_lines), []
@@ -188,13 +180,7 @@ def reproduce(recording: Recording) -> Reproduction:
                 _tell(stepped, record)
     differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
     followed.close()
-    extent = {
-        "steps": len(recording.steps),
-        "packets_received": sum(len(step.received) for step in recording.steps),
-        "packets_sent": sum(len(step.sent) for step in recording.steps),
-        "events": len(expected),
-    }
-    return Reproduction(followed.findings, extent, recording.is_cut, differences[0] if differences else None)
+    return followed.findings, differences[0] if differences else None
 
 
 def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:

@@ -9,8 +9,8 @@ from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
 from companion.reflex.detection.detector import Evidence, ImpactKind
 from companion.reflex.surface import Normal
-from rebound_cli.logs.log import WANTED, Log, clipped
-from rebound_cli.replay.recording import Recording, Reproduction, reproduce
+from rebound_cli.logs.log import WANTED, Log, clipping_text
+from rebound_cli.replay.recording import Recording, reproduce
 from rebound_cli.replay.watching import Finding, Findings, watch_log
 
 _WIDTH = 110
@@ -19,13 +19,15 @@ _SEEN_BY = {Evidence.VELOCITY_JUMP: "a velocity that jumped", Evidence.RATE_JUMP
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What was looked at, with what, and what was found."""
+    """What was looked at, with what, and what was found; of our own flight that was decided again, the `recording` and
+    the first `difference` from it.
+    """
 
     log: Log
-    detector: str
+    config: CompanionConfig
     findings: Findings
-    losses: tuple[str, ...]
-    reproduction: Reproduction | None
+    recording: Recording | None = None
+    difference: str | None = None
 
 
 def replay_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = None) -> Replay:
@@ -33,28 +35,15 @@ def replay_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = 
 
     `modes`: those in which the guard may take over; None: it watches whoever flies.
     """
-    return Replay(log, config.detector, watch_log(log, config, modes), _losses(log, config), None)
+    return Replay(log, config, watch_log(log, config, modes))
 
 
 def replay_flight(log: Log, recording: Recording) -> Replay:
     """Our own flight decided again, from the first byte to the last."""
-    config = recording.settings.companion
-    reproduction = reproduce(recording)
+    findings, difference = reproduce(recording)
     # The flight's own zero, so that times are those of its timeline.
     log = replace(log, started_at_us=recording.steps[0].time_us)
-    return Replay(log, config.detector, reproduction.findings, _losses(log, config), reproduction)
-
-
-def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
-    """What the log lacks, and what the detector loses by it."""
-    detector = config.detectors[config.detector](getattr(config, config.detector), 0)
-    kinds = {type(heard.sample) for heard in log.heard}
-    missing = [
-        f"without {message.name} '{config.detector}' loses: {loss}"
-        for message, loss in detector.losses.items()
-        if message in WANTED and WANTED[message] not in kinds
-    ]
-    return (*log.losses, *missing)
+    return Replay(log, recording.settings.companion, findings, recording, difference)
 
 
 def report_text(replay: Replay) -> str:
@@ -62,16 +51,16 @@ def report_text(replay: Replay) -> str:
     log = replay.log
     headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {log.imu_rate_hz:.0f} Hz"
     told: list[tuple[int, list[str]]] = [(at_us, [text]) for at_us, text in replay.findings.happenings]
-    if replay.reproduction is None:
+    if replay.recording is None:
         # Each interval in which a guard would have left a hit to whoever flies.
         spans = replay.findings.off
         told += [(s.start_us, [f"not watched for {s.duration_s:.2f} s: {s.reason}"]) for s in spans]
     told += [(finding.at_us, list(_finding_rows(replay, finding))) for finding in replay.findings.impacts]
     timeline = [_entry(log.seconds(at_us), texts) for at_us, texts in sorted(told, key=lambda row: row[0])]
-    parts = [f"{headline}, detector '{replay.detector}'", *(["\n".join(timeline)] if timeline else [])]
+    parts = [f"{headline}, detector '{replay.config.detector}'", *(["\n".join(timeline)] if timeline else [])]
     parts.append("\n".join(_wrapped(fact, "", "  ") for fact in _facts(replay)))
-    if replay.reproduction is not None:
-        parts.append(_wrapped(_reproduction_text(replay.reproduction), "", "  "))
+    if replay.recording is not None:
+        parts.append(_wrapped(_reproduction_text(replay.recording, replay.difference), "", "  "))
     return "\n\n".join([*parts, _verdict(replay)]) + "\n"
 
 
@@ -149,27 +138,30 @@ def bearing(normal_ned: Vector3) -> str:
 
 
 def _facts(replay: Replay) -> Iterator[str]:
-    count, how = clipped(replay.log)
-    samples = f"{count or 'no'} sample{'' if count == 1 else 's'} ({how})"
     peak_m_s2 = max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in replay.log.imu())
-    yield f"clipping: {samples}; largest sample {peak_m_s2:.1f} m/s^2"
+    yield f"{clipping_text(replay.log)}; largest sample {peak_m_s2:.1f} m/s^2"
     for word, spans in (("blind", replay.findings.blind), ("off", replay.findings.off)):
         total_s = sum(span.duration_s for span in spans)
         shown = [f"{replay.log.seconds(s.start_us):.2f} s for {s.duration_s:.2f} s ({s.reason})" for s in spans[:4]]
         more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
         yield f"{word}: {total_s:.2f} s in all: {', '.join(shown)}{more}" if spans else f"{word}: never"
-    for loss in replay.losses:
-        yield f"note: {loss}"
-    if replay.reproduction is None and replay.findings.is_flying:
+    yield from (f"note: {loss}" for loss in replay.log.losses)
+    config, kinds = replay.config, {type(heard.sample) for heard in replay.log.heard}
+    detector = config.detectors[config.detector](getattr(config, config.detector), 0)
+    for message, loss in detector.losses.items():
+        if message in WANTED and WANTED[message] not in kinds:
+            yield f"note: without {message.name} '{config.detector}' loses: {loss}"
+    if replay.recording is None and replay.findings.is_flying:
         yield "note: the log ends in flight, cut short or without power: what came then is not in it"
 
 
-def _reproduction_text(again: Reproduction) -> str:
+def _reproduction_text(recording: Recording, difference: str | None) -> str:
     """Whether the flight was decided again to the bit."""
-    extent = "{steps} steps, {packets_received} packets in, {packets_sent} packets out, {events} events"
-    extent = extent.format_map(again.extent)
-    if again.is_cut:
+    received, sent = (sum(len(getattr(step, way)) for step in recording.steps) for way in ("received", "sent"))
+    extent = f"{len(recording.steps)} steps, {received} packets in, {sent} packets out"
+    extent += f", {len(recording.event_lines)} events"
+    if recording.is_cut:
         extent += "; the program was ended at once, and what came after its last packet is not known"
-    if again.first_difference is None:
+    if difference is None:
         return f"identical: every decision of the flight came again to the bit ({extent})"
-    return f"NOT identical ({extent}): {again.first_difference}"
+    return f"NOT identical ({extent}): {difference}"

@@ -18,14 +18,15 @@ from typing import Any, TypeAlias
 from companion.mission.config import CompanionConfig
 from rebound_cli.inputs.documents import parse_document, refuse_existing, validated
 from rebound_cli.inputs.inputs import companion_settings
-from rebound_cli.logs.log import Log, LogError, clipped
+from rebound_cli.logs.log import Log, LogError, clipping_text
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.recording import log_file
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import watch_log
 from rebound_cli.results.run_folder import read_summary
 
-Place: TypeAlias = tuple[str, ...]
+# Why a setting is as it is, by its part of `companion:` and its name.
+Reasons: TypeAlias = Mapping[tuple[str, str], str]
 
 _WIDTH = 110
 # PX4's take-off ramp lasts 3 s (MPC_TKO_RAMP_T) and a landing some 4 s: as long again shows how the noise varies.
@@ -48,15 +49,6 @@ class Margin:
     share: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Advice:
-    """Each value, and the reason for it if there is one, by its place below `companion:`; `config` is the whole."""
-
-    config: CompanionConfig
-    settings: Mapping[Place, tuple[Any, str | None]]
-    false_alarms_left: int
-
-
 def run_tune(options: Namespace) -> int:
     """Print what the flights say and the settings; with --out write these. Raises LogError, ConfigurationError."""
     out: Path | None = options.out
@@ -69,12 +61,12 @@ def run_tune(options: Namespace) -> int:
         print(*rows, sep="\n", end="\n\n", flush=True)
     logs = [flight.log for flight in flights]
     found = margins(logs, config)
-    advice = advise(logs, config, found)
-    text = settings_text(advice, ", ".join(path.name for path in options.logs))
+    settings, reasons, left = advise(logs, config, found)
+    text = settings_text(settings, reasons, ", ".join(path.name for path in options.logs))
     # Read as `rebound fly` will read it before anybody has it.
     document = parse_document(text, str(out or "the settings"))
     validated(CompanionConfig, document, document.data["companion"], ("companion",))
-    if left := advice.false_alarms_left:
+    if left:
         print(f"With these settings still {left} false alarms: this vehicle is not made quiet by thresholds.\n")
     print(text, end="")
     if out is not None:
@@ -104,10 +96,9 @@ def read_healthy(path: Path, config: CompanionConfig) -> Replay:
 def _flight_rows(flight: Replay) -> Iterator[str]:
     log, found = flight.log, flight.findings
     yield f"{log.path}: {log.vehicle}, {found.flown_us * 1e-6:.0f} s in the air, IMU at {log.imu_rate_hz:.0f} Hz"
-    count, how = clipped(log)
     alarms, blind_s = len(found.collisions), sum(span.duration_s for span in found.blind)
     blind = f"blind for {blind_s:.2f} s, first: {found.blind[0].reason}" if found.blind else "never blind"
-    yield f"  clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how})"
+    yield f"  {clipping_text(log)}"
     yield f"  as set now: {alarms or 'no'} false alarm{'s' if alarms > 1 else ''}, {blind}"
     yield f"  smallest hit that shows: {found.promise.text() if found.promise else 'not known'}"
     yield from (f"  note: {loss}" for loss in log.losses)
@@ -143,18 +134,19 @@ def _false_alarms(logs: Sequence[Log], config: CompanionConfig) -> int:
     return sum(len(watch_log(log, config).collisions) for log in logs)
 
 
-def advise(logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin]) -> Advice:
-    """Thresholds with a reserve over these flights, never below where they started."""
+def advise(logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin]) -> tuple[dict[str, Any], Reasons, int]:
+    """The `companion:` part: thresholds with a reserve over these flights, never below where they started; and the
+    false alarms that are left.
+    """
     raised = _raised(logs, start, found)
-    given = _leaves(start.model_dump(mode="json", exclude_unset=True))
-    settings: dict[Place, tuple[Any, str | None]] = {("detector",): (start.detector, None)}
-    settings |= {place: (value, None) for place, value in given}
-    for margin in found:
-        value = raised.get(margin.setting, margin.value)
-        settings[start.detector, margin.setting] = value, _why(margin, raised)
-    settings["estimate", "imu_averaging_interval_s"] = _averaging(logs, start)
-    config = _with(start, raised)
-    return Advice(config, settings, _false_alarms(logs, config))
+    settings: dict[str, Any] = {"detector": start.detector, **start.model_dump(mode="json", exclude_unset=True)}
+    averaging_s, why_averaging = _averaging(logs, start)
+    new = {start.detector: {margin.setting: raised.get(margin.setting, margin.value) for margin in found}}
+    for part, values in (new | {"estimate": {"imu_averaging_interval_s": averaging_s}}).items():
+        settings[part] = settings.get(part, {}) | values
+    reasons = {(start.detector, margin.setting): _why(margin, raised) for margin in found}
+    reasons["estimate", "imu_averaging_interval_s"] = why_averaging
+    return settings, reasons, _false_alarms(logs, _with(start, raised))
 
 
 def _raised(logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin]) -> dict[str, float]:
@@ -188,23 +180,15 @@ def _averaging(logs: Sequence[Log], start: CompanionConfig) -> tuple[float, str]
     return math.ceil(max(known) / 100) / 1e4, "99 of 100 IMU samples hold this time or less"
 
 
-def settings_text(advice: Advice, source: str) -> str:
-    """YAML with each reason above its number."""
+def settings_text(settings: Mapping[str, Any], reasons: Reasons, source: str) -> str:
+    """YAML with each reason above its number. What is JSON is YAML."""
     lines = [f"# Written by rebound tune from {source}.", "companion:"]
-    for part in dict.fromkeys(place[0] for place in advice.settings):
-        if (part,) not in advice.settings:
-            lines.append(f"  {part}:")
-        for place, (value, reason) in advice.settings.items():
-            if place[0] == part:
-                indent = "  " * len(place[:2])
-                lines += [f"{indent}# {reason}"] if reason else []
-                lines.append(f"{indent}{'.'.join(place[1:]) or part}: {json.dumps(value)}")
+    for part, values in settings.items():
+        if not isinstance(values, dict):
+            lines.append(f"  {part}: {json.dumps(values)}")
+            continue
+        lines.append(f"  {part}:")
+        for name, value in values.items():
+            lines += [f"    # {reasons[part, name]}"] if (part, name) in reasons else []
+            lines.append(f"    {name}: {json.dumps(value)}")
     return "\n".join(lines) + "\n"
-
-
-def _leaves(data: Mapping[str, Any], place: Place = ()) -> Iterator[tuple[Place, Any]]:
-    for name, value in data.items():
-        if isinstance(value, dict):
-            yield from _leaves(value, (*place, name))
-        else:
-            yield (*place, name), value

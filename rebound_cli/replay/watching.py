@@ -68,7 +68,6 @@ class Circumstances:
 
     @property
     def situation(self) -> Situation:
-        """Now."""
         guard = self.guard
         off = self._why_not(guard) or (State.CRASHED.value if guard.is_wreck else None)
         return situation_of(guard, off, goes_down(guard, self._now_us), is_held=False)
@@ -175,9 +174,6 @@ class Findings:
             start_us, first_reason = self._open.pop(name)
             (self.blind if name == "blind" else self.off).append(Span(start_us, at_us, first_reason))
 
-    def tell(self, at_us: int, text: str) -> None:
-        self.happenings.append((at_us, text))
-
     def close(self, at_us: int) -> None:
         self._note_span("blind", None, at_us)
         self._note_span("off", None, at_us)
@@ -196,7 +192,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
         situation = circumstances.situation
         impacts, notices = advance(monitor, samples, situation, now_us)
         for notice in notices:
-            findings.tell(now_us, notice.text)
+            findings.happenings.append((now_us, notice.text))
         findings.note(monitor, situation, circumstances.guard.vehicle.is_airborne, now_us)
         circumstances.note(impacts)
 
@@ -207,7 +203,7 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
             step((), poll_us)
         told = [item.sample for item in group]
         for text in circumstances.hear(told, at_us):
-            findings.tell(at_us, text)
+            findings.happenings.append((at_us, text))
         # One by one: two impacts of one instant would otherwise be one.
         for sample in told:
             step((sample,), at_us)

@@ -18,23 +18,7 @@ from companion.reflex.detection.detector import Phase
 from rebound_cli.replay.listening import PHASES, Numbers
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
-from rebound_cli.report.series import (
-    FOLD_M,
-    FORCE_M_S2,
-    NED,
-    PLACE_M,
-    PLACES,
-    RATIO,
-    SPEED_M_S,
-    TIME_S,
-    TURN,
-    UNIT,
-    VELOCITY,
-    Columns,
-    series,
-    times,
-    vector,
-)
+from rebound_cli.report.series import FORCE_M_S2, PLACES, RATIO, TIME_S, Columns, of_truth, series, times
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
@@ -143,15 +127,8 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     }
     columns["path"] = _on_both_clocks(columns["path"], log.position_time_boot_us - first_us)
     if truth is not None and truth.series:
-        true, boot_us, folds_m = truth.series, truth.series["time_boot_us"], truth.series["arm_fold_m"]
-        columns["truth"] = (
-            times(truth.at_us(boot_us), flight.started_at_us)
-            | {"boot": ((truth.told_us(boot_us) - first_us) * 1e-6, TIME_S)}
-            | vector(NED, true["position_ned_m"], PLACE_M)
-            | vector(VELOCITY, true["velocity_ned_m_s"], SPEED_M_S)
-            | vector(TURN, true["attitude_wxyz"], UNIT)
-            | vector([f"fold{arm}" for arm in range(1, 1 + folds_m.shape[1])], folds_m, FOLD_M)
-        )
+        told_us = truth.told_us(truth.series["time_boot_us"]) - first_us
+        columns["truth"] = _on_both_clocks(of_truth(truth, flight.started_at_us), told_us)
     return {name: _packed(table, loud if name == "imu" else None, near_s, most) for name, table in columns.items()}
 
 

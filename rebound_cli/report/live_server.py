@@ -29,8 +29,6 @@ _PORT = re.compile(r":\d+$")  # of a Host; a browser leaves 80 out
 
 
 class WatchServer(ThreadingHTTPServer):
-    """Serves one page and its stream."""
-
     daemon_threads = True
 
     def __init__(self, folder: Path, host: str, port: int) -> None:
@@ -87,12 +85,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, kind: str) -> None:
         self.send_response(200)
-        for name, value in (
-            ("Content-Type", kind),
-            ("Cache-Control", "no-store"),
-            ("X-Content-Type-Options", "nosniff"),
-        ):
-            self.send_header(name, value)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("X-Content-Type-Options", "nosniff")
         self.end_headers()
 
     def _stream(self) -> None:

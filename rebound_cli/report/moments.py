@@ -14,7 +14,7 @@ from companion.messages import Vector3
 from companion.motion.config import SHOWN_US
 from companion.reflex.detection.detector import ImpactKind, Phase
 from companion.reflex.surface import Normal
-from rebound_cli.replay.listening import PHASES, Shown, Tested
+from rebound_cli.replay.listening import PHASES, Tested
 from rebound_cli.replay.report import bearing, impact_facts, kind_text, speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
@@ -100,16 +100,16 @@ def _normal(flight: ShownFlight, finding: Finding) -> Normal:
 def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iterator[str]:
     """Sign by sign, then what else it could have been."""
     impact, situation = finding.first.impact, finding.situation
-    shown = flight.findings.listener.shown.get(impact.sample_time_boot_us)
-    if shown is not None:
-        yield from _signs(shown.tested)
+    tested, may_be_hand = flight.findings.listener.shown.get(impact.sample_time_boot_us, (None, False))
+    if tested is not None:
+        yield from _signs(tested)
     if situation.descent_commanded:
         height = "an unknown height" if situation.height_m is None else f"{situation.height_m:.2f} m"
         yield f"A landing: thinkable, the vehicle was told to go down, at {height}."
     else:
         yield "A landing: no, nobody had told the vehicle to go down."
-    if shown is not None:
-        yield _hand_text(flight, finding, shown)
+    if tested is not None:
+        yield _hand_text(flight, finding, may_be_hand)
     kind = finding.final.impact.kind
     verdict = "a collision, to be recovered from" if finding.is_collision else "nothing to recover from"
     yield f"Verdict: {kind.value}, {verdict}."
@@ -142,8 +142,8 @@ def _signs(tested: Tested) -> Iterator[str]:
             yield f"{name}: {value:.{digits}f} {unit}, {needed}: {says}."
 
 
-def _hand_text(flight: ShownFlight, finding: Finding, shown: Shown) -> str:
-    if not shown.may_be_hand:
+def _hand_text(flight: ShownFlight, finding: Finding, may_be_hand: bool) -> str:
+    if not may_be_hand:
         return "A person's hand: no, the vehicle had not hovered in the last half second."
     if finding.first.impact.kind is ImpactKind.CONTACT:
         return "A person's hand: yes, the vehicle hovered and the force rose slowly."
@@ -207,20 +207,10 @@ def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Momen
         return []
     loudest = max(nearest, key=lambda one: float(one.ratio))
     row = int(np.argmin(np.abs(flight.log.imu_time_boot_us - loudest.time_boot_us)))
-    at_us = float(flight.log.imu_at_us[row])
-    return [
-        Moment(
-            kind="closest",
-            title=f"Closest call: {100 * loudest.ratio:.0f} % of a hit",
-            at_us=at_us,
-            boot_us=float(loudest.time_boot_us),
-            facts=[("At", f"{flight.seconds(at_us):.3f} s")],
-            reasons=[
-                *_signs(loudest),
-                "Verdict: no hit. Outside of the contacts above nothing in the flight came nearer to one.",
-            ],
-        )
-    ]
+    at_us, boot_us = float(flight.log.imu_at_us[row]), float(loudest.time_boot_us)
+    title, facts = f"Closest call: {100 * loudest.ratio:.0f} % of a hit", [("At", f"{flight.seconds(at_us):.3f} s")]
+    verdict = "Verdict: no hit. Outside of the contacts above nothing in the flight came nearer to one."
+    return [Moment("closest", title, at_us, boot_us, facts, [*_signs(loudest), verdict])]
 
 
 def _watched(tested: Tested, others_boot_us: Sequence[float]) -> Floats:

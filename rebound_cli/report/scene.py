@@ -8,7 +8,7 @@ from companion.memory.stored import KnownPatch
 from companion.memory.surroundings import assumed_area
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.run_folder import EVENTS_NAME, reading
-from sim_vehicle.world import Motion, Obstacle, Pole
+from sim_vehicle.world import Obstacle, Pole
 
 # From ahead to the right, as PX4 counts the motors of a quad-x.
 QUAD_X = [math.radians(degrees) for degrees in (45.0, 225.0, -45.0, 135.0)]
@@ -45,20 +45,16 @@ def obstacles(flight: ShownFlight) -> list[dict[str, Any]]:
 
 
 def _obstacle(flight: ShownFlight, obstacle: Obstacle) -> dict[str, Any]:
-    motion = _motion(flight, obstacle.motion)
+    motion = None
+    if obstacle.motion is not None and flight.truth is not None:
+        # By the page's own clock.
+        times_s = [rounded_s(flight, flight.truth.at_us(time_s * 1e6)) for time_s in obstacle.motion.times_s]
+        motion = {"t": times_s, "offsets": obstacle.motion.offsets_ned_m}
     if isinstance(obstacle, Pole):
         shape = {"foot": obstacle.foot_ned_m, "axis": obstacle.axis_ned, "radius": obstacle.radius_m}
         return {"name": obstacle.name, "kind": "pole", "height": obstacle.height_m, **shape, "motion": motion}
     shape = {"centre": obstacle.centre_ned_m, "axes": obstacle.axes_ned, "sizes": obstacle.sizes_m}
     return {"name": obstacle.name, "kind": "box", **shape, "motion": motion}
-
-
-def _motion(flight: ShownFlight, motion: Motion | None) -> dict[str, Any] | None:
-    """By the page's own clock."""
-    if motion is None or flight.truth is None:
-        return None
-    times_s = [rounded_s(flight, flight.truth.at_us(time_s * 1e6)) for time_s in motion.times_s]
-    return {"t": times_s, "offsets": motion.offsets_ned_m}
 
 
 def surfaces(flight: ShownFlight) -> list[dict[str, Any]]:

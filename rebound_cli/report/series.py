@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rebound_cli.results.flight_log import FlightLog, Floats
+from rebound_cli.results.truth_match import FlightTruth
 
 # Values and their resolution, by the column's name.
 Columns: TypeAlias = dict[str, tuple[Floats, float]]
@@ -64,3 +65,15 @@ def series(log: FlightLog, started_us: float) -> dict[str, Columns]:
         "wanted": _attitude_control(log.wanted_at_us, log.wanted, started_us),
         "setpoint": times(log.setpoint_at_us, started_us) | vector(NED, log.setpoint_ned_m, PLACE_M),
     }
+
+
+def of_truth(truth: FlightTruth, started_us: float) -> Columns:
+    """The same of what the simulator knows."""
+    true, folds_m = truth.series, truth.series["arm_fold_m"]
+    return (
+        times(truth.at_us(true["time_boot_us"]), started_us)
+        | vector(NED, true["position_ned_m"], PLACE_M)
+        | vector(VELOCITY, true["velocity_ned_m_s"], SPEED_M_S)
+        | vector(TURN, true["attitude_wxyz"], UNIT)
+        | vector([f"fold{arm}" for arm in range(1, 1 + folds_m.shape[1])], folds_m, FOLD_M)
+    )

@@ -13,15 +13,7 @@ from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from rebound_cli.inputs.documents import load_document, validated
-from rebound_cli.replay.recording import (
-    Followed,
-    Recording,
-    Reproduction,
-    read_recording,
-    read_settings,
-    reproduce,
-    settings_file,
-)
+from rebound_cli.replay.recording import Followed, Recording, read_recording, read_settings, reproduce, settings_file
 from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings, sampled_as
 from rebound_cli.results import run_folder
@@ -96,17 +88,17 @@ class ShownFlight:
 def recorded_flight(folder: Path) -> ShownFlight:
     """Of a run's folder: what was recorded, decided again for all that the detector thought. Raises ReboundError."""
     recording = read_recording(folder)
-    return decided_again(folder, recording, reproduce(recording))
+    return decided_again(folder, recording, *reproduce(recording))
 
 
-def decided_again(folder: Path, recording: Recording, again: Reproduction) -> ShownFlight:
+def decided_again(folder: Path, recording: Recording, findings: Findings, difference: str | None) -> ShownFlight:
     """The same where that was done already. Raises ReboundError."""
     return replace(
-        _in_folder(folder, recording.settings, again.findings, "".join(recording.event_lines)),
+        _in_folder(folder, recording.settings, findings, "".join(recording.event_lines)),
         started_at_us=recording.steps[0].time_us,
         log=read_flight_log(folder / run_folder.TLOG_NAME),
         versions=recording.versions,
-        difference=again.first_difference,
+        difference=difference,
     )
 
 
@@ -144,14 +136,14 @@ def _in_folder(folder: Path, settings: Mission | GuardConfig, findings: Findings
     )
 
 
-def replayed_flight(replay: Replay, config: CompanionConfig) -> ShownFlight:
+def replayed_flight(replay: Replay) -> ShownFlight:
     """Of any log: what it holds and what was found in it."""
     log, told = replay.log, replay.findings.happenings
     return ShownFlight(
         name=log.path.name,
         started_at_us=log.started_at_us,
-        log=flight_log_of((heard.at_us, heard.sample) for heard in log.heard),
-        config=sampled_as(log, config),
+        log=flight_log_of(log.heard),
+        config=sampled_as(log, replay.config),
         findings=replay.findings,
         events=[{"time_us": at_us, "kind": _kind(text), "text": text, "data": {}} for at_us, text in told],
     )

@@ -38,30 +38,25 @@ class Flown:
     fault: ReboundError | None = None  # of the program around the flight
 
 
-@dataclass(frozen=True, slots=True)
-class FlightFacts:
-    """What was flown; airframe and seed are None for a real vehicle."""
+def build_summary(
+    flown: Flown, settled_s: float, mission: str, airframe: str | None, seed: int | None
+) -> dict[str, Any]:
+    """The content of summary.json. Without truth everything that needs it is null.
 
-    mission: str
-    airframe: str | None
-    seed: int | None
-    settled_duration_s: float  # how long a vehicle must have stayed settled to count as recovered
-
-
-def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
-    """The content of summary.json. Without truth everything that needs it is null."""
+    A vehicle counts as recovered that has stayed settled for `settled_s`; a real one has no `airframe` and no `seed`.
+    """
     report, truth = flown.report, flown.truth
     duration_s = (report.ended_at_us - report.started_at_us) / 1e6
-    matches = match_contacts(report.collisions, truth, facts.settled_duration_s) if truth else None
+    matches = match_contacts(report.collisions, truth, settled_s) if truth else None
     hits = matches.hit_of_collision if matches else (None,) * len(report.collisions)
     return {
         "schema": SCHEMA,
-        "mission": facts.mission,
+        "mission": mission,
         "outcome": report.outcome if flown.fault is None else "failed",
         "reason": report.reason if flown.fault is None else str(flown.fault),
         "autopilot": report.autopilot,
-        "seed": facts.seed,
-        "airframe": facts.airframe,
+        "seed": seed,
+        "airframe": airframe,
         "duration_s": round(duration_s, _TIME_DIGITS),
         "wall_clock_s": round(flown.wall_clock_s, 3),
         "realtime_factor": round(duration_s / flown.wall_clock_s, 3) if flown.wall_clock_s > 0 else None,
@@ -86,7 +81,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         "collisions": [
             {
                 **_collision(report, number),
-                "truth": _truth(report, number, facts, hit, truth) if truth and hit else None,
+                "truth": _truth(report, number, settled_s, hit, truth) if truth and hit else None,
             }
             for number, hit in enumerate(hits)
         ],
@@ -106,10 +101,14 @@ def _collision(report: FlightReport, number: int) -> dict[str, Any]:
     }
 
 
-def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", truth: FlightTruth) -> Mapping[str, Any]:
+def _truth(report: FlightReport, number: int, settled_s: float, hit: "Hit", truth: FlightTruth) -> Mapping[str, Any]:
     collision = report.collisions[number]
     contact_at_us = truth.at_us(hit.contact_at_boot_us)
-    end_boot_us = hit.contact_at_boot_us + _recovery_end_us(report, number, facts) - contact_at_us
+    # When it was called recovered, or the next hit was detected, or the longest time looked at was over.
+    recovered_s = LONGEST_RECOVERY_S if collision.settled_after_s is None else collision.settled_after_s + settled_s
+    following_us = (later.detected_at_us for later in report.collisions[number + 1 :])
+    end_us = min(collision.detected_at_us + recovered_s * 1e6, report.ended_at_us, *following_us)
+    end_boot_us = hit.contact_at_boot_us + end_us - contact_at_us
     overshoot_m, height_lost_m = truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, end_boot_us)
     believed_ned_m = tuple(map(sum, zip(hit.contact_position_ned_m, hit.frame_offset_ned_m, strict=True)))
     return {
@@ -126,16 +125,6 @@ def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", tr
         "height_lost_m": round(height_lost_m, _DIGITS),
         "stopped_off_m": _between(believed_ned_m, collision.recovery_setpoint_ned_m, hit.normal_ned),
     }
-
-
-def _recovery_end_us(report: FlightReport, number: int, facts: FlightFacts) -> float:
-    """When it was called recovered, or the next hit was detected, or the longest time looked at was over."""
-    collision = report.collisions[number]
-    lasted_s = LONGEST_RECOVERY_S
-    if collision.settled_after_s is not None:
-        lasted_s = collision.settled_after_s + facts.settled_duration_s
-    following_us = (later.detected_at_us for later in report.collisions[number + 1 :])
-    return min(collision.detected_at_us + lasted_s * 1e6, report.ended_at_us, *following_us)
 
 
 def _between(from_ned_m: Sequence[float], to_ned_m: Sequence[float], normal_ned: Sequence[float]) -> float:

@@ -1,10 +1,9 @@
 """Companion and simulated vehicle in lockstep, joined by the same bytes, on virtual time."""
 
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from companion.companion import Companion
 from companion.mission.item_trajectory import LEAST_TRY_M_S
@@ -16,7 +15,11 @@ from rebound_cli.replay.recording import Followed
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
 from rebound_cli.results.truth_match import FlightTruth
-from sim_vehicle.truth import TruthRecorder, clock_jumps
+from sim_vehicle.truth import clock_jumps
+
+if TYPE_CHECKING:
+    from sim_vehicle.shell.json_udp import ArduPilotVehicle
+    from sim_vehicle.vehicle import SimulatedVehicle
 
 # When virtual time begins: any fixed moment will do, so that the same seed gives the same bytes.
 EPOCH_US = 1_600_000_000_000_000
@@ -30,18 +33,6 @@ _LONGEST_WAIT_S = 60.0
 
 # Ctrl-C and the live line are looked at once in so many intervals: often enough at 100 times real time.
 _LOOK_EVERY = 250
-
-
-class SteppedVehicle(Protocol):
-    """One interval a step: MAVLink in, MAVLink out."""
-
-    @property
-    def time_boot_us(self) -> int: ...
-
-    @property
-    def truth(self) -> TruthRecorder: ...
-
-    def step(self, received: bytes, /) -> Sequence[bytes]: ...
 
 
 def virtual_time_limit_s(mission: Mission) -> float:
@@ -60,47 +51,20 @@ def virtual_time_limit_s(mission: Mission) -> float:
 
 def fly_mission_lockstep(
     mission: Mission,
-    vehicle: SteppedVehicle,
+    vehicle: "SimulatedVehicle | ArduPilotVehicle",
     recorder: FlightRecorder,
     interrupts: Interrupts,
     console: Console | None = None,
     followed: Followed | None = None,
-) -> tuple[Flown, TruthRecorder]:
-    """Fly a whole mission; it fails when it takes much longer than it should. `followed` notes what is detected."""
-    companion = Companion(mission)
-    limit_s = virtual_time_limit_s(mission)
-
-    def look(flight_time_s: float) -> None:
-        # In a file or a pipe the timeline that follows within seconds says the same.
-        if console is not None and console.is_terminal:
-            console.live(companion.status, flight_time_s)
-
-    started_s, truth = time.monotonic(), vehicle.truth
-    is_finished = run_lockstep(companion, vehicle, recorder, interrupts, limit_s, look, followed)
-    wall_clock_s, report = time.monotonic() - started_s, companion.report()
-    if not is_finished:
-        reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
-        report = replace(report, outcome="failed", reason=reason)
-    known = FlightTruth(truth.hits, truth.series(), EPOCH_US, jumps=clock_jumps(truth.faults))
-    return Flown(report, wall_clock_s, known), truth
-
-
-def run_lockstep(
-    companion: Companion,
-    vehicle: SteppedVehicle,
-    recorder: FlightRecorder,
-    interrupts: Interrupts,
-    limit_s: float,
-    look: Callable[[float], None],
-    followed: Followed | None = None,
-) -> bool:
-    """Exchange bytes until the companion has finished, its packets one interval later; `look` is told the virtual time
-    in seconds now and then. False when virtual time ran out first.
+) -> Flown:
+    """Exchange bytes, an interval a step, until the companion has finished, its packets one interval later; it fails
+    when that takes much longer than it should. `followed` notes what is detected.
     """
-    is_confirmed = False
-    limit_us = vehicle.time_boot_us + round(limit_s * 1e6)
-    pending, count = b"", 0
+    companion = Companion(mission)
     step = companion.step if followed is None else partial(followed.step, companion)
+    limit_s, started_s = virtual_time_limit_s(mission), time.monotonic()
+    limit_us = vehicle.time_boot_us + round(limit_s * 1e6)
+    is_confirmed, pending, count = False, b"", 0
     while not companion.finished:
         frames = vehicle.step(pending)
         now_us = EPOCH_US + vehicle.time_boot_us
@@ -117,10 +81,18 @@ def run_lockstep(
         if count % _LOOK_EVERY:
             continue
         if vehicle.time_boot_us > limit_us:
-            return False
+            break
         if (reason := interrupts.news(companion.stop_is_put_off)) is not None:
             companion.stop(reason)
             recorder.record_stop(now_us, reason)
         look_for_file(companion, recorder, now_us)
-        look(vehicle.time_boot_us / 1e6)
-    return True
+        # In a file or a pipe the timeline that follows within seconds says the same.
+        if console is not None and console.is_terminal:
+            console.live(companion.status, vehicle.time_boot_us / 1e6)
+    wall_clock_s, report, truth = time.monotonic() - started_s, companion.report(), vehicle.truth
+    if not companion.finished:
+        reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
+        report = replace(report, outcome="failed", reason=reason)
+    return Flown(
+        report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US, jumps=clock_jumps(truth.faults))
+    )

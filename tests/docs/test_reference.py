@@ -112,7 +112,7 @@ def test_the_simulated_vehicles_modes_and_failsafes_are_all_named():
 def test_every_key_of_the_summary_has_its_meaning():
     # Given a flight with one collision, of which the simulator knows the contact
     truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
-    found = build_summary(Flown(made_up.report(collision(10_004)), 0.5, truth), FACTS)
+    found = build_summary(Flown(made_up.report(collision(10_004)), 0.5, truth), *FACTS)
     # Then the page explains just the keys that there are
     (entry,) = found["collisions"]
     headings = {

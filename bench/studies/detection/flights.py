@@ -130,16 +130,15 @@ def run_flights(options: Namespace) -> int:
     files = (path for folder in options.folders for path in folder.rglob("*"))
     for path in sorted(path for path in files if path.suffix.lower() in SUFFIXES):
         name = f"{path.parent.name}/{path.name}"
-        config = CompanionConfig()
         try:
-            replay = replay_log(read_log(path), config)
+            replay = replay_log(read_log(path), CompanionConfig())
         except LogError as error:
             refused.append(str(error))
             continue
         rows.append(row_of(name, replay, labels.get(name, {})))
         if replay.findings.collisions:
             shown = page.parent / f"{path.parent.name}-{path.stem}.html"
-            report_page.write_page(replayed_flight(replay, config), shown)
+            report_page.write_page(replayed_flight(replay), shown)
         print(f"{name}: {rows[-1]['watched_h'] * 60:.1f} min watched, {rows[-1]['collisions']} collisions")
     found = pd.DataFrame(rows, columns=COLUMNS)
     seen, idle = found[found["watched_h"] > 0.0], found[found["watched_h"] == 0.0]["log"]

@@ -12,7 +12,7 @@ from rebound_cli.background import Background
 from rebound_cli.inputs.inputs import load_mission_document, mission_from, resolved, world_from
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
-from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
+from rebound_cli.live.realtime import FlightFaultError, Loop, confirm_now, fly_realtime
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -67,12 +67,11 @@ def fly(folder, stream=sys.stderr, confirm=None, computer=None, followed=None, m
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, {})
     run_folder.write_json(folder / run_folder.SUMMARY_NAME, {})
     recorder, console = FlightRecorder(folder, Background("log")), Console(stream, Background("console"))
-    confirmation = ConfirmAtOnce() if confirm is None else confirm(world)
     problem = None
     try:
         loop = Loop(companion, world, world, recorder, console, Interrupts(), None, computer)
         loop.step = None if followed is None else partial(followed.step, companion)
-        fly_realtime(companion, loop, confirmation)
+        fly_realtime(companion, loop, confirm_now if confirm is None else confirm(world))
     except FlightFaultError as error:
         problem = str(error)
     recorder.close()

@@ -191,8 +191,7 @@ def test_a_simulated_flight_has_its_page_without_being_flown_again(wall, wall_fo
 
 
 def of_a_log(log):
-    config = CompanionConfig()
-    return replayed_flight(replay_log(log, config), config)
+    return replayed_flight(replay_log(log, CompanionConfig()))
 
 
 def test_a_log_of_anybodys_has_a_page_too():
@@ -209,9 +208,9 @@ def test_a_hit_between_the_samples_is_told_by_the_velocity_that_shows_it():
     log, level, chance, heard = flight(hit_us=None), (1.0, 0.0, 0.0, 0.0), random.Random(1), []
     for one in log.heard:
         if isinstance(one.sample, LocalPosition):
-            heard.append(replace(one, sample=Attitude(one.at_us, level)))
+            heard.append(one._replace(sample=Attitude(one.at_us, level)))
             velocity = ((1.0 if one.at_us < HIT_US else 0.4) + chance.gauss(0.0, 0.01), 0.0, 0.0)
-            one = replace(one, sample=replace(one.sample, velocity_ned_m_s=velocity))
+            one = one._replace(sample=replace(one.sample, velocity_ned_m_s=velocity))
         heard.append(one)
     shown = of_a_log(log := replace(log, heard=tuple(heard)))
     assert "HIT: wall, seen by a velocity that jumped" in report_text(replay_log(log, CompanionConfig()))

@@ -21,7 +21,7 @@ from rebound_cli.main import main
 from rebound_cli.report.content import heard_at_us
 from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import TLOG_NAME, RunFolderError, check_place
-from rebound_cli.results.summary import FlightFacts, Flown, build_summary
+from rebound_cli.results.summary import Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth, match_contacts
 from rebound_cli.simulation import compiling
 from tests.bench.random_missions import made_up
@@ -141,7 +141,7 @@ def path_of(rows):
     return {"time_boot_us": 1e6 * times_s, "position_ned_m": position}
 
 
-FACTS = FlightFacts("wall", "foldable", 3, SETTLED_S)
+FACTS = (SETTLED_S, "wall", "foldable", 3)
 
 
 def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
@@ -150,7 +150,7 @@ def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
     truth = FlightTruth([hit(10_000)], path, EPOCH_US)
     # When it is summed up, of a companion that began a second later than the vehicle
     report = replace(made_up.report(collision(10_004)), started_at_us=EPOCH_US + 1_000_000)
-    summary = build_summary(Flown(report, 0.5, truth), FACTS)
+    summary = build_summary(Flown(report, 0.5, truth), *FACTS)
     # Then what came after the recovery does not count, and times are seconds since the start
     entry = summary["collisions"][0]
     assert entry["truth"]["overshoot_m"] == pytest.approx(0.04)
@@ -162,7 +162,7 @@ def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
     assert (summary["duration_s"], summary["realtime_factor"]) == (16.0, 32.0)
     # and a simulator that stands still for half a second, 0.4 s after the contact, changes none of it
     truth = FlightTruth([hit(10_000)], path, EPOCH_US + 500_000, stalls=[(10_400_000, 500_000)])
-    assert build_summary(Flown(report, 0.5, truth), FACTS) == summary
+    assert build_summary(Flown(report, 0.5, truth), *FACTS) == summary
 
 
 def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contact():
@@ -170,7 +170,7 @@ def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contac
     path = path_of([(10.0, 3.8, -1.5), (11.0, 3.0, -1.5), (12.0, 2.46, -1.5)])
     drifted = replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
     summary = build_summary(
-        Flown(made_up.report(collision(10_004)), 0.5, FlightTruth([drifted], path, EPOCH_US)), FACTS
+        Flown(made_up.report(collision(10_004)), 0.5, FlightTruth([drifted], path, EPOCH_US)), *FACTS
     )
     # Then its setpoint of 2.8 m was at 2.5 m, 1.3 m off the wall, which faces south; and it went 4 cm past that
     found = summary["collisions"][0]["truth"]
@@ -182,7 +182,7 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
     path = path_of([(10.0, 3.8, -1.5), (10.9, 3.0, -1.48), (11.5, 2.5, -1.2), (12.0, 2.5, -1.2)])
     truth = FlightTruth([hit(10_000), hit(11_000)], path, EPOCH_US)
     # When it is summed up
-    summary = build_summary(Flown(made_up.report(collision(10_004, None), collision(11_004)), 0.5, truth), FACTS)
+    summary = build_summary(Flown(made_up.report(collision(10_004, None), collision(11_004)), 0.5, truth), *FACTS)
     # Then the first hit has neither that overshoot nor that loss of height; the second has both
     first, second = (entry["truth"] for entry in summary["collisions"])
     assert (first["overshoot_m"], first["height_lost_m"]) == pytest.approx((0.0, 0.02))
@@ -190,12 +190,12 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
 
 
 def test_without_truth_nothing_is_counted_and_without_a_contact_zero():
-    summary = build_summary(Flown(made_up.report(collision(10_004)), 25.0, None), FlightFacts("wall", None, None, 0.5))
+    summary = build_summary(Flown(made_up.report(collision(10_004)), 25.0, None), 0.5, "wall", None, None)
     unknown = ("false_detections", "missed_contacts", "recontacts", "seed", "airframe")
     assert [summary[key] for key in unknown] == [None] * 5
     assert summary["collisions"][0]["truth"] is None
     truth = FlightTruth([], path_of([(10.0, 0.0, 0.0)]), EPOCH_US)
-    summary = build_summary(Flown(made_up.report(), 0.5, truth), FACTS)
+    summary = build_summary(Flown(made_up.report(), 0.5, truth), *FACTS)
     assert [summary[key] for key in ("false_detections", "missed_contacts", "recontacts")] == [0, 0, 0]
 
 
@@ -272,7 +272,7 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     shown, log = flight
     moved = LocalPosition(1_000_000, (3.0, 2.0, -1.0), (0.0, 0.0, 0.0))
     attitude = next(h for h in log.heard if type(h.sample).__name__ == "Attitude")
-    heard = (replace(attitude, sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
+    heard = (attitude._replace(sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
     imu, end_us = LoggedSample(*log.imu()[0]), log.heard[-1].at_us
     here = LoggedSample(end_us, GpsFix((0.0, 0.0), 47.397742, 8.545594, 488.0))
     content, log = BytesIO(), replace(log, heard=(imu, *heard, LoggedSample(end_us, moved), here))
