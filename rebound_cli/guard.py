@@ -34,9 +34,7 @@ def run_guard(options: Namespace) -> int:
     run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-        between = None
-        if config.between:
-            between = Between(carried_bytes_s(options.connect))
+        between = Between(carried_bytes_s(options.connect)) if config.between else None
 
         def shared(opened: Opened) -> Connection:
             return opened if between is None else SharedConnection(opened, config.between, between)
@@ -113,10 +111,7 @@ def guard_config(options: Namespace) -> GuardConfig:
     if options.modes is not None:
         modes = [mode.strip().upper() for mode in options.modes.split(",")]
         document.put_option("--modes", ("modes",), modes, options.modes)
-    if options.wait:
-        document.put_option("--wait", ("companion", "link", "wait"), True)
-    if options.between:
-        document.put_option("--between", ("between",), options.between)
-    if options.then is not None:
-        document.put_option("--then", ("then",), options.then)
+    for option, path in (("wait", ("companion", "link", "wait")), ("between", ("between",)), ("then", ("then",))):
+        if value := getattr(options, option):
+            document.put_option(f"--{option}", path, value)
     return validated(GuardConfig, document, document.data)

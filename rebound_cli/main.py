@@ -21,7 +21,7 @@ from rebound_cli.inputs.shipped import shipped_examples, shipped_missions
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 # Arguments whose values have names that ship, and which.
 _NAMED = dict.fromkeys(("mission", "missions", "model"), "missions")
-_NAMED |= {"airframe": "airframes", "based_on": "airframes", "example": "examples"}
+_NAMED |= {"airframe": "airframes", "example": "examples"}
 # Whoever ends these at once leaves a vehicle to itself.
 COMMANDING = ("fly", "guard")
 
@@ -37,22 +37,22 @@ class _Parser(argparse.ArgumentParser):
             from rebound_cli.inputs.documents import nearest
 
             _, _, allowed = message.partition("(choose from ")
-            near = nearest(given[1], re.findall(r"'([^']+)'", allowed) or list(_options_of(self)))
+            options = [option for parser in _parsers_of(self) for option in parser._option_string_actions]
+            near = nearest(given[1], re.findall(r"'([^']+)'", allowed) or options)
             message += "" if near is None else f"; did you mean {near}?"
         super().error(message)
 
 
-def _options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
-    """Its own and its commands'."""
-    yield from parser._option_string_actions
+def _parsers_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """Itself and its commands'."""
+    yield parser
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for command in action.choices.values():
-                yield from _options_of(command)
+                yield from _parsers_of(command)
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
     words = _with_plain_sim(sys.argv[1:] if words is None else words)
     command = next(iter(words), "")
     if command in TABLE["gone"]:
@@ -115,18 +115,12 @@ def run_completion(options: argparse.Namespace) -> int:
     """What a shell needs to complete commands, options, choices and files."""
     import shtab
 
-    def complete_values(parser: argparse.ArgumentParser) -> None:
-        for action in parser._actions:
-            if isinstance(action, argparse._SubParsersAction):
-                for command in action.choices.values():
-                    complete_values(command)
-            elif (names := _NAMED.get(action.dest)) is not None:
-                action.complete = {"bash": f"_rebound_{names}", "zsh": f"_rebound_{names}"}  # type: ignore[attr-defined]
-            elif action.type is Path:
-                action.complete = shtab.FILE  # type: ignore[attr-defined]
-
     parser = build_parser()
-    complete_values(parser)
+    for action in (action for each in _parsers_of(parser) for action in each._actions):
+        if (names := _NAMED.get(action.dest)) is not None:
+            action.complete = {"bash": f"_rebound_{names}", "zsh": f"_rebound_{names}"}  # type: ignore[attr-defined]
+        elif action.type is Path:
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
     print(shtab.complete(parser, options.shell, preamble=_names_to_complete()[options.shell]))
     return 0
 

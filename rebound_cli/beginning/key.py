@@ -41,13 +41,12 @@ def _from_passphrase() -> bytes:
 
 
 def _next_steps(file: Path, is_from_passphrase: bool) -> str:
-    over_usb = "\n    or over USB: send the passphrase from QGroundControl, or `signing setup` in MAVProxy"
+    usb = "\n    or over USB: send the passphrase from QGroundControl, or `signing setup` in MAVProxy"
+    over_usb = usb if is_from_passphrase else ""
     return f"""The key is in {file}, for you alone. It is in no log; keep a copy in a safe place.
 
 Give it to PX4 1.17 (docs/how-to/security.md has the details):
-    rebound key px4 {file}    # writes mavlink-signing-key.bin: copy it to mavlink/ on the SD card{
-        over_usb if is_from_passphrase else ""
-    }
+    rebound key px4 {file}    # writes mavlink-signing-key.bin: copy it to mavlink/ on the SD card{over_usb}
     restart PX4; then set MAV_SIGN_CFG = 1: signing on every link but USB
 
 Use it here:

@@ -67,13 +67,9 @@ def mission_text(mission: Mission, legs: Sequence[FlownLeg]) -> str:
     rows = [f"  {'item':<{width + text_width}}{'length':>9}{'time':>9}{'begins':>9}"]
     for flown in shown:
         step, leg = flown.leg.step, flown.leg
-        length, lasts, begins = (
-            f"{flown.length_m:.1f} m" if flown.length_m else "",
-            _time(leg.lasts_s),
-            _time(flown.begins_s),
-        )
+        length = f"{flown.length_m:.1f} m" if flown.length_m else ""
         text = f"{step.label:<{width}}{describe_item(step.action):<{text_width}}"
-        rows.append(f"  {text}{length:>9}{lasts:>9}{begins:>9}")
+        rows.append(f"  {text}{length:>9}{_time(leg.lasts_s):>9}{_time(flown.begins_s):>9}")
         rows += [f"  {'':<{width + 2}}{note}" for note in _notes(flown)]
     if len(shown) < len(legs):
         rows.append(f"  ... {len(legs) - len(shown)} more steps")

@@ -12,7 +12,7 @@ from rebound_cli.results.run_folder import TLOG_NAME
 
 
 def run_export(options: Namespace) -> int:
-    """Raises FlightError, RunFolderError, LogError."""
+    """Raises RunFolderError, LogError."""
     flight, kind = flight_named(runs_folder(options.runs), options.flight), options.format
     out = options.out or Path(f"{flight.name}.{'tar.gz' if kind == 'archive' else kind}")
     refuse_special(out)

@@ -27,7 +27,7 @@ def run_list(options: Namespace) -> int:
 
 
 def run_show(options: Namespace) -> int:
-    """Raises FlightError, RunFolderError."""
+    """Raises RunFolderError."""
     flight = flight_named(runs_folder(options.runs), options.flight)
     lines = flight.event_lines()
     events = flight.timed_events(lines)

@@ -47,14 +47,8 @@ LOOK_EVERY_US = 10_000_000
 _GOING = ".removed-"
 
 
-class FlightError(ReboundError):
-    """No such flight."""
-
-
 @dataclass(frozen=True, slots=True)
 class KeptFlight:
-    """A folder of a flight."""
-
     folder: Path
     size_bytes: int
 
@@ -146,18 +140,18 @@ def kept_flights(runs: Path) -> list[KeptFlight]:
 
 
 def flight_named(runs: Path, name: str) -> KeptFlight:
-    """`last`, a name in the folder of runs, or a path. Raises FlightError."""
+    """`last`, a name in the folder of runs, or a path. Raises RunFolderError."""
     flights = kept_flights(runs)
     if name == "last" and flights:
         return flights[-1]
     if name == "last":
-        raise FlightError(f"No flight of a vehicle is in {runs}.{simulated_text(runs)}")
+        raise run_folder.RunFolderError(f"No flight of a vehicle is in {runs}.{simulated_text(runs)}")
     for folder in (runs / name, Path(name).resolve()):
         if (folder / TLOG_NAME).is_file():
             return KeptFlight(folder, size_of(folder))
     near = nearest(name, [flight.name for flight in flights])
     meant = f"did you mean {near}?" if near else "`rebound logs list` names those that are."
-    raise FlightError(f"No flight {name} is in {runs}; {meant}")
+    raise run_folder.RunFolderError(f"No flight {name} is in {runs}; {meant}")
 
 
 def simulated_text(runs: Path) -> str:
@@ -169,17 +163,10 @@ def simulated_text(runs: Path) -> str:
     return f" {count} {what} there too: give its folder, as in rebound report {runs}/NAME."
 
 
-@dataclass(frozen=True, slots=True)
-class DiskLimits:
+def limits_of(config: DiskConfig, file_system_bytes: int) -> tuple[int, int]:
     """In bytes: of all flights together, and of what is left free."""
-
-    max_use: int
-    keep_free: int
-
-
-def limits_of(config: DiskConfig, file_system_bytes: int) -> DiskLimits:
     tenth = file_system_bytes // 10
-    return DiskLimits(
+    return (
         min(tenth, _MOST_BYTES) if config.max_use_mb is None else round(config.max_use_mb * _MB),
         min(tenth, _FREE_BYTES) if config.keep_free_mb is None else round(config.keep_free_mb * _MB),
     )
@@ -210,17 +197,17 @@ class Ring:
         for folder in self._runs.glob(f"{_GOING}*"):
             shutil.rmtree(folder, ignore_errors=True)
         disk = shutil.disk_usage(self._runs)
-        limits = limits_of(self._config, disk.total)
+        max_use_bytes, keep_free_bytes = limits_of(self._config, disk.total)
         others = [flight for flight in kept_flights(self._runs) if flight.folder != self._present]
         present_bytes = size_of(self._present) if self._present.exists() else 0
         used_bytes = sum(flight.size_bytes for flight in others) + present_bytes
-        to_go = max(used_bytes - limits.max_use, limits.keep_free - disk.free)
+        to_go = max(used_bytes - max_use_bytes, keep_free_bytes - disk.free)
         # From the oldest on: those without a hit, then those with one.
         for flight in sorted(others, key=KeptFlight.has_hit) if to_go > 0 else ():
             if to_go > 0 and flight.remove():
                 to_go -= flight.size_bytes
-        self._has_room = shutil.disk_usage(self._runs).free >= min(LAST_BYTES, limits.keep_free)
-        self.is_long = self._has_room and present_bytes > max(limits.max_use // _FLIGHTS_A_BUDGET, LAST_BYTES)
+        self._has_room = shutil.disk_usage(self._runs).free >= min(LAST_BYTES, keep_free_bytes)
+        self.is_long = self._has_room and present_bytes > max(max_use_bytes // _FLIGHTS_A_BUDGET, LAST_BYTES)
 
 
 def folder_with_room(out: Path | None, name: str, config: DiskConfig) -> tuple[Path, Ring | None]:

@@ -42,28 +42,21 @@ class DocumentError(ConfigurationError):
     """A file, or a value given with --set, that cannot be used."""
 
 
-@dataclass(frozen=True, slots=True)
-class Override:
-    """A value from the command line, put in place of the file's."""
-
-    text: str  # as the person typed it, such as `--set items.1.go_to.speed_m_s=2.5`
-    path: DocumentPath
-    value: Any
-
-
 @dataclass(slots=True)
 class Document:
-    """The content of a YAML file: plain data, where each value stands, and what --set changed."""
+    """The content of a YAML file: plain data, where each value stands, and what the command line has put in its place.
+
+    `overrides`: where, and as the person typed it, such as `--set items.1.go_to.speed_m_s=2.5`.
+    """
 
     name: str
     data: dict[str, Any] = field(default_factory=dict)
     lines: dict[DocumentPath, int] = field(default_factory=dict)
-    overrides: list[Override] = field(default_factory=list)
+    overrides: list[tuple[DocumentPath, str]] = field(default_factory=list)
 
-    def override_of(self, path: DocumentPath) -> Override | None:
+    def override_of(self, path: DocumentPath) -> str | None:
         """The last --set that gave this value, or a part around or inside it."""
-        around = (given for given in reversed(self.overrides) if path and all(map(eq, path, given.path)))
-        return next(around, None)
+        return next((text for given, text in reversed(self.overrides) if path and all(map(eq, path, given))), None)
 
     def place_of(self, path: DocumentPath) -> str:
         """Where a person has to look: `--set items.1=...` or `missions/wall.yaml:12`.
@@ -71,34 +64,36 @@ class Document:
         That is the line of the value, or of the nearest part around it that the file has; 1 for the whole file.
         """
         if (override := self.override_of(path)) is not None:
-            return override.text
+            return override
         if not self.lines:
             return self.name
         around = (self.lines[path[:length]] for length in range(len(path), 0, -1) if path[:length] in self.lines)
         return f"{self.name}:{next(around, 1)}"
 
-    def put(self, override: Override) -> None:
-        """Change one value; keys that are missing on the way are made, and the model judges them afterwards."""
+    def put(self, text: str, path: DocumentPath, value: Any) -> None:
+        """Change one value, as `text` asks for; keys that are missing on the way are made, and the model judges them
+        afterwards.
+        """
         target: Any = self.data
-        for depth, part in enumerate(override.path):
-            where = ".".join(map(str, override.path[:depth]))
+        for depth, part in enumerate(path):
+            where = ".".join(map(str, path[:depth]))
             if isinstance(target, dict):
                 part = str(part)
             elif not isinstance(target, list):
-                raise DocumentError(f"{override.text}: '{where}' is a single value and has nothing below it.")
+                raise DocumentError(f"{text}: '{where}' is a single value and has nothing below it.")
             elif not isinstance(part, int) or part >= len(target):
-                text = f"'{where}' is a list of {len(target)}, counted from 0; it has no '{part}'"
-                raise DocumentError(f"{override.text}: {text}.")
-            if depth == len(override.path) - 1:
-                target[part] = override.value
+                why = f"'{where}' is a list of {len(target)}, counted from 0; it has no '{part}'"
+                raise DocumentError(f"{text}: {why}.")
+            if depth == len(path) - 1:
+                target[part] = value
             elif isinstance(target, dict) and target.get(part) is None:
                 target[part] = {}
             target = target[part]
-        self.overrides.append(override)
+        self.overrides.append((path, text))
 
     def put_option(self, option: str, path: DocumentPath, value: Any, given: object = None) -> None:
         """The value of a command line's option; `given`: as the person typed it, where that differs."""
-        self.put(Override(f"{option} {value if given is None else given}", path, value))
+        self.put(f"{option} {value if given is None else given}", path, value)
 
 
 def load_document(path: Path, shipped_names: Iterable[str] = ()) -> Document:
@@ -183,7 +178,7 @@ def _lines_below(node: yaml.Node, path: DocumentPath, name: str) -> Iterator[tup
             yield from _lines_below(item, (*path, index), name)
 
 
-def parse_override(text: str) -> Override:
+def parse_override(text: str) -> tuple[DocumentPath, Any]:
     """Read `items.1.go_to.speed_m_s=2.5`; the value is YAML. Raises DocumentError."""
     dotted, separator, value_text = text.partition("=")
     parts = dotted.strip().split(".")
@@ -193,15 +188,16 @@ def parse_override(text: str) -> Override:
         value = yaml.load(value_text, _Loader)
     except (yaml.YAMLError, ValueError, RecursionError):
         raise DocumentError(f"--set {text}: the value {value_text!r} is not valid YAML.") from None
-    return Override(f"--set {text}", tuple(int(part) if part.isdecimal() else part for part in parts), value)
+    return tuple(int(part) if part.isdecimal() else part for part in parts), value
 
 
 def apply_overrides(document: Document, texts: Sequence[str], part: str | None = None) -> None:
     """Apply every `--set` in order; where only one `part` counts, to that. Raises DocumentError."""
-    for override in map(parse_override, texts):
-        if part not in (None, override.path[0]):
-            raise DocumentError(f"{override.text}: only what begins with {part}. counts here.")
-        document.put(override)
+    for text in texts:
+        path, value = parse_override(text)
+        if part not in (None, path[0]):
+            raise DocumentError(f"--set {text}: only what begins with {part}. counts here.")
+        document.put(f"--set {text}", path, value)
 
 
 def validated(model: type[Model], document: Document, data: Any, prefix: DocumentPath = ()) -> Model:
@@ -263,9 +259,7 @@ def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
         least, most = (error["ctx"].get(name) for name in ("min_length", "max_length"))
         bound = f"at least {least}" if kind == "too_short" else f"at most {most}"
         return f"needs {bound} of them, and has {error['ctx']['actual_length']}"
-    message = str(error["msg"])
-    for lead in ("Value error, ", "Assertion failed, "):
-        message = message.removeprefix(lead)
+    message = str(error["msg"]).removeprefix("Value error, ")
     message = message.replace("Input should be", "must be").rstrip(".")
     message = _OF_THE_MODEL.sub(lambda found: "a list" if "tuple" in found[0] else "a mapping", message)
     given = error.get("input")

@@ -1,6 +1,7 @@
 """From a mission file and the command line's options to validated models."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from rebound_cli.inputs.documents import Document, DocumentError, DocumentPath, 
 from rebound_cli.inputs.shipped import shipped_missions
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import HIT_KINDS, RESOLVED_NAME, read_records, read_text, reading, whole_lines
-from sim_vehicle.errors import AirframeError, FaultError, SceneError
+from sim_vehicle.errors import SimulationError
 
 if TYPE_CHECKING:
     from companion.mission.config import CompanionConfig
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SimulatedWorld:
-    """What the simulated vehicle needs."""
-
     scene: "Scene"
     airframe: "Airframe"
 
@@ -115,22 +114,28 @@ def world_from(document: Document) -> SimulatedWorld:
     from sim_vehicle.scene import Scene, check_start_is_free, check_wind_can_be_held
 
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
-    airframe = _load_airframe(scene.airframe, document)
+    with _at(document, "airframe"):
+        airframe = _load_airframe(scene.airframe)
     for number, fault in enumerate(scene.faults):
-        for key, check_fault in (
-            ("messages", check_messages),
-            ("motor", lambda f: check_motor(f, airframe.rotor_count)),
-        ):
-            try:
-                check_fault(fault)
-            except FaultError as error:
-                raise DocumentError(f"{document.place_of(('sim', 'faults', number, key))}: {error}") from error
-    for key, check in (("walls", check_start_is_free), ("wind_ned_m_s", check_wind_can_be_held)):
-        try:
-            check(scene, airframe)
-        except SceneError as error:
-            raise DocumentError(f"{document.place_of(('sim', key))}: {_sentence(error)}") from error
+        with _at(document, "faults", number, "messages"):
+            check_messages(fault)
+        with _at(document, "faults", number, "motor"):
+            check_motor(fault, airframe.rotor_count)
+    with _at(document, "walls"):
+        check_start_is_free(scene, airframe)
+    with _at(document, "wind_ned_m_s"):
+        check_wind_can_be_held(scene, airframe)
     return SimulatedWorld(scene, airframe)
+
+
+@contextmanager
+def _at(document: Document, *path: str | int) -> Iterator[None]:
+    """What the simulator refuses of `sim:` is told with its place. Raises DocumentError."""
+    try:
+        yield
+    except SimulationError as error:
+        sentence = str(error) if str(error).endswith((".", "!", "?")) else f"{error}."
+        raise DocumentError(f"{document.place_of(('sim', *path))}: {sentence}") from error
 
 
 def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, seed: int | None) -> SimulatedWorld:
@@ -141,17 +146,14 @@ def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, see
     return world_from(document)
 
 
-def _load_airframe(name: str, document: Document) -> "Airframe":
+def _load_airframe(name: str) -> "Airframe":
     """A built-in airframe by name, or one from a file when the name looks like a path."""
     from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 
-    try:
-        if "/" not in name and not name.endswith((".yaml", ".yml")):
-            return load_built_in(name)
-        own = load_document(Path(name), built_in_airframes())
-        return validated(Airframe, own, with_base(own.data))
-    except AirframeError as error:
-        raise DocumentError(f"{document.place_of(('sim', 'airframe'))}: {_sentence(error)}") from error
+    if "/" not in name and not name.endswith((".yaml", ".yml")):
+        return load_built_in(name)
+    own = load_document(Path(name), built_in_airframes())
+    return validated(Airframe, own, with_base(own.data))
 
 
 def resolved(mission: "Mission", world: SimulatedWorld | None) -> dict[str, Any]:
@@ -162,22 +164,18 @@ def resolved(mission: "Mission", world: SimulatedWorld | None) -> dict[str, Any]
     return data
 
 
-class ResumeError(ConfigurationError):
-    """A flight with which there is nothing to go on, or that is not this mission's."""
-
-
 def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
-    """The mission's `resume:` part, of a flight that ended early or whose process was killed. Raises ResumeError."""
+    """The mission's `resume:` part, of a flight that ended early or was killed. Raises ConfigurationError."""
     flown = mission_from(load_document(run / RESOLVED_NAME))
     if flown.items != mission.items:
-        raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
+        raise ConfigurationError(f"{run} is not a flight of this mission: its items are others.")
     events = list(read_records(run / run_folder.EVENTS_NAME, whole_lines(read_text(run / run_folder.EVENTS_NAME))))
     armed = _last(events, "armed")
     item, end = _last(events, "item"), _last(events, "aborted")
     if _last(events, "done") is not None:
-        raise ResumeError(f"{run} was flown to its end: there is nothing to resume.")
+        raise ConfigurationError(f"{run} was flown to its end: there is nothing to resume.")
     if armed is None or item is None:
-        raise ResumeError(f"{run} ended before its first item: fly it from the start.")
+        raise ConfigurationError(f"{run} ended before its first item: fly it from the start.")
     with reading(run / run_folder.EVENTS_NAME):
         at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
         return {
@@ -190,7 +188,7 @@ def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
 
 
 def resume(document: Document, run: Path, mission: "Mission", knows_more: bool) -> None:
-    """Go on where that flight was interrupted, and if it `knows_more` with its obstacles. Raises ResumeError."""
+    """Go on where that flight was interrupted, and if it `knows_more` with its obstacles. Raises ConfigurationError."""
     stored = run / run_folder.OBSTACLES_NAME
     given: dict[DocumentPath, Any] = {("resume",): resume_of(run, mission)}
     if knows_more and stored.exists():
@@ -201,8 +199,3 @@ def resume(document: Document, run: Path, mission: "Mission", knows_more: bool) 
 
 def _last(events: Sequence[dict[str, Any]], kind: str) -> dict[str, Any] | None:
     return next((event for event in reversed(events) if event["kind"] == kind), None)
-
-
-def _sentence(error: Exception) -> str:
-    text = str(error)
-    return text if text.endswith((".", "!", "?")) else f"{text}."

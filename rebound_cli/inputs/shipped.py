@@ -1,6 +1,5 @@
 """The missions and examples that ship with the program, by their names."""
 
-import contextlib
 from pathlib import Path
 
 
@@ -14,12 +13,6 @@ def shipped_examples() -> dict[str, Path]:
 
 
 def _files_of(package: str, *kinds: str) -> dict[str, Path]:
-    """Without the package, none."""
-    # Here, because it takes a tenth of the program's start.
-    import importlib.resources
-
-    with contextlib.suppress(ModuleNotFoundError):
-        folder = Path(str(importlib.resources.files(package)))
-        files = (path for path in sorted(folder.iterdir()) if path.suffix in kinds and path.stem != "__init__")
-        return {path.stem: path for path in files}
-    return {}
+    """Of the one beside this one, in a wheel as in a checkout."""
+    files = sorted((Path(__file__).parents[2] / package).iterdir())
+    return {path.stem: path for path in files if path.suffix in kinds and path.stem != "__init__"}

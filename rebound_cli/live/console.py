@@ -18,10 +18,6 @@ PLAIN_INTERVAL_S = 5.0
 LAST_WAIT_S = 1.0
 # The events that a person waits for: a hit as the companion sees it, and as the simulator knows it.
 STANDING_OUT = ("detection", "hit")
-
-Fields = Sequence[tuple[str, str]]
-
-
 # Of a terminal: back to the line's beginning and clear it; bold red, and as before.
 _ANEW, _RED, _AS_BEFORE = "\r\x1b[K", "\x1b[1;31m", "\x1b[0m"
 
@@ -102,7 +98,7 @@ def console_for(json_on_stdout: bool, writer: Background | None = None) -> Conso
     return Console(sys.stderr if json_on_stdout else sys.stdout, writer)
 
 
-def state_fields(status: "Status", flight_time_s: float, link: str = "") -> Fields:
+def state_fields(status: "Status", flight_time_s: float, link: str = "") -> Sequence[tuple[str, str]]:
     """What is worth knowing at a glance. The position is the vehicle's local NED."""
     fields = [("time", f"{flight_time_s:.1f} s"), ("state", status.state)]
     if not status.vehicle_mode:

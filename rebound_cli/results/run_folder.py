@@ -5,6 +5,7 @@ import json
 import os
 import platform
 import re
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib import metadata
@@ -21,8 +22,6 @@ from rebound_cli import __version__
 from rebound_cli.background import Background, at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
     from companion.companion import StepResult
     from companion.memory.patch import Patch
     from companion.report import Event
@@ -94,7 +93,7 @@ class FlightRecorder:
     """
 
     def __init__(
-        self, folder: Path, writer: Background | None = None, make_room: "Callable[[int], None] | None" = None
+        self, folder: Path, writer: Background | None = None, make_room: Callable[[int], None] | None = None
     ) -> None:
         self._folder = folder
         self.writer = writer
@@ -178,7 +177,7 @@ def event_line(event: "Event") -> str:
     return json.dumps(record) + "\n"
 
 
-def read_records(path: Path, text: str) -> "Iterator[dict[str, Any]]":
+def read_records(path: Path, text: str) -> Iterator[dict[str, Any]]:
     """Each line of `events.jsonl` or `inputs.jsonl` with its time and kind. Raises RunFolderError for a damaged one."""
     for number, line in enumerate(text.splitlines(), start=1):
         with reading(f"{path}:{number}"):
@@ -188,7 +187,7 @@ def read_records(path: Path, text: str) -> "Iterator[dict[str, Any]]":
 
 
 @contextmanager
-def reading(place: object) -> "Iterator[None]":
+def reading(place: object) -> Iterator[None]:
     """A damaged file makes its reader raise whatever the bytes led to: that is one sentence. Raises RunFolderError."""
     try:
         yield

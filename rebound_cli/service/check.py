@@ -26,7 +26,8 @@ def findings(
         yield PreflightItem("settings", Verdict.BAD, str(error), f"mend it, then {_AGAIN}")
         return
     yield PreflightItem("settings", Verdict.GOOD, f"{settings.run} at {settings.connect}")
-    other = [f"/{file.path}" for file in planned if not _is_there(system.root / file.path, file.text)]
+    paths = [(system.root / file.path, file) for file in planned]
+    other = [f"/{file.path}" for path, file in paths if not path.exists() or path.read_bytes() != file.text.encode()]
     text = "as this version writes them"
     yield _judged("files", not other, text, f"not {text}: {', '.join(other)}")
     hidden = hidden_program()
@@ -36,10 +37,6 @@ def findings(
         yield _judged("user", USER in {user.pw_name for user in pwd.getpwall()}, USER, f"{USER} is not there")
         if settings.device is not None:
             yield _device(settings.device)
-
-
-def _is_there(path: Path, text: str) -> bool:
-    return path.exists() and path.read_bytes() == text.encode()
 
 
 def _judged(item: str, is_good: bool, good: str, bad: str, remedy: str = _AGAIN) -> PreflightItem:

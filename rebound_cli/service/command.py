@@ -5,6 +5,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
+from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
 from rebound_cli.inputs import documents
 from rebound_cli.inputs.documents import DocumentError, load_document, parse_document, validated
@@ -14,7 +15,7 @@ from rebound_cli.results.run_folder import read_text
 from rebound_cli.service import files
 from rebound_cli.service.check import findings
 from rebound_cli.service.files import FOLDER, SYSUSERS, UDEV, UNIT, UNIT_NAME, PlannedFile, ServiceSettings
-from rebound_cli.service.system import ServiceError, System, hidden_program, serial_group
+from rebound_cli.service.system import System, hidden_program, serial_group
 
 _SETTINGS_NAME, _GUARD_NAME = "service.yaml", "guard.yaml"
 # A guard by all its defaults, of which the first to be changed is shown.
@@ -25,16 +26,13 @@ What ran before goes on as it was. Restart it on the ground: sudo systemctl rest
 _NOT_STARTED = f"The mission is flown when a person starts it, and never by itself: sudo systemctl start {UNIT_NAME}"
 
 
-def run_service(options: Namespace) -> int:
-    """Raises DocumentError, ServiceError."""
-    return run_on(System(), options)
-
-
-def run_on(system: System, options: Namespace) -> int:
+def run_service(options: Namespace, system: System | None = None) -> int:
+    """On this computer, or another `system`. Raises DocumentError, ReboundError."""
+    system = system or System()
     if options.what == "install":
         return _install(system, options)
     if options.guard is not None or options.mission is not None or options.connect is not None:
-        raise ServiceError("--guard, --mission and --connect belong to `rebound service install`.")
+        raise ReboundError("--guard, --mission and --connect belong to `rebound service install`.")
     if options.what == "uninstall":
         return _uninstall(system, options.dry_run)
     if options.what == "check":
@@ -51,7 +49,7 @@ def _install(system: System, options: Namespace) -> int:
     hidden = hidden_program()
     if hidden is not None:
         text = f"{hidden} is hidden from the service: install Rebound in /opt/rebound (docs/how-to/service.md)."
-        raise ServiceError(text)
+        raise ReboundError(text)
     for file in planned:
         if not file.is_kept:
             system.write(file.path, file.text)
@@ -60,10 +58,10 @@ def _install(system: System, options: Namespace) -> int:
     if settings.device is None:
         (system.root / UDEV).unlink(missing_ok=True)
     is_guard = settings.run == "guard"
-    system.told("systemd-sysusers", *system.root_option(), SYSUSERS.rpartition("/")[2])
+    system.told("systemd-sysusers", SYSUSERS.rpartition("/")[2])
     _reload(system)
     # What was a guard and is a mission now is not to begin with the next boot.
-    system.told("systemctl", *system.root_option(), "enable" if is_guard else "disable", UNIT_NAME)
+    system.told("systemctl", "enable" if is_guard else "disable", UNIT_NAME)
     if is_guard and system.is_running:
         # It is ready when the vehicle is heard: nobody waits for that here.
         system.told("systemctl", "start", "--no-block", UNIT_NAME)
@@ -134,14 +132,13 @@ def _check_run(kind: str, text: str, name: str) -> bool:
 def _uninstall(system: System, is_dry_run: bool) -> int:
     present = [path for path in (SYSUSERS, UDEV, UNIT) if (system.root / path).exists()]
     if not present:
-        raise ServiceError("No service of Rebound is installed.")
+        raise ReboundError("No service of Rebound is installed.")
     if is_dry_run:
         print("\n".join(f"# /{path}" for path in present))
         return 0
     system.refuse_if_unfit()
     if UNIT in present:
-        now = ["--now"] if system.is_running else []
-        system.told("systemctl", *system.root_option(), "disable", *now, UNIT_NAME)
+        system.told("systemctl", "disable", *(["--now"] if system.is_running else []), UNIT_NAME)
     for path in present:
         (system.root / path).unlink()
         print(f"removed /{path}")

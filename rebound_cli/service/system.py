@@ -19,13 +19,9 @@ _HIDDEN = ("/home", "/root", "/run/user")
 _SERIAL_GROUPS = ("dialout", "uucp")
 
 
-class ServiceError(ReboundError):
-    """The system has no systemd, or it refused."""
-
-
 @dataclass(frozen=True, slots=True)
 class System:
-    """The one of this computer; with another `root` that in a folder, as `systemctl --root` has it."""
+    """The one of this computer; with another `root` its files in a folder."""
 
     root: Path = Path("/")
 
@@ -35,33 +31,30 @@ class System:
         # As sd_booted(3) finds out.
         return self.root == Path("/") and Path("/run/systemd/system").is_dir()
 
-    def root_option(self) -> list[str]:
-        return [] if self.root == Path("/") else [f"--root={self.root}"]
-
     def refuse_if_unfit(self) -> None:
-        """Raises ServiceError where there is no systemd, or nothing may be changed."""
+        """Raises ReboundError where there is no systemd, or nothing may be changed."""
         if shutil.which("systemctl") is None:
-            raise ServiceError("This system has no systemd, which runs Rebound's service.")
+            raise ReboundError("This system has no systemd, which runs Rebound's service.")
         if not os.access(self.root / "etc", os.W_OK):
-            raise ServiceError(f"{self.root / 'etc'} cannot be written to: run it again with sudo.")
+            raise ReboundError(f"{self.root / 'etc'} cannot be written to: run it again with sudo.")
 
     def call(self, *command: str) -> int:
-        """The exit code; what the program prints is for the person. Raises ServiceError where it is not there."""
+        """The exit code; what the program prints is for the person. Raises ReboundError where it is not there."""
         if shutil.which(command[0]) is None:
-            raise ServiceError(f"{command[0]} is not on this machine: Rebound's service needs systemd.")
+            raise ReboundError(f"{command[0]} is not on this machine: Rebound's service needs systemd.")
         return subprocess.run(command, check=False).returncode
 
     def told(self, *command: str) -> None:
-        """Raises ServiceError where it fails."""
+        """Raises ReboundError where it fails."""
         code = self.call(*command)
         if code != 0:
-            raise ServiceError(f"`{' '.join(command)}` failed with exit code {code}: what it says is above.")
+            raise ReboundError(f"`{' '.join(command)}` failed with exit code {code}: what it says is above.")
 
     def release(self) -> int | None:
         """systemd's; None where there is none."""
         if shutil.which("systemctl") is None:
             return None
-        found = re.match(r"systemd (\d+)", answer("systemctl", "--version")[0])
+        found = re.match(r"systemd (\d+)", answer("systemctl", "--version"))
         return None if found is None else int(found[1])
 
     def write(self, path: str, text: str) -> None:
@@ -75,10 +68,10 @@ class System:
         file.chmod(0o644)
 
 
-def answer(*command: str) -> tuple[str, int]:
-    """What the program prints, and its exit code."""
+def answer(*command: str) -> str:
+    """What the program prints."""
     done = subprocess.run(command, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    return done.stdout.strip(), done.returncode
+    return done.stdout.strip()
 
 
 def serial_group() -> str:

@@ -22,10 +22,6 @@ READY_WORDS = "Simulated vehicle"
 _READY_POLL_S = 0.02
 
 
-class VehicleProcessError(ReboundError):
-    """The simulated vehicle ended before the flight did, or the flight before it began."""
-
-
 class VehicleProcess:
     """`rebound sim` with the run's world and options of its own; its stdin is the leash that ends it."""
 
@@ -41,7 +37,7 @@ class VehicleProcess:
             self._process = subprocess.Popen(command, stdin=pipe, stdout=log, stderr=log, start_new_session=True)
 
     def wait_until_ready(self, interrupts: Interrupts, console: Console) -> None:
-        """Return when the vehicle is on the air. Raises VehicleProcessError when the person has had enough.
+        """Return when the vehicle is on the air. Raises ReboundError when the person has had enough.
 
         The companion waits ten seconds for a vehicle; compiling the physics may take longer.
         """
@@ -51,7 +47,7 @@ class VehicleProcess:
             if interrupts.reason is not None:
                 # It has nothing to hand over, and may be compiling: it is not waited for.
                 self._process.kill()
-                raise VehicleProcessError(f"The flight was {interrupts.reason} before the vehicle was ready.")
+                raise ReboundError(f"The flight was {interrupts.reason} before the vehicle was ready.")
             for line in self._said()[told:]:
                 told += 1
                 is_ready |= line.startswith(self._ready_words)
@@ -61,10 +57,10 @@ class VehicleProcess:
                 time.sleep(_READY_POLL_S)
 
     def check_running(self) -> None:
-        """Raise VehicleProcessError with the process's last words if it has ended."""
+        """Raise ReboundError with the process's last words if it has ended."""
         if self._process.poll() is not None:
             last = self._said() or [f"exit code {self._process.returncode}"]
-            raise VehicleProcessError(f"The simulated vehicle ended by itself: {last[-1].removeprefix('rebound: ')}")
+            raise ReboundError(f"The simulated vehicle ended by itself: {last[-1].removeprefix('rebound: ')}")
 
     def _said(self) -> list[str]:
         return (self._folder / VEHICLE_LOG_NAME).read_text(errors="replace").strip().splitlines()

@@ -10,7 +10,7 @@ import pytest
 from companion.mission.config import DiskConfig
 from rebound_cli.background import Background
 from rebound_cli.flights import kept as ring
-from rebound_cli.flights.kept import LAST_BYTES, LOOK_EVERY_US, DiskLimits, Ring, folder_with_room, kept_flights
+from rebound_cli.flights.kept import LAST_BYTES, LOOK_EVERY_US, Ring, folder_with_room, kept_flights
 from rebound_cli.results.run_folder import EVENTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.test_logs import BLOCK, EPOCH_US, pretend, record
 
@@ -44,11 +44,11 @@ def disk(monkeypatch):
     ("config", "disk_bytes", "limits"),
     [
         # A 32 GB card: a tenth of it for flights, and 300 MiB free.
-        ({}, 32 * 10**9, DiskLimits(3_200_000_000, 300 * MIB)),
+        ({}, 32 * 10**9, (3_200_000_000, 300 * MIB)),
         # On a large disk no more than 4 GiB, on a small one a tenth is left free.
-        ({}, 1000 * GIB, DiskLimits(4 * GIB, 300 * MIB)),
-        ({}, 1 * GIB, DiskLimits(GIB // 10, GIB // 10)),
-        ({"max_use_mb": 500, "keep_free_mb": 50}, GIB, DiskLimits(500 * MB, 50 * MB)),
+        ({}, 1000 * GIB, (4 * GIB, 300 * MIB)),
+        ({}, 1 * GIB, (GIB // 10, GIB // 10)),
+        ({"max_use_mb": 500, "keep_free_mb": 50}, GIB, (500 * MB, 50 * MB)),
     ],
 )
 def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_others(config, disk_bytes, limits):

@@ -14,6 +14,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from companion.errors import ReboundError
 from companion.report import Event, Status
 from rebound_cli.live import status as status_socket
 from rebound_cli.live.console import Console
@@ -22,7 +23,7 @@ from rebound_cli.live.realtime import AskPerson
 from rebound_cli.live.status import StatusServer, ask, served, socket_of_this_program, sockets_to_ask, text_of
 from rebound_cli.main import main
 from rebound_cli.results.timing import LinkRate
-from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
+from rebound_cli.simulation.vehicle_process import VehicleProcess
 
 EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))
 FLYING = Status("mission", "OFFBOARD", True, (1.0, 2.0, -1.5), 2.0, "armed at 1.8 m/s^2", 4_000)
@@ -78,7 +79,7 @@ def test_what_a_vehicle_compiles_is_told_by_who_waits_for_it_and_ctrl_c_ends_tha
     # And Ctrl-C before it is ready ends the wait
     interrupts = Interrupts()
     interrupts.reason = "stopped with Ctrl-C"
-    with pytest.raises(VehicleProcessError, match="Ctrl-C"), VehicleProcess(tmp_path, []) as vehicle:
+    with pytest.raises(ReboundError, match="Ctrl-C"), VehicleProcess(tmp_path, []) as vehicle:
         vehicle.wait_until_ready(interrupts, Console(stream))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from companion.errors import ReboundError
 from companion.report import Status
 from companion.shell.service_manager import ServiceManager
 from rebound_cli import exit_codes
@@ -16,7 +17,7 @@ from rebound_cli.live.console import Console
 from rebound_cli.main import main
 from rebound_cli.service import check, command
 from rebound_cli.service.files import SYSUSERS, UDEV, UNIT, UNIT_NAME, ServiceSettings, udev_text, unit_text
-from rebound_cli.service.system import ServiceError, System, answer, hidden_program
+from rebound_cli.service.system import System, answer, hidden_program
 from tests.rebound_cli.live.flying import fly
 
 ROOT = Path(__file__).parents[3]
@@ -50,7 +51,7 @@ def system(tmp_path, monkeypatch):
 
 def service(system, what, **options):
     given = {"guard": None, "mission": None, "connect": None, "dry_run": False, **options}
-    return command.run_on(system.system, Namespace(what=what, **given))
+    return command.run_service(Namespace(what=what, **given), system.system)
 
 
 def files(root):
@@ -81,15 +82,14 @@ def test_a_guard_is_installed_enabled_and_taken_away_again(system, capsys):
     # All of it can be read by the service's user
     assert {(system.root / file).stat().st_mode & 0o777 for file in files(system.root)} == {0o644}
     assert (system.root / "etc/rebound").stat().st_mode & 0o777 == 0o755
-    at = f"--root={system.root}"
-    assert system.called == [("systemd-sysusers", at, "rebound.conf"), ("systemctl", at, "enable", "rebound.service")]
+    assert system.called == [("systemd-sysusers", "rebound.conf"), ("systemctl", "enable", "rebound.service")]
     # And what is taken away leaves what a person wrote
     assert service(system, "uninstall", dry_run=True) == 0
     assert f"/{UNIT}" in capsys.readouterr().out and UNIT in files(system.root)
     assert service(system, "uninstall") == 0
     assert files(system.root) == etc
-    assert system.called[-1] == ("systemctl", at, "disable", "rebound.service")
-    with pytest.raises(ServiceError, match="No service of Rebound is installed"):
+    assert system.called[-1] == ("systemctl", "disable", "rebound.service")
+    with pytest.raises(ReboundError, match="No service of Rebound is installed"):
         service(system, "uninstall")
 
 
@@ -176,10 +176,10 @@ def test_a_system_that_is_unfit_is_one_sentence(system, monkeypatch):
     monkeypatch.setattr("rebound_cli.service.system.sys.prefix", "/home/pi/rebound")
     assert hidden_program() == "/home/pi/rebound"
     monkeypatch.setattr(command, "hidden_program", hidden_program)
-    with pytest.raises(ServiceError, match="/home/pi/rebound is hidden from the service: install Rebound in /opt"):
+    with pytest.raises(ReboundError, match="/home/pi/rebound is hidden from the service: install Rebound in /opt"):
         service(system, "install")
     monkeypatch.setattr(shutil, "which", lambda program: None)
-    with pytest.raises(ServiceError, match="has no systemd"):
+    with pytest.raises(ReboundError, match="has no systemd"):
         service(system, "install")
     assert files(system.root) == set()
 
@@ -240,8 +240,8 @@ def test_systemd_finds_nothing_to_complain_of_and_little_exposed(connect, run, t
     systemd = System().release()
     file = tmp_path / UNIT_NAME
     file.write_text(unit_text(ServiceSettings(run=run, connect=connect), shutil.which("python3"), systemd, "dialout"))
-    complaints, _ = answer("systemd-analyze", "verify", str(file))
-    said, _ = answer("systemd-analyze", "security", "--offline=true", "--no-pager", str(file))
+    complaints = answer("systemd-analyze", "verify", str(file))
+    said = answer("systemd-analyze", "security", "--offline=true", "--no-pager", str(file))
     exposed = float(said.rpartition("→ ")[2].rpartition(": ")[2].split()[0])
     # It calls up to 2 of its 10 safe or nearly so.
     assert complaints == "" and exposed <= 2.0
