@@ -14,7 +14,6 @@ from typing import Any, TypeAlias, TypeVar
 from rebound_cli.exit_codes import USAGE
 from rebound_cli.inputs.shipped import shipped_missions
 
-Run: TypeAlias = Callable[[argparse.Namespace], int]
 Table: TypeAlias = Mapping[str, Any]
 Number = TypeVar("Number", int, float)
 
@@ -131,8 +130,7 @@ def add_commands(
             add_commands(command, told["commands"], shared, gone, "what")
             continue
         module, _, function = told["run"].partition(":")
-        run: Run = partial(_run, module, function)
-        command.set_defaults(run=run)
+        command.set_defaults(run=partial(_run, module, function))
         groups: dict[str | None, Any] = {None: command}
         for option, written in told.get("options", {}).items():
             settings = _settings(written, shared)

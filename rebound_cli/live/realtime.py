@@ -250,7 +250,7 @@ class Loop:
     def _stop(self, reason: str) -> None:
         self.stepped.stop(reason)
         if self.now_us is not None:
-            self.recorder.record_stop(self.now_us, reason)
+            self.recorder.record_input(self.now_us, "stop", reason=reason)
 
     def _hand_over(self, reason: str) -> None:
         """With the steps and the link alone. Where these fail again the next one is tried, for as long as it takes."""
@@ -277,10 +277,12 @@ def fly_realtime(companion: Companion, loop: Loop, confirm: Callable[[Companion]
         if result.events:
             recorder.record_obstacles(companion.obstacles())
             loop.console.events(result.events, companion.core.started_at_us)
+        was_confirmed, stop_reason = companion.plan_is_confirmed, companion.stop_reason
         confirm(companion)
         look_for_file(companion, recorder, now_us)
-        recorder.record_confirmation(now_us, companion.plan_is_confirmed)
-        if companion.stop_reason is not None:
-            recorder.record_stop(now_us, companion.stop_reason)
+        if companion.plan_is_confirmed and not was_confirmed:
+            recorder.record_input(now_us, "confirm")
+        if companion.stop_reason != stop_reason:
+            recorder.record_input(now_us, "stop", reason=companion.stop_reason)
 
     loop.run(beside)

@@ -13,7 +13,6 @@ from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import LONGEST_US, WANTED, Log, LogError, LoggedSample
 
 _ULOG_MAGIC, _DATAFLASH_MAGIC = b"ULog", b"\xa3\x95"
-Packets = list[tuple[int, bytes]]
 
 
 def read_log(path: Path) -> Log:
@@ -72,7 +71,7 @@ def _going_on(packets: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes
         yield now_us, packet
 
 
-def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
+def _vehicle(path: Path, packets: Iterable[tuple[int, bytes]]) -> tuple[Identity, str]:
     """The multicopter with the most IMU samples, and the other ones by number."""
     decoder = Decoder()
     beats: dict[int, Heartbeat] = {}

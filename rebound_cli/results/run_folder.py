@@ -113,8 +113,6 @@ class FlightRecorder:
                 descriptor = os.open(entries, os.O_RDONLY)
                 os.fsync(descriptor)
                 os.close(descriptor)
-        self._is_confirmed = False
-        self._stop_reason: str | None = None
         self.events: list[Event] = []
 
     def record(self, now_us: int, result: "StepResult") -> None:
@@ -139,21 +137,10 @@ class FlightRecorder:
         for file in (self._events_file, self._inputs_file):
             os.fdatasync(file.fileno())
 
-    def record_confirmation(self, now_us: int, is_confirmed: bool) -> None:
-        """Whether the plan is agreed to by now, after the companion's step at `now_us`; written when it is newly so."""
-        if is_confirmed and not self._is_confirmed:
-            self.record_input(now_us, "confirm")
-        self._is_confirmed = is_confirmed
-
-    def record_stop(self, now_us: int, reason: str) -> None:
-        """The companion has been asked to stop, after its step at `now_us`; written once a reason."""
-        if reason != self._stop_reason:
-            self._stop_reason = reason
-            self.record_input(now_us, "stop", reason=reason)
-
     def record_input(self, now_us: int, kind: str, **data: Any) -> None:
-        """What the companion was told besides, after its step at `now_us`: `file` (the one it waits for exists), `note`
-        (an event and its text), `computer` (its status), `setpoint` and `interval` (what a client has sent).
+        """What the companion was told besides, after its step at `now_us`: `confirm` (the plan), `stop` (and why),
+        `file` (the one it waits for exists), `note` (an event and its text), `computer` (its status), `setpoint` and
+        `interval` (what a client has sent).
         """
         self._do(self._inputs_file.write, json.dumps({"time_us": now_us, "kind": kind, **data}) + "\n")
 

@@ -76,7 +76,7 @@ def fly_mission_lockstep(
         if not is_confirmed and companion.plan_is_ready():
             is_confirmed = True
             companion.confirm_plan()
-            recorder.record_confirmation(now_us, is_confirmed)
+            recorder.record_input(now_us, "confirm")
         count += 1
         if count % _LOOK_EVERY:
             continue
@@ -84,7 +84,7 @@ def fly_mission_lockstep(
             break
         if (reason := interrupts.news(companion.stop_is_put_off)) is not None:
             companion.stop(reason)
-            recorder.record_stop(now_us, reason)
+            recorder.record_input(now_us, "stop", reason=reason)
         look_for_file(companion, recorder, now_us)
         # In a file or a pipe the timeline that follows within seconds says the same.
         if console is not None and console.is_terminal:
