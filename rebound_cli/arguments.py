@@ -100,10 +100,10 @@ def _run(module: str, name: str, options: argparse.Namespace) -> int:
     # What is imported stays: to look for garbage in it takes a fifth of a guard's start.
     gc.disable()
     try:
-        function = getattr(importlib.import_module(module), name)
+        function: Callable[[argparse.Namespace], int | None] = getattr(importlib.import_module(module), name)
         gc.freeze()
         gc.enable()
-        return int(function(options))
+        return function(options) or 0
     finally:
         gc.enable()
         gc.unfreeze()
@@ -121,7 +121,8 @@ def add_commands(
 ) -> None:
     """Each command of a table, with its function, its options and those that are gone, `gone` of all among them.
 
-    A function is "module:name", imported when it runs: `--help` and errors in arguments come at once.
+    A function is "module:name", imported when it runs: `--help` and errors in arguments come at once. It returns an
+    exit code, or nothing.
     """
     added = parser.add_subparsers(required=True, metavar=dest.upper(), dest=dest)
     for name, told in commands.items():

@@ -28,8 +28,8 @@ from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
 
 
-def run_guard(options: Namespace) -> int:
-    """Guard until told to stop; 0 then. Raises ReboundError where there is nothing that can be guarded."""
+def run_guard(options: Namespace) -> None:
+    """Guard until told to stop. Raises ReboundError where there is nothing that can be guarded."""
     config = guard_config(options)
     run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
@@ -46,7 +46,6 @@ def run_guard(options: Namespace) -> int:
                 pass
         if interrupts.reason is None:
             raise ReboundError(outcome[:1].upper() + outcome[1:] + ("" if outcome.endswith("?") else "."))
-        return 0
 
 
 def _recorded(

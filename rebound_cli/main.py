@@ -111,7 +111,7 @@ def _with_plain_sim(words: Sequence[str]) -> list[str]:
     ]
 
 
-def run_completion(options: argparse.Namespace) -> int:
+def run_completion(options: argparse.Namespace) -> None:
     """What a shell needs to complete commands, options, choices and files."""
     import shtab
 
@@ -122,7 +122,6 @@ def run_completion(options: argparse.Namespace) -> int:
         elif action.type is Path:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
     print(shtab.complete(parser, options.shell, preamble=_names_to_complete()[options.shell]))
-    return 0
 
 
 def _names_to_complete() -> dict[str, str]:

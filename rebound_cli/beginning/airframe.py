@@ -11,7 +11,7 @@ from sim_vehicle.json.parameters import as_parameter_file
 _FORMATS = {"env": as_environment, "params": as_params_file, "airframe": as_airframe_file}
 
 
-def run_airframe(options: Namespace) -> int:
+def run_airframe(options: Namespace) -> None:
     """Print them in the format asked for."""
     world = load_world(None, (), options.airframe, None)
     stand_own(world)
@@ -22,4 +22,3 @@ def run_airframe(options: Namespace) -> int:
         raise ConfigurationError("--format and --position belong to px4: leave them out for ArduPilot.")
     else:
         print(as_parameter_file(airframe))
-    return 0

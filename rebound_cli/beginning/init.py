@@ -12,7 +12,7 @@ from rebound_cli.inputs.documents import suggestion
 from rebound_cli.inputs.shipped import shipped_examples, shipped_missions
 
 
-def run_init(options: Namespace) -> int:
+def run_init(options: Namespace) -> None:
     """Raises ConfigurationError for a file that is there or a mission or an example that is not."""
     missions, examples = shipped_missions(), shipped_examples()
     if options.list:
@@ -26,7 +26,6 @@ def run_init(options: Namespace) -> int:
         raise ConfigurationError("Which file? Such as: rebound init my-mission.yaml")
     else:
         _copy_mission(options.file, options.model, _named(options.model, "mission", missions))
-    return 0
 
 
 def _named(name: str, kind: str, shipped: Mapping[str, Path]) -> Path:

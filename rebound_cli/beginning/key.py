@@ -15,16 +15,15 @@ from companion.shell.signing_files import read_key, write_new
 _NO_STAMP = bytes(8)
 
 
-def run_key(options: Namespace) -> int:
+def run_key(options: Namespace) -> None:
     """Raises ConfigurationError."""
     if options.what == "px4":
         write_new(options.card, read_key(options.file) + _NO_STAMP)
         print(f"{options.card}: copy it to mavlink/ on the SD card, start PX4 again, then delete it here.")
-        return 0
+        return
     key = _from_passphrase() if options.passphrase else secrets.token_bytes(KEY_LENGTH)
     write_new(options.file, key.hex().encode() + b"\n")
     print(_next_steps(options.file, options.passphrase))
-    return 0
 
 
 def _from_passphrase() -> bytes:

@@ -11,7 +11,7 @@ from rebound_cli.inputs.documents import refuse_special
 from rebound_cli.results.run_folder import TLOG_NAME
 
 
-def run_export(options: Namespace) -> int:
+def run_export(options: Namespace) -> None:
     """Raises RunFolderError, LogError."""
     flight, kind = flight_named(runs_folder(options.runs), options.flight), options.format
     out = options.out or Path(f"{flight.name}.{'tar.gz' if kind == 'archive' else kind}")
@@ -28,7 +28,6 @@ def run_export(options: Namespace) -> int:
         write_mcap(recorded_flight(flight.folder), read_telemetry(flight.folder / TLOG_NAME), content)
         write_whole(out, content.getvalue())
     print(f"{flight.name} is in {out}")
-    return 0
 
 
 def _write_archive(path: Path, flight: KeptFlight) -> None:

@@ -7,7 +7,7 @@ from rebound_cli.live.console import console_for
 from rebound_cli.results.run_folder import RunFolderError
 
 
-def run_list(options: Namespace) -> int:
+def run_list(options: Namespace) -> None:
     runs = runs_folder(options.runs)
     flights = kept_flights(runs)
     for flight in flights:
@@ -23,10 +23,9 @@ def run_list(options: Namespace) -> int:
     total_mb = sum(flight.size_bytes for flight in flights) / 1e6
     many = "" if len(flights) == 1 else "s"
     print(f"{len(flights)} flight{many}, {total_mb:.1f} MB in {runs}.{simulated_text(runs)}")
-    return 0
 
 
-def run_show(options: Namespace) -> int:
+def run_show(options: Namespace) -> None:
     """Raises RunFolderError."""
     flight = flight_named(runs_folder(options.runs), options.flight)
     lines = flight.event_lines()
@@ -35,4 +34,3 @@ def run_show(options: Namespace) -> int:
     console.print(f"{flight.name}: {flight.end()}; {hits_text(hits_in(lines))}, {flight.size_bytes / 1e6:.1f} MB")
     for at_s, event in events:
         console.event(at_s, event["kind"], str(event.get("text", "")))
-    return 0

@@ -142,11 +142,10 @@ def served(tell: Callable[[str], None], **about: Any) -> contextlib.AbstractCont
         return contextlib.nullcontext()
 
 
-def run_status(options: Namespace) -> int:
+def run_status(options: Namespace) -> None:
     """Raises StatusError where nothing runs."""
     status = ask(options.socket)
     print(json.dumps(status, indent=2) if options.json else text_of(status))
-    return 0
 
 
 def ask(path: Path | None) -> Mapping[str, Any]:

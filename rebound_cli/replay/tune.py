@@ -49,7 +49,7 @@ class Margin:
     share: float | None
 
 
-def run_tune(options: Namespace) -> int:
+def run_tune(options: Namespace) -> None:
     """Print what the flights say and the settings; with --out write these. Raises LogError, ConfigurationError."""
     out: Path | None = options.out
     refuse_existing(out)
@@ -72,7 +72,6 @@ def run_tune(options: Namespace) -> int:
     if out is not None:
         out.write_text(text, encoding="utf-8")
         print(f"\nWritten to {out}. Fly with it: rebound fly MISSION --companion {out} ...")
-    return 0
 
 
 def read_healthy(path: Path, config: CompanionConfig) -> Replay:

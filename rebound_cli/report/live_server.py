@@ -103,7 +103,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Nothing: the terminal has one line, the address."""
 
 
-def run_watch(options: Namespace) -> int:
+def run_watch(options: Namespace) -> None:
     """Until Ctrl-C. Raises ReboundError where there is nothing to watch."""
     folder = options.flight or Path(str(ask(None)["folder"]))
     if not (folder / run_folder.TLOG_NAME).exists():
@@ -111,4 +111,3 @@ def run_watch(options: Namespace) -> int:
     with WatchServer(folder, options.host, options.port) as server, suppress(KeyboardInterrupt):
         print(f"{folder}: http://{options.host}:{server.server_port}/ (Ctrl-C ends it)", flush=True)
         server.serve_forever()
-    return 0

@@ -63,13 +63,12 @@ def file_text(name: str) -> str:
     return (resources.files(__package__) / "web" / name).read_bytes().decode("utf-8")
 
 
-def run_report(options: Namespace) -> int:
+def run_report(options: Namespace) -> None:
     """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
     folder = flight_named(runs_folder(options.runs), str(options.flight)).folder
     out = options.out or folder / REPORT_NAME
     refuse_special(out)
     print(f"The report is in {write_page(recorded_flight(folder), out, options.no_position)}")
-    return 0
 
 
 def write_page(flight: ShownFlight, path: Path, no_position: bool = False) -> Path:

@@ -24,7 +24,7 @@ from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
 
 
-def run_sim(options: Namespace) -> int:
+def run_sim(options: Namespace) -> None:
     """Serve until Ctrl-C or SIGTERM, or until stdin closes when the caller wants to be outlived by nobody."""
     stopped = threading.Event()
     if options.truth is not None:
@@ -41,7 +41,6 @@ def run_sim(options: Namespace) -> int:
             threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
         serve_it = _serve_px4 if options.autopilot == "px4" else _serve_builtin
         serve_it(options, world, stopped, console)
-    return 0
 
 
 def _tell_of(console: Console, hit: Hit) -> None:
