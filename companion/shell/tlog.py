@@ -30,13 +30,15 @@ class TlogWriter:
         self._file = path.open("wb", buffering=0)
         self._sync_first = sync_first
         self._pending: list[bytes] = []
-        self._flushed_at_us = 0
+        self._flushed_at_us: int | None = None
 
     def write(self, now_us: int, frames: Iterable[bytes]) -> None:
         """Log packets received or sent at `now_us` (microseconds since the epoch)."""
         stamp = _STAMP.pack(now_us)
         self._pending += [part for frame in frames for part in (stamp, frame)]
-        if now_us - self._flushed_at_us >= FLUSH_INTERVAL_US:
+        if self._flushed_at_us is None:
+            self._flushed_at_us = now_us
+        elif now_us - self._flushed_at_us >= FLUSH_INTERVAL_US:
             self._flushed_at_us = now_us
             self.flush()
 

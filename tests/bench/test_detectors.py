@@ -220,7 +220,7 @@ def test_what_follows_within_two_seconds_is_one_event():
     replay = replay_log(flight(), CompanionConfig())
     (hit,) = replay.findings.impacts
     replay.findings.impacts += [replace(hit, at_us=hit.at_us + 1_500_000), replace(hit, at_us=hit.at_us + 4_000_000)]
-    replay.findings.tell(hit.at_us + 5_000_000, "crashed: tipped over")
+    replay.findings.happenings.append((hit.at_us + 5_000_000, "crashed: tipped over"))
     first, second = events(replay)
     assert (first.told, second.told) == ("collision", "crash")
     assert first.at_s == pytest.approx(HIT_US * 1e-6, abs=0.01)
