@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import SettledConfig
 from companion.motion.settling import Lasting, SettlingMonitor
-from companion.motion.vector import ZERO, along, minus, plus, split, unit
+from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex import config as reflex
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.recovery.attitude_law import brakable_m_s
@@ -109,20 +109,11 @@ class Recovery:
             return None
         return max(0.0, 1e-6 * (since_us - record.sample_time_boot_us))
 
-    def _state(self) -> MotionState:
-        """The present motion. During the contact it has no velocity into the obstacle."""
-        motion, normal = self.record.estimator.motion, self._contact.normal_ned
-        velocity = motion.velocity_ned_m_s
-        if not self._has_left:
-            off_m_s, sideways = split(velocity, normal)
-            velocity = plus(sideways, max(0.0, off_m_s), normal)
-        return MotionState(motion.position_ned_m, velocity)
-
     def _follow(self, sample: LocalPosition) -> tuple[float | None, float | None]:
         """Set the goal again by contact and motion; hand over to it once the vehicle rests."""
-        record, state, rested_s = self.record, self._state(), None
+        record, motion, rested_s = self.record, self.record.estimator.motion, None
         self.surfaces = self._around(self._contact)
-        record.setpoint_ned_m = place = self._goal(state)
+        record.setpoint_ned_m = place = self._goal(motion)
         if self.leans and self._rests(sample):
             self.leans, self._held_since_us, record.overshoot_m = False, sample.time_boot_us, 0.0
             rested_s = 1e-6 * (sample.time_boot_us - record.sample_time_boot_us)
@@ -131,7 +122,7 @@ class Recovery:
         if math.dist(place, self._told_ned_m) <= self._settled.distance_m:
             return rested_s, None
         self._told_ned_m, record.overshoot_m = place, 0.0  # measured past the earlier setpoint
-        return rested_s, along(state.velocity_ned_m_s, self._contact.normal_ned)
+        return rested_s, along(motion.velocity_ned_m_s, self._contact.normal_ned)
 
     def _rests(self, sample: LocalPosition) -> bool:
         """Whether it rests as clear of all surfaces as its goal is, and the errors of the vehicle's own estimate are
