@@ -72,8 +72,6 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
         if off_m_s <= 0.0:
             continue
         velocity = _certain(velocity, normal, belief.spread_m_s, off_m_s)
-        # What it pushes with is no wind to lean against.
-        external = plus(external, -max(0.0, along(external, normal)), normal)
     off = projected(ZERO, [side for side in sides if side[1] > 0.0])
     short, moves = minus(off, velocity), plus(belief.tilt_m_s2, 1.0, external)
     n, e, _ = minus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), moves)

@@ -20,7 +20,6 @@ from companion.motion.config import (
     DELAY_S,
     DOPPLER_GATE,
     GRAVITY_M_S2,
-    LATEST_S,
     LEVEL_SPREAD_M_S2,
     LONGEST_GAP_US,
     SAME_M_S,
@@ -255,10 +254,8 @@ class MotionEstimator:
 
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
-        at_us, since_us = sample.time_boot_us - round(1e6 * DELAY_S), sample.time_boot_us - self.hit_boot_us
-        changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
-        is_late = since_us < 1e6 * LATEST_S and changed_m_s <= SAME_M_S and not self.is_second
-        if at_us <= self.hit_boot_us or is_late:
+        at_us = sample.time_boot_us - round(1e6 * DELAY_S)
+        if at_us <= self.hit_boot_us:
             return
         if self.is_fully_measured:
             self.has_converged = True
