@@ -294,10 +294,7 @@ class Airframe(Part):
             )
         if 2 * sum(rotor.direction == "cw" for rotor in self.rotors) != len(self.rotors):
             raise ValueError("rotors: let half of them turn cw and half ccw, else the vehicle turns about itself")
-        made = [
-            (x, y, 1.0 if rotor.direction == "ccw" else -1.0)
-            for (x, y), rotor in zip(places_m, self.rotors, strict=True)
-        ]
+        made = [(*rotor.place_frd_m, 1.0 if rotor.direction == "ccw" else -1.0) for rotor in self.rotors]
         if np.linalg.matrix_rank(np.array(made), tol=PLACED_M) < 3:
             raise ValueError("rotors: placed and turning so, they cannot roll, pitch and yaw the vehicle one by one")
         furthest_m, said_m = max(math.hypot(*place) for place in places_m), self.geometry.motor_radius_m

@@ -234,7 +234,7 @@ class Autopilot:
         """EXTENDED_SYS_STATE.landed_state."""
         if self.detector.landed:
             return LandedState.ON_GROUND
-        phase = self.navigator.phase
-        if phase is Kind.TAKEOFF:
+        target = self.navigator.target
+        if target is not None and target.kind is Kind.TAKEOFF:
             return LandedState.TAKING_OFF
-        return LandedState.LANDING if phase is Kind.LAND else LandedState.IN_AIR
+        return LandedState.LANDING if target is not None and target.kind is Kind.LAND else LandedState.IN_AIR

@@ -34,7 +34,6 @@ class Need(StrEnum):
     MISSION = "valid mission"
     LOCAL_POSITION = "local position"
     GLOBAL_POSITION = "global position"
-    HOME = "home position"
 
 
 # mode_requirements.cpp; attitude and rates, which every mode needs, are always there.
@@ -45,7 +44,7 @@ NEEDS: dict[Mode, frozenset[Need]] = {
     Mode.STABILIZED: frozenset({Need.STICKS}),
     Mode.MISSION: _PLACE | {Need.MISSION},
     Mode.LOITER: _PLACE,
-    Mode.RETURN: _PLACE | {Need.HOME},
+    Mode.RETURN: _PLACE,
     Mode.TAKEOFF: frozenset({Need.LOCAL_POSITION}),
     Mode.LAND: frozenset({Need.LOCAL_POSITION}),
     Mode.FOLLOW_TARGET: frozenset({Need.LOCAL_POSITION}),

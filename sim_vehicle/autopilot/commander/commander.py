@@ -218,7 +218,6 @@ class Commander:
     def _available(self) -> frozenset[Need]:
         """What modes may need, as far as it is there."""
         there = {
-            Need.HOME: True,
             Need.LOCAL_POSITION: self.positioning.has_local,
             Need.GLOBAL_POSITION: self.positioning.has_global,
             Need.STICKS: self.sticks.sticks is not None,

@@ -167,6 +167,4 @@ def mode_fallback(now: FailsafeSituation, parameters: Parameters, intended: Mode
         action, mode = OFFBOARD_LOSS.get(int(parameters["COM_OBL_RC_ACT"]), OFFBOARD_LOSS[0])
     if mode is Mode.POSCTL and mode in now.cannot_run:
         action, mode = Action.FALL_BACK_TO_ALTITUDE, Mode.ALTCTL
-    if mode is Mode.ALTCTL and mode in now.cannot_run:
-        action, mode = Action.FALL_BACK_TO_STABILIZED, Mode.STABILIZED
     return Action.RETURN if mode in now.cannot_run else action

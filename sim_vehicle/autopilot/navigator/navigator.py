@@ -86,7 +86,7 @@ class Navigator:
 
     def enter(self, mode: Mode) -> None:
         """The mode that flies is another, or the vehicle was armed in it. Disarmed, nothing is begun."""
-        previous, self._mode = self._mode, mode
+        previous, kept, self._mode = self._mode, self.target, mode
         if previous is Mode.MISSION and mode is not Mode.MISSION:
             self.mission.end()
         self.missions.progress.is_flown = mode in _MISSION_IS_ACTIVE
@@ -95,7 +95,6 @@ class Navigator:
             return
         self.flight.cruise_m_s = None
         # A hold goes on where one is held already, or where a takeoff leads to.
-        kept = self._target_of(previous) if previous in _BY_TARGET else None
         keeps = mode is Mode.LOITER and kept is not None and (previous is Mode.TAKEOFF or kept.kind is Kind.HOLD)
         if not keeps:
             self.flight.start(self.view, at_rest=mode is Mode.TAKEOFF)
@@ -218,8 +217,8 @@ class Navigator:
             return self.follow.demand(view, step_s)
         if mode is Mode.DESCEND:
             return self.sink(step_s)
-        target = self._target_of(mode)
-        if view.landed and target.kind is not Kind.TAKEOFF:
+        target = self.target
+        if target is None or (view.landed and target.kind is not Kind.TAKEOFF):
             return None
         return self.flight.demand(target, view, step_s)
 
@@ -231,11 +230,6 @@ class Navigator:
         """Begin to sink where the vehicle can stop: a stick mode without sticks."""
         self.flight.start(self.view)
         self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
-
-    def _target_of(self, mode: Mode) -> NavigatorTarget:
-        if mode is Mode.MISSION:
-            return self.mission.target
-        return self._return.target if mode is Mode.RETURN else self._target
 
     def set_home_here(self) -> None:
         """Where the vehicle is, is home: on arming and again on leaving the ground."""
@@ -251,22 +245,23 @@ class Navigator:
     @property
     def wants_takeoff(self) -> bool:
         """Whether a vehicle on the ground is to leave it."""
-        if self._mode not in _BY_TARGET:
-            return False
-        target = self._target_of(self._mode)
-        return target.kind is Kind.TAKEOFF and climbs_to(target, self.view, self._parameters)
+        target = self.target
+        return target is not None and target.kind is Kind.TAKEOFF and climbs_to(target, self.view, self._parameters)
 
     @property
-    def phase(self) -> Kind | None:
-        """TAKEOFF and LAND are shown as such."""
-        return self._target_of(self._mode).kind if self._mode in _BY_TARGET else None
+    def target(self) -> NavigatorTarget | None:
+        """Where the mode flies to; None for one that flies to no place."""
+        if self._mode not in _BY_TARGET:
+            return None
+        if self._mode is Mode.MISSION:
+            return self.mission.target
+        return self._return.target if self._mode is Mode.RETURN else self._target
 
     @property
     def shown_target_ned_m(self) -> Vector3 | None:
         """POSITION_TARGET_GLOBAL_INT's place: the target's, in a mode that has one."""
-        target = self._target_of(self._mode)
-        is_none = self._mode not in _BY_TARGET or target.kind is Kind.IDLE
-        return None if is_none else target.position_ned_m
+        target = self.target
+        return None if target is None or target.kind is Kind.IDLE else target.position_ned_m
 
     @property
     def orbit_status(self) -> tuple[float, Vector3] | None:
