@@ -1,6 +1,7 @@
 """A vehicle that moves as asked, without noise: an integrator over flat ground, and flights that tests begin with."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -84,8 +85,8 @@ def _acceleration(state: Estimate, setpoint: TrajectorySetpoint, axis: int) -> f
 class Flight:
     """An autopilot on the kinematic vehicle, in virtual time."""
 
-    def __init__(self, start: Estimate | None = None, **parameters: float) -> None:
-        self.state = start or STANDING
+    def __init__(self, **parameters: float) -> None:
+        self.state = STANDING
         self.parameters = Parameters(parameters)
         self.autopilot = Autopilot(HOVER, self.state, self.parameters)
         self.acks: list[CommandAck] = []
@@ -112,9 +113,8 @@ class Flight:
                 self.autopilot.receive(message)
             self.step()
 
-    def fly_until(self, condition: object, at_most_s: float, message: FlightInput | None = None) -> float:
+    def fly_until(self, condition: Callable[[], bool], at_most_s: float, message: FlightInput | None = None) -> float:
         """Seconds until ``condition()`` is true."""
-        assert callable(condition)
         start_s = self.time_s
         while not condition():
             assert self.time_s - start_s < at_most_s, f"not within {at_most_s} s"
@@ -142,7 +142,7 @@ ORIGIN = Origin()
 
 def hovering(height_m: float = 5.0, **parameters: float) -> Flight:
     """In hold, taken off to that height."""
-    flight = Flight(None, MIS_TAKEOFF_ALT=height_m, **parameters)
+    flight = Flight(MIS_TAKEOFF_ALT=height_m, **parameters)
     assert flight.ask(NAV_TAKEOFF) is Result.ACCEPTED
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
     flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.LOITER, 30.0)

@@ -30,7 +30,7 @@ def with_ground_station(**parameters: float) -> Flight:
 
 
 def with_sticks(**parameters: float) -> Flight:
-    flight = Flight(None, MIS_TAKEOFF_ALT=5.0, COM_RC_IN_MODE=1, COM_RC_OVERRIDE=0, **parameters)
+    flight = Flight(MIS_TAKEOFF_ALT=5.0, COM_RC_IN_MODE=1, COM_RC_OVERRIDE=0, **parameters)
     flight.autopilot.ground_station_heard()
     sticks(flight, 0.2, throttle=-1)
     set_mode(flight, Mode.TAKEOFF)
@@ -172,7 +172,7 @@ def test_without_gps_the_position_is_lost_after_a_while_and_the_vehicle_descends
 
 @pytest.mark.parametrize(("value", "arms"), [(0, False), (1, True)])
 def test_whether_it_arms_without_gps_is_com_arm_wo_gps(value, arms):
-    flight = Flight(None, COM_ARM_WO_GPS=value)
+    flight = Flight(COM_ARM_WO_GPS=value)
     lose_gps(flight)
     assert (flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED) is arms
     assert ("Preflight Fail: GPS fix too low" in flight.texts()) is not arms

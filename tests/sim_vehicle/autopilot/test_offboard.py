@@ -192,7 +192,7 @@ FIRST, SECOND = 1, 2
 
 def flying(mode: Mode, **parameters: float) -> Flight:
     """Taken off by the stick in POSCTL to some 5 m, then in ``mode`` with centred sticks."""
-    flight = Flight(None, **parameters)
+    flight = Flight(**parameters)
     sticks(flight, 0.2, throttle=-1.0)
     assert flight.autopilot.modes.flown is Mode.POSCTL
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
@@ -289,7 +289,7 @@ def test_stabilised_sticks_are_angles_and_thrust():
 
 
 def test_after_arming_the_throttle_waits_for_the_motors_and_then_rises_slowly():
-    flight = Flight(None)
+    flight = Flight()
     sticks(flight, 0.2, throttle=-1.0)
     assert set_mode(flight, Mode.STABILIZED) is Result.ACCEPTED
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED

@@ -5,15 +5,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.control.setpoint import TrajectorySetpoint
-from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.plant.plant import Plant
+from sim_vehicle.quantities import Floats
 from sim_vehicle.scene import Scene
-
-Floats = npt.NDArray[np.float64]
+from tests.sim_vehicle.physics.throwing import flown
 
 HEIGHT_M = 1.5
 STEP_S = 0.004
@@ -30,9 +28,7 @@ class Flight:
 
     def __init__(self, airframe: Airframe, seed: int = 1, scene: Scene | None = None) -> None:
         self.plant = Plant(airframe, scene or Scene(), seed)
-        self.output: Estimate
-        for _ in range(500):
-            self.output = self.plant.step(None, armed=False)
+        self.output = flown(self.plant, None, 2.0)[-1]
 
     @property
     def velocity_error_m_s(self) -> Floats:

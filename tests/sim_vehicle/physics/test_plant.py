@@ -17,11 +17,9 @@ from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import flown, quiet
 
-NONE = (None, None, None)
-
 
 def at(north: float, east: float, down: float) -> TrajectorySetpoint:
-    return TrajectorySetpoint((north, east, down), NONE, NONE, 0.0, None)
+    return TrajectorySetpoint((north, east, down), yaw_rad=0.0)
 
 
 def hovering(airframe: Airframe, seed: int = 1, **scene: object) -> Plant:
@@ -44,7 +42,7 @@ def test_a_tipped_vehicle_thrusts_as_it_would_to_hover() -> None:
 def test_thrust_ends_where_px4s_does(down_m_s2: float, leant_m_s2: float, thrust_n: float) -> None:
     """MPC_THR_MIN of all thrust when asked to fall; all of it when asked to climb, and then it still leans a little."""
     plant = hovering(quiet(load_built_in("foldable")))
-    asked = TrajectorySetpoint(NONE, NONE, (leant_m_s2, 0.0, down_m_s2), 0.0)
+    asked = TrajectorySetpoint(acceleration_ned_m_s2=(leant_m_s2, 0.0, down_m_s2), yaw_rad=0.0)
     flown(plant, asked, 0.012)
     assert plant.state.collective_n == pytest.approx(thrust_n, rel=0.01)
     lean = plant.state.attitude_setpoint[0, 2] / plant.state.attitude_setpoint[2, 2]
