@@ -60,7 +60,7 @@ class SimulatedVehicle:
         check_start(airframe, scene)
         self._airframe, self._seed = airframe, seed
         self._links: list[Link] = []
-        self._links_may_fail, self._faults = links_may_fail, list(scene.faults)
+        self._links_may_fail = links_may_fail
         self.texts: tuple[StatusText, ...] = ()
         self._links_so_far = 0
         self._companion_link: Link | None = None
@@ -117,9 +117,10 @@ class SimulatedVehicle:
     def add_link(self, kind: LinkKind) -> Link:
         """One more connection, from now on."""
         number, seed = self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far
-        is_faulty = self._links_may_fail or needs_faulty_link(self._faults)
+        faults = self._plant.faults.known
+        is_faulty = self._links_may_fail or needs_faulty_link(faults)
         parts = kind, self._board, number, seed
-        link = FaultyLink(*parts, self._faults) if is_faulty else Link(*parts)
+        link = FaultyLink(*parts, faults) if is_faulty else Link(*parts)
         self._links_so_far += 1
         self._links.append(link)
         return link
@@ -174,10 +175,9 @@ class SimulatedVehicle:
     def add_fault(self, fault: Fault) -> None:
         """One more fault from now on. Raises FaultError for one that does not fit those that are there."""
         check_messages(fault)
-        problem = overlapping((*self._faults, fault))
+        problem = overlapping((*self._plant.faults.known, fault))
         if problem is not None:
             raise FaultError(f"{problem}.")
-        self._faults.append(fault)
         self._plant.faults.add(fault)
         for link in self._links:
             if isinstance(link, FaultyLink):
@@ -185,7 +185,6 @@ class SimulatedVehicle:
 
     def remove_fault(self, fault: Fault) -> None:
         """End or cancel a fault: the same object that was added."""
-        self._faults = [kept for kept in self._faults if kept is not fault]
         self._plant.faults.remove(fault, self.time_boot_us)
         for link in self._links:
             if isinstance(link, FaultyLink):

@@ -45,7 +45,8 @@ class Faults:
         )
         self.acts: list[Callable[[float, PlantState, Disturbance], None]] = []
         """Empty while there was never a fault; then the notes, and the groups that ever had one of theirs."""
-        self._faults: list[Fault] = []
+        self.known: list[Fault] = []
+        """Those that act, have acted or will."""
         self._turns_at_s = math.inf
         """When the next of them begins or ends."""
         self._span_of: dict[int, int] = {}
@@ -57,7 +58,7 @@ class Faults:
     def add(self, fault: Fault) -> None:
         """Add a fault. It acts in its own window of the boot clock. Raises FaultError for a motor that is not there."""
         spec.check_motor(fault, self._rotors)
-        self._faults.append(fault)
+        self.known.append(fault)
         self._turns_at_s = min(self._turns_at_s, fault.window_s[0])
         for kinds, group in self._groups:
             if isinstance(fault, kinds):
@@ -66,7 +67,7 @@ class Faults:
 
     def remove(self, fault: Fault, time_us: int) -> None:
         """The very fault that was added is over, or never comes."""
-        self._faults = [kept for kept in self._faults if kept is not fault]
+        self.known = [kept for kept in self.known if kept is not fault]
         self._end(fault, time_us)
         # Another may get the number that Python knew it by.
         self._span_of.pop(id(fault), None)
@@ -88,7 +89,7 @@ class Faults:
         if time_s < self._turns_at_s:
             return
         time_us = int(state.time_us)
-        for fault in self._faults:
+        for fault in self.known:
             start_s, end_s = fault.window_s
             if start_s <= time_s and id(fault) not in self._span_of:
                 self._span_of[id(fault)] = len(self.spans)
@@ -96,7 +97,7 @@ class Faults:
                 self.spans.append(FaultSpan(fault.kind, time_us, None, details))
             if end_s <= time_s or (start_s <= time_s and isinstance(fault, spec.Moment)):
                 self._end(fault, time_us)
-        ahead = (turn_s for fault in self._faults for turn_s in fault.window_s if turn_s > time_s)
+        ahead = (turn_s for fault in self.known for turn_s in fault.window_s if turn_s > time_s)
         self._turns_at_s = min(ahead, default=math.inf)
 
     def _end(self, fault: Fault, time_us: int) -> None:

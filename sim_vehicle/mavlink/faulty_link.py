@@ -34,7 +34,6 @@ class FaultyLink(Link):
         self._inbound = Wire((), seed ^ _INBOUND_SEED)
         self._on_wire: list[tuple[Fault, Wire, WireFault]] = []
         self._jumps: list[ClockJump] = []
-        self._arriving = b""
         for fault in faults:
             self.add(fault)
 
@@ -57,14 +56,9 @@ class FaultyLink(Link):
         now_s = self.now_us / 1e6
         self._jumps = [jump for jump in self._jumps if jump is not fault or jump.window_s[0] < now_s]
 
-    def push(self, data: bytes) -> None:
-        """Bytes have been sent; they arrive when the wire lets them."""
-        self._arriving += data
-
     def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
-        """Act on what has arrived."""
-        frames, self._arriving = split(self._arriving), b""
-        super().push(b"".join(self._inbound.carry(frames, self.now_us)))
+        """Act on what has arrived: bytes that were pushed do when the wire lets them."""
+        self._waiting = b"".join(self._inbound.carry(split(self._waiting), self.now_us))
         return super().receive(collects_foreign)
 
     def take(self) -> tuple[bytes, ...]:

@@ -157,15 +157,15 @@ class Streams:
         self._state = state
         self._encoder = encoder
         now_us = state.sample.time_boot_us
-        self._streams = [Stream(kind, now_us, interval_from_rate(kind.rates.on(link))) for kind in KINDS]
-        self._by_id = {stream.kind.message_id: stream for stream in self._streams}
+        streams = (Stream(kind, now_us, interval_from_rate(kind.rates.on(link))) for kind in KINDS)
+        self._by_id = {stream.kind.message_id: stream for stream in streams}
         self._versions = topics.versions
         self._loops = LateLoops(seed)
         self._run()
 
     def _run(self) -> None:
         """Find the streams that run."""
-        self._running = [stream for stream in self._streams if stream.interval_us >= 0]
+        self._running = [stream for stream in self._by_id.values() if stream.interval_us >= 0]
 
     def update(self) -> None:
         """Send what is due at the newest sample."""
