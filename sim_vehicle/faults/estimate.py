@@ -1,7 +1,5 @@
 """Faults of the vehicle's estimate: it jumps, it resets after a clipped hit, it drifts without its sensors."""
 
-from bisect import insort
-
 import numpy as np
 
 from sim_vehicle.faults.group import Group
@@ -16,7 +14,6 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
         """``drifts``: nothing else models what the loss of a sensor does."""
         super().__init__()
         self._drifts = drifts
-        self._pending: list[EstimatorReset] = []
         self._step_s = step_s
         self._rng = rng
         self._straying: list[AidingLoss] = []
@@ -25,16 +22,6 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
         self._settles_s = 1.0
         self._shift, self._velocity, self._drift = np.zeros(3), np.zeros(3), np.zeros(6)
         self.reset_counter = 0
-
-    def add(self, fault: EstimatorReset | EstimatorAfterClipping | AidingLoss) -> None:
-        super().add(fault)
-        if isinstance(fault, EstimatorReset):
-            insort(self._pending, fault, key=lambda reset: reset.window_s)
-
-    def remove(self, fault: EstimatorReset | EstimatorAfterClipping | AidingLoss) -> None:
-        """What has jumped stays; a sensor that was lost is back."""
-        super().remove(fault)
-        self._pending = [reset for reset in self._pending if reset is not fault]
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         self._velocity *= np.exp(-self._step_s / self._settles_s)
@@ -45,8 +32,10 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
         disturbance.estimate_jump[3:6] = self._velocity + self._drift[3:6]
 
     def _jump(self, time_s: float) -> None:
-        while self._pending and self._pending[0].window_s[0] <= time_s:
-            reset = self._pending.pop(0)
+        due = [fault for fault in self._faults if isinstance(fault, EstimatorReset) and fault.window_s[0] <= time_s]
+        for reset in sorted(due, key=lambda reset: reset.window_s):
+            # It happens once, and what has jumped stays.
+            self.remove(reset)
             self._shift += reset.position_jump_ned_m
             self._velocity += reset.velocity_jump_ned_m_s
             self._settles_s = reset.settles_s
