@@ -87,16 +87,12 @@ class Air(Group[Gust | Turbulence]):
         super().__init__()
         self._steady_ned_m_s = np.array(steady_ned_m_s)
         self._along_ned, self._step_s, self._rng = steady_ned_m_s, step_s, rng
-        self._drydens: list[tuple[Turbulence, Dryden]] = []
+        self._drydens: dict[int, Dryden] = {}
 
     def add(self, fault: Gust | Turbulence) -> None:
         super().add(fault)
         if isinstance(fault, Turbulence):
-            self._drydens.append((fault, Dryden(fault.wind_20ft_m_s, self._along_ned, self._step_s, self._rng)))
-
-    def remove(self, fault: Gust | Turbulence) -> None:
-        super().remove(fault)
-        self._drydens = [(kept, dryden) for kept, dryden in self._drydens if kept is not fault]
+            self._drydens[id(fault)] = Dryden(fault.wind_20ft_m_s, self._along_ned, self._step_s, self._rng)
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         """Write the wind (NED, m/s) at this boot time into ``disturbance``: steady, gusts and turbulence."""
@@ -104,10 +100,8 @@ class Air(Group[Gust | Turbulence]):
         for gust in self._faults:
             if isinstance(gust, Gust):
                 wind += risen(time_s, *gust.window_s, gust.rise_s) * np.array(gust.velocity_ned_m_s)
-        if self._drydens:
-            body = state.body
-            airspeed_m_s = float(np.linalg.norm(body[3:6] - self._steady_ned_m_s))
-            for fault, dryden in self._drydens:
-                if fault.window_s[0] <= time_s < fault.window_s[1]:
-                    wind += dryden.next(-float(body[2]), airspeed_m_s)
+        for fault in self.acting(time_s):
+            if isinstance(fault, Turbulence):
+                airspeed_m_s = float(np.linalg.norm(state.body[3:6] - self._steady_ned_m_s))
+                wind += self._drydens[id(fault)].next(-float(state.body[2]), airspeed_m_s)
         disturbance.wind_ned_m_s[:] = wind
